@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The command line. Exit status: 0, 1 (a check failed or a model gave a bad value), 2 (bad usage or input).
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "app/commands.h"
+#include "core/error.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{"brdfc compiles reflection models into a Blender extension and renders their reference images."};
+  app.name("brdfc");
+  app.set_version_flag("--version", BRDFC_VERSION);
+  app.require_subcommand(1);
+  brdfc::add_list_command(app);
+  brdfc::add_eval_command(app);
+  brdfc::add_sample_command(app);
+  brdfc::add_albedo_command(app);
+  brdfc::add_check_command(app);
+  brdfc::add_build_command(app);
+  brdfc::add_render_command(app);
+  brdfc::add_scene_command(app);
+  brdfc::add_compare_command(app);
+  brdfc::add_report_command(app);
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "brdfc: {}\n", e.what());
+    return 2;
+  } catch (const brdfc::InputError& e) {
+    fmt::print(stderr, "brdfc: {}\n", e.what());
+    return 2;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "brdfc: {}\n", e.what());
+    return 1;
+  }
+}

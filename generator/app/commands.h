@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One function a subcommand. Each adds itself to the application and sets its callback; the callback throws
+// InputError (exit 2) or ValueError / CheckFailed (exit 1). Tables go to stdout, messages to stderr.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+namespace brdfc {
+
+/// A check ran and failed. Exit status 1.
+struct CheckFailed : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+void add_list_command(CLI::App&);
+void add_eval_command(CLI::App&);
+void add_sample_command(CLI::App&);
+void add_albedo_command(CLI::App&);
+void add_check_command(CLI::App&);
+void add_build_command(CLI::App&);
+void add_render_command(CLI::App&);
+void add_scene_command(CLI::App&);
+void add_compare_command(CLI::App&);
+void add_report_command(CLI::App&);
+
+}  // namespace brdfc

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The scalar types a model is instantiated for, and the vocabulary its formulas are written in.
+//
+//   double  truth            float  what OSL computes
+//   Wide    113-bit mantissa Expr   records the formula (expr.h)
+//
+// A model formula is a template over the scalar T and uses only the functions named here, so that one
+// text serves all four. There are no data-dependent branches: select() evaluates both arms, hence guard
+// the arguments of an arm, not its result.
+#pragma once
+
+#include <array>
+#include <boost/multiprecision/cpp_bin_float.hpp>
+#include <cmath>
+#include <concepts>
+#include <type_traits>
+
+namespace brdfc {
+
+/// IEEE binary128 significand (113 bits): the reference for conditioning and rounding tests.
+using Wide = boost::multiprecision::number<boost::multiprecision::cpp_bin_float_quad::backend_type,
+                                           boost::multiprecision::et_off>;
+
+/// float, double, Wide: types whose comparisons are decided at once.
+template <class T>
+concept Numeric = std::floating_point<T> || std::same_as<T, Wide>;
+
+using std::abs;
+using std::atan;
+using std::cbrt;
+using std::cos;
+using std::exp;
+using std::expm1;
+using std::log;
+using std::log1p;
+using std::pow;
+using std::sin;
+using std::sqrt;
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kInvPi = 0.31830988618379067154;
+
+/// pi to the precision of T.
+template <class T> T pi() {
+  if constexpr (std::same_as<T, Wide>)
+    return boost::math::constants::pi<Wide>();
+  else
+    return T(kPi);
+}
+
+template <Numeric T> T minimum(const T& a, const T& b) { return b < a ? b : a; }
+template <Numeric T> T maximum(const T& a, const T& b) { return a < b ? b : a; }
+
+/// a where the condition holds, else b. Both arms are evaluated.
+template <Numeric T> T select(bool condition, const T& a, const T& b) { return condition ? a : b; }
+
+/// Smallest positive argument that a guard may hand to log() or a division: normal in float.
+template <class T> T tiny() { return T(1e-30); }
+
+template <class T> T sqr(const T& x) { return x * x; }
+template <class T> T pow5(const T& x) {
+  const T x2 = x * x;
+  return x2 * x2 * x;
+}
+template <class T> T clamp01(const T& x) { return minimum(maximum(x, T(0)), T(1)); }
+
+/// Runs state = step(state) `count` times. The recorded form is an OSL loop, never unrolled.
+template <Numeric T, std::size_t N, class Step> std::array<T, N> iterate(int count, std::array<T, N> state, Step step) {
+  for (int i = 0; i < count; ++i) state = step(state);
+  return state;
+}
+
+/// Steps that a safeguarded Newton iteration takes: to 2e-7 of the target in single precision (float, and the recorded
+/// form, which OSL executes in float), to 1e-15 otherwise.
+template <class T> constexpr int newton_steps() { return std::same_as<T, double> || std::same_as<T, Wide> ? 24 : 10; }
+
+/// Gives a subexpression the name it has in the paper; only the recorded form keeps it.
+template <Numeric T> const T& named(const char*, const T& x) { return x; }
+
+}  // namespace brdfc

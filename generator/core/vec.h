@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Directions and colours over any scalar type.
+#pragma once
+
+#include "core/scalar.h"
+
+namespace brdfc {
+
+/// A direction or vector. Local shading frame: z is the normal, x the tangent.
+template <class T> struct Vec3 {
+  T x{}, y{}, z{};
+
+  template <class S> static Vec3 from(const Vec3<S>& v) { return {T(v.x), T(v.y), T(v.z)}; }
+};
+
+template <class T> Vec3<T> operator+(const Vec3<T>& a, const Vec3<T>& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+template <class T> Vec3<T> operator-(const Vec3<T>& a, const Vec3<T>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+template <class T> Vec3<T> operator-(const Vec3<T>& a) { return {-a.x, -a.y, -a.z}; }
+template <class T> Vec3<T> operator*(const Vec3<T>& a, const T& s) { return {a.x * s, a.y * s, a.z * s}; }
+template <class T> Vec3<T> operator*(const T& s, const Vec3<T>& a) { return a * s; }
+template <class T> Vec3<T> operator/(const Vec3<T>& a, const T& s) { return {a.x / s, a.y / s, a.z / s}; }
+template <class T> T dot(const Vec3<T>& a, const Vec3<T>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class T> Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+template <class T> T length(const Vec3<T>& a) { return sqrt(dot(a, a)); }
+template <class T> Vec3<T> normalize(const Vec3<T>& a) { return a / length(a); }
+
+/// Squared sine of the angle to the normal: from x and y, because 1 - z^2 cancels near the normal.
+template <class T> T sin2_theta(const Vec3<T>& w) { return w.x * w.x + w.y * w.y; }
+
+/// Rotates the frame by -angle about the normal, so that a lobe turned by +angle is axis-aligned.
+template <class T> Vec3<T> rotate_z(const Vec3<T>& w, const T& cos_angle, const T& sin_angle) {
+  return {cos_angle * w.x + sin_angle * w.y, cos_angle * w.y - sin_angle * w.x, w.z};
+}
+
+/// Linear scene-referred RGB reflectance or radiance.
+template <class T> struct Rgb {
+  T r{}, g{}, b{};
+
+  Rgb() = default;
+  Rgb(T r_, T g_, T b_) : r(r_), g(g_), b(b_) {}
+  explicit Rgb(const T& grey) : r(grey), g(grey), b(grey) {}
+};
+
+template <Numeric T> Rgb<T> operator+(const Rgb<T>& a, const Rgb<T>& b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }
+template <Numeric T> Rgb<T> operator-(const Rgb<T>& a, const Rgb<T>& b) { return {a.r - b.r, a.g - b.g, a.b - b.b}; }
+template <Numeric T> Rgb<T> operator*(const Rgb<T>& a, const Rgb<T>& b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
+template <Numeric T> Rgb<T> operator*(const Rgb<T>& a, const T& s) { return {a.r * s, a.g * s, a.b * s}; }
+template <Numeric T> Rgb<T> operator*(const T& s, const Rgb<T>& a) { return a * s; }
+template <Numeric T> Rgb<T> operator/(const Rgb<T>& a, const T& s) { return {a.r / s, a.g / s, a.b / s}; }
+template <Numeric T> Rgb<T>& operator+=(Rgb<T>& a, const Rgb<T>& b) { return a = a + b; }
+template <Numeric T> Rgb<T> select(bool condition, const Rgb<T>& a, const Rgb<T>& b) { return condition ? a : b; }
+template <Numeric T> T max_component(const Rgb<T>& c) { return maximum(c.r, maximum(c.g, c.b)); }
+
+/// Luminance of linear Rec.709 primaries (ITU-R BT.709), used only to choose between lobes.
+template <Numeric T> T luminance(const Rgb<T>& c) { return T(0.2126) * c.r + T(0.7152) * c.g + T(0.0722) * c.b; }
+template <Numeric T> const Rgb<T>& named(const char*, const Rgb<T>& c) { return c; }
+
+}  // namespace brdfc

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "model/model.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace brdfc {
+namespace {
+
+std::map<std::string, std::unique_ptr<Model>>& registry() {
+  static std::map<std::string, std::unique_ptr<Model>> all;
+  return all;
+}
+
+template <class Names> std::string join(const Names& names) {
+  std::string text;
+  for (const auto& n : names) text += (text.empty() ? "" : ", ") + std::string(n);
+  return text;
+}
+
+double parse_number(const std::string& model, const std::string& name, const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    input_error("{}: {}: expected a number, got '{}'", model, name, text);
+  return value;
+}
+
+void check_range(const ModelInfo& m, const ParamInfo& p, double value) {
+  if (!(value >= p.min && value <= p.max))  // also catches NaN
+    input_error("{}: {}: expected a number in [{:g}, {:g}], got {}", m.name, p.name, p.min, p.max, value);
+}
+
+void check_identifier(const std::string& what, const std::string& name) {
+  // Identifiers reach OSL, Python and file names: letters, digits and underscores only.
+  const bool plain = !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return std::islower(c) || std::isdigit(c) || c == '_';
+  });
+  if (!plain || std::isdigit(static_cast<unsigned char>(name[0])))
+    throw std::logic_error(what + " '" + name + "': expected lower-case letters, digits and underscores");
+}
+
+}  // namespace
+
+const ParamInfo* ModelInfo::param(const std::string& wanted) const {
+  for (const ParamInfo& p : params)
+    if (p.name == wanted) return &p;
+  return nullptr;
+}
+
+const std::map<std::string, std::unique_ptr<Model>>& models() { return registry(); }
+
+const Model& find_model(const std::string& name) {
+  const auto it = registry().find(name);
+  if (it != registry().end()) return *it->second;
+  std::vector<std::string> names;
+  for (const auto& [n, m] : registry()) names.push_back(n);
+  input_error("unknown model '{}': expected one of {}", name, join(names));
+}
+
+bool register_model(std::unique_ptr<Model> model) {
+  const ModelInfo& info = model->info();
+  check_identifier("model name", info.name);
+  for (const ParamInfo& p : info.params) {
+    check_identifier(info.name + ": parameter name", p.name);
+    for (const std::string& c : p.choices) check_identifier(info.name + ": " + p.name + ": choice", c);
+    if (!(p.min <= p.soft_min && p.soft_min <= p.soft_max && p.soft_max <= p.max))
+      throw std::logic_error(info.name + ": " + p.name + ": the slider's range must lie inside the accepted one");
+  }
+  const std::string name = info.name;
+  if (!registry().emplace(name, std::move(model)).second) throw std::logic_error("two models are named " + name);
+  return true;
+}
+
+ParamValues complete(const ModelInfo& info, const ParamValues& given) {
+  ParamValues all;
+  for (const auto& [name, value] : given) {
+    if (info.param(name)) continue;
+    std::vector<std::string> names;
+    for (const ParamInfo& p : info.params) names.push_back(p.name);
+    input_error("{}: unknown parameter '{}': expected one of {}", info.name, name, join(names));
+  }
+  for (const ParamInfo& p : info.params) {
+    const auto it = given.find(p.name);
+    switch (p.kind) {
+      case ParamKind::Number: {
+        double v = p.value[0];
+        if (it != given.end()) {
+          const double* number = std::get_if<double>(&it->second);
+          if (!number) input_error("{}: {}: expected a number", info.name, p.name);
+          v = *number;
+        }
+        check_range(info, p, v);
+        all[p.name] = v;
+        break;
+      }
+      case ParamKind::Color: {
+        std::array<double, 3> c = p.value;
+        if (it != given.end()) {
+          if (const double* level = std::get_if<double>(&it->second))
+            c = {*level, *level, *level};
+          else if (const auto* rgb = std::get_if<std::array<double, 3>>(&it->second))
+            c = *rgb;
+          else
+            input_error("{}: {}: expected a colour (three numbers)", info.name, p.name);
+        }
+        for (double v : c) check_range(info, p, v);
+        all[p.name] = c;
+        break;
+      }
+      case ParamKind::Choice: {
+        std::string text = p.choices[std::size_t(p.value[0])];
+        if (it != given.end()) {
+          const auto* s = std::get_if<std::string>(&it->second);
+          if (!s || std::find(p.choices.begin(), p.choices.end(), *s) == p.choices.end())
+            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, join(p.choices),
+                        s ? *s : "a number");
+          text = *s;
+        }
+        all[p.name] = text;
+        break;
+      }
+    }
+  }
+  return all;
+}
+
+ParamValues parse_values(const ModelInfo& info, const std::vector<std::string>& assignments) {
+  ParamValues values;
+  for (const std::string& a : assignments) {
+    const auto eq = a.find('=');
+    if (eq == std::string::npos) input_error("{}: expected name=value, got '{}'", info.name, a);
+    const std::string name = a.substr(0, eq), text = a.substr(eq + 1);
+    const ParamInfo* p = info.param(name);
+    if (values.count(name)) input_error("{}: {}: given twice", info.name, name);
+    if (!p || p->kind == ParamKind::Choice) {
+      values[name] = text;  // complete() names what was expected
+    } else if (p->kind == ParamKind::Number) {
+      values[name] = parse_number(info.name, name, text);
+    } else {
+      std::vector<double> parts;
+      std::size_t start = 0;
+      for (std::size_t comma = text.find(','); comma != std::string::npos; comma = text.find(',', start)) {
+        parts.push_back(parse_number(info.name, name, text.substr(start, comma - start)));
+        start = comma + 1;
+      }
+      parts.push_back(parse_number(info.name, name, text.substr(start)));
+      if (parts.size() == 1)
+        values[name] = parts[0];
+      else if (parts.size() == 3)
+        values[name] = std::array<double, 3>{parts[0], parts[1], parts[2]};
+      else
+        input_error("{}: {}: expected one number or r,g,b, got '{}'", info.name, name, text);
+    }
+  }
+  return complete(info, values);
+}
+
+std::string format_values(const ModelInfo& info, const ParamValues& values) {
+  std::string text;
+  for (const ParamInfo& p : info.params) {
+    const auto it = values.find(p.name);
+    if (it == values.end()) continue;
+    text += (text.empty() ? "" : " ") + p.name + "=";
+    if (const double* v = std::get_if<double>(&it->second))
+      text += fmt::format("{}", *v);
+    else if (const auto* c = std::get_if<std::array<double, 3>>(&it->second))
+      text += fmt::format("{},{},{}", (*c)[0], (*c)[1], (*c)[2]);
+    else
+      text += std::get<std::string>(it->second);
+  }
+  return text;
+}
+
+}  // namespace brdfc

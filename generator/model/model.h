@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a reflection model is: a schema and formulas over a scalar type, registered under one name.
+//
+// Conventions. Directions are unit vectors that leave the surface in a local frame whose z axis is the
+// normal: wi points to the light, wo to the viewer. eval() is the BRDF in 1/sr without the cosine and
+// without delta terms; pdf() is the density of sample() in solid angle at wi, for the same wo, delta terms
+// left out; mirror() is the weight of the delta term in the direction of ideal reflection. Albedo is the
+// integral of f cos(theta_i) over wi, plus the mirror weight. Colours are linear scene-referred RGB.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/error.h"
+#include "core/expr.h"
+#include "core/vec.h"
+#include "represent/closure.h"
+
+namespace brdfc {
+
+enum class ParamKind { Number, Color, Choice };
+
+/// One parameter: the single source for the command line, manifest, sockets, tests and documentation.
+struct ParamInfo {
+  std::string name;                      ///< identifier, as in `name=value`
+  std::string label;                     ///< for people
+  std::string unit;                      ///< "" for a pure number, "rad", ...
+  std::string doc;                       ///< tooltip: one sentence
+  double min = 0, max = 1;               ///< accepted range, inclusive
+  double soft_min = 0, soft_max = 1;     ///< the range of a slider; must lie inside [min, max]
+  std::array<double, 3> value{0, 0, 0};  ///< default; a Number uses element 0, a Choice its index
+  std::vector<std::string> choices;      ///< identifiers, for a Choice
+  ParamKind kind = ParamKind::Number;
+};
+
+/// A property the paper or this project claims; tests try to prove each one, also the negative ones.
+struct ModelProperties {
+  bool reciprocal = true;  ///< f(wi, wo) = f(wo, wi)
+  bool conserving = true;  ///< albedo <= 1 for every view direction and admissible parameter
+  bool lossless = false;   ///< albedo = 1 (colours at 1, no other loss) for every view direction
+  bool isotropic = true;   ///< unchanged when both directions turn about the normal
+};
+
+struct ModelInfo {
+  std::string name;       ///< identifier
+  std::string label;      ///< for people
+  std::string paper;      ///< citation
+  std::string equations;  ///< "eqs. 10, 14, 16, 19, 20"
+  std::string doc;        ///< one or two sentences
+  ModelProperties properties;
+  std::vector<ParamInfo> params;
+
+  /// nullptr if there is none of that name.
+  const ParamInfo* param(const std::string& name) const;
+};
+
+using ParamValue = std::variant<double, std::array<double, 3>, std::string>;
+/// Values by name; what is missing takes its default.
+using ParamValues = std::map<std::string, ParamValue>;
+
+/// A sampled direction. pdf == 0 means: no direction (below the horizon); weight is then 0.
+template <class T> struct Sample {
+  Vec3<T> wi;
+  Rgb<T> weight;  ///< f cos(theta_i) / pdf
+  T pdf;          ///< per solid angle
+};
+
+/// A model with its parameters bound.
+template <class T> class Brdf {
+ public:
+  virtual ~Brdf() = default;
+  /// BRDF in 1/sr; 0 unless both directions are above the surface.
+  virtual Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
+  /// Density of sample() per solid angle.
+  virtual T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
+  /// u: three numbers in [0, 1): lobe choice, and two for the direction.
+  virtual Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const = 0;
+  /// Weight of ideal reflection; 0 for a model without a mirror term.
+  virtual Rgb<T> mirror(const Vec3<T>& wo) const = 0;
+  /// The closures that equal the model, or nothing if no such sum is known.
+  virtual std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const = 0;
+};
+
+/// A registered model.
+class Model {
+ public:
+  virtual ~Model() = default;
+  virtual const ModelInfo& info() const = 0;
+  virtual bool has_mirror() const = 0;
+  virtual bool has_exact() const = 0;
+  /// Throws InputError naming model, parameter and what was expected.
+  virtual std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const = 0;
+  virtual std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const = 0;
+  virtual std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const = 0;
+  /// Parameters in `fixed` become constants, other numbers and colours become inputs named after them.
+  /// A choice that is not fixed takes its default. A Recorder must be active.
+  virtual std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const = 0;
+};
+
+/// Checks names, kinds and ranges; returns every parameter with its value. Throws InputError.
+ParamValues complete(const ModelInfo&, const ParamValues&);
+/// Reads "name=value" (colours as r,g,b or one grey number). Throws InputError.
+ParamValues parse_values(const ModelInfo&, const std::vector<std::string>& assignments);
+/// Text in the form parse_values reads, parameters in schema order.
+std::string format_values(const ModelInfo&, const ParamValues&);
+
+/// Name to model, in alphabetical order.
+const std::map<std::string, std::unique_ptr<Model>>& models();
+/// Throws InputError that lists the known names.
+const Model& find_model(const std::string& name);
+
+/// Called by BRDFC_MODEL; a name taken twice throws std::logic_error.
+bool register_model(std::unique_ptr<Model>);
+
+/// A parameter's index among its choices, fixed while a formula is recorded.
+struct Choice {
+  int index = 0;
+  operator int() const { return index; }
+};
+
+struct NumberSpec {
+  const char* name;
+  const char* label;
+  double value;
+  double min, max;
+  double soft_min, soft_max;
+  const char* doc;
+  const char* unit = "";
+};
+struct ColorSpec {
+  const char* name;
+  const char* label;
+  std::array<double, 3> value;
+  const char* doc;
+};
+struct ChoiceSpec {
+  const char* name;
+  const char* label;
+  std::vector<std::string> choices;
+  const char* doc;
+};
+
+namespace detail {
+
+struct SchemaVisitor {
+  std::vector<ParamInfo>& out;
+  template <class T> void operator()(T&, const NumberSpec& s) const {
+    out.push_back(
+        {s.name, s.label, s.unit, s.doc, s.min, s.max, s.soft_min, s.soft_max, {s.value, 0, 0}, {}, ParamKind::Number});
+  }
+  template <class T> void operator()(Rgb<T>&, const ColorSpec& s) const {
+    out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color});
+  }
+  void operator()(Choice&, const ChoiceSpec& s) const {
+    out.push_back({s.name,
+                   s.label,
+                   "",
+                   s.doc,
+                   0,
+                   double(s.choices.size() - 1),
+                   0,
+                   double(s.choices.size() - 1),
+                   {0, 0, 0},
+                   s.choices,
+                   ParamKind::Choice});
+  }
+};
+
+/// `values` is complete, so every look-up succeeds.
+template <class T> struct BindVisitor {
+  const ParamValues& values;
+  void operator()(T& member, const NumberSpec& s) const { member = T(std::get<double>(values.at(s.name))); }
+  void operator()(Rgb<T>& member, const ColorSpec& s) const {
+    const auto& c = std::get<std::array<double, 3>>(values.at(s.name));
+    member = Rgb<T>(T(c[0]), T(c[1]), T(c[2]));
+  }
+  void operator()(Choice& member, const ChoiceSpec& s) const {
+    const auto& text = std::get<std::string>(values.at(s.name));
+    for (std::size_t i = 0; i < s.choices.size(); ++i)
+      if (s.choices[i] == text) member.index = int(i);
+  }
+};
+
+/// Binds what is fixed to constants and the rest to inputs.
+struct RecordVisitor {
+  const ParamValues& values;  // complete
+  const ParamValues& fixed;
+  void operator()(Expr& member, const NumberSpec& s) const {
+    member = fixed.count(s.name) ? Expr(std::get<double>(values.at(s.name))) : Expr::input(s.name);
+  }
+  void operator()(Rgb<Expr>& member, const ColorSpec& s) const {
+    if (fixed.count(s.name)) {
+      const auto& c = std::get<std::array<double, 3>>(values.at(s.name));
+      member = Rgb<Expr>(Expr(c[0]), Expr(c[1]), Expr(c[2]));
+    } else {
+      member = Rgb<Expr>::input(s.name);
+    }
+  }
+  void operator()(Choice& member, const ChoiceSpec& s) const { BindVisitor<Expr>{values}(member, s); }
+};
+
+template <class M>
+concept HasMirror = requires(const M& m, const Vec3<double>& w) {
+  m.mirror(w);
+};
+template <class M>
+concept HasExact = requires(const M& m, const Vec3<double>& w) {
+  m.exact(w);
+};
+
+template <template <class> class M, class T> class BrdfOf final : public Brdf<T> {
+ public:
+  explicit BrdfOf(M<T> m) : m_(std::move(m)) {}
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const override { return m_.eval(wi, wo); }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const override { return m_.pdf(wi, wo); }
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const override { return m_.sample(wo, u); }
+  Rgb<T> mirror(const Vec3<T>& wo) const override {
+    if constexpr (HasMirror<M<double>>)
+      return m_.mirror(wo);
+    else
+      return Rgb<T>(T(0));
+  }
+  std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const override {
+    if constexpr (HasExact<M<double>>)
+      return m_.exact(wo);
+    else
+      return std::nullopt;
+  }
+
+ private:
+  M<T> m_;
+};
+
+template <template <class> class M> class ModelOf final : public Model {
+ public:
+  ModelOf() : info_(M<double>::info()) {
+    M<double> prototype;
+    prototype.parameters(SchemaVisitor{info_.params});
+  }
+  const ModelInfo& info() const override { return info_; }
+  bool has_mirror() const override { return HasMirror<M<double>>; }
+  bool has_exact() const override { return HasExact<M<double>>; }
+  std::unique_ptr<Brdf<double>> make_double(const ParamValues& v) const override { return make<double>(v); }
+  std::unique_ptr<Brdf<float>> make_float(const ParamValues& v) const override { return make<float>(v); }
+  std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues& v) const override { return make<Wide>(v); }
+  std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const override {
+    const ParamValues values = complete(info_, fixed);
+    M<Expr> m;
+    m.parameters(RecordVisitor{values, fixed});
+    return std::make_unique<BrdfOf<M, Expr>>(std::move(m));
+  }
+
+ private:
+  template <class T> std::unique_ptr<Brdf<T>> make(const ParamValues& v) const {
+    const ParamValues values = complete(info_, v);
+    M<T> m;
+    m.parameters(BindVisitor<T>{values});
+    return std::make_unique<BrdfOf<M, T>>(std::move(m));
+  }
+  ModelInfo info_;
+};
+
+}  // namespace detail
+
+/// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this.
+#define BRDFC_MODEL(M)                                                                                  \
+  namespace {                                                                                           \
+  const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::detail::ModelOf<M>>()); \
+  }
+
+}  // namespace brdfc

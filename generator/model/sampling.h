@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pieces of sampling that several models share.
+#pragma once
+
+#include "model/model.h"
+
+namespace brdfc {
+
+/// True where both directions are above the surface; the BRDF is 0 elsewhere.
+template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
+
+/// Ideal reflection of wo about the normal.
+template <class T> Vec3<T> reflect(const Vec3<T>& wo) { return {-wo.x, -wo.y, wo.z}; }
+
+/// cos(theta) / pi for a direction above the surface.
+template <class T> T cosine_pdf(const Vec3<T>& wi) { return select(wi.z > T(0), wi.z / pi<T>(), T(0)); }
+
+/// Direction with density cos(theta) / pi; u1 gives the height, u2 the azimuth.
+template <class T> Vec3<T> sample_cosine(const T& u1, const T& u2) {
+  const T phi = T(2) * pi<T>() * u2;
+  const T sinTheta = sqrt(u1);
+  return {sinTheta * cos(phi), sinTheta * sin(phi), sqrt(maximum(T(1) - u1, T(0)))};
+}
+
+/// A sample that does not exist where `exists` fails: weight and density 0.
+template <class Flag, class T>
+Sample<T> sample_if(const Flag& exists, const Vec3<T>& wi, const Rgb<T>& weight, const T& pdf) {
+  return {wi, select(exists, weight, Rgb<T>(T(0))), select(exists, pdf, T(0))};
+}
+
+/// (1 - c)^5, the angular part of Schlick's Fresnel approximation.
+template <class T> T schlick_weight(const T& cosTheta) { return pow5(clamp01(T(1) - cosTheta)); }
+
+}  // namespace brdfc

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The coupled matte/specular model: a smooth dielectric coat over a matte base that gets what the coat lets through.
+//
+// P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
+// Graphics 1997. Equations below are the paper's.
+// f = R_f(theta_o) delta + k R_m [1 - (1 - cos theta_i)^5] [1 - (1 - cos theta_o)^5] (eq. 5), Schlick's R_f (eq. 1).
+//
+// Erratum: k = 21 / (20 pi (1 - R_0)) of eq. 4 belongs with [1 - R_f(theta)][1 - R_f(theta')]; with eq. 5 as
+// printed, which has no (1 - R_0) factors, k is 21 (1 - R_0) / (20 pi). Then R_m = 1 loses nothing at any angle.
+//
+// Sampling eq. 6. The printed rational guess is good to 1.2 % absolutely but not relatively, and Newton from it
+// stalls near 0; below xi = 0.02 the start is c = t (1 + t/2), t = cbrt(2 xi / 7), from the leading terms of eq. 6.
+#include "model/sampling.h"
+
+namespace brdfc {
+
+template <class T> struct Coupled {
+  T r0;
+  Rgb<T> rm;
+  Choice fresnel;
+
+  static ModelInfo info() {
+    return {.name = "coupled",
+            .label = "Coupled Matte/Specular",
+            .paper =
+                "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
+                "Models, Pacific Graphics 1997",
+            .equations = "eqs. 1, 5, 6; k of eq. 4 mended",
+            .doc = "Polished surface: a mirror-like coat over a matte base, whose shares trade off with the angle.",
+            .properties = {.reciprocal = true, .conserving = true, .lossless = true, .isotropic = true},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(r0,
+      NumberSpec{"r0", "Normal Reflectance", 0.05, 0, 1, 0, 0.2, "Reflectance of the coat at normal incidence, R_0"});
+    v(rm, ColorSpec{"rm", "Matte Reflectance", {0.8, 0.8, 0.8}, "Reflectance of the matte base, R_m"});
+    v(fresnel, ChoiceSpec{"fresnel", "Fresnel", {"schlick"}, "schlick: eq. 1"});
+  }
+
+  /// R_f(theta), eq. 1.
+  T R_f(const T& cosTheta) const { return r0 + (T(1) - r0) * schlick_weight(cosTheta); }
+
+  /// Weight of the mirror term of eq. 5.
+  Rgb<T> mirror(const Vec3<T>& wo) const { return Rgb<T>(R_f(wo.z)); }
+
+  /// 1 - (1 - c)^5 as a polynomial: no cancellation for small c.
+  static T f(const T& c) { return c * (T(5) - c * (T(10) - c * (T(10) - c * (T(5) - c)))); }
+
+  T k() const { return T(21) * (T(1) - r0) / (T(20) * pi<T>()); }
+
+  /// Matte term of eq. 5.
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return select(above(wi, wo), rm * (k() * f(wi.z) * f(wo.z)), Rgb<T>(T(0)));
+  }
+
+  /// The matte term's shape in wi, normalised.
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return select(above(wi, wo), T(21) / (T(20) * pi<T>()) * f(wi.z) * wi.z, T(0));
+  }
+
+  /// cos theta' with eq. 6 = xi.
+  static T invert_eq6(const T& xi) {
+    const T t = cbrt(T(2) / T(7) * xi);
+    const T rational = (((T(38295.9) * xi + T(13002.4)) * xi + T(154.4)) * xi + T(0.0114813)) /
+                       (((T(16520.2) * xi + T(33596.4)) * xi + T(1483.57)) * xi + T(1));
+    const T start = select(xi < T(0.02), t * (T(1) + t / T(2)), rational);
+    const std::array<T, 1> c = iterate(4, std::array<T, 1>{start}, [&](const std::array<T, 1>& state) {
+      const T c = state[0];
+      const T c2 = c * c;
+      const T F = c2 * c * (T(3.5) - c * (T(5.25) - c * (T(4.2) - c * (T(1.75) - T(0.3) * c))));
+      const T dF = T(2.1) * c * f(c);
+      return std::array<T, 1>{c - (F - xi) / maximum(dF, tiny<T>())};
+    });
+    return clamp01(c[0]);
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const T c = named("cosTheta_i", invert_eq6(u.y));
+    const T sinTheta = sqrt((T(1) - c) * (T(1) + c));
+    const T phi = T(2) * pi<T>() * u.z;
+    const Vec3<T> wi = {sinTheta * cos(phi), sinTheta * sin(phi), c};
+    // f cos / pdf = R_m (1 - R_f(theta_o)): the shape in wi cancels.
+    return sample_if(above(wi, wo), wi, rm * ((T(1) - r0) * f(wo.z)), pdf(wi, wo));
+  }
+
+  /// With s = (1 - c)^5: (1 - s) c = 2 (1 - s/2) c - c. Burley's closure at roughness 0 gives the first term and
+  /// a ramp, which may be negative, the second. The ramp is linear in c, hence exact. Its magnitude sits in its
+  /// colours, so that its weight adds nothing to what the passes take for albedo.
+  ClosureSum<T> exact(const Vec3<T>& wo) const {
+    const Rgb<T> W = named("W", rm * (T(1.05) * (T(1) - r0) * f(wo.z)));
+    const T so = schlick_weight(wo.z);
+    Closure<T> burley(ClosureKind::Burley, W * (T(2) / (T(1) - so / T(2))));
+    const T small = T(kRampWeight);
+    Closure<T> ramp(ClosureKind::DiffuseRamp, Rgb<T>(small));
+    for (int i = 0; i < kRampSize; ++i) ramp.ramp[std::size_t(i)] = W * (T(-i) / (T(kRampSize - 1) * small));
+    return {burley, ramp, Closure<T>(ClosureKind::Reflection, mirror(wo))};
+  }
+
+  /// Large enough that Cycles does not drop the closure (it does at 1e-5), small beside any albedo that matters.
+  static constexpr double kRampWeight = 1e-3;
+};
+
+BRDFC_MODEL(Coupled)
+
+}  // namespace brdfc

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Radziszewski and Alda's energy-conserving glossy family: a latitudinal lobe in cos^2 theta times a longitudinal
+// lobe in azimuth, lossless and symmetric for every glossiness from matte (n = 0) to mirror (n -> infinity).
+//
+// M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008. Equations are the paper's.
+// x = cos^2 theta_i, y = cos^2 theta_r; f = f_theta(x, y) f_phi(phi_i - phi_r), eqs. 4, 17, 18, 19.
+//
+// Errata. Eqs. 17 and 19 integrate to 1/2, because eq. 8 has R_y = 0.5 integral f dx: f_theta needs a factor 2.
+// In eq. 19 P_5 must take nbar = n_phi sin theta_i sin theta_r, not n_phi.
+//
+// Stable forms. With phi(z) = (1 - e^-z) / z, m = 2 ln cosh n, d = m |x - y| / 2,
+//   E = m (x - y)^2 phi(d)^2 / 4 + e^-d [(x + y)/2 phi(m (x + y)/2) + (2 - x - y)/2 phi(m (2 - x - y)/2)],
+//   f_theta = 2 (tanh^2 n / m) e^-2d / E^2:
+// eq. 17 with its denominator written as a sum of non-negative terms, scaled so that nothing over- or underflows
+// from n = 0 to 1e8 (the printed form breaks at n = 25).
+// f_phi: with k = 2 nbar + 1, q = 1/k, P_5(nbar) / k^5 = a^5 + 5 a^3 b^2 + (15/8) a b^4, a = (1+q)/2, b = (1-q)/2.
+// Sampling phi: tan psi = sqrt(k) tan(dphi/2) turns the density into (cos^2 psi + q sin^2 psi)^5 / (pi P_5/k^5),
+// bounded for every k; its CDF is a trigonometric polynomial, inverted by safeguarded Newton steps.
+#include "model/sampling.h"
+
+namespace brdfc {
+
+template <class T> struct RadziszewskiAlda {
+  T n, n_theta, n_phi;
+  Choice proportion, part, around;
+  Rgb<T> tint;
+
+  enum { Product, Latitudinal, Longitudinal };
+  enum { Paper, Equal, Custom };
+
+  static ModelInfo info() {
+    return {.name = "radziszewski_alda",
+            .label = "Radziszewski-Alda",
+            .paper = "M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008",
+            .equations = "eqs. 17-19; factor 2 and nbar mended",
+            .doc = "Glossy reflection that loses no light at any angle, from matte (0) to mirror.",
+            .properties = {.reciprocal = true, .conserving = true, .lossless = true, .isotropic = true},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e8, 0, 100, "Glossiness n: 0 is matte, infinity a mirror"});
+    v(n_theta,
+      NumberSpec{"n_theta", "Latitudinal Glossiness", 4, 0, 1e8, 0, 100, "n_theta, for the custom proportion"});
+    v(n_phi, NumberSpec{"n_phi", "Longitudinal Glossiness", 4, 0, 1e8, 0, 100, "n_phi, for the custom proportion"});
+    v(proportion, ChoiceSpec{"proportion",
+                             "Proportion",
+                             {"paper", "equal", "custom"},
+                             "paper: n_theta = n, n_phi = 0.75 n sqrt(n sin theta_i sin theta_r); equal: both n"});
+    v(part, ChoiceSpec{"part", "Part", {"product", "latitudinal", "longitudinal"}, "Which lobes to multiply, eq. 4"});
+    v(around, ChoiceSpec{"around", "Around", {"reflection"}, "Direction the lobe is centred on"});
+    v(tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
+  }
+
+  T latitudinal_n() const { return proportion == Custom ? n_theta : n; }
+
+  /// nbar = n_phi sin theta_i sin theta_r, sin sin the product of both sines.
+  T nbar(const T& sin_sin) const {
+    switch (proportion) {
+      case Paper:
+        return T(0.75) * n * sqrt(n * sin_sin) * sin_sin;
+      case Equal:
+        return n * sin_sin;
+      default:
+        return n_phi * sin_sin;
+    }
+  }
+
+  /// (1 - e^-z) / z for z >= 0.
+  static T phi1(const T& z) {
+    const T guarded = maximum(z, T(1e-6));
+    return select(z < T(1e-6), T(1) - z / T(2), -expm1(-guarded) / guarded);
+  }
+
+  /// m = 2 ln cosh n: log1p(sinh^2 n) for small n, where the other form loses everything.
+  static T log_cosh2(const T& n) {
+    const T small = minimum(n, T(1));
+    const T half = expm1(small) / T(2);
+    const T sinh = half + half / (T(2) * half + T(1));
+    const T large = maximum(n, T(1));
+    return named("m", select(n < T(1), log1p(sinh * sinh),
+                             T(2) * (large + log1p(exp(T(-2) * large)) - T(0.69314718055994530942))));
+  }
+
+  /// tanh^2 n / m, 1 at n = 0.
+  static T tanh2_over_m(const T& n, const T& m) {
+    const T guarded = maximum(n, T(1e-4));
+    const T e = expm1(T(-2) * guarded);
+    const T tanh = -e / (T(2) + e);
+    return named("tanh2_over_m", select(n < T(1e-4), T(1) - n * n / T(2), tanh * tanh / maximum(m, T(1e-9))));
+  }
+
+  /// Latitudinal lobe, eq. 17; 1/2 its integral over x is 1.
+  T f_theta(const Vec3<T>& wi, const Vec3<T>& wr) const {
+    const T nt = latitudinal_n();
+    const T m = log_cosh2(nt);
+    const T x_minus_y = (wi.z - wr.z) * (wi.z + wr.z);
+    const T s = named("s", (wi.z * wi.z + wr.z * wr.z) / T(2));        // (x + y) / 2
+    const T t = named("t", (sin2_theta(wi) + sin2_theta(wr)) / T(2));  // (2 - x - y) / 2
+    const T d = named("d", m * abs(x_minus_y) / T(2));
+    const T decay = named("decay", exp(-d));
+    const T E = named("E", m * sqr(x_minus_y * phi1(d)) / T(4) + decay * (s * phi1(m * s) + t * phi1(m * t)));
+    return named("f_theta", T(2) * tanh2_over_m(nt, m) * sqr(decay / E));
+  }
+
+  /// P_5(nbar) / k^5 with q = 1/k.
+  static T p5_over_k5(const T& q) {
+    const T a = (T(1) + q) / T(2), b = (T(1) - q) / T(2);
+    const T a2 = a * a, b2 = b * b;
+    return a * (a2 * a2 + T(5) * a2 * b2 + T(1.875) * b2 * b2);
+  }
+
+  /// Longitudinal lobe, eq. 18; integrates to 1 over the circle.
+  T f_phi(const Vec3<T>& wi, const Vec3<T>& wr) const {
+    const T si = sqrt(sin2_theta(wi)), sr = sqrt(sin2_theta(wr));
+    const T sin_sin = named("sin_sin", si * sr);
+    const T nb = named("nbar", nbar(sin_sin));
+    // 1 - cos(phi_i - phi_r) as half the squared distance of the unit vectors: no cancellation at the peak.
+    const T ix = wi.x / maximum(si, tiny<T>()), iy = wi.y / maximum(si, tiny<T>());
+    const T rx = wr.x / maximum(sr, tiny<T>()), ry = wr.y / maximum(sr, tiny<T>());
+    const T one_minus_cos = named("one_minus_cos", (sqr(ix - rx) + sqr(iy - ry)) / T(2));
+    const T k = named("k", T(2) * nb + T(1));
+    const T base = nb * one_minus_cos + T(1);
+    const T base3 = base * base * base;
+    return named("f_phi", sqrt(k) / (T(2) * pi<T>() * p5_over_k5(T(1) / k)) / base3 / base3);
+  }
+
+  /// eq. 19 without tint, where both directions are above the surface.
+  T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const Vec3<T> wr = reflect(wo);
+    switch (part) {
+      case Latitudinal:
+        return f_theta(wi, wr) / (T(2) * pi<T>());
+      case Longitudinal:
+        return T(2) * f_phi(wi, wr);
+      default:
+        return f_theta(wi, wr) * f_phi(wi, wr);
+    }
+  }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return tint * select(above(wi, wo), lobe(wi, wo), T(0)); }
+
+  /// The cosine-weighted lobe is itself a density.
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), lobe(wi, wo) * wi.z, T(0)); }
+
+  /// cos^2 theta_i with density f_theta / 2 given y, for u in [0, 1).
+  static T sample_cos2(const T& m, const T& y, const T& u) {
+    const T v = T(1) - u;
+    // x = log1p(-u expm1(-m) / (v e^{-my} + u e^{-m})) / m.
+    const T grow = -u * expm1(-m) / maximum(v * exp(-m * y) + u * exp(-m), tiny<T>());
+    const T mild = log1p(grow) / maximum(m, T(1e-6));
+    // For large m the difference of ln(u + v e^{-my}) and ln(v e^{-my} + u e^{-m}), larger terms taken out.
+    const T lu = log(maximum(u, tiny<T>())), lv = log(maximum(v, tiny<T>()));
+    const auto logaddexp = [](const T& p, const T& q) { return maximum(p, q) + log1p(exp(-abs(p - q))); };
+    const T steep = (logaddexp(lu, lv - m * y) - logaddexp(lv - m * y, lu - m)) / maximum(m, T(1));
+    return clamp01(select(m < T(1e-6), u, select(m < T(16), mild, steep)));
+  }
+
+  /// (x, 1 - x) given (y, 1 - y). f_theta is unchanged when x and y become 1 - x and 1 - y, so that the smaller of
+  /// each pair is computed and keeps its digits, near the normal as at the horizon.
+  static std::array<T, 2> sample_x(const T& n, const T& y, const T& one_minus_y, const T& u) {
+    const auto near_normal = y > T(0.5);
+    const T m = log_cosh2(n);
+    const T x = sample_cos2(m, select(near_normal, one_minus_y, y), select(near_normal, T(1) - u, u));
+    return {select(near_normal, T(1) - x, x), select(near_normal, x, T(1) - x)};
+  }
+
+  /// (cos dphi, sin dphi) with density f_phi for k = 2 nbar + 1.
+  static std::array<T, 2> sample_phi(const T& k, const T& u) {
+    const T q = T(1) / k;
+    const T a = (T(1) + q) / T(2), b = (T(1) - q) / T(2);
+    const T a2 = a * a, b2 = b * b;
+    // (a + b cos t)^5 = c0 + sum of c_j cos(j t), t = 2 psi.
+    const T c0 = named("c0", p5_over_k5(q));
+    const T c1 = named("c1", b * (T(5) * a2 * a2 + T(7.5) * a2 * b2 + T(0.625) * b2 * b2));
+    const T c2 = named("c2", T(2.5) * a * b2 * (T(2) * a2 + b2));
+    const T c3 = named("c3", T(0.3125) * b * b2 * (T(8) * a2 + b2));
+    const T c4 = named("c4", T(0.625) * a * b2 * b2);
+    const T c5 = named("c5", T(0.0625) * b * b2 * b2);
+    // The lobe is even: solve for t in [0, pi] at the share 2 |u - 1/2|, then restore the sign.
+    const T share = named("share", abs(T(2) * u - T(1)));
+    const T target = share * c0 * pi<T>();
+    const std::array<T, 3> state = iterate(
+        newton_steps<T>(), std::array<T, 3>{T(0), pi<T>(), pi<T>() / T(2) * share}, [&](const std::array<T, 3>& s) {
+          const T t = s[2];
+          const T C = cos(t), S = sin(t);
+          // sin(j t) / sin(t) by Chebyshev's recurrence.
+          const T u1 = T(2) * C, u2 = u1 * u1 - T(1), u3 = u1 * u2 - u1, u4 = u1 * u3 - u2;
+          const T F = c0 * t + S * (c1 + c2 * u1 / T(2) + c3 * u2 / T(3) + c4 * u3 / T(4) + c5 * u4 / T(5));
+          const T w = a + b * C;
+          const T dF = w * w * w * w * w;
+          const auto below = F < target;
+          const T lo = select(below, t, s[0]), hi = select(below, s[1], t);
+          const T newton = t - (F - target) / maximum(dF, tiny<T>());
+          const T middle = (lo + hi) / T(2);
+          const auto inside = newton >= lo && newton <= hi;
+          return std::array<T, 3>{lo, hi, select(inside, newton, middle)};
+        });
+    const T psi = state[2] / T(2);
+    const T C = cos(psi), S = sin(psi);
+    // tan(dphi/2) = tan(psi) / sqrt(k).
+    const T c2h = k * C * C, s2h = S * S, norm = c2h + s2h;
+    const T cos_dphi = (c2h - s2h) / norm;
+    const T sin_dphi = T(2) * sqrt(k) * S * C / norm;
+    return {cos_dphi, select(u < T(0.5), -sin_dphi, sin_dphi)};
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> wr = reflect(wo);
+    const T sr2 = sin2_theta(wr), sr = sqrt(sr2);
+    std::array<T, 2> x = {T(1) - u.y, u.y};
+    if (part != Longitudinal) x = sample_x(latitudinal_n(), wr.z * wr.z, sr2, u.y);
+    const T cosTheta = named("cosTheta_i", sqrt(x[0])), sinTheta = named("sinTheta_i", sqrt(x[1]));
+    std::array<T, 2> dphi;
+    if (part == Latitudinal) {
+      const T angle = T(2) * pi<T>() * u.z;
+      dphi = {cos(angle), sin(angle)};
+    } else {
+      dphi = sample_phi(named("k", T(2) * nbar(sinTheta * sr) + T(1)), u.z);
+    }
+    // Azimuth of the reflected direction; any will do at normal incidence, where the lobe is round.
+    const auto defined = sr > T(1e-20);
+    const T rx = select(defined, wr.x / maximum(sr, T(1e-20)), T(1));
+    const T ry = select(defined, wr.y / maximum(sr, T(1e-20)), T(0));
+    const Vec3<T> wi = {sinTheta * (rx * dphi[0] - ry * dphi[1]), sinTheta * (ry * dphi[0] + rx * dphi[1]), cosTheta};
+    return sample_if(above(wi, wo), wi, tint, pdf(wi, wo));
+  }
+};
+
+BRDFC_MODEL(RadziszewskiAlda)
+
+}  // namespace brdfc

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pack/pack.h"
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "analysis/albedo_table.h"
+#include "core/hash.h"
+#include "pack/shader.h"
+
+namespace brdfc {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kExtensionId = "brdfc_shaders";
+
+std::string read_text(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) input_error("{}: cannot be read", path.string());
+  return text.str();
+}
+
+void write_text(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) input_error("{}: cannot be written", path.string());
+}
+
+Json parameter_json(const ParamInfo& p) {
+  Json j = {{"name", p.name}, {"label", p.label}};
+  switch (p.kind) {
+    case ParamKind::Number:
+      j["kind"] = "number";
+      break;
+    case ParamKind::Color:
+      j["kind"] = "color";
+      break;
+    case ParamKind::Choice:
+      j["kind"] = "choice";
+      break;
+  }
+  j["unit"] = p.unit;
+  if (p.kind == ParamKind::Choice) {
+    j["default"] = p.choices[std::size_t(p.value[0])];
+    j["choices"] = p.choices;
+  } else {
+    j["min"] = p.min;
+    j["max"] = p.max;
+    j["soft_min"] = p.soft_min;
+    j["soft_max"] = p.soft_max;
+    j["default"] = p.kind == ParamKind::Color ? Json(p.value) : Json(p.value[0]);
+  }
+  j["doc"] = p.doc;
+  return j;
+}
+
+Json error_json(const RepresentationError& e) {
+  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()}, {"albedo", e.albedo}, {"note", e.note}};
+}
+
+/// What a user must know of a form; the add-on turns each into words where it applies.
+std::vector<std::string> warnings(RepresentationKind kind) {
+  // Measured in Cycles: bump-map correction bends lobes that are tilted from the shading normal, and a clamp on
+  // indirect light, path guiding or a lamp of no size meets a sampled lobe differently from Blender's own closures.
+  if (kind == RepresentationKind::Sampled)
+    return {"bump_correction", "clamp_indirect", "zero_size_lights", "orthographic_far"};
+  return {};
+}
+
+Json table_json(const AlbedoTable& t, const std::string& file) {
+  Json grids = Json::array(), terms = Json::array();
+  for (const AlbedoGrid& g : t.grids) {
+    Json axes = Json::array();
+    for (const TableAxis& a : g.axes)
+      axes.push_back({{"name", a.name}, {"scale", name_of(a.scale)}, {"values", a.values}});
+    grids.push_back({{"axes", axes}, {"channels", g.channels}, {"error", g.error}, {"values", g.values}});
+  }
+  for (const auto& combination : t.terms) {
+    Json list = Json::array();
+    for (const AlbedoTerm& term : combination)
+      list.push_back({{"mirror", term.mirror}, {"colors", term.colors}, {"grid", term.grid}});
+    terms.push_back(list);
+  }
+  return {{"table", file},        {"doc", t.doc},
+          {"error", t.error},     {"anisotropy", t.anisotropy},
+          {"choices", t.choices}, {"choice_sizes", t.choice_sizes},
+          {"terms", terms},       {"grids", grids}};
+}
+
+struct ArchiveDelete {
+  void operator()(archive* a) const { archive_write_free(a); }
+};
+
+/// Fixed times and order: the same members give the same bytes.
+void write_zip(const fs::path& path, const std::map<std::string, std::string>& members) {
+  const std::unique_ptr<archive, ArchiveDelete> zip(archive_write_new());
+  const auto require = [&](int status) {
+    if (status != ARCHIVE_OK) input_error("{}: cannot be written: {}", path.string(), archive_error_string(zip.get()));
+  };
+  require(archive_write_set_format_zip(zip.get()));
+  require(archive_write_open_filename(zip.get(), path.c_str()));
+  for (const auto& [name, data] : members) {
+    const std::unique_ptr<archive_entry, decltype(&archive_entry_free)> entry(archive_entry_new(), archive_entry_free);
+    archive_entry_set_pathname(entry.get(), name.c_str());
+    archive_entry_set_size(entry.get(), static_cast<la_int64_t>(data.size()));
+    archive_entry_set_filetype(entry.get(), AE_IFREG);
+    archive_entry_set_perm(entry.get(), 0644);
+    archive_entry_set_mtime(entry.get(), 1577836800, 0);  // 2020-01-01
+    require(archive_write_header(zip.get(), entry.get()));
+    if (archive_write_data(zip.get(), data.data(), data.size()) != la_ssize_t(data.size()))
+      input_error("{}: cannot be written: {}", path.string(), archive_error_string(zip.get()));
+  }
+  require(archive_write_close(zip.get()));
+}
+
+/// A folder beside the target that goes away unless renamed.
+class Staging {
+ public:
+  explicit Staging(const fs::path& out) : path_(out / fmt::format(".brdfc-build-{}", getpid())) {
+    std::error_code error;
+    fs::create_directories(path_, error);
+    if (error) input_error("{}: cannot be created: {}", path_.string(), error.message());
+  }
+  ~Staging() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Puts `fresh` where `target` is; the old folder goes only once the new one stands.
+void replace_folder(const fs::path& fresh, const fs::path& target, const fs::path& scratch) {
+  if (fs::exists(target)) fs::rename(target, scratch);
+  fs::rename(fresh, target);
+}
+
+struct BuiltModel {
+  Json manifest;
+  std::map<std::string, std::string> files;
+  std::vector<PackLine> lines;
+};
+
+BuiltModel build_model(const Model& model, const fs::path& scratch) {
+  const ModelInfo& info = model.info();
+  BuiltModel built;
+  Json& j = built.manifest;
+  j = {{"label", info.label},
+       {"paper", info.paper},
+       {"equations", info.equations},
+       {"doc", info.doc},
+       {"isotropic", info.properties.isotropic}};
+  j["parameters"] = Json::array();
+  for (const ParamInfo& p : info.params) j["parameters"].push_back(parameter_json(p));
+
+  const AlbedoTable table = tabulate_albedo(model);
+  const std::string table_file = "tables/" + info.name + "_albedo.exr";
+  const fs::path exr = scratch / (info.name + ".exr");
+  write_albedo_exr(table, exr.string());
+  built.files[table_file] = read_text(exr);
+  fs::remove(exr);
+
+  const std::vector<RepresentationKind> kinds = representations(model);
+  j["auto"] = name_of(kinds.front());
+  for (RepresentationKind kind : kinds) {
+    const Shader shader = write_shader(model, kind, table);
+    const RepresentationError error = measure_error(model, kind);
+    const std::string file = "shaders/" + shader.name + ".osl";
+    built.files[file] = shader.source;
+    built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
+                           table.size(), table.error, shader.source.size()});
+    j["representations"][name_of(kind)] = {
+        {"shader", file},
+        {"closures", shader.closures},
+        {"slots", shader.slots},
+        {"statements", shader.operations},
+        {"error", error_json(error)},
+        {"cost", nullptr},
+        {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", kMaxLobes}} : Json()},
+        {"warnings", warnings(kind)},
+        {"sha256", sha256(shader.source)}};
+  }
+  j["albedo"] = table_json(table, table_file);
+  return built;
+}
+
+}  // namespace
+
+PackResult build_pack(const PackOptions& options) {
+  std::vector<const Model*> chosen;
+  if (options.models.empty())
+    for (const auto& [name, model] : models()) chosen.push_back(model.get());
+  else
+    for (const std::string& name : options.models) chosen.push_back(&find_model(name));
+  if (!fs::exists(options.addon / "blender_manifest.toml"))
+    input_error("{}: expected the add-on's folder with blender_manifest.toml", options.addon.string());
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error || !fs::is_directory(options.out))
+    input_error("{}: expected a folder that can be written", options.out.string());
+
+  const Staging staging(options.out);
+  std::vector<BuiltModel> built(chosen.size());
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (options.progress) options.progress(chosen[i]->info().name, int(i), int(chosen.size()));
+    built[i] = build_model(*chosen[i], staging.path());
+  }
+
+  PackResult result;
+  std::map<std::string, std::string> members;
+  Json manifest = {
+      {"format", 1}, {"generator", std::string("brdfc ") + BRDFC_VERSION}, {"hash", ""}, {"models", Json::object()}};
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    manifest["models"][chosen[i]->info().name] = built[i].manifest;
+    members.merge(built[i].files);
+    result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
+  }
+  for (const fs::directory_entry& entry : fs::directory_iterator(options.addon)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() == ".py" || name == "blender_manifest.toml") members[name] = read_text(entry.path());
+  }
+  std::string everything;
+  for (const auto& [name, data] : members) everything += name + '\0' + data;
+  manifest["hash"] = sha256(everything);
+  members["manifest.json"] = manifest.dump(1) + "\n";
+
+  const fs::path folder = staging.path() / kExtensionId;
+  for (const auto& [name, data] : members) write_text(folder / name, data);
+  const std::string zip_name = fmt::format("{}-{}.zip", kExtensionId, BRDFC_VERSION);
+  write_zip(staging.path() / zip_name, members);
+
+  result.folder = options.out / kExtensionId;
+  result.zip = options.out / zip_name;
+  replace_folder(folder, result.folder, staging.path() / "old");
+  fs::rename(staging.path() / zip_name, result.zip);
+  if (options.progress) options.progress("done", int(chosen.size()), int(chosen.size()));
+  return result;
+}
+
+}  // namespace brdfc

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Writes the Blender extension: shaders, tables, manifest and the add-on's Python, as a folder and as a zip.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "represent/representation.h"
+
+namespace brdfc {
+
+struct PackOptions {
+  std::filesystem::path out;        ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
+  std::filesystem::path addon;      ///< folder with the add-on's Python and blender_manifest.toml
+  std::vector<std::string> models;  ///< identifiers; empty: every model
+  std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty
+};
+
+/// A line of the table that a build prints.
+struct PackLine {
+  std::string model, representation;
+  int closures = 0, slots = 0, operations = 0;
+  RepresentationError error;
+  std::size_t table_floats = 0;
+  double table_error = 0;
+  std::size_t bytes = 0;  ///< of the shader's text
+};
+
+struct PackResult {
+  std::filesystem::path folder, zip;
+  std::vector<PackLine> lines;
+};
+
+/// Builds beside the target and renames, so that a target is whole or untouched. The same models give the same
+/// bytes. Throws InputError (paths, names) or ValueError (a model that gives a bad value).
+PackResult build_pack(const PackOptions&);
+
+}  // namespace brdfc

@@ -1,0 +1,405 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pack/shader.h"
+
+#include <algorithm>
+#include <set>
+
+#include "pack/osl_library.h"
+
+namespace brdfc {
+namespace {
+
+/// Words a parameter may not be called in OSL: globals, keywords and the names of this generator.
+const std::set<std::string>& reserved_words() {
+  static const std::set<std::string> words = {
+      "and",      "break",   "closure",     "color",      "continue",     "do",     "else",   "emit", "float",
+      "for",      "if",      "illuminance", "illuminate", "int",          "matrix", "normal", "not",  "or",
+      "output",   "point",   "public",      "return",     "string",       "struct", "vector", "void", "while",
+      "u",        "v",       "time",        "dtime",      "wi",           "wo",     "weight", "lobe", "sum",
+      "position", "frame_n", "frame_t",     "frame_b",    "mirror_weight"};
+  return words;
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (c == '\n')
+      out += "\\n";
+    else
+      out += c;
+  }
+  return out + "\"";
+}
+
+std::string number(double v) {
+  std::string s = fmt::format("{}", float(v));
+  if (s.find_first_of(".e") == std::string::npos) s += ".0";
+  return s;
+}
+
+std::string parameter(const ParamInfo& p) {
+  const std::string meta = fmt::format(" [[ string label = {}, string help = {} ]],\n", quoted(p.label), quoted(p.doc));
+  switch (p.kind) {
+    case ParamKind::Number:
+      return fmt::format("    float {} = {}", p.name, number(p.value[0])) + meta;
+    case ParamKind::Color:
+      return fmt::format("    color {} = color({}, {}, {})", p.name, number(p.value[0]), number(p.value[1]),
+                         number(p.value[2])) +
+             meta;
+    default:
+      return fmt::format("    int {} = {}", p.name, int(p.value[0])) + meta;
+  }
+}
+
+std::string comment(const std::string& text) {
+  std::string out = "//", line;
+  std::size_t width = 2;
+  std::size_t start = 0;
+  while (start < text.size()) {
+    std::size_t end = text.find(' ', start);
+    if (end == std::string::npos) end = text.size();
+    if (width + 1 + end - start > 118) {
+      out += "\n//";
+      width = 2;
+    }
+    out += " " + text.substr(start, end - start);
+    width += 1 + end - start;
+    start = end + 1;
+  }
+  return out + "\n";
+}
+
+/// Statements that differ by combination of choices: equal ones are written once.
+class ChoiceSwitch {
+ public:
+  ChoiceSwitch(const ModelInfo& info, const ParamValues& fixed) : info_(info), fixed_(fixed) {}
+
+  void add(const Choices& choices, const std::string& statements) {
+    for (auto& [text, combinations] : cases_)
+      if (text == statements) {
+        combinations.push_back(choices);
+        return;
+      }
+    cases_.push_back({statements, {choices}});
+  }
+
+  std::string print(int indent) const {
+    if (cases_.size() == 1) return cases_[0].first;
+    std::string out;
+    for (std::size_t i = 0; i < cases_.size(); ++i) {
+      const bool last = i + 1 == cases_.size();
+      out += fmt::format("{:{}}{}{{\n", "", indent,
+                         i == 0 ? "if (" + condition(cases_[i].second) + ") "
+                         : last ? std::string("else ")
+                                : "else if (" + condition(cases_[i].second) + ") ");
+      out += indented(cases_[i].first);
+      out += fmt::format("{:{}}}}\n", "", indent);
+    }
+    return out;
+  }
+
+ private:
+  std::string condition(const std::vector<Choices>& combinations) const {
+    // Only the choices that tell these combinations from the others need a test.
+    std::set<std::string> alternatives;
+    for (const Choices& c : combinations) {
+      std::string all;
+      std::size_t k = 0;
+      for (const ParamInfo& p : info_.params) {
+        if (p.kind != ParamKind::Choice) continue;
+        const int index = c[k];
+        if (p.choices.size() > 1 && !fixed_.count(p.name) && !covers(combinations, c, k, int(p.choices.size())))
+          all += (all.empty() ? "" : " && ") + fmt::format("{} == {}", p.name, index);
+        ++k;
+      }
+      alternatives.insert(all.empty() ? "1" : all);
+    }
+    std::string text;
+    for (const std::string& a : alternatives)
+      text += (text.empty() ? "" : " || ") + (alternatives.size() > 1 ? "(" + a + ")" : a);
+    return text;
+  }
+
+  /// Whether every value of choice k stands in the combinations with the others as in c.
+  static bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size) {
+    for (int i = 0; i < size; ++i) {
+      c[k] = i;
+      if (std::find(combinations.begin(), combinations.end(), c) == combinations.end()) return false;
+    }
+    return true;
+  }
+
+  static std::string indented(const std::string& text) {
+    std::string out;
+    std::size_t start = 0;
+    while (start < text.size()) {
+      const std::size_t end = text.find('\n', start);
+      out += "    " + text.substr(start, end + 1 - start);
+      start = end + 1;
+    }
+    return out;
+  }
+
+  const ModelInfo& info_;
+  const ParamValues& fixed_;
+  std::vector<std::pair<std::string, std::vector<Choices>>> cases_;
+};
+
+std::string array(const char* name, std::size_t index, const auto& values) {
+  std::string out = fmt::format("    float {}_{}[{}] = {{", name, index, values.size());
+  std::size_t width = 200;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::string v = number(values[i]);
+    if (width + v.size() + 2 > 116) {
+      out += "\n        ";
+      width = 8;
+    }
+    out += v + (i + 1 < values.size() ? ", " : "");
+    width += v.size() + 2;
+  }
+  return out + "\n    };\n";
+}
+
+/// Statements that look the albedo up.
+class AlbedoText {
+ public:
+  AlbedoText(const ModelInfo& info, const AlbedoTable& table, const ParamValues& fixed)
+      : info_(info), table_(table), fixed_(fixed) {}
+
+  std::string print() {
+    ChoiceSwitch by_choice(info_, fixed_);
+    const std::vector<Choices> combinations = choice_combinations(info_);
+    for (std::size_t i = 0; i < combinations.size(); ++i)
+      if (matches(combinations[i])) by_choice.add(combinations[i], terms(table_.terms.at(i)));
+    const std::string body = by_choice.print(4);
+    std::string out;
+    for (std::size_t g = 0; g < table_.grids.size(); ++g)
+      if (used_.count(int(g))) out += arrays(g);
+    return out + positions_ + body;
+  }
+
+ private:
+  bool matches(const Choices& c) const {
+    std::size_t k = 0;
+    for (const ParamInfo& p : info_.params) {
+      if (p.kind != ParamKind::Choice) continue;
+      const auto it = fixed_.find(p.name);
+      if (it != fixed_.end() && std::get<std::string>(it->second) != p.choices[std::size_t(c[k])]) return false;
+      ++k;
+    }
+    return true;
+  }
+
+  std::string terms(const std::vector<AlbedoTerm>& list) {
+    std::string out = "    Albedo = 0.0;\n";
+    for (const AlbedoTerm& t : list) {
+      std::string product = lookup(t.grid);
+      for (const std::string& c : t.colors) product = operand(c) + " * " + product;
+      out += fmt::format("    Albedo += {};\n", product);
+    }
+    return out;
+  }
+
+  /// A parameter's name, or its value where it is fixed.
+  std::string operand(const std::string& name) const {
+    const auto it = fixed_.find(name);
+    if (it == fixed_.end()) return name == "cos_theta_o" ? "wo_z" : name;
+    if (const auto* c = std::get_if<std::array<double, 3>>(&it->second))
+      return fmt::format("color({}, {}, {})", number((*c)[0]), number((*c)[1]), number((*c)[2]));
+    return number(std::get<double>(it->second));
+  }
+
+  std::string scaled(const TableAxis& axis) const {
+    const std::string x = operand(axis.name);
+    switch (axis.scale) {
+      case AxisScale::Log:
+        return fmt::format("log(max({}, {}))", x, number(axis.values.front()));
+      case AxisScale::Log1p:
+        return fmt::format("log(1.0 + {})", x);
+      default:
+        return x;
+    }
+  }
+
+  std::string lookup(int index) {
+    const AlbedoGrid& g = table_.grids.at(std::size_t(index));
+    if (g.axes.empty()) {
+      if (g.channels == 1) return number(g.values[0]);
+      return fmt::format("color({}, {}, {})", number(g.values[0]), number(g.values[1]), number(g.values[2]));
+    }
+    if (g.axes.size() > 3)
+      input_error("{}: the albedo table has {} axes, and OSL look-ups exist for 3", info_.name, g.axes.size());
+    if (g.values.size() > kMaxArray)
+      input_error("{}: the albedo table has {} numbers, and an OSL array may have {}", info_.name, g.values.size(),
+                  kMaxArray);
+    if (used_.insert(index).second)
+      for (std::size_t a = 0; a < g.axes.size(); ++a)
+        positions_ += fmt::format("    float position_{}_{} = brdfc_position(knots_{}_{}, {}, {});\n", index, a, index,
+                                  a, g.axes[a].values.size(), scaled(g.axes[a]));
+    if (g.channels == 1) return call(g, index, "");
+    return fmt::format("color({}, {}, {})", call(g, index, "_r"), call(g, index, "_g"), call(g, index, "_b"));
+  }
+
+  static std::string call(const AlbedoGrid& g, int index, const std::string& channel) {
+    std::string text = fmt::format("brdfc_table{}(table{}_{}", g.axes.size(), channel, index);
+    for (const TableAxis& a : g.axes) text += fmt::format(", {}", a.values.size());
+    for (std::size_t a = 0; a < g.axes.size(); ++a) text += fmt::format(", position_{}_{}", index, a);
+    return text + ")";
+  }
+
+  std::string arrays(std::size_t index) const {
+    const AlbedoGrid& g = table_.grids[index];
+    std::string out;
+    for (std::size_t a = 0; a < g.axes.size(); ++a) {
+      std::vector<double> knots = g.axes[a].values;
+      for (double& k : knots)
+        k = g.axes[a].scale == AxisScale::Log ? std::log(k) : g.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : k;
+      out += array(fmt::format("knots_{}", index).c_str(), a, knots);
+    }
+    if (g.channels == 1) return out + array("table", index, g.values);
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::vector<float> channel;
+      for (std::size_t i = c; i < g.values.size(); i += 3) channel.push_back(g.values[i]);
+      const char* names[] = {"table_r", "table_g", "table_b"};
+      out += array(names[c], index, channel);
+    }
+    return out;
+  }
+
+  const ModelInfo& info_;
+  const AlbedoTable& table_;
+  const ParamValues& fixed_;
+  std::set<int> used_;
+  std::string positions_;
+};
+
+std::string closure_text(ClosureKind kind, std::size_t index) {
+  switch (kind) {
+    case ClosureKind::Diffuse:
+      return fmt::format("weight_{} * diffuse(frame_n)", index);
+    case ClosureKind::Burley:
+      return fmt::format("weight_{} * burley_diffuse_bsdf(frame_n, color(1), 0.0)", index);
+    case ClosureKind::DiffuseRamp:
+      return fmt::format("weight_{} * diffuse_ramp(frame_n, ramp_{})", index, index);
+    case ClosureKind::Reflection:
+      return fmt::format("weight_{} * reflection(frame_n)", index);
+    case ClosureKind::PhongRamp:
+      break;
+  }
+  throw std::logic_error("no OSL for this closure");
+}
+
+}  // namespace
+
+std::string balanced_sum(const std::vector<std::string>& terms) {
+  if (terms.empty()) return "0";
+  if (terms.size() == 1) return terms[0];
+  const auto middle = terms.begin() + std::ptrdiff_t((terms.size() + 1) / 2);
+  const std::string left = balanced_sum({terms.begin(), middle}), right = balanced_sum({middle, terms.end()});
+  const auto group = [](const std::string& s, bool compound) { return compound ? "(" + s + ")" : s; };
+  return group(left, middle - terms.begin() > 1) + " + " + group(right, terms.end() - middle > 1);
+}
+
+Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& fixed) {
+  const ModelInfo& info = model.info();
+  const bool sampled = kind == RepresentationKind::Sampled;
+  Shader shader;
+  shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
+  shader.lobes = sampled;
+
+  std::vector<ClosureKind> kinds;
+  ChoiceSwitch statements(info, fixed), mirror(info, fixed);
+  std::set<std::string> inputs;
+  int operations = 0, mirror_operations = 0;
+  const int indent = sampled ? 8 : 4;
+  for (const Choices& choices : choice_combinations(info)) {
+    const ParamValues values = with_choices(info, choices, fixed);
+    bool admitted = true;
+    for (const auto& [name, value] : fixed) admitted = admitted && values.at(name) == value;
+    if (!admitted) continue;
+    const Recording r = record(model, kind, values, indent);
+    operations = std::max(operations, r.operations);
+    statements.add(choices, r.statements);
+    inputs.insert(r.inputs.begin(), r.inputs.end());
+    if (!kinds.empty() && kinds != r.closures)
+      throw std::logic_error(info.name + ": exact closures must be the same for every combination of choices");
+    kinds = r.closures;
+    if (sampled && model.has_mirror()) {
+      const Recording m = record_mirror(model, values, 4);
+      mirror_operations = std::max(mirror_operations, m.operations);
+      mirror.add(choices, m.statements);
+    }
+  }
+  shader.operations = operations + mirror_operations;
+
+  std::string body;
+  body +=
+      "    vector frame_n = normalize(Normal);\n    vector frame_t, frame_b;\n"
+      "    brdfc_frame(frame_n, Tangent, frame_t, frame_b);\n"
+      "    // Towards the viewer: I in Cycles points away from the surface.\n"
+      "    float wo_x = dot(I, frame_t);\n    float wo_y = dot(I, frame_b);\n    float wo_z = dot(I, frame_n);\n\n";
+  std::vector<std::string> terms;
+  if (sampled) {
+    body += fmt::format(
+        "    color weight_0[{}] = {{ 0.0 }};\n    vector wi[{}] = {{ vector(0.0) }};\n"
+        "    int count = clamp(Lobes, 1, {});\n"
+        "    for (int lobe = 0; lobe < count; lobe++) {{\n"
+        "        vector u_all = brdfc_random(lobe);\n"
+        "        float u_0 = u_all[0];\n        float u_1 = u_all[1];\n        float u_2 = u_all[2];\n"
+        "        float wi_x, wi_y, wi_z;\n        color weight;\n",
+        kMaxLobes, kMaxLobes, kMaxLobes);
+    body += statements.print(8);
+    body +=
+        "        weight_0[lobe] = weight / float(count);\n"
+        "        wi[lobe] = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n    }\n";
+    if (model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
+    for (int i = 0; i < kMaxLobes; ++i) terms.push_back(fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
+    shader.slots = kMaxLobes * slots(ClosureKind::PhongRamp);
+    if (model.has_mirror()) {
+      terms.push_back("mirror_weight * reflection(frame_n)");
+      shader.slots += slots(ClosureKind::Reflection);
+    }
+  } else {
+    for (std::size_t c = 0; c < kinds.size(); ++c) {
+      body += fmt::format("    color weight_{};\n", c);
+      if (kinds[c] == ClosureKind::DiffuseRamp) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
+      terms.push_back(closure_text(kinds[c], c));
+      shader.slots += slots(kinds[c]);
+    }
+    body += statements.print(4);
+  }
+  shader.closures = int(terms.size());
+  if (shader.slots > kMaxClosures)
+    input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,
+                kMaxClosures);
+  body += "    BSDF = " + balanced_sum(terms) + ";\n\n";
+  body += AlbedoText(info, table, fixed).print();
+
+  std::string& out = shader.source;
+  out += comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION));
+  out += comment(fmt::format("Form: {}. {}", name_of(kind), info.equations));
+  out += "// SPDX-License-Identifier: GPL-3.0-or-later\n\n";
+  out += library_for(body);
+  out += fmt::format("\nshader {}(\n", shader.name);
+  for (const ParamInfo& p : info.params) {
+    if (fixed.count(p.name)) continue;
+    if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
+    if (reserved_words().count(p.name))
+      input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
+                  p.name);
+    out += parameter(p);
+  }
+  if (sampled)
+    out += fmt::format(
+        "    int Lobes = {} [[ string label = \"Lobes\", string help = \"Directions traced per shading "
+        "point, 1 to {}\" ]],\n",
+        kDefaultLobes, kMaxLobes);
+  out +=
+      "    normal Normal = N,\n    vector Tangent = vector(0, 0, 0),\n"
+      "    output closure color BSDF = 0,\n    output color Albedo = 0)\n{\n";
+  out += body + "}\n";
+  return shader;
+}
+
+}  // namespace brdfc

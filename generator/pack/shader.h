@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The OSL text of a representation.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/albedo_table.h"
+#include "represent/representation.h"
+
+namespace brdfc {
+
+struct Shader {
+  std::string name;    ///< of the shader and, with .osl, of its file
+  std::string source;  ///< stands alone
+  int closures = 0;    ///< most that one shading point adds
+  int slots = 0;       ///< what they take of Cycles' kMaxClosures
+  int operations = 0;  ///< most that one combination of choices executes, a loop's body counted once
+  bool lobes = false;  ///< has the Lobes parameter
+};
+
+/// Parameters in `fixed` are folded into the text and are no parameters of the shader. `table` gives the Albedo
+/// output. Throws InputError if the closures would exceed what Cycles keeps or the table what an array holds.
+Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& fixed = {});
+
+/// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
+std::string balanced_sum(const std::vector<std::string>& terms);
+
+/// Numbers in one OSL array; more compile slowly.
+inline constexpr std::size_t kMaxArray = 32768;
+
+}  // namespace brdfc

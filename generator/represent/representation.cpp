@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "represent/representation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "analysis/albedo.h"
+#include "model/horizon.h"
+#include "model/sampling.h"
+
+namespace brdfc {
+namespace {
+
+/// Names the statements around a recording use; a recording may not declare them.
+std::vector<std::string> frame_names() {
+  std::vector<std::string> names = {"Normal",  "Tangent", "Lobes", "BSDF",    "Albedo",        "frame_n",
+                                    "frame_t", "frame_b", "wi",    "weight",  "mirror_weight", "lobe",
+                                    "u",       "wo",      "sum",   "position"};
+  return names;
+}
+
+Vec3<Expr> recorded_wo() {
+  return raise_to_horizon(Vec3<Expr>{Expr::input("wo_x"), Expr::input("wo_y"), Expr::input("wo_z")});
+}
+
+std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
+
+void output_exact(const ClosureSum<Expr>& sum, Program& program, std::vector<ClosureKind>& kinds) {
+  for (std::size_t c = 0; c < sum.size(); ++c) {
+    kinds.push_back(sum[c].kind);
+    program.output(fmt::format("weight_{}", c), sum[c].weight);
+    if (sum[c].kind == ClosureKind::DiffuseRamp)
+      for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
+  }
+}
+
+void output_sampled(const Brdf<Expr>& brdf, const Vec3<Expr>& wo, Program& program) {
+  const Sample<Expr> s = brdf.sample(wo, {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
+  program.output("wi_x", s.wi.x);
+  program.output("wi_y", s.wi.y);
+  program.output("wi_z", s.wi.z);
+  program.output("weight", s.weight);
+}
+
+Recording finish(const Program& program, int indent, std::vector<ClosureKind> kinds = {}) {
+  return {program.print_osl(indent, frame_names()), std::move(kinds), program.operations(), program.inputs()};
+}
+
+using FloatInputs = std::map<std::string, std::array<float, 3>>;
+
+void set_input(FloatInputs& inputs, const std::string& name, double v) { inputs[name] = {float(v), float(v), float(v)}; }
+
+FloatInputs float_inputs(const ParamValues& values, const Vec3<double>& wo) {
+  FloatInputs inputs;
+  for (const auto& [name, value] : values) {
+    if (const double* v = std::get_if<double>(&value)) set_input(inputs, name, *v);
+    if (const auto* c = std::get_if<std::array<double, 3>>(&value))
+      inputs[name] = {float((*c)[0]), float((*c)[1]), float((*c)[2])};
+  }
+  set_input(inputs, "wo_x", wo.x);
+  set_input(inputs, "wo_y", wo.y);
+  set_input(inputs, "wo_z", wo.z);
+  return inputs;
+}
+
+void require_finite(const Model& model, const ParamValues& values, const Vec3<double>& wo, const std::string& what,
+                    const std::array<float, 3>& v, bool may_be_negative) {
+  for (float x : v)
+    if (!std::isfinite(x) || (!may_be_negative && x < 0))
+      throw ValueError(fmt::format("{}: {} = {} at {}, wo = ({:.9g}, {:.9g}, {:.9g})", model.info().name, what, x,
+                                   format_values(model.info(), values), wo.x, wo.y, wo.z));
+}
+
+/// Parameters a slider reaches, drawn uniformly; a wide range logarithmically, as its effect is.
+ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt19937_64& rng) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ParamValues values = with_choices(info, choices);
+  for (const ParamInfo& p : info.params) {
+    if (p.kind == ParamKind::Number) {
+      const double span = p.soft_max - p.soft_min;
+      values[p.name] =
+          span > 50 ? p.soft_min + std::expm1(uniform(rng) * std::log1p(span)) : p.soft_min + span * uniform(rng);
+    } else if (p.kind == ParamKind::Color) {
+      values[p.name] = std::array<double, 3>{uniform(rng), uniform(rng), uniform(rng)};
+    }
+  }
+  return values;
+}
+
+}  // namespace
+
+const char* name_of(RepresentationKind kind) { return kind == RepresentationKind::Exact ? "exact" : "sampled"; }
+
+RepresentationKind representation_named(const std::string& name) {
+  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled})
+    if (name == name_of(kind)) return kind;
+  input_error("unknown representation '{}': expected one of exact, sampled", name);
+}
+
+std::vector<RepresentationKind> representations(const Model& model) {
+  if (model.has_exact()) return {RepresentationKind::Exact, RepresentationKind::Sampled};
+  return {RepresentationKind::Sampled};
+}
+
+std::vector<Choices> choice_combinations(const ModelInfo& info) {
+  std::vector<Choices> all = {{}};
+  for (const ParamInfo& p : info.params) {
+    if (p.kind != ParamKind::Choice) continue;
+    std::vector<Choices> longer;
+    for (const Choices& c : all)
+      for (int i = 0; i < int(p.choices.size()); ++i) {
+        longer.push_back(c);
+        longer.back().push_back(i);
+      }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+ParamValues with_choices(const ModelInfo& info, const Choices& choices, ParamValues values) {
+  std::size_t k = 0;
+  for (const ParamInfo& p : info.params)
+    if (p.kind == ParamKind::Choice) values[p.name] = p.choices[std::size_t(choices.at(k++))];
+  return values;
+}
+
+Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent) {
+  Recorder recorder;
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  const Vec3<Expr> wo = recorded_wo();
+  Program program;
+  std::vector<ClosureKind> kinds;
+  if (kind == RepresentationKind::Exact) {
+    const auto sum = brdf->exact(wo);
+    if (!sum) input_error("{}: has no exact representation", model.info().name);
+    output_exact(*sum, program, kinds);
+  } else {
+    output_sampled(*brdf, wo, program);
+  }
+  int used = 0;
+  for (ClosureKind k : kinds) used += slots(k);
+  if (used > kMaxClosures)
+    input_error("{}: the exact form needs {} closure slots, and Cycles keeps {}", model.info().name, used,
+                kMaxClosures);
+  return finish(program, indent, std::move(kinds));
+}
+
+Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
+  Recorder recorder;
+  Program program;
+  program.output("mirror_weight", model.record(fixed)->mirror(recorded_wo()));
+  return finish(program, indent, {ClosureKind::Reflection});
+}
+
+RepresentationError measure_error(const Model& model, RepresentationKind kind) {
+  constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
+  std::mt19937_64 rng(20260101);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  double difference = 0, total = 0, albedo_error = 0;
+  for (const Choices& choices : choice_combinations(model.info())) {
+    // The recording does not depend on the values, so one serves all parameter sets.
+    Recorder recorder;
+    const std::unique_ptr<Brdf<Expr>> recorded = model.record(with_choices(model.info(), choices));
+    Program program;
+    std::vector<ClosureKind> kinds;
+    if (kind == RepresentationKind::Exact)
+      output_exact(*recorded->exact(recorded_wo()), program, kinds);
+    else
+      output_sampled(*recorded, recorded_wo(), program);
+
+    for (int view = 0; view < kParameterSets * kViews; ++view) {
+      const ParamValues values = random_values(model.info(), choices, rng);
+      const BoundModel truth = bind_model(model, values);
+      const Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
+      FloatInputs inputs = float_inputs(values, wo);
+      const auto executed = [&](const std::map<std::string, std::array<float, 3>>& out, const std::string& name,
+                                bool may_be_negative) {
+        const auto& v = out.at(name);
+        require_finite(model, values, wo, name, v, may_be_negative);
+        return Rgb<double>(v[0], v[1], v[2]);
+      };
+      ClosureSum<double> closures;
+      if (kind == RepresentationKind::Exact) {
+        const auto out = program.run<float>(inputs);
+        for (std::size_t c = 0; c < kinds.size(); ++c) {
+          Closure<double> closure(kinds[c], executed(out, fmt::format("weight_{}", c), false));
+          if (kinds[c] == ClosureKind::DiffuseRamp)
+            for (std::size_t i = 0; i < kRampSize; ++i) closure.ramp[i] = executed(out, ramp_entry(c, i), true);
+          closures.push_back(closure);
+        }
+      }
+      Rgb<double> albedo_difference(0.0);
+      Sequence3 points(std::uint64_t(view) + 1);
+      for (int i = 0; i < kPoints; ++i) {
+        const Vec3<double> u = points.next();
+        if (kind == RepresentationKind::Exact) {
+          const Vec3<double> wi = sample_cosine(u.x, u.y);
+          const Rgb<double> f_cos = truth.brdf->eval(wi, wo) * wi.z;
+          const Rgb<double> d = evaluate(closures, wi, wo) - f_cos;
+          difference += std::abs(d.r) + std::abs(d.g) + std::abs(d.b);
+          total += f_cos.r + f_cos.g + f_cos.b;
+          albedo_difference += d * (kPi / wi.z / kPoints);
+        } else {
+          // The same numbers drive both, so that what differs is the arithmetic and not the noise.
+          const Vec3<float> v = Vec3<float>::from(u);
+          set_input(inputs, "u_0", v.x);
+          set_input(inputs, "u_1", v.y);
+          set_input(inputs, "u_2", v.z);
+          const auto out = program.run<float>(inputs);
+          for (const char* axis : {"wi_x", "wi_y", "wi_z"}) executed(out, axis, true);
+          albedo_difference +=
+              (executed(out, "weight", false) - truth.brdf->sample(wo, Vec3<double>::from(v)).weight) / double(kPoints);
+        }
+      }
+      albedo_error = std::max(
+          {albedo_error, std::abs(albedo_difference.r), std::abs(albedo_difference.g), std::abs(albedo_difference.b)});
+    }
+  }
+  if (kind == RepresentationKind::Exact)
+    return {total > 0 ? difference / total : 0, albedo_error, "closures equal the model; what is left is rounding"};
+  return {std::nullopt, albedo_error, "equals the model in expectation, with the noise of sampling it"};
+}
+
+}  // namespace brdfc

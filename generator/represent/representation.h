@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A representation is a model in a form that Cycles runs: statements that compute closures.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/model.h"
+
+namespace brdfc {
+
+enum class RepresentationKind {
+  Exact,   ///< closures that equal the model
+  Sampled  ///< the shader samples the model itself, one narrow lobe per sample
+};
+
+const char* name_of(RepresentationKind);
+/// Throws InputError that lists the known names.
+RepresentationKind representation_named(const std::string&);
+
+/// The forms a model has, preferred first.
+std::vector<RepresentationKind> representations(const Model&);
+
+/// How many lobes a sampled shader may trace per shading point.
+inline constexpr int kMaxLobes = 8;
+inline constexpr int kDefaultLobes = 1;
+
+/// One combination of the model's choices.
+using Choices = std::vector<int>;
+/// Every combination, in the order of an odometer whose last wheel turns fastest.
+std::vector<Choices> choice_combinations(const ModelInfo&);
+/// Adds the combination to the fixed values.
+ParamValues with_choices(const ModelInfo&, const Choices&, ParamValues values = {});
+
+/// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
+/// sampled, u_0, u_1, u_2; and assign what `kind` says.
+struct Recording {
+  std::string statements;
+  std::vector<ClosureKind> closures;  ///< Exact: closure i has weight_i, and ramp_i[8] if it is a ramp
+  int operations = 0;
+  std::vector<std::string> inputs;
+};
+
+/// Exact: assigns the weights and ramps of its closures. Sampled: assigns wi_x, wi_y, wi_z and weight.
+/// Throws InputError if more closures than Cycles keeps would be needed.
+Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
+/// Assigns mirror_weight, the weight of ideal reflection.
+Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
+
+/// The measured error of a form against the model.
+struct RepresentationError {
+  std::optional<double> relative_l1;  ///< of f cos over directions and parameters; none if equal in expectation only
+  double albedo = 0;                  ///< largest |albedo - quadrature| as executed in single precision
+  std::string note;
+};
+
+/// Executes the recorded form in float at random parameters and directions (fixed seed). Throws ValueError naming
+/// model, parameters, directions and value for a result that is NaN, infinite or negative.
+RepresentationError measure_error(const Model&, RepresentationKind);
+
+}  // namespace brdfc

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The recorded scalar: folding, sharing, pruning, loops, and what it refuses.
+#include "core/expr.h"
+
+#include <gmock/gmock.h>
+
+#include <bit>
+#include <random>
+
+#include "model/horizon.h"
+#include "model/model.h"
+#include "represent/representation.h"
+
+namespace brdfc {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Expr, FoldsConstantsInDoublePrecision) {
+  Recorder recorder;
+  Program program;
+  program.output("y", sqrt(Expr(2.0)) * Expr(2.0) + Expr(1.0));
+  EXPECT_EQ(program.operations(), 0);
+  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("y = 3.828427;"));
+}
+
+TEST(Expr, SharesEqualSubexpressions) {
+  Recorder recorder;
+  Program program;
+  const Expr x = Expr::input("x"), y = Expr::input("y");
+  program.output("z", exp(x * y) + sin(exp(y * x)));
+  EXPECT_EQ(program.operations(), 4);  // product, exp, sin, sum
+}
+
+TEST(Expr, AZeroFactorRemovesATerm) {
+  Recorder recorder;
+  Program program;
+  program.output("z", Expr::input("x") + Expr(0.0) * exp(Expr::input("y")));
+  EXPECT_EQ(program.operations(), 0);
+  EXPECT_EQ(program.inputs(), std::vector<std::string>{"x"});
+}
+
+TEST(Expr, OnlyWhatOutputsReachIsPrinted) {
+  Recorder recorder;
+  Program program;
+  const Expr x = Expr::input("x");
+  named("unused", exp(x));
+  program.output("z", named("used", sin(x)));
+  const std::string text = program.print_osl(0, {});
+  EXPECT_THAT(text, HasSubstr("float used = sin(x);"));
+  EXPECT_THAT(text, Not(HasSubstr("unused")));
+}
+
+TEST(Expr, GroupingOfFloatingPointOperationsIsPrinted) {
+  Recorder recorder;
+  Program program;
+  const Expr a = Expr::input("a"), b = Expr::input("b"), c = Expr::input("c");
+  program.output("p", a - (b - c));
+  program.output("q", (a - b) - c);
+  program.output("r", a / (b * c));
+  program.output("s", -(a + b));
+  const std::string text = program.print_osl(0, {});
+  EXPECT_THAT(text, HasSubstr("p = a - (b - c);"));
+  EXPECT_THAT(text, HasSubstr("q = a - b - c;"));
+  EXPECT_THAT(text, HasSubstr("r = a / (b * c);"));
+  EXPECT_THAT(text, HasSubstr("s = -(a + b);"));
+}
+
+TEST(Expr, ALoopStaysALoop) {
+  Recorder recorder;
+  Program program;
+  const Expr x = Expr::input("x");
+  // Heron's square root.
+  const auto result = iterate(5, std::array<Expr, 1>{Expr(1.0)}, [&](const std::array<Expr, 1>& s) {
+    return std::array<Expr, 1>{(s[0] + x / s[0]) / Expr(2.0)};
+  });
+  program.output("root", result[0]);
+  const std::string text = program.print_osl(0, {});
+  EXPECT_THAT(text, HasSubstr("for (int i = 0; i < 5; i++) {"));
+  EXPECT_NEAR(program.run<double>({{"x", {2.0, 2.0, 2.0}}}).at("root")[0], std::sqrt(2.0), 1e-9);
+}
+
+TEST(Expr, TwoLoopsWithTheSameBodyStayApart) {
+  Recorder recorder;
+  Program program;
+  const Expr x = Expr::input("x");
+  const auto times_x = [&](const std::array<Expr, 1>& s) { return std::array<Expr, 1>{s[0] * x}; };
+  program.output("a", iterate(3, std::array<Expr, 1>{Expr(1.0)}, times_x)[0]);
+  program.output("b", iterate(3, std::array<Expr, 1>{Expr(2.0)}, times_x)[0]);
+  const auto out = program.run<double>({{"x", {2.0, 2.0, 2.0}}});
+  EXPECT_EQ(out.at("a")[0], 8);
+  EXPECT_EQ(out.at("b")[0], 16);
+}
+
+TEST(Expr, RefusesWhatItCannotExpress) {
+  Recorder recorder;
+  EXPECT_THROW(log(Expr(0.0)), ExprError);
+  EXPECT_THROW(Expr::input("x") / Expr(0.0), ExprError);
+  const auto identity = [](const std::array<Expr, 1>& s) { return s; };
+  const auto nested = [&](const std::array<Expr, 1>& s) { return iterate(2, s, identity); };
+  EXPECT_THROW(iterate(2, std::array<Expr, 1>{Expr::input("x")}, nested), ExprError);
+  static_assert(!std::is_convertible_v<Condition, bool>);
+}
+
+TEST(Expr, NamesDoNotCollideWithOslOrInputs) {
+  Recorder recorder;
+  Program program;
+  const Expr n = Expr::input("n");
+  program.output("z", named("n", exp(n)) + named("N", sin(n)) + named("float", cos(n)));
+  const std::string text = program.print_osl(0, {});
+  EXPECT_THAT(text, HasSubstr("float n_1 = exp(n);"));
+  EXPECT_THAT(text, HasSubstr("float N_1 = sin(n);"));
+  EXPECT_THAT(text, HasSubstr("float float_1 = cos(n);"));
+}
+
+TEST(Expr, ColoursAreOneNode) {
+  Recorder recorder;
+  Program program;
+  const Rgb<Expr> c = Rgb<Expr>::input("c");
+  program.output("z", c + (Rgb<Expr>(Expr(1.0)) - c) * Expr::input("f"));
+  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("z = c + (1.0 - c) * f;"));
+}
+
+TEST(Model, TwoModelsOfOneNameAreRefused) {
+  struct Twin : Model {
+    ModelInfo info_ = find_model("lambert").info();
+    const ModelInfo& info() const override { return info_; }
+    bool has_mirror() const override { return false; }
+    bool has_exact() const override { return false; }
+    std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override { return nullptr; }
+    std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override { return nullptr; }
+    std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override { return nullptr; }
+    std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { return nullptr; }
+  };
+  EXPECT_THROW(register_model(std::make_unique<Twin>()), std::logic_error);
+}
+
+/// Every model's recorded eval, pdf and sample, executed in float, against its float instantiation: the same bits,
+/// but for constants, which the recording folds in double and rounds once.
+class RecordedFormula : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
+  const Model& model = find_model(GetParam());
+  std::mt19937 rng(7);
+  std::uniform_real_distribution<float> uniform(0.0f, 1.0f);
+  const auto direction = [&] {
+    const float z = 0.001f + 0.999f * uniform(rng), r = std::sqrt(1 - z * z), phi = 6.2831853f * uniform(rng);
+    return Vec3<float>{r * std::cos(phi), r * std::sin(phi), z};
+  };
+  for (const Choices& choices : choice_combinations(model.info())) {
+    Recorder recorder;
+    const auto recorded = model.record(with_choices(model.info(), choices));
+    const auto vec = [](const char* stem) {
+      const std::string s = stem;
+      return Vec3<Expr>{Expr::input(s + "_x"), Expr::input(s + "_y"), Expr::input(s + "_z")};
+    };
+    const Vec3<Expr> u = {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")};
+    Program program;
+    program.output("f", recorded->eval(vec("wi"), vec("wo")));
+    program.output("p", recorded->pdf(vec("wi"), vec("wo")));
+    program.output("w", recorded->sample(vec("wo"), u).weight);
+
+    double worst = 0;
+    for (int i = 0; i < 2000; ++i) {
+      ParamValues values = with_choices(model.info(), choices);
+      std::map<std::string, std::array<float, 3>> inputs;
+      for (const ParamInfo& p : model.info().params) {
+        if (p.kind == ParamKind::Choice) continue;
+        std::array<float, 3> v;
+        const double scale = p.kind == ParamKind::Color ? 1 : std::min(p.soft_max, 50.0) - p.soft_min;
+        for (float& x : v) x = float(p.kind == ParamKind::Color ? 0 : p.soft_min) + float(scale) * uniform(rng);
+        if (p.kind == ParamKind::Number) v[1] = v[2] = v[0];
+        inputs[p.name] = v;
+        if (p.kind == ParamKind::Number)
+          values[p.name] = double(v[0]);
+        else
+          values[p.name] = std::array<double, 3>{v[0], v[1], v[2]};
+      }
+      const Vec3<float> wi = direction(), wo = direction(), un = {uniform(rng), uniform(rng), uniform(rng)};
+      const auto set = [&](const std::string& name, float x) { inputs[name] = {x, x, x}; };
+      set("wi_x", wi.x), set("wi_y", wi.y), set("wi_z", wi.z);
+      set("wo_x", wo.x), set("wo_y", wo.y), set("wo_z", wo.z);
+      set("u_0", un.x), set("u_1", un.y), set("u_2", un.z);
+      const auto brdf = model.make_float(values);
+      const auto out = program.run<float>(inputs);
+      const Rgb<float> f = brdf->eval(wi, wo);
+      const float p = brdf->pdf(wi, wo);
+      const auto compare = [&](float a, float b) {
+        ASSERT_TRUE(std::isfinite(a) && std::isfinite(b)) << model.info().name;
+        worst = std::max(worst, std::abs(double(a) - b) / std::max(1e-30, double(std::abs(b))));
+      };
+      compare(out.at("f")[0], f.r);
+      compare(out.at("f")[1], f.g);
+      compare(out.at("f")[2], f.b);
+      compare(out.at("p")[0], p);
+      compare(out.at("w")[0], brdf->sample(wo, un).weight.r);
+    }
+    // A rounding of a constant may grow with the exponent: 50 here.
+    EXPECT_LT(worst, 2e-5) << model.info().name;
+  }
+}
+
+std::vector<std::string> model_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, model] : models()) names.push_back(name);
+  return names;
+}
+INSTANTIATE_TEST_SUITE_P(EveryModel, RecordedFormula, ::testing::ValuesIn(model_names()),
+                         [](const auto& info) { return info.param; });
+
+}  // namespace
+}  // namespace brdfc
