@@ -4,10 +4,9 @@
 
 #include <gmock/gmock.h>
 
-#include <bit>
 #include <random>
 
-#include "model/horizon.h"
+#include "core/table.h"
 #include "model/model.h"
 #include "represent/representation.h"
 
@@ -91,6 +90,25 @@ TEST(Expr, TwoLoopsWithTheSameBodyStayApart) {
   const auto out = program.run<double>({{"x", {2.0, 2.0, 2.0}}});
   EXPECT_EQ(out.at("a")[0], 8);
   EXPECT_EQ(out.at("b")[0], 16);
+}
+
+TEST(Expr, ALookUpIsAnArrayAndACall) {
+  Recorder recorder;
+  Program program;
+  const auto table = make_table("grid", {2, 3}, {0, 1, 4, 10, 11, 14});
+  program.output("z", lookup(table, std::array<Expr, 2>{Expr::input("x"), Expr::input("y")}));
+  const std::string text = program.print_osl(0, {});
+  EXPECT_THAT(text, HasSubstr("float grid[6] = {0.0, 1.0, 4.0, 10.0, 11.0, 14.0};"));
+  EXPECT_THAT(text, HasSubstr("brdfc_table2(grid, 2, 3, 1.0 * clamp(x, 0.0, 1.0), 2.0 * clamp(y, 0.0, 1.0))"));
+  for (const double x : {0.0, 0.3, 1.0, 2.0})
+    for (const double y : {-1.0, 0.0, 0.4, 0.9, 1.0}) {
+      const double z = program.run<double>({{"x", {x, x, x}}, {"y", {y, y, y}}}).at("z")[0];
+      EXPECT_EQ(z, lookup(table, std::array<double, 2>{x, y}));
+    }
+  EXPECT_DOUBLE_EQ(lookup(table, std::array<double, 2>{0.5, 0.75}), 0.5 * (2.5 + 12.5));
+  EXPECT_THROW(make_table("bad", {2}, {0, std::nan("")}), ValueError);
+  const auto other = make_table("grid", {2}, {0, 1});
+  EXPECT_THROW(lookup(other, std::array<Expr, 2>{Expr::input("x"), Expr::input("y")}), ExprError);
 }
 
 TEST(Expr, RefusesWhatItCannotExpress) {

@@ -6,6 +6,8 @@
 #include <set>
 #include <tuple>
 
+#include "core/table.h"
+
 namespace brdfc {
 namespace {
 
@@ -75,10 +77,10 @@ template <class T> T apply(Op op, const T* a) {
 
 const char* op_name(Op op) {
   static const char* const names[] = {
-      "constant",   "input", "+",     "-",   "*",   "/",      "negation",      "sqrt",  "cbrt", "exp",
-      "log",        "log1p", "expm1", "sin", "cos", "atan",   "pow",           "abs",   "min",  "max",
-      "<",          "<=",    "and",   "or",  "not", "select", "max_component", "color", "loop", "loop variable",
-      "loop result"};
+      "constant",    "input",  "+",     "-",   "*",   "/",      "negation",      "sqrt",  "cbrt", "exp",
+      "log",         "log1p",  "expm1", "sin", "cos", "atan",   "pow",           "abs",   "min",  "max",
+      "<",           "<=",     "and",   "or",  "not", "select", "max_component", "color", "loop", "loop variable",
+      "loop result", "look-up"};
   return names[int(op)];
 }
 
@@ -169,9 +171,11 @@ int build(Op op, std::vector<int> args) {
     default:
       break;
   }
-  // Equal operations share one node whichever way round they were written.
-  if ((op == Op::Add || op == Op::Mul) && node(0).type == node(1).type && args[0] > args[1] && !is_const(node(1)))
-    std::swap(args[0], args[1]);
+  // Equal operations share one node whichever way round they were written; the first way is the one printed.
+  if (op == Op::Add || op == Op::Mul) {
+    const int swapped = r.find({op, type, {args[1], args[0]}, {}, "", 0, -1, ""});
+    if (swapped >= 0) return swapped;
+  }
   return r.add({op, type, std::move(args), {}, "", 0, -1, ""});
 }
 
@@ -213,13 +217,27 @@ Recorder& Recorder::current() {
   return *current_recorder;
 }
 
-int Recorder::add(ExprNode node) {
+Recorder::Key Recorder::key_of(const ExprNode& n) { return {n.op, n.type, n.args, n.value, n.name, n.index, n.scope}; }
+
+int Recorder::scope_of(const ExprNode& node) const {
+  int scope = node.scope;
   for (int a : node.args) {
     if (a < 0 || a >= size()) throw ExprError("an Expr of another Recorder");
-    if (node.op != Op::Loop) node.scope = std::max(node.scope, nodes_[std::size_t(a)].scope);
+    if (node.op != Op::Loop) scope = std::max(scope, nodes_[std::size_t(a)].scope);
   }
-  Key key{node.op, node.type, node.args, node.value, node.name, node.index, node.scope};
-  const auto [it, inserted] = interned_.emplace(std::move(key), size());
+  return scope;
+}
+
+int Recorder::find(const ExprNode& node) const {
+  ExprNode scoped = node;
+  scoped.scope = scope_of(node);
+  const auto it = interned_.find(key_of(scoped));
+  return it == interned_.end() ? -1 : it->second;
+}
+
+int Recorder::add(ExprNode node) {
+  node.scope = scope_of(node);
+  const auto [it, inserted] = interned_.emplace(key_of(node), size());
   if (inserted) nodes_.push_back(std::move(node));
   return it->second;
 }
@@ -353,6 +371,16 @@ Rgb<Expr> named(const char* name, const Rgb<Expr>& c) {
 
 namespace detail {
 
+Expr record_lookup(const std::shared_ptr<const Table>& table, const std::vector<Expr>& coordinates) {
+  if (coordinates.size() != table->sizes.size())
+    throw ExprError("table " + table->name + ": wrong number of coordinates");
+  ExprNode node{Op::Lookup, ExprType::Real, {}, {}, table->name, 0, -1, "", table};
+  for (const Expr& x : coordinates) node.args.push_back(x.id());
+  const int id = Recorder::current().add(std::move(node));
+  if (Recorder::current().node(id).table != table) throw ExprError("two tables are named " + table->name);
+  return Expr::of_node(id);
+}
+
 std::vector<Expr> loop_variables(int count, int serial) {
   std::vector<Expr> vars;
   for (int i = 0; i < count; ++i)
@@ -434,6 +462,18 @@ std::map<std::string, std::array<T, 3>> Program::run(const std::map<std::string,
       case Op::MakeColor:
         out = {arg(0)[0], arg(1)[0], arg(2)[0]};
         break;
+      case Op::Lookup:
+        switch (n.args.size()) {
+          case 1:
+            out.fill(lookup<T, 1>(n.table, {arg(0)[0]}));
+            break;
+          case 2:
+            out.fill(lookup<T, 2>(n.table, {arg(0)[0], arg(1)[0]}));
+            break;
+          default:
+            out.fill(lookup<T, 3>(n.table, {arg(0)[0], arg(1)[0], arg(2)[0]}));
+        }
+        break;
       case Op::LoopVar:
         break;  // set by the loop
       case Op::LoopOut:
@@ -503,6 +543,23 @@ class OslPrinter {
     for (std::size_t i = 0; i < reachable.size(); ++i)
       if (reachable[i])
         for (int a : r_.node(int(i)).args) ++uses_[std::size_t(a)];
+  }
+
+  /// The arrays that look-ups read, before all statements.
+  void arrays(int indent, std::string& out) {
+    for (std::size_t i = 0; i < reachable_.size(); ++i) {
+      const ExprNode& n = r_.node(int(i));
+      if (!reachable_[i] || n.op != Op::Lookup || array_names_.count(n.name)) continue;
+      const std::string name = fresh(n.name);
+      array_names_[n.name] = name;
+      out += fmt::format("{:{}}float {}[{}] = {{", "", indent, name, n.table->values.size());
+      for (std::size_t k = 0; k < n.table->values.size(); ++k)
+        out += (k == 0        ? ""
+                : k % 12 == 0 ? ",\n" + std::string(std::size_t(indent + 4), ' ')
+                              : ", ") +
+               number(n.table->values[k]);
+      out += "};\n";
+    }
   }
 
   void count_output(int id) { ++uses_[std::size_t(id)]; }
@@ -675,6 +732,13 @@ class OslPrinter {
         return call("brdfc_max_component", n);
       case Op::MakeColor:
         return call("color", n);
+      case Op::Lookup: {
+        std::string text = fmt::format("brdfc_table{}({}", n.args.size(), array_names_.at(n.name));
+        for (int size : n.table->sizes) text += fmt::format(", {}", size);
+        for (std::size_t i = 0; i < n.args.size(); ++i)
+          text += fmt::format(", {} * clamp({}, 0.0, 1.0)", number(n.table->sizes[i] - 1), use(n.args[i], 0));
+        return {text + ")", 6};
+      }
       case Op::LoopOut:
         return {loop_vars_.at(n.args[0])[std::size_t(n.index)], 6};
       default:
@@ -688,6 +752,7 @@ class OslPrinter {
   std::vector<int> uses_;
   std::map<int, std::string> names_;
   std::map<int, std::vector<std::string>> loop_vars_;
+  std::map<std::string, std::string> array_names_;
 };
 
 }  // namespace
@@ -700,6 +765,7 @@ std::string Program::print_osl(int indent, const std::vector<std::string>& taken
   OslPrinter printer(seen, reserved);
   for (const auto& [name, id] : outputs_) printer.count_output(id);
   std::string out;
+  printer.arrays(indent, out);
   printer.statements(-1, Recorder::current().size(), indent, out);
   for (const auto& [name, id] : outputs_) out += fmt::format("{:{}}{} = {};\n", "", indent, name, printer.use(id, 0));
   return out;

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,8 @@
 #include "core/vec.h"
 
 namespace brdfc {
+
+struct Table;
 
 /// A formula that a recording cannot express.
 struct ExprError : std::logic_error {
@@ -56,7 +59,8 @@ enum class Op : std::uint8_t {
   MakeColor,
   Loop,
   LoopVar,
-  LoopOut
+  LoopOut,
+  Lookup
 };
 
 enum class ExprType : std::uint8_t { Real, Color, Bool };
@@ -64,12 +68,13 @@ enum class ExprType : std::uint8_t { Real, Color, Bool };
 struct ExprNode {
   Op op;
   ExprType type;
-  std::vector<int> args;          ///< Loop: N initial values, then N values of the next state
-  std::array<double, 3> value{};  ///< Const; a Real uses element 0
-  std::string name;               ///< Input
-  int index = 0;                  ///< Loop: count. LoopVar, LoopOut: which state element
-  int scope = -1;                 ///< LoopVar: its loop's serial; else that of the loop it depends on, or -1
-  std::string hint;               ///< name given by named()
+  std::vector<int> args;                 ///< Loop: N initial values, then N values of the next state
+  std::array<double, 3> value{};         ///< Const; a Real uses element 0
+  std::string name;                      ///< Input
+  int index = 0;                         ///< Loop: count. LoopVar, LoopOut: which state element
+  int scope = -1;                        ///< LoopVar: its loop's serial; else that of the loop it depends on, or -1
+  std::string hint;                      ///< name given by named()
+  std::shared_ptr<const Table> table{};  ///< Lookup
 };
 
 /// Owns the nodes of one recording; the innermost one alive on this thread is the current one.
@@ -82,6 +87,8 @@ class Recorder {
 
   static Recorder& current();
   int add(ExprNode node);
+  /// The node equal to this one, or -1.
+  int find(const ExprNode& node) const;
   const ExprNode& node(int id) const { return nodes_[std::size_t(id)]; }
   int size() const { return int(nodes_.size()); }
   void hint(int id, const char* name);
@@ -90,6 +97,9 @@ class Recorder {
 
  private:
   using Key = std::tuple<Op, ExprType, std::vector<int>, std::array<double, 3>, std::string, int, int>;
+  static Key key_of(const ExprNode& node);
+  int scope_of(const ExprNode& node) const;
+
   std::vector<ExprNode> nodes_;
   std::map<Key, int> interned_;
   int loops_ = 0;
@@ -189,6 +199,7 @@ Expr max_component(const Rgb<Expr>&);
 Rgb<Expr> named(const char* name, const Rgb<Expr>&);
 
 namespace detail {
+Expr record_lookup(const std::shared_ptr<const Table>&, const std::vector<Expr>& coordinates);
 std::vector<Expr> loop_variables(int count, int serial);
 std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& init, const std::vector<Expr>& next);
 }  // namespace detail

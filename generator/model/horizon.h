@@ -15,7 +15,8 @@ template <class T> Vec3<T> raise_to_horizon(const Vec3<T>& wo) {
   const T low = T(kMinCosTheta);
   const T shrink = sqrt(T(1) - low * low) / sinTheta;
   const auto below = wo.z < low;
-  return {select(below, wo.x * shrink, wo.x), select(below, wo.y * shrink, wo.y), select(below, low, wo.z)};
+  return {named("x_o", select(below, wo.x * shrink, wo.x)), named("y_o", select(below, wo.y * shrink, wo.y)),
+          named("cosTheta_o", select(below, low, wo.z))};
 }
 
 }  // namespace brdfc

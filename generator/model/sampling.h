@@ -17,8 +17,8 @@ template <class T> T cosine_pdf(const Vec3<T>& wi) { return select(wi.z > T(0), 
 
 /// Direction with density cos(theta) / pi; u1 gives the height, u2 the azimuth.
 template <class T> Vec3<T> sample_cosine(const T& u1, const T& u2) {
-  const T phi = T(2) * pi<T>() * u2;
-  const T sinTheta = sqrt(u1);
+  const T phi = named("phi", T(2) * pi<T>() * u2);
+  const T sinTheta = named("sinTheta", sqrt(u1));
   return {sinTheta * cos(phi), sinTheta * sin(phi), sqrt(maximum(T(1) - u1, T(0)))};
 }
 

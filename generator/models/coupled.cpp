@@ -61,7 +61,7 @@ template <class T> struct Coupled {
 
   /// cos theta' with eq. 6 = xi.
   static T invert_eq6(const T& xi) {
-    const T t = cbrt(T(2) / T(7) * xi);
+    const T t = named("t", cbrt(T(2) / T(7) * xi));
     const T rational = (((T(38295.9) * xi + T(13002.4)) * xi + T(154.4)) * xi + T(0.0114813)) /
                        (((T(16520.2) * xi + T(33596.4)) * xi + T(1483.57)) * xi + T(1));
     const T start = select(xi < T(0.02), t * (T(1) + t / T(2)), rational);
@@ -89,7 +89,7 @@ template <class T> struct Coupled {
   /// colours, so that its weight adds nothing to what the passes take for albedo.
   ClosureSum<T> exact(const Vec3<T>& wo) const {
     const Rgb<T> W = named("W", rm * (T(1.05) * (T(1) - r0) * f(wo.z)));
-    const T so = schlick_weight(wo.z);
+    const T so = named("s_o", schlick_weight(wo.z));
     Closure<T> burley(ClosureKind::Burley, W * (T(2) / (T(1) - so / T(2))));
     const T small = T(kRampWeight);
     Closure<T> ramp(ClosureKind::DiffuseRamp, Rgb<T>(small));

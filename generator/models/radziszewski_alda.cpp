@@ -105,8 +105,8 @@ template <class T> struct RadziszewskiAlda {
 
   /// P_5(nbar) / k^5 with q = 1/k.
   static T p5_over_k5(const T& q) {
-    const T a = (T(1) + q) / T(2), b = (T(1) - q) / T(2);
-    const T a2 = a * a, b2 = b * b;
+    const T a = named("a", (T(1) + q) / T(2)), b = named("b", (T(1) - q) / T(2));
+    const T a2 = named("a2", a * a), b2 = named("b2", b * b);
     return a * (a2 * a2 + T(5) * a2 * b2 + T(1.875) * b2 * b2);
   }
 
@@ -145,14 +145,15 @@ template <class T> struct RadziszewskiAlda {
 
   /// cos^2 theta_i with density f_theta / 2 given y, for u in [0, 1).
   static T sample_cos2(const T& m, const T& y, const T& u) {
-    const T v = T(1) - u;
+    const T v = named("one_minus_u", T(1) - u);
     // x = log1p(-u expm1(-m) / (v e^{-my} + u e^{-m})) / m.
     const T grow = -u * expm1(-m) / maximum(v * exp(-m * y) + u * exp(-m), tiny<T>());
-    const T mild = log1p(grow) / maximum(m, T(1e-6));
+    const T mild = named("mild", log1p(grow) / maximum(m, T(1e-6)));
     // For large m the difference of ln(u + v e^{-my}) and ln(v e^{-my} + u e^{-m}), larger terms taken out.
-    const T lu = log(maximum(u, tiny<T>())), lv = log(maximum(v, tiny<T>()));
+    const T lu = named("ln_u", log(maximum(u, tiny<T>())));
+    const T lv = named("ln_v", log(maximum(v, tiny<T>())));
     const auto logaddexp = [](const T& p, const T& q) { return maximum(p, q) + log1p(exp(-abs(p - q))); };
-    const T steep = (logaddexp(lu, lv - m * y) - logaddexp(lv - m * y, lu - m)) / maximum(m, T(1));
+    const T steep = named("steep", (logaddexp(lu, lv - m * y) - logaddexp(lv - m * y, lu - m)) / maximum(m, T(1)));
     return clamp01(select(m < T(1e-6), u, select(m < T(16), mild, steep)));
   }
 
@@ -161,15 +162,15 @@ template <class T> struct RadziszewskiAlda {
   static std::array<T, 2> sample_x(const T& n, const T& y, const T& one_minus_y, const T& u) {
     const auto near_normal = y > T(0.5);
     const T m = log_cosh2(n);
-    const T x = sample_cos2(m, select(near_normal, one_minus_y, y), select(near_normal, T(1) - u, u));
+    const T x = named("x", sample_cos2(m, select(near_normal, one_minus_y, y), select(near_normal, T(1) - u, u)));
     return {select(near_normal, T(1) - x, x), select(near_normal, x, T(1) - x)};
   }
 
   /// (cos dphi, sin dphi) with density f_phi for k = 2 nbar + 1.
   static std::array<T, 2> sample_phi(const T& k, const T& u) {
     const T q = T(1) / k;
-    const T a = (T(1) + q) / T(2), b = (T(1) - q) / T(2);
-    const T a2 = a * a, b2 = b * b;
+    const T a = named("a", (T(1) + q) / T(2)), b = named("b", (T(1) - q) / T(2));
+    const T a2 = named("a2", a * a), b2 = named("b2", b * b);
     // (a + b cos t)^5 = c0 + sum of c_j cos(j t), t = 2 psi.
     const T c0 = named("c0", p5_over_k5(q));
     const T c1 = named("c1", b * (T(5) * a2 * a2 + T(7.5) * a2 * b2 + T(0.625) * b2 * b2));
@@ -179,24 +180,24 @@ template <class T> struct RadziszewskiAlda {
     const T c5 = named("c5", T(0.0625) * b * b2 * b2);
     // The lobe is even: solve for t in [0, pi] at the share 2 |u - 1/2|, then restore the sign.
     const T share = named("share", abs(T(2) * u - T(1)));
-    const T target = share * c0 * pi<T>();
+    const T target = named("target", share * c0 * pi<T>());
     const std::array<T, 3> state = iterate(
         newton_steps<T>(), std::array<T, 3>{T(0), pi<T>(), pi<T>() / T(2) * share}, [&](const std::array<T, 3>& s) {
           const T t = s[2];
-          const T C = cos(t), S = sin(t);
+          const T C = named("C", cos(t)), S = named("S", sin(t));
           // sin(j t) / sin(t) by Chebyshev's recurrence.
           const T u1 = T(2) * C, u2 = u1 * u1 - T(1), u3 = u1 * u2 - u1, u4 = u1 * u3 - u2;
-          const T F = c0 * t + S * (c1 + c2 * u1 / T(2) + c3 * u2 / T(3) + c4 * u3 / T(4) + c5 * u4 / T(5));
-          const T w = a + b * C;
+          const T F = named("F", c0 * t + S * (c1 + c2 * u1 / T(2) + c3 * u2 / T(3) + c4 * u3 / T(4) + c5 * u4 / T(5)));
+          const T w = named("w", a + b * C);
           const T dF = w * w * w * w * w;
           const auto below = F < target;
           const T lo = select(below, t, s[0]), hi = select(below, s[1], t);
-          const T newton = t - (F - target) / maximum(dF, tiny<T>());
+          const T newton = named("newton", t - (F - target) / maximum(dF, tiny<T>()));
           const T middle = (lo + hi) / T(2);
           const auto inside = newton >= lo && newton <= hi;
           return std::array<T, 3>{lo, hi, select(inside, newton, middle)};
         });
-    const T psi = state[2] / T(2);
+    const T psi = named("psi", state[2] / T(2));
     const T C = cos(psi), S = sin(psi);
     // tan(dphi/2) = tan(psi) / sqrt(k).
     const T c2h = k * C * C, s2h = S * S, norm = c2h + s2h;

@@ -63,7 +63,7 @@ std::string comment(const std::string& text) {
       out += "\n//";
       width = 2;
     }
-    out += " " + text.substr(start, end - start);
+    out.append(" ").append(text, start, end - start);
     width += 1 + end - start;
     start = end + 1;
   }

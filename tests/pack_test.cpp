@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the generator writes: shaders, closure counts, refusals and the extension's files.
+#include "pack/pack.h"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "model/sampling.h"
+#include "pack/osl_library.h"
+#include "pack/shader.h"
+
+namespace brdfc {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Depth of the left spine of a printed sum: what Cycles' stack of 16 has to hold.
+int nesting(const std::string& sum) {
+  int depth = 0, most = 0;
+  for (char c : sum) {
+    depth += c == '(' ? 1 : c == ')' ? -1 : 0;
+    most = std::max(most, depth);
+  }
+  return most;
+}
+
+AlbedoTable empty_table(const Model& model) {
+  AlbedoTable t;
+  t.terms.resize(choice_combinations(model.info()).size());
+  return t;
+}
+
+std::string read(const fs::path& p) {
+  std::ifstream in(p, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+class TempFolder {
+ public:
+  TempFolder() {
+    std::string name = (fs::temp_directory_path() / "brdfc-test-XXXXXX").string();
+    path_ = mkdtemp(name.data());
+  }
+  ~TempFolder() { fs::remove_all(path_); }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Lambert with faults that a build must not hide.
+template <class T> struct Broken {
+  Rgb<T> rho;
+  static ModelInfo info() {
+    return {.name = "broken", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
+  }
+  // log(z - 1/2): NaN for grazing light.
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>&) const { return rho * log(wi.z - T(0.5)); }
+  T pdf(const Vec3<T>& wi, const Vec3<T>&) const { return cosine_pdf(wi); }
+  Sample<T> sample(const Vec3<T>&, const Vec3<T>& u) const {
+    const Vec3<T> wi = sample_cosine(u.y, u.z);
+    return {wi, rho * log(wi.z - T(0.5)), cosine_pdf(wi)};
+  }
+};
+
+/// An exact form that needs more slots than Cycles keeps.
+template <class T> struct Greedy : Broken<T> {
+  ClosureSum<T> exact(const Vec3<T>&) const {
+    return ClosureSum<T>(22, Closure<T>(ClosureKind::DiffuseRamp, this->rho));
+  }
+};
+
+TEST(Shader, SumIsABalancedTree) {
+  std::vector<std::string> terms;
+  for (int i = 0; i < 64; ++i) terms.push_back(fmt::format("t{}", i));
+  const std::string sum = balanced_sum(terms);
+  EXPECT_EQ(std::count(sum.begin(), sum.end(), '+'), 63);
+  EXPECT_LE(nesting(sum), 6);
+  EXPECT_EQ(balanced_sum({"a", "b", "c"}), "(a + b) + c");
+  EXPECT_EQ(balanced_sum({}), "0");
+}
+
+TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
+  const detail::ModelOf<Greedy> greedy;
+  try {
+    write_shader(greedy, RepresentationKind::Exact, empty_table(greedy));
+    FAIL() << "not refused";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("66 closure slots"));
+    EXPECT_THAT(e.what(), HasSubstr("64"));
+  }
+}
+
+TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
+  for (const auto& [name, model] : models())
+    for (RepresentationKind kind : representations(*model)) {
+      const Shader s = write_shader(*model, kind, empty_table(*model));
+      EXPECT_LE(s.slots, kMaxClosures) << s.name;
+      EXPECT_LT(s.operations, 600) << s.name;
+      EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
+    }
+}
+
+TEST(Shader, AFixedParameterLeavesTheText) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const Shader all = write_shader(m, RepresentationKind::Sampled, empty_table(m));
+  const Shader specular = write_shader(m, RepresentationKind::Sampled, empty_table(m),
+                                       {{"part", std::string("specular")}, {"rotation", 0.0}});
+  EXPECT_THAT(all.source, HasSubstr("color rd ="));
+  EXPECT_THAT(all.source, HasSubstr("int part ="));
+  EXPECT_THAT(specular.source, Not(HasSubstr("int part")));
+  EXPECT_THAT(specular.source, Not(HasSubstr("rotation")));
+  EXPECT_LT(specular.operations, all.operations);
+  EXPECT_LT(specular.source.size(), all.source.size());
+}
+
+TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const ParamValues both = {{"part", std::string("both")}};
+  ParamValues black = both;
+  black["rd"] = 0.0;
+  const Recording with = record(m, RepresentationKind::Sampled, both, 0);
+  const Recording without = record(m, RepresentationKind::Sampled, black, 0);
+  EXPECT_LT(without.operations, with.operations);
+  EXPECT_EQ(std::count(without.inputs.begin(), without.inputs.end(), "rd"), 0);
+}
+
+TEST(Shader, TextOnlyHoldsTheLibraryItCalls) {
+  const std::string library = library_for("x = brdfc_log1p(y);");
+  EXPECT_THAT(library, HasSubstr("float brdfc_log1p("));
+  EXPECT_THAT(library, Not(HasSubstr("brdfc_expm1(")));
+  EXPECT_THROW(library_for("brdfc_missing(1)"), std::logic_error);
+}
+
+TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
+  const detail::ModelOf<Broken> broken;
+  try {
+    tabulate_albedo(broken);
+    FAIL() << "NaN reached a table";
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("broken"));
+    EXPECT_THAT(e.what(), HasSubstr("rho="));
+    EXPECT_THAT(e.what(), HasSubstr("wi"));
+    EXPECT_THAT(e.what(), HasSubstr("nan"));
+  }
+  EXPECT_THROW(measure_error(broken, RepresentationKind::Sampled), ValueError);
+}
+
+class PackFiles : public ::testing::Test {
+ protected:
+  PackOptions options(const fs::path& out) const { return {out, BRDFC_SOURCE_DIR "/blender_addon", {"lambert"}, {}}; }
+  TempFolder temp;
+};
+
+TEST_F(PackFiles, TheSameModelsGiveTheSameBytes) {
+  const PackResult a = build_pack(options(temp.path() / "a")), b = build_pack(options(temp.path() / "b"));
+  EXPECT_EQ(read(a.zip), read(b.zip));
+  EXPECT_FALSE(read(a.zip).empty());
+}
+
+TEST_F(PackFiles, ManifestAndFilesAgree) {
+  const PackResult pack = build_pack(options(temp.path()));
+  const auto manifest = nlohmann::json::parse(read(pack.folder / "manifest.json"));
+  EXPECT_EQ(manifest.at("format"), 1);
+  const auto& lambert = manifest.at("models").at("lambert");
+  EXPECT_EQ(lambert.at("auto"), "exact");
+  for (const auto& [form, r] : lambert.at("representations").items())
+    EXPECT_TRUE(fs::exists(pack.folder / r.at("shader").get<std::string>())) << form;
+  EXPECT_TRUE(fs::exists(pack.folder / lambert.at("albedo").at("table").get<std::string>()));
+  EXPECT_TRUE(fs::exists(pack.folder / "blender_manifest.toml"));
+  for (const auto& entry : fs::recursive_directory_iterator(pack.folder)) EXPECT_NE(entry.path().extension(), ".oso");
+}
+
+TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
+  const PackResult pack = build_pack(options(temp.path()));
+  const std::string before = read(pack.zip);
+  PackOptions bad = options(temp.path());
+  bad.models = {"lambert", "no_such_model"};
+  EXPECT_THROW(build_pack(bad), InputError);
+  bad = options(temp.path());
+  bad.addon = temp.path() / "nowhere";
+  EXPECT_THROW(build_pack(bad), InputError);
+  EXPECT_EQ(read(pack.zip), before);
+  int files = 0;
+  for (const auto& entry : fs::directory_iterator(temp.path())) files += entry.exists();
+  EXPECT_EQ(files, 2);  // the zip and the folder: nothing half-written
+}
+
+TEST_F(PackFiles, AnOutputThatIsAFileIsAnErrorThatNamesIt) {
+  const fs::path file = temp.path() / "file";
+  std::ofstream(file) << "x";
+  try {
+    build_pack(options(file));
+    FAIL() << "not refused";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr(file.string()));
+  }
+}
+
+}  // namespace
+}  // namespace brdfc
