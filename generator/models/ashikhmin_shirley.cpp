@@ -84,7 +84,11 @@ template <class T> struct AshikhminShirley {
 
   /// Diffuse term, eq. 14.
   Rgb<T> substrate(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const auto fade = [](const T& c) { return T(1) - pow5(T(1) - c / T(2)); };
+    // 1 - (1 - c/2)^5 as a polynomial: no cancellation for small c.
+    const auto fade = [](const T& c) {
+      const T x = c / T(2);
+      return x * (T(5) - x * (T(10) - x * (T(10) - x * (T(5) - x))));
+    };
     return rd * (Rgb<T>(T(1)) - rs) * (T(28) / (T(23) * pi<T>()) * fade(wi.z) * fade(wo.z));
   }
 

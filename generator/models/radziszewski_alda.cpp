@@ -69,7 +69,7 @@ template <class T> struct RadziszewskiAlda {
   /// (1 - e^-z) / z for z >= 0.
   static T phi1(const T& z) {
     const T guarded = maximum(z, T(1e-6));
-    return select(z < T(1e-6), T(1) - z / T(2), -expm1(-guarded) / guarded);
+    return select(z < T(1e-6), T(1) - z / T(2) * (T(1) - z / T(3)), -expm1(-guarded) / guarded);
   }
 
   /// m = 2 ln cosh n: log1p(sinh^2 n) for small n, where the other form loses everything.

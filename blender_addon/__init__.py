@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""brdfc Shaders: reflection models compiled for Cycles, as node groups around an OSL script node.
+
+Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
+"""
+
+from . import operators, ui
+
+
+def register():
+    operators.register()
+    ui.register()
+
+
+def unregister():
+    ui.unregister()
+    operators.unregister()

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials from scripts, with and without a window.
+
+    from bl_ext.user_default.brdfc_shaders import api
+    material = api.new_material("coupled", r0=0.05, rm=(0.8, 0.1, 0.1))
+    api.enable_osl(bpy.context.scene)
+
+Names and values are those of the models' schema: numbers, colours as (r, g, b) or one grey
+number, choices by identifier. `lobes` sets how many directions a sampled form draws.
+"""
+
+import bpy
+
+from . import checks, nodes, pack
+from .checks import Finding, enable_osl, warnings
+from .nodes import CompileError
+from .pack import PackError
+
+__all__ = [
+    "CompileError",
+    "PackError",
+    "Finding",
+    "albedo",
+    "enable_osl",
+    "get_parameters",
+    "models",
+    "new_material",
+    "prepare_material",
+    "set_parameters",
+    "switch_representation",
+    "warnings",
+]
+
+
+def models():
+    """Models by identifier: label, paper, doc, parameters, representations, as in the manifest."""
+    return {name: pack.model(name) for name in pack.model_names()}
+
+
+def _checked(model_name, representation, given):
+    given = dict(given)
+    lobes = given.pop("lobes", None) if "lobes" not in pack.parameters(model_name) else None
+    values = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
+    if lobes is not None:
+        values[pack.LOBES] = pack.check_lobes(model_name, representation, lobes)
+    return values
+
+
+def prepare_material(material):
+    """Gives a material the settings that its models need; returns a sentence for each change."""
+    declared = set()
+    for node in nodes.group_nodes(material):
+        if nodes.is_current(node):
+            declared |= set(pack.representation(*nodes.identity(node)).get("warnings", []))
+    if "bump_correction" in declared and material.cycles.use_bump_map_correction:
+        material.cycles.use_bump_map_correction = False
+        return ["Bump Map Correction turned off for this material"]
+    return []
+
+
+def new_material(model, representation="auto", **parameters):
+    """Makes a material of one model. Parameters that are not given take their default.
+
+    Raises ValueError for an unknown model, representation or parameter, or a value that is out of
+    range; CompileError when Cycles can't compile the shader. Nothing is left in the file then.
+    """
+    representation = pack.resolve(model, representation)
+    values = _checked(model, representation, parameters)
+    nodes.ensure_group(model, representation)
+    material = bpy.data.materials.new(pack.model(model)["label"])
+    try:
+        if material.node_tree is None:  # before 5.0 a material starts without nodes
+            material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        node = nodes.add_group_node(tree, model, representation)
+        for name, value in values.items():
+            nodes.set_value(node, name, value)
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        output.location = (300, 0)
+        tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
+        prepare_material(material)
+    except BaseException:
+        bpy.data.materials.remove(material)
+        raise
+    return material
+
+
+def _the_node(material):
+    ours = nodes.group_nodes(material)
+    if len(ours) != 1:
+        raise ValueError(
+            f"material {material.name!r} has {len(ours)} nodes of this extension, expected one"
+        )
+    return ours[0]
+
+
+def set_parameters(material, **parameters):
+    """Sets parameters of a material with one model. All are checked before one is changed.
+
+    Raises ValueError as new_material does, and for a parameter that a link controls.
+    """
+    node = _the_node(material)
+    values = _checked(*nodes.identity(node), parameters)
+    present = nodes.sockets(node)
+    for name in values:
+        if name in present and present[name].is_linked:
+            raise ValueError(f"{name!r} of material {material.name!r} is controlled by a link")
+    for name, value in values.items():
+        nodes.set_value(node, name, value)
+
+
+def get_parameters(material):
+    """Values of the parameters that no link controls, of a material with one model."""
+    node = _the_node(material)
+    model_name, _ = nodes.identity(node)
+    values = {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def switch_representation(material, representation):
+    """Changes the form of a material with one model; values and links stay."""
+    nodes.switch(_the_node(material), representation)
+    prepare_material(material)
+
+
+def albedo(model, cos_theta_o, **parameters):
+    """Directional albedo (r, g, b) from the model's table. Raises ValueError."""
+    from . import energy
+
+    if not 0 < cos_theta_o <= 1:
+        raise ValueError(f"cos_theta_o: expected a number in (0, 1], got {cos_theta_o!r}")
+    return energy.albedo(model, _checked(model, "auto", parameters), cos_theta_o)
+
+
+def scene_warnings(scene):
+    """What keeps any material of this extension from rendering in a scene."""
+    return checks.scene_warnings(scene)

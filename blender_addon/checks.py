@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What in a file or its settings would spoil a material of this extension."""
+
+from dataclasses import dataclass
+
+import bpy
+
+from . import nodes, pack
+
+BLENDER_MIN = (4, 5, 0)
+#: Devices other than the CPU whose kernels can run OSL.
+OSL_DEVICES = {"OPTIX"}
+#: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
+#: pixel is about 1e-6 of the distance; an orthographic camera has no direction to help out.
+FAR_PIXEL = 1e-5
+#: Lamps below this size (metres, or radians for a sun) are hit by chance too rarely.
+SMALL_LIGHT = 0.01
+SMALL_SUN = 0.02
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A finding: a stable code, "ERROR" (the picture is wrong) or "WARNING", and a sentence."""
+
+    code: str
+    severity: str
+    message: str
+
+
+def osl_available():
+    """Whether this build of Blender has OSL."""
+    import _cycles
+
+    return bool(_cycles.with_osl)
+
+
+def gpu_backend():
+    """Compute device type of the preferences: NONE, CUDA, OPTIX, HIP, METAL, ONEAPI."""
+    addon = bpy.context.preferences.addons.get("cycles")
+    return addon.preferences.compute_device_type if addon else "NONE"
+
+
+def device_without_osl(scene):
+    """Name of the compute device if the scene renders on one that can't run OSL, or None."""
+    backend = gpu_backend()
+    if scene.cycles.device != "GPU" or backend == "NONE" or backend in OSL_DEVICES:
+        return None
+    return backend
+
+
+def _pixel_size(scene):
+    render, camera = scene.render, scene.camera.data
+    longest = max(render.resolution_x, render.resolution_y) * render.resolution_percentage / 100
+    return camera.ortho_scale / max(longest, 1)
+
+
+def _far_orthographic(scene):
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA" or camera.data.type != "ORTHO":
+        return False
+    distance = camera.matrix_world.translation.length
+    return _pixel_size(scene) < FAR_PIXEL * distance
+
+
+def _is_tiny(light):
+    if light.type == "SUN":
+        return light.angle < SMALL_SUN
+    if light.type == "AREA":
+        sizes = [light.size]
+        if light.shape in {"RECTANGLE", "ELLIPSE"}:
+            sizes.append(light.size_y)
+        return min(sizes) < SMALL_LIGHT
+    return light.shadow_soft_size < SMALL_LIGHT
+
+
+def _tiny_lights(scene):
+    return [o.name for o in scene.objects if o.type == "LIGHT" and _is_tiny(o.data)]
+
+
+def _bump_correction(material, scene):
+    if material.cycles.use_bump_map_correction:
+        return (
+            "ERROR",
+            "Bump Map Correction is on in the material's settings: it bends tilted closures and "
+            "falsifies the model",
+        )
+
+
+def _path_guiding(material, scene):
+    if scene.cycles.use_guiding:
+        return "ERROR", "Path Guiding is on: it samples this form wrongly; turn it off"
+
+
+def _clamp_indirect(material, scene):
+    clamp = scene.cycles.sample_clamp_indirect
+    if clamp > 0:
+        return (
+            "WARNING",
+            f"Clamp Indirect is {clamp:g}: it darkens bright reflections of this form; 0 is exact",
+        )
+
+
+def _clamp_direct(material, scene):
+    clamp = scene.cycles.sample_clamp_direct
+    if clamp > 0:
+        return "WARNING", f"Clamp Direct is {clamp:g}: it darkens highlights of this form"
+
+
+def _zero_size_lights(material, scene):
+    if tiny := _tiny_lights(scene):
+        return (
+            "WARNING",
+            f"Lamps too small for a sampled form ({', '.join(tiny[:3])}): their highlights are "
+            "noisy or missing; enlarge the lamp or use another representation",
+        )
+
+
+def _far_camera(material, scene):
+    if _far_orthographic(scene):
+        return (
+            "WARNING",
+            "The orthographic camera is far away for its pixel size: the random numbers of a "
+            "sampled form repeat; move it closer",
+        )
+
+
+def _caustics(material, scene):
+    if not scene.cycles.caustics_reflective:
+        return (
+            "WARNING",
+            "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
+            "is lost",
+        )
+
+
+def _filter_glossy(material, scene):
+    if scene.cycles.blur_glossy > 0:
+        return (
+            "WARNING",
+            f"Filter Glossy is {scene.cycles.blur_glossy:g}: it darkens repeated reflections of "
+            "this form; 0 is exact",
+        )
+
+
+#: What a representation may declare itself sensitive to in the manifest. A rule returns
+#: (severity, message), or None where nothing is wrong.
+DECLARED = {
+    "bump_correction": _bump_correction,
+    "path_guiding": _path_guiding,
+    "clamp_indirect": _clamp_indirect,
+    "clamp_direct": _clamp_direct,
+    "zero_size_lights": _zero_size_lights,
+    "orthographic_far": _far_camera,
+    "caustics": _caustics,
+    "filter_glossy": _filter_glossy,
+}
+
+
+def scene_warnings(scene):
+    """What keeps any form from rendering in a scene."""
+    found = []
+    if bpy.app.version < BLENDER_MIN:
+        found.append(
+            Finding(
+                "blender_version",
+                "ERROR",
+                f"Blender {bpy.app.version_string} is too old; "
+                f"{'.'.join(map(str, BLENDER_MIN[:2]))} or newer is needed",
+            )
+        )
+    if not osl_available():
+        found.append(
+            Finding("no_osl", "ERROR", "This Blender was built without Open Shading Language")
+        )
+    if scene.render.engine != "CYCLES":
+        found.append(
+            Finding(
+                "engine",
+                "ERROR",
+                f"The render engine is {scene.render.engine}; these shaders need Cycles",
+            )
+        )
+        return found
+    if not scene.cycles.shading_system:
+        found.append(
+            Finding("osl_off", "ERROR", "Open Shading Language is off in the render settings")
+        )
+    if backend := device_without_osl(scene):
+        found.append(
+            Finding(
+                "device",
+                "ERROR",
+                f"{backend} devices can't run Open Shading Language; use the CPU or OptiX",
+            )
+        )
+    return found
+
+
+def node_warnings(node, material, scene):
+    """What is wrong with one group node of a material."""
+    model_name, representation = nodes.identity(node)
+    label = f"{node.label or node.name}: "
+    found = []
+    if problem := nodes.script_problem(node.node_tree):
+        found.append(Finding("script_failed", "ERROR", f"{label}the shader {problem}"))
+    form, schema = {}, {}
+    if nodes.is_current(node):
+        form = pack.representation(model_name, representation)
+        schema = pack.parameters(model_name)
+    else:
+        found.append(
+            Finding(
+                "outdated",
+                "WARNING",
+                f"{label}made by another version of the extension; Update replaces it",
+            )
+        )
+    declared = form.get("warnings", [])
+    for name, parameter in schema.items():
+        value = nodes.get_value(node, name)
+        if parameter["kind"] == "choice" or value is None:
+            continue
+        # Sockets hold single precision: the limits must be compared in the same.
+        slack = 1e-6 * max(abs(parameter["min"]), abs(parameter["max"]))
+        low, high = parameter["min"] - slack, parameter["max"] + slack
+        for number in value if parameter["kind"] == "color" else (value,):
+            if not low <= number <= high:
+                found.append(
+                    Finding(
+                        "out_of_range",
+                        "ERROR",
+                        f"{label}{parameter['label']} is {number:g}, "
+                        f"expected {parameter['min']:g} to {parameter['max']:g}",
+                    )
+                )
+    # Measured: a sampled form comes out right, no less noisy, and half as slow again.
+    if form.get("lobes") and "path_guiding" not in declared and scene.cycles.use_guiding:
+        found.append(
+            Finding(
+                "path_guiding",
+                "WARNING",
+                f"{label}Path Guiding is on: it can't guide a sampled form and only costs time",
+            )
+        )
+    for code in declared:
+        if code in DECLARED and (result := DECLARED[code](material, scene)):
+            found.append(Finding(code, result[0], label + result[1]))
+    return found
+
+
+def warnings(material, scene):
+    """Everything that keeps a material from rendering as its models say. Changes nothing.
+
+    Returns an empty list when the material has no group of this extension.
+    """
+    ours = nodes.group_nodes(material)
+    if not ours:
+        return []
+    found = scene_warnings(scene)
+    for node in ours:
+        found += node_warnings(node, material, scene)
+    return list(dict.fromkeys(found))
+
+
+def enable_osl(scene):
+    """Turns OSL on for a scene, with what it needs. Returns a sentence for each change made.
+
+    Raises RuntimeError when this Blender has no OSL.
+    """
+    if not osl_available():
+        raise RuntimeError("this Blender was built without Open Shading Language")
+    done = []
+    if scene.render.engine != "CYCLES":
+        done.append(f"render engine changed from {scene.render.engine} to Cycles")
+        scene.render.engine = "CYCLES"
+    if backend := device_without_osl(scene):
+        done.append(f"device changed from {backend} to CPU")
+        scene.cycles.device = "CPU"
+    if not scene.cycles.shading_system:
+        done.append("Open Shading Language turned on")
+        scene.cycles.shading_system = True
+    return done

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Directional albedo from the generator's tables. No bpy in here.
+
+Per colour channel the albedo is a sum of terms, each interpolated in a grid and multiplied with the
+colours it names; the choices of a model select which terms.
+"""
+
+import bisect
+import math
+
+from . import pack
+
+_SCALES = {"linear": float, "log": math.log, "log1p": math.log1p}
+
+
+def _bracket(axis, value):
+    """Index of the lower knot and the weight of the upper one; ends clamp."""
+    knots = axis["values"]
+    value = min(max(value, knots[0]), knots[-1])
+    upper = min(max(bisect.bisect_right(knots, value), 1), len(knots) - 1)
+    scale = _SCALES[axis["scale"]]
+    low, high = scale(knots[upper - 1]), scale(knots[upper])
+    return upper - 1, (scale(value) - low) / (high - low)
+
+
+def _interpolate(grid, coordinates):
+    """Multilinear interpolation in a row-major table, first axis slowest, channel innermost."""
+    corners = [(0, 1.0)]
+    for axis in grid["axes"]:
+        lower, weight = _bracket(axis, coordinates[axis["name"]])
+        size = len(axis["values"])
+        corners = [
+            (index * size + lower + step, factor * w)
+            for index, factor in corners
+            for step, w in ((0, 1 - weight), (1, weight))
+            if w
+        ]
+    channels = grid["channels"]
+    value = [sum(f * grid["values"][i * channels + c] for i, f in corners) for c in range(channels)]
+    return value * 3 if channels == 1 else value
+
+
+def _combination(table, schema, values):
+    """Index of the choices, like the reading of an odometer whose last wheel turns fastest."""
+    index = 0
+    for name in table["choices"]:
+        choices = schema[name]["choices"]
+        index = index * len(choices) + choices.index(values[name])
+    return index
+
+
+def albedo(model_name, values, cos_theta_o):
+    """Directional albedo (r, g, b) for a view cosine in (0, 1], mirror term included.
+
+    `values` has the model's parameters in the form of pack.check_value; what is missing takes its
+    default. Raises ValueError for an unknown model.
+    """
+    table, schema = pack.model(model_name)["albedo"], pack.parameters(model_name)
+    complete = {name: p["default"] for name, p in schema.items()} | values
+    coordinates = complete | {"cos_theta_o": cos_theta_o}
+    total = [0.0, 0.0, 0.0]
+    for term in table["terms"][_combination(table, schema, complete)]:
+        value = _interpolate(table["grids"][term["grid"]], coordinates)
+        for name in term["colors"]:
+            value = [v * c for v, c in zip(value, complete[name], strict=True)]
+        total = [t + v for t, v in zip(total, value, strict=True)]
+    return tuple(total)

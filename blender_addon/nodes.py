@@ -1,0 +1,437 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Node groups around an OSL script node.
+
+A group is made once per model, representation and version of the shader, and reused. Source and
+bytecode both lie inside the .blend, so a saved file renders where the extension is not installed.
+"""
+
+import contextlib
+import json
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from . import pack
+
+#: Custom property of a group: which model and representation it is, and its sockets' identifiers.
+TAG = "brdfc"
+OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
+_SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
+
+
+class CompileError(RuntimeError):
+    """Cycles could not compile a shader, or compiled it to something else than expected."""
+
+
+def _find_oslquery():
+    """Makes the `oslquery` module importable, which Cycles needs to find a script's sockets.
+
+    Blender proper has it on its path. The bpy wheel has not: there it lies in the folder of
+    site-packages that ships with the wheel.
+    """
+    try:
+        import oslquery  # noqa: F401
+
+        return
+    except ImportError:
+        pass
+    root = Path(bpy.utils.resource_path("LOCAL"))
+    added = [str(p) for p in root.glob("python/lib/python3.*/site-packages")]
+    # At the end, so that what the interpreter already has keeps its priority.
+    sys.path.extend(p for p in added if p not in sys.path)
+    try:
+        import oslquery  # noqa: F401
+    except ImportError as error:
+        raise CompileError(
+            f"the module oslquery, which compiles script nodes, can't be loaded: {error}. "
+            "A separately installed OpenImageIO in the same Python gets in its way"
+        ) from error
+
+
+@contextlib.contextmanager
+def _captured_stderr():
+    """Collects what native code prints: the OSL compiler reports errors nowhere else."""
+    lines = []
+    try:
+        saved = os.dup(2)
+    except OSError:  # a windowed application without a console
+        yield lines
+        return
+    with tempfile.TemporaryFile() as sink:
+        os.dup2(sink.fileno(), 2)
+        try:
+            yield lines
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+            sink.seek(0)
+            lines += sink.read().decode(errors="replace").splitlines()
+
+
+def expected_inputs(model_name, representation):
+    """Identifiers of the script node's inputs and the types of their sockets."""
+    inputs = {
+        p["name"]: _SOCKET_TYPES[p["kind"]]
+        for p in pack.parameters(model_name).values()
+        if pack.has_socket(p)
+    }
+    inputs |= {pack.NORMAL: "VECTOR", pack.TANGENT: "VECTOR"}
+    if pack.representation(model_name, representation).get("lobes"):
+        inputs[pack.LOBES] = "INT"
+    return inputs
+
+
+def script_problem(group):
+    """What is wrong with a group's script node, or None.
+
+    A shader that fails to compile raises nothing in Cycles: it leaves a node without sockets.
+    """
+    script = next((n for n in group.nodes if n.bl_idname == "ShaderNodeScript"), None)
+    if script is None:
+        return "has no script node"
+    if not script.bytecode:
+        return "is not compiled"
+    tag = group[TAG]
+    inputs = {s.identifier: s.type for s in script.inputs}
+    outputs = {s.identifier: s.type for s in script.outputs}
+    for found, expected in ((inputs, dict(tag["script_inputs"])), (outputs, OUTPUTS)):
+        if missing := sorted(set(expected) - set(found)):
+            return f"lacks the sockets {', '.join(missing)}"
+        for name, kind in expected.items():
+            if found[name] != kind:
+                return f"has a socket {name} of type {found[name]}, expected {kind}"
+    return None
+
+
+def _compile(script_node, text, what):
+    import cycles.osl
+
+    _find_oslquery()
+    reports = []
+    with _captured_stderr() as console:
+        # Under Cycles the assignment compiles by itself; under another engine it does nothing.
+        script_node.script = text
+        if not script_node.bytecode:
+            cycles.osl.update_script_node(
+                script_node, lambda kind, message: reports.append((kind, message))
+            )
+    if script_node.bytecode and script_node.outputs:
+        return
+    lines = [line.strip() for line in console if "error" in line.lower()]
+    lines += [message for kind, message in reports if "ERROR" in kind]
+    detail = "; ".join(dict.fromkeys(lines[:4])) or "the compiler gave no reason"
+    raise CompileError(f"{what}: the shader failed to compile: {detail}")
+
+
+def _socket(group, name, kind, description, **settings):
+    socket = group.interface.new_socket(
+        name, in_out="INPUT", socket_type=kind, description=description
+    )
+    for key, value in settings.items():
+        setattr(socket, key, value)
+    return socket
+
+
+def _range_text(parameter):
+    unit = f" {parameter['unit']}" if parameter.get("unit") else ""
+    return f"{parameter['min']:g} to {parameter['max']:g}{unit}"
+
+
+def tooltip(parameter):
+    """Tooltip of a parameter's socket: its description and what it accepts."""
+    doc = parameter["doc"].rstrip()
+    doc += "" if doc.endswith((".", "!", "?")) or not doc else "."
+    if parameter["kind"] == "number":
+        return f"{doc} Accepted: {_range_text(parameter)}"
+    if parameter["kind"] == "choice":
+        listed = ", ".join(f"{i} = {c}" for i, c in enumerate(parameter["choices"]))
+        return f"{doc} {listed}"
+    return doc.removesuffix(".")
+
+
+def has_menus():
+    """Whether shader groups can have menu sockets (from 5.0); a choice is a number before that."""
+    return bpy.app.version >= (5, 0, 0)
+
+
+def choice_label(identifier):
+    """An identifier as people read it."""
+    return identifier.replace("_", " ").capitalize()
+
+
+def _add_choice(group, group_input, script_input, parameter):
+    default = parameter["choices"].index(parameter["default"])
+    if not has_menus():
+        socket = _socket(
+            group,
+            parameter["label"],
+            "NodeSocketInt",
+            tooltip(parameter),
+            min_value=0,
+            max_value=len(parameter["choices"]) - 1,
+            default_value=default,
+        )
+        group.links.new(group_input.outputs[-2], script_input)
+        return socket
+    switch = group.nodes.new("GeometryNodeMenuSwitch")
+    switch.label = parameter["label"]
+    switch.data_type = "INT"
+    switch.enum_items.clear()
+    for identifier in parameter["choices"]:
+        switch.enum_items.new(choice_label(identifier))
+    values = [s for s in switch.inputs if s.type == "INT"]
+    for index, value in enumerate(values):
+        value.default_value = index
+    socket = _socket(group, parameter["label"], "NodeSocketMenu", tooltip(parameter))
+    group.links.new(group_input.outputs[-2], switch.inputs[0])
+    group.links.new(switch.outputs[0], script_input)
+    socket.default_value = choice_label(parameter["default"])
+    return socket
+
+
+def _add_parameter(group, group_input, script_input, parameter):
+    label, text, kind = parameter["label"], tooltip(parameter), parameter["kind"]
+    if kind == "choice":
+        return _add_choice(group, group_input, script_input, parameter)
+    if kind == "color":
+        color = (*parameter["default"], 1.0)
+        socket = _socket(group, label, "NodeSocketColor", text, default_value=color)
+    else:
+        # Blender holds a slider to a socket's range but accepts other typed numbers: that is
+        # the meaning of the soft range. Out of the accepted range, the panel warns.
+        low, high = parameter["soft_min"], parameter["soft_max"]
+        settings = {"min_value": low, "max_value": high}
+        if (low, high) == (0, 1) == (parameter["min"], parameter["max"]):
+            settings = {"subtype": "FACTOR"} | settings
+        socket = _socket(
+            group, label, "NodeSocketFloat", text, **settings, default_value=parameter["default"]
+        )
+    group.links.new(group_input.outputs[-2], script_input)
+    return socket
+
+
+def _vector_socket(group, group_input, script_input, name, text):
+    # Without a value, an unlinked input keeps the shader's own default: the shading normal, and
+    # the frame that the shader builds for itself.
+    socket = _socket(group, name, "NodeSocketVector", text, hide_value=True)
+    group.links.new(group_input.outputs[-2], script_input)
+    return socket
+
+
+def _fill_group(group, model_name, representation, text):
+    entry = pack.representation(model_name, representation)
+    for output, kind in (("BSDF", "NodeSocketShader"), ("Albedo", "NodeSocketColor")):
+        group.interface.new_socket(output, in_out="OUTPUT", socket_type=kind)
+    group_input = group.nodes.new("NodeGroupInput")
+    group_output = group.nodes.new("NodeGroupOutput")
+    script = group.nodes.new("ShaderNodeScript")
+    script.mode = "INTERNAL"
+    group_input.location, group_output.location = (-500, 0), (300, 0)
+    _compile(script, text, f"{model_name} ({representation})")
+
+    tag = group[TAG]
+    tag["script_inputs"] = expected_inputs(model_name, representation)
+    if problem := script_problem(group):
+        raise CompileError(f"{model_name} ({representation}): the compiled shader {problem}")
+
+    inputs = {s.identifier: s for s in script.inputs}
+    sockets = {}
+    for name, parameter in pack.parameters(model_name).items():
+        if not pack.has_socket(parameter):
+            continue
+        sockets[name] = _add_parameter(group, group_input, inputs[name], parameter)
+    if lobes := entry.get("lobes"):
+        sockets[pack.LOBES] = _socket(
+            group,
+            pack.LOBES,
+            "NodeSocketInt",
+            f"Directions drawn per shading: less noise, more time. 1 to {lobes['max']}",
+            min_value=1,
+            max_value=lobes["max"],
+            default_value=lobes["default"],
+        )
+        group.links.new(group_input.outputs[-2], inputs[pack.LOBES])
+    for name, text_ in (
+        (pack.NORMAL, "Shading normal; unlinked, the one of the surface"),
+        (
+            pack.TANGENT,
+            "First axis of anisotropy; unlinked, the object's Z axis along the surface",
+        ),
+    ):
+        sockets[name] = _vector_socket(group, group_input, inputs[name], name, text_)
+    for output in OUTPUTS:
+        group.links.new(script.outputs[output], group_output.inputs[output])
+    tag["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
+
+
+def is_ours(node):
+    """Whether a node is a group of this extension, also of another version of it."""
+    tree = getattr(node, "node_tree", None)
+    return node.bl_idname == "ShaderNodeGroup" and tree is not None and TAG in tree
+
+
+def find_group(model_name, representation):
+    """The group of the current version of a shader, if the file has a sound one."""
+    digest = pack.digest(model_name, representation)
+    for group in bpy.data.node_groups:
+        tag = group.get(TAG)
+        if group.library is None and tag is not None and tag.get("digest") == digest:
+            same = (tag["model"], tag["representation"]) == (model_name, representation)
+            if same and script_problem(group) is None:
+                return group
+    return None
+
+
+def ensure_group(model_name, representation="auto"):
+    """Node group of a model, made if the file has none. Raises ValueError, CompileError.
+
+    Nothing is left in the file when it fails.
+    """
+    representation = pack.resolve(model_name, representation)
+    if group := find_group(model_name, representation):
+        return group
+    stem, source = pack.source(model_name, representation)
+    text = bpy.data.texts.new(f"{stem}.osl")
+    group = bpy.data.node_groups.new(
+        f"{pack.model(model_name)['label']} ({representation})", "ShaderNodeTree"
+    )
+    try:
+        text.write(source)
+        text.cursor_set(0)
+        group.color_tag = "SHADER"
+        group.description = pack.model(model_name)["doc"]
+        group[TAG] = {
+            "model": model_name,
+            "representation": representation,
+            "digest": pack.digest(model_name, representation),
+            "choices": json.dumps(
+                {
+                    p["name"]: p["choices"]
+                    for p in pack.parameters(model_name).values()
+                    if p["kind"] == "choice"
+                }
+            ),
+        }
+        _fill_group(group, model_name, representation, text)
+    except BaseException:
+        bpy.data.node_groups.remove(group)
+        bpy.data.texts.remove(text)
+        raise
+    return group
+
+
+def add_group_node(tree, model_name, representation="auto"):
+    """Adds a group node to a shader tree and returns it."""
+    group = ensure_group(model_name, representation)
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.width = 200
+    node.label = pack.model(model_name)["label"]
+    return node
+
+
+def identity(node):
+    """(model, representation) of a group node."""
+    tag = node.node_tree[TAG]
+    return tag["model"], tag["representation"]
+
+
+def is_current(node):
+    """Whether the group is of the installed version of its shader."""
+    model_name, representation = identity(node)
+    try:
+        return node.node_tree[TAG]["digest"] == pack.digest(model_name, representation)
+    except ValueError:  # a model or form that the installed version does not have
+        return False
+
+
+def sockets(node):
+    """Input sockets of a group node by parameter name, and Normal, Tangent, Lobes."""
+    by_identifier = {s.identifier: s for s in node.inputs}
+    return {
+        name: by_identifier[identifier]
+        for name, identifier in node.node_tree[TAG]["sockets"].items()
+        if identifier in by_identifier
+    }
+
+
+def _choices(node, name):
+    return json.loads(node.node_tree[TAG]["choices"])[name]
+
+
+def set_value(node, name, value):
+    """Sets a socket to a value in the canonical form of pack.check_value."""
+    socket = sockets(node).get(name)
+    if socket is None:  # a choice of one
+        return
+    if socket.type == "RGBA":
+        value = (*value, 1.0)
+    elif socket.type == "MENU":
+        value = choice_label(value)
+    elif socket.type == "INT" and isinstance(value, str):
+        value = _choices(node, name).index(value)
+    socket.default_value = value
+
+
+def get_value(node, name):
+    """Value of an unlinked socket in the same form; None for a linked one or a vector."""
+    socket = sockets(node).get(name)
+    if socket is None:
+        return _choices(node, name)[0]
+    if socket.is_linked or socket.type == "VECTOR":
+        return None
+    if socket.type == "RGBA":
+        return tuple(socket.default_value)[:3]
+    if socket.type == "MENU":
+        labels = {choice_label(c): c for c in _choices(node, name)}
+        return labels.get(socket.default_value)
+    if socket.type == "INT" and name != pack.LOBES:
+        choices = _choices(node, name)
+        return choices[min(max(socket.default_value, 0), len(choices) - 1)]
+    return socket.default_value
+
+
+def _trees(tree, seen):
+    if tree is None or tree in seen:
+        return
+    seen.append(tree)
+    for node in tree.nodes:
+        if hasattr(node, "node_tree") and not is_ours(node):
+            _trees(node.node_tree, seen)
+
+
+def group_nodes(material):
+    """Every group node of this extension in a material, nested groups included."""
+    trees = []
+    _trees(material.node_tree, trees)
+    return [node for tree in trees for node in tree.nodes if is_ours(node)]
+
+
+def switch(node, representation):
+    """Puts another representation of the same model into a group node; values and links stay.
+
+    Raises ValueError, CompileError; the node is then as it was.
+    """
+    model_name, _ = identity(node)
+    group = ensure_group(model_name, representation)
+    if group == node.node_tree:
+        return
+    tree = node.id_data
+    values = {name: get_value(node, name) for name in sockets(node)}
+    incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
+    outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
+    for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:
+        tree.links.remove(link)
+    node.node_tree = group
+    present = sockets(node)
+    for name, value in values.items():
+        if name in present and value is not None:
+            set_value(node, name, value)
+    for name, source in incoming:
+        if name in present:
+            tree.links.new(source, present[name])
+    for name, target in outgoing:
+        tree.links.new(node.outputs[name], target)

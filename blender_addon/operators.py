@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: add a group, make a material, turn OSL on, switch the form, mend settings."""
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+from bpy.types import Operator
+
+from . import api, checks, nodes, pack
+
+_ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
+
+
+def _doc(properties):
+    try:
+        return pack.model(properties.model)["doc"]
+    except _ERRORS:
+        return ""
+
+
+class _ModelOperator:
+    model: StringProperty(name="Model", description="Identifier of the model")
+    representation: StringProperty(
+        name="Representation",
+        description="Form of the model: auto, or one that the model has",
+        default="auto",
+    )
+
+    @classmethod
+    def description(cls, context, properties):
+        return _doc(properties)
+
+
+def _report_osl(operator, scene):
+    for finding in checks.scene_warnings(scene):
+        operator.report({"WARNING"}, finding.message)
+
+
+class BRDFC_OT_add_node(_ModelOperator, Operator):
+    bl_idname = "brdfc.add_node"
+    bl_label = "Add Reflection Model"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        space = context.space_data
+        return (
+            space is not None
+            and space.type == "NODE_EDITOR"
+            and space.tree_type == "ShaderNodeTree"
+            and space.edit_tree is not None
+            and space.edit_tree.is_editable
+        )
+
+    def execute(self, context):
+        space = context.space_data
+        try:
+            node = nodes.add_group_node(space.edit_tree, self.model, self.representation)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for other in space.edit_tree.nodes:
+            other.select = False
+        node.select = True
+        space.edit_tree.nodes.active = node
+        node.location = space.cursor_location
+        if isinstance(space.id, bpy.types.Material):
+            for change in api.prepare_material(space.id):
+                self.report({"INFO"}, change)
+        _report_osl(self, context.scene)
+        return {"FINISHED"}
+
+    def invoke(self, context, event):
+        context.space_data.cursor_location_from_region(event.mouse_region_x, event.mouse_region_y)
+        result = self.execute(context)
+        if result == {"FINISHED"}:
+            bpy.ops.node.translate_attach_remove_on_cancel("INVOKE_DEFAULT")
+        return result
+
+
+class BRDFC_OT_new_material(_ModelOperator, Operator):
+    bl_idname = "brdfc.new_material"
+    bl_label = "New Reflection Model Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        data = getattr(context.object, "data", None)
+        return data is not None and hasattr(data, "materials") and data.is_editable
+
+    def execute(self, context):
+        try:
+            material = api.new_material(self.model, self.representation)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        target = context.object
+        if not target.material_slots:
+            target.data.materials.append(material)
+        else:
+            target.active_material = material
+        self.report({"INFO"}, f"{material.name} assigned to {target.name}")
+        _report_osl(self, context.scene)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_enable_osl(Operator):
+    """Turn on Open Shading Language, which these shaders need, and Cycles with it"""
+
+    bl_idname = "brdfc.enable_osl"
+    bl_label = "Turn On OSL"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            done = checks.enable_osl(context.scene)
+        except RuntimeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        text = "; ".join(done) if done else "Open Shading Language is on already"
+        self.report({"INFO"}, text[0].upper() + text[1:])
+        return {"FINISHED"}
+
+
+class BRDFC_OT_fix_material(Operator):
+    """Give the active material the settings that its models need"""
+
+    bl_idname = "brdfc.fix_material"
+    bl_label = "Set Up Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def execute(self, context):
+        changes = api.prepare_material(context.object.active_material)
+        self.report({"INFO"}, "; ".join(changes) if changes else "Nothing to change")
+        return {"FINISHED"}
+
+
+class BRDFC_OT_switch(Operator):
+    """Use another form of the same model; values and links stay"""
+
+    bl_idname = "brdfc.switch"
+    bl_label = "Switch Form"
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(name="Node", description="Name of the group node")
+    representation: StringProperty(name="Representation", default="auto")
+    all_users: BoolProperty(
+        name="All Materials",
+        description="Also in every other material that has this model and form",
+        default=False,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def execute(self, context):
+        material = context.object.active_material
+        node = next((n for n in nodes.group_nodes(material) if n.name == self.node), None)
+        if node is None:
+            self.report({"ERROR"}, f"material {material.name} has no model node {self.node!r}")
+            return {"CANCELLED"}
+        identity = nodes.identity(node)
+        materials = bpy.data.materials if self.all_users else [material]
+        try:
+            for user in materials:
+                for other in nodes.group_nodes(user):
+                    if other == node or (self.all_users and nodes.identity(other) == identity):
+                        nodes.switch(other, self.representation)
+                api.prepare_material(user)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+_CLASSES = (
+    BRDFC_OT_add_node,
+    BRDFC_OT_new_material,
+    BRDFC_OT_enable_osl,
+    BRDFC_OT_fix_material,
+    BRDFC_OT_switch,
+)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The generated part of the extension: models, parameters, forms, tables. No bpy in here."""
+
+import hashlib
+import json
+import math
+from functools import lru_cache
+from numbers import Real
+from pathlib import Path
+
+ROOT = Path(__file__).parent
+FORMAT = 1
+
+#: Sockets that every group has beside the model's parameters.
+NORMAL = "Normal"
+TANGENT = "Tangent"
+LOBES = "Lobes"
+
+
+class PackError(RuntimeError):
+    """The extension's own files are missing or damaged."""
+
+
+@lru_cache(maxsize=1)
+def manifest():
+    """The manifest as a dict. Raises PackError when it is missing, damaged or of another format."""
+    path = ROOT / "manifest.json"
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise PackError(f"{path}: {error}; reinstall the extension") from error
+    if data.get("format") != FORMAT:
+        raise PackError(f"{path}: format {data.get('format')!r}, expected {FORMAT}")
+    return data
+
+
+def model_names():
+    """Identifiers of the models, in alphabetical order."""
+    return sorted(manifest()["models"])
+
+
+def model(name):
+    """Manifest entry of a model. Raises ValueError for an unknown name."""
+    models = manifest()["models"]
+    if name not in models:
+        raise ValueError(f"unknown model {name!r}; expected one of {', '.join(sorted(models))}")
+    return models[name]
+
+
+def resolve(model_name, representation):
+    """Name of the representation, "auto" replaced by the model's preference. Raises ValueError."""
+    entry = model(model_name)
+    name = entry["auto"] if representation == "auto" else representation
+    if name not in entry["representations"]:
+        known = ", ".join(["auto", *sorted(entry["representations"])])
+        raise ValueError(
+            f"model {model_name!r} has no representation {representation!r}; "
+            f"expected one of {known}"
+        )
+    return name
+
+
+def representation(model_name, name):
+    """Manifest entry of one representation. Raises ValueError."""
+    return model(model_name)["representations"][resolve(model_name, name)]
+
+
+def parameters(model_name):
+    """Schema of the parameters by name, in the order of the manifest."""
+    return {p["name"]: p for p in model(model_name)["parameters"]}
+
+
+def has_socket(parameter):
+    """Whether a parameter is shown: a choice of one leaves nothing to choose."""
+    return parameter["kind"] != "choice" or len(parameter["choices"]) > 1
+
+
+def _file(relative):
+    path = ROOT / relative
+    if not path.is_file():
+        raise PackError(f"{path} is missing; reinstall the extension")
+    return path
+
+
+def source(model_name, name):
+    """File stem and text of the OSL source."""
+    path = _file(representation(model_name, name)["shader"])
+    return path.stem, path.read_text(encoding="utf-8")
+
+
+def digest(model_name, name):
+    """Changes whenever the shader or the sockets of its group would."""
+    schema = [model(model_name)["parameters"], representation(model_name, name).get("lobes")]
+    text = source(model_name, name)[1] + json.dumps(schema, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _is_number(value):
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _checked_number(what, value, low, high):
+    if not _is_number(value):
+        raise ValueError(f"{what}: expected a number from {low:g} to {high:g}, got {value!r}")
+    value = float(value)
+    if not math.isfinite(value) or not low <= value <= high:
+        raise ValueError(f"{what}: expected a number from {low:g} to {high:g}, got {value:g}")
+    return value
+
+
+def check_value(model_name, name, value):
+    """Returns the value in canonical form: float, (r, g, b) or the identifier of a choice.
+
+    A colour may be given as one grey number. Raises ValueError naming model, parameter and
+    what was expected.
+    """
+    schema = parameters(model_name)
+    if name not in schema:
+        known = ", ".join(schema)
+        raise ValueError(f"model {model_name!r} has no parameter {name!r}; expected one of {known}")
+    parameter = schema[name]
+    what = f"{model_name}.{name}"
+    if parameter["kind"] == "choice":
+        if value not in parameter["choices"]:
+            known = ", ".join(parameter["choices"])
+            raise ValueError(f"{what}: expected one of {known}, got {value!r}")
+        return value
+    low, high = parameter["min"], parameter["max"]
+    if parameter["kind"] == "number":
+        return _checked_number(what, value, low, high)
+    if _is_number(value):
+        value = (value,) * 3
+    try:
+        channels = tuple(float(c) for c in value)
+    except (TypeError, ValueError):
+        channels = ()
+    if isinstance(value, str) or len(channels) not in (3, 4):
+        raise ValueError(f"{what}: expected a number or three (r, g, b), got {value!r}")
+    return tuple(
+        _checked_number(f"{what} ({channel})", c, low, high)
+        for channel, c in zip("rgb", channels[:3], strict=True)
+    )
+
+
+def check_lobes(model_name, name, value):
+    """Returns the number of directions a sampled form draws. Raises ValueError."""
+    lobes = representation(model_name, name).get("lobes")
+    if not lobes:
+        raise ValueError(f"representation {name!r} of {model_name!r} has no lobes to set")
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= lobes["max"]:
+        raise ValueError(
+            f"{model_name}.lobes: expected a whole number from 1 to {lobes['max']}, got {value!r}"
+        )
+    return value

@@ -1,0 +1,471 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds a Blender scene from a resolved scene file, the one that the reference renderer reads.
+
+`brdfc scene S.json --out DIR` writes DIR/scene.json, in which every shape is a mesh of arrays and
+every procedural picture a file. Units and conventions are Blender's: metres, watts, z up.
+"""
+
+import json
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Vector
+
+from . import api, nodes, pack
+
+#: Representation name that stands for Blender's own Glossy node, to compare run times with.
+GLOSSY = "glossy"
+
+
+class _View:
+    """A JSON value that knows where it lies, so that an error can name file and key."""
+
+    def __init__(self, value, file, path=""):
+        self.value, self.file, self.path = value, file, path
+
+    def error(self, expected):
+        where = self.path or "the top level"
+        return ValueError(f"{self.file}: {where}: expected {expected}, got {self.value!r:.80}")
+
+    def _child(self, key):
+        path = f"{self.path}.{key}" if self.path else str(key)
+        return _View(self.value[key], self.file, path)
+
+    def has(self, key):
+        return isinstance(self.value, dict) and self.value.get(key) is not None
+
+    def get(self, key):
+        if not isinstance(self.value, dict):
+            raise self.error("an object")
+        if key not in self.value:
+            raise self.error(f"an object with {key!r}")
+        return self._child(key)
+
+    def items(self):
+        if isinstance(self.value, dict):
+            return [(key, self._child(key)) for key in self.value]
+        if isinstance(self.value, list):
+            return [(index, self._child(index)) for index in range(len(self.value))]
+        raise self.error("an object or a list")
+
+    def number(self):
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+            raise self.error("a number")
+        return float(self.value)
+
+    def text(self):
+        if not isinstance(self.value, str):
+            raise self.error("a text")
+        return self.value
+
+    def numbers(self, count):
+        if not isinstance(self.value, list) or len(self.value) != count:
+            raise self.error(f"{count} numbers")
+        return [v.number() for _, v in self.items()]
+
+    def vector(self):
+        return Vector(self.numbers(3))
+
+    def number_or(self, key, default):
+        return self.get(key).number() if self.has(key) else default
+
+    def flag(self, key):
+        if not self.has(key):
+            return False
+        view = self.get(key)
+        if not isinstance(view.value, bool):
+            raise view.error("true or false")
+        return view.value
+
+    def color_or(self, key, default):
+        if not self.has(key):
+            return default
+        view = self.get(key)
+        return view.numbers(3) if isinstance(view.value, list) else [view.number()] * 3
+
+    def file_path(self):
+        path = Path(self.file).parent / self.text()
+        if not path.is_file():
+            raise ValueError(f"{self.file}: {self.path}: file {path} does not exist")
+        return path
+
+
+def _array(view, columns):
+    path = view.file_path()
+    try:
+        data = np.load(path, allow_pickle=False)
+    except ValueError as error:
+        raise ValueError(f"{view.file}: {view.path}: {path}: {error}") from error
+    if data.ndim != 2 or data.shape[1] != columns or not np.isfinite(data).all():
+        raise ValueError(
+            f"{view.file}: {view.path}: {path}: expected finite numbers of shape (n, {columns}), "
+            f"got {data.shape}"
+        )
+    return data
+
+
+def build_mesh(name, vertices, triangles, normals=None, uvs=None):
+    """Mesh datablock from arrays: (n, 3) float, (m, 3) int, and per vertex (n, 3) and (n, 2).
+
+    Normals are kept in single precision, as given. Without them the triangles are flat.
+    """
+    triangles = np.ascontiguousarray(triangles, np.int32)
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
+    mesh.loops.add(triangles.size)
+    mesh.loops.foreach_set("vertex_index", triangles.ravel())
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.full(len(triangles), normals is not None))
+    if uvs is not None:
+        layer = mesh.uv_layers.new(name="UVMap")
+        layer.uv.foreach_set("vector", np.ascontiguousarray(uvs, np.float32)[triangles].ravel())
+    mesh.update(calc_edges=True)
+    if normals is not None:
+        # Blender's other way to store custom normals rounds them to 16 bits.
+        attribute = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
+        attribute.data.foreach_set("vector", np.ascontiguousarray(normals, np.float32).ravel())
+        mesh.update()
+    return mesh
+
+
+def _transform(view):
+    if not view.has("transform"):
+        return Matrix.Identity(4)
+    view = view.get("transform")
+    translate = view.get("translate").vector() if view.has("translate") else Vector()
+    degrees = view.get("rotate_degrees").numbers(3) if view.has("rotate_degrees") else [0] * 3
+    scale = view.color_or("scale", [1.0] * 3)  # one number or three
+    rotation = Euler([math.radians(d) for d in degrees], "XYZ").to_matrix().to_4x4()
+    return Matrix.Translation(translate) @ rotation @ Matrix.Diagonal((*scale, 1.0))
+
+
+def _link(scene, name, data, matrix):
+    item = bpy.data.objects.new(name, data)
+    item.matrix_world = matrix
+    scene.collection.objects.link(item)
+    return item
+
+
+def _aimed(position, direction, up=None):
+    """Matrix of something that looks along its own -z."""
+    back = -direction.normalized()
+    up = up if up is not None else Vector((0, 0, 1))
+    if back.cross(up).length < 1e-6 * up.length:
+        up = Vector((0, 1, 0)) if abs(back.y) < 0.9 else Vector((1, 0, 0))
+    right = up.cross(back).normalized()
+    matrix = Matrix((right, back.cross(right), back)).transposed().to_4x4()
+    matrix.translation = position
+    return matrix
+
+
+def _camera(scene, view):
+    data = bpy.data.cameras.new("Camera")
+    data.sensor_fit = "VERTICAL"
+    kind = view.get("type").text()
+    if kind == "perspective":
+        data.type, data.angle = "PERSP", math.radians(view.get("fov_y_degrees").number())
+    elif kind == "orthographic":
+        data.type, data.ortho_scale = "ORTHO", view.get("height").number()
+    else:
+        raise view.get("type").error("perspective or orthographic")
+    position = view.get("position").vector()
+    direction = view.get("look_at").vector() - position
+    if direction.length == 0:
+        raise view.get("look_at").error("another point than the camera's position")
+    # No clipping worth the name: the reference renderer has none.
+    data.clip_start, data.clip_end = 1e-4, 1e6
+    up = view.get("up").vector() if view.has("up") else None
+    scene.camera = _link(scene, "Camera", data, _aimed(position, direction, up))
+
+
+def _light(scene, index, view):
+    kind = view.get("type").text()
+    types = {"point": "POINT", "sun": "SUN", "area": "AREA", "disk": "AREA"}
+    if kind not in types:
+        raise view.get("type").error(f"one of {', '.join(types)}")
+    data = bpy.data.lights.new(f"{kind}{index}", types[kind])
+    data.use_shadow = True
+    data.color = view.color_or("color", [1.0] * 3)
+    position, direction = Vector(), Vector((0, 0, -1))
+    if kind != "sun":
+        position = view.get("position").vector()
+        data.energy = view.get("power").number()
+    if kind != "point":
+        direction = view.get("direction").vector()
+    if kind == "point":
+        data.shadow_soft_size = view.number_or("radius", 0.0)
+        data.use_soft_falloff = False  # a sphere of light, not Blender's softened one
+    elif kind == "sun":
+        data.energy = view.get("irradiance").number()
+        data.angle = math.radians(view.number_or("angle_degrees", 0.0))
+    else:
+        size = view.get("size")
+        sizes = size.numbers(2) if isinstance(size.value, list) else [size.number()] * 2
+        data.shape = "RECTANGLE" if kind == "area" else "ELLIPSE"  # size: diameters
+        data.size, data.size_y = sizes
+    up = view.get("up").vector() if view.has("up") else None
+    lamp = _link(scene, f"{kind}{index}", data, _aimed(position, direction, up))
+    lamp.visible_camera = view.flag("camera_visible")
+
+
+def _load_image(path, space="auto"):
+    """The picture; `auto`: floats are linear, integers sRGB, as in the reference renderer."""
+    image = bpy.data.images.load(str(path), check_existing=True)
+    linear = image.is_float if space == "auto" else space == "linear"
+    image.colorspace_settings.name = "Non-Color" if linear else "sRGB"
+    return image
+
+
+def _image_node(tree, image):
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    node.interpolation, node.extension = "Linear", "REPEAT"
+    return node
+
+
+def _environment(scene, view):
+    world = bpy.data.worlds.new("World")
+    scene.world = world
+    if world.node_tree is None:
+        world.use_nodes = True
+    tree = world.node_tree
+    tree.nodes.clear()
+    background = tree.nodes.new("ShaderNodeBackground")
+    output = tree.nodes.new("ShaderNodeOutputWorld")
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    background.inputs["Color"].default_value = (0, 0, 0, 1)
+    if view is None:
+        return
+    background.inputs["Strength"].default_value = view.number_or("strength", 1.0)
+    if view.has("image"):
+        picture = tree.nodes.new("ShaderNodeTexEnvironment")
+        picture.image = _load_image(view.get("image").file_path())
+        picture.interpolation = "Linear"
+        tree.links.new(picture.outputs["Color"], background.inputs["Color"])
+        # As fine as the picture; the automatic choice spends seconds on a map of 4096 x 2048.
+        world.cycles.sampling_method = "MANUAL"
+        world.cycles.sample_map_resolution = min(max(picture.image.size[0], 256), 4096)
+    elif view.has("color"):
+        background.inputs["Color"].default_value = (*view.color_or("color", [0.0] * 3), 1.0)
+    else:
+        raise view.error("an environment with color or image; resolve the scene first")
+
+
+def _exponents(values):
+    """A Phong exponent along and across the tangent for Blender's Glossy node."""
+    for u, v in (("nu", "nv"), ("e", "e"), ("n", "n")):
+        if u in values and v in values:
+            return values[u], values[v]
+    return 0.0, 0.0
+
+
+def glossy_material(name, values):
+    """A material of Blender's own Glossy node, as like a model's values as it can be.
+
+    It is the yardstick for run times, and the same node that artists have without the extension.
+    Exponents n become the roughness of Ashikhmin and Shirley's distribution, (2 / (n + 2))^(1/4).
+    """
+    material = bpy.data.materials.new(f"{name} (Glossy)")
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node = tree.nodes.new("ShaderNodeBsdfAnisotropic")
+    node.distribution = "ASHIKHMIN_SHIRLEY"
+    color = next((v for v in values.values() if isinstance(v, tuple)), (0.8, 0.8, 0.8))
+    node.inputs["Color"].default_value = (*color, 1.0)
+    nu, nv = (float(n) if isinstance(n, int | float) else 100.0 for n in _exponents(values))
+    ax, ay = (math.sqrt(2 / (n + 2)) for n in (nu, nv))
+    # Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the other way round below 0.
+    node.inputs["Roughness"].default_value = (ax * ay) ** 0.25
+    ratio = math.sqrt(ax / ay)
+    node.inputs["Anisotropy"].default_value = 1 - ratio if ratio <= 1 else 1 / ratio - 1
+    if nu != nv:
+        # The frame of this project: the object's z axis along the surface.
+        axis = tree.nodes.new("ShaderNodeVectorTransform")
+        axis.vector_type, axis.convert_from, axis.convert_to = "VECTOR", "OBJECT", "WORLD"
+        axis.inputs["Vector"].default_value = (0, 0, 1)
+        tree.links.new(axis.outputs[0], node.inputs["Tangent"])
+        node.inputs["Rotation"].default_value = values.get("rotation", 0.0) / (2 * math.pi)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def _texture(view):
+    if not isinstance(view.value, dict):
+        return _load_image(view.file_path())
+    if not view.has("image"):
+        raise view.error("a file or an image; resolve the scene first")
+    space = view.get("colorspace").text() if view.has("colorspace") else "auto"
+    if space not in {"auto", "linear", "srgb"}:
+        raise view.get("colorspace").error("auto, linear or srgb")
+    return _load_image(view.get("image").file_path(), space)
+
+
+def _material(name, view, representation):
+    model = view.get("model").text()
+    if model not in pack.model_names():
+        raise view.get("model").error(f"one of {', '.join(pack.model_names())}")
+    values, textures = {}, {}
+    if view.has("parameters"):
+        for key, parameter in view.get("parameters").items():
+            if isinstance(parameter.value, dict):
+                textures[key] = _texture(parameter.get("texture"))
+            else:
+                try:
+                    values[key] = pack.check_value(model, key, parameter.value)
+                except ValueError as error:
+                    raise ValueError(f"{view.file}: {parameter.path}: {error}") from error
+    defaults = {p["name"]: p["default"] for p in pack.parameters(model).values()}
+    defaults = {k: tuple(v) if isinstance(v, list) else v for k, v in defaults.items()}
+    if representation is None:
+        representation = view.get("representation").text() if view.has("representation") else "auto"
+    if representation == GLOSSY:
+        material = glossy_material(name, defaults | values)
+        node = material.node_tree.nodes["Glossy BSDF"]
+        colors = [k for k, p in pack.parameters(model).items() if p["kind"] == "color"]
+        targets = {colors[0]: node.inputs["Color"]} if colors else {}
+    else:
+        if view.has("lobes") and pack.representation(model, representation).get("lobes"):
+            values["lobes"] = view.get("lobes").value
+        try:
+            material = api.new_material(model, representation, **values)
+        except ValueError as error:
+            raise ValueError(f"{view.file}: {view.path}: {error}") from error
+        node = nodes.group_nodes(material)[0]
+        targets = nodes.sockets(node)
+        unknown = set(textures) - set(targets)
+        if unknown:
+            raise view.error(f"no texture for {', '.join(sorted(unknown))}")
+    material.name = name
+    for key, image in textures.items():
+        if key in targets:
+            picture = _image_node(material.node_tree, image)
+            material.node_tree.links.new(picture.outputs["Color"], targets[key])
+    return material
+
+
+def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
+    """Settings under which Cycles computes the light transport integral, and nothing else.
+
+    Linear float EXR, samples spread evenly over the square of a pixel, OSL on the CPU; no filter
+    glossy, clamping, denoising, adaptive sampling, light threshold, guiding or approximation.
+    """
+    api.enable_osl(scene)
+    cycles = scene.cycles
+    settings = {
+        "device": "CPU",
+        "samples": samples,
+        "seed": seed,
+        "use_animated_seed": False,
+        "use_adaptive_sampling": False,
+        "use_denoising": False,
+        "time_limit": 0.0,
+        "pixel_filter_type": "BOX",
+        "blur_glossy": 0.0,
+        "caustics_reflective": True,
+        "caustics_refractive": True,
+        "sample_clamp_direct": 0.0,
+        "sample_clamp_indirect": 0.0,
+        "light_sampling_threshold": 0.0,
+        "use_fast_gi": False,
+        "use_guiding": False,
+        "max_bounces": max_bounces,
+        "diffuse_bounces": max_bounces,
+        "glossy_bounces": max_bounces,
+        "transmission_bounces": max_bounces,
+        "transparent_max_bounces": max_bounces,
+        "min_light_bounces": 0,
+        "min_transparent_bounces": 0,
+        "film_exposure": 1.0,
+        "auto_scrambling_distance": False,
+        "scrambling_distance": 1.0,
+    }
+    for name, value in settings.items():
+        setattr(cycles, name, value)
+    render = scene.render
+    render.use_motion_blur = False
+    render.use_simplify = False
+    render.dither_intensity = 0
+    render.film_transparent = False
+    render.use_compositing = render.use_sequencer = False
+    render.resolution_percentage = 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1
+    render.image_settings.file_format = "OPEN_EXR"
+    render.image_settings.color_mode = "RGBA"
+    render.image_settings.color_depth = "32"
+    render.image_settings.exr_codec = "ZIP"
+    view = scene.view_settings
+    view.view_transform, view.look, view.exposure, view.gamma = "Raw", "None", 0.0, 1.0
+
+
+def load_scene(path, representation=None, name=None):
+    """Makes a scene with clean settings from a resolved scene file, and makes it the active one.
+
+    `representation` overrides that of every material: auto, exact, sampled, or "glossy" for
+    Blender's own Glossy node. Returns the bpy scene. Raises ValueError naming file and key.
+    """
+    path = Path(path)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise ValueError(f"{path}: not JSON: {error}") from error
+    view = _View(data, str(path))
+    scene = bpy.data.scenes.new(
+        name or (view.get("name").text() if view.has("name") else path.stem)
+    )
+    if bpy.context.window is not None:
+        bpy.context.window.scene = scene
+
+    settings = view.get("settings")
+    apply_clean_settings(
+        scene,
+        samples=int(settings.number_or("spp", 64)),
+        seed=int(settings.number_or("seed", 1)),
+        max_bounces=int(settings.number_or("max_bounces", 8)),
+    )
+    scene.render.resolution_x = int(settings.get("width").number())
+    scene.render.resolution_y = int(settings.get("height").number())
+
+    _camera(scene, view.get("camera"))
+    materials = {
+        key: _material(key, entry, representation) for key, entry in view.get("materials").items()
+    }
+    for index, entry in view.get("objects").items():
+        shape = entry.get("shape")
+        if shape.get("type").text() != "mesh" or not shape.has("vertices"):
+            raise shape.error("a mesh of arrays; resolve the scene first")
+        vertices = _array(shape.get("vertices"), 3)
+        triangles = _array(shape.get("triangles"), 3)
+        if triangles.min() < 0 or triangles.max() >= len(vertices):
+            raise shape.get("triangles").error(f"indices from 0 to {len(vertices) - 1}")
+        extra = {
+            key: _array(shape.get(key), columns) if shape.has(key) else None
+            for key, columns in (("normals", 3), ("uvs", 2))
+        }
+        for key, array in extra.items():
+            if array is not None and len(array) != len(vertices):
+                raise shape.get(key).error(f"{len(vertices)} rows, one a vertex")
+        label = entry.get("name").text() if entry.has("name") else f"object{index}"
+        mesh = build_mesh(label, vertices, triangles, **extra)
+        material = entry.get("material").text()
+        if material not in materials:
+            raise entry.get("material").error(f"one of {', '.join(materials)}")
+        mesh.materials.append(materials[material])
+        item = _link(scene, label, mesh, _transform(entry))
+        if entry.flag("camera_only"):
+            for ray in ("diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+                setattr(item, f"visible_{ray}", False)
+    if view.has("lights"):
+        for index, entry in view.get("lights").items():
+            _light(scene, index, entry)
+    _environment(scene, view.get("environment") if view.has("environment") else None)
+    bpy.context.view_layer.update()
+    return scene

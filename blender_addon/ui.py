@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Menus and panels."""
+
+import math
+
+import bpy
+from bpy.types import Menu, Panel
+
+from . import checks, energy, nodes, pack
+
+_WRAP = 46  # characters of a panel's line; Blender does not wrap labels
+
+
+def _wrapped(layout, text, icon="NONE"):
+    """A label over several lines."""
+    line = ""
+    for word in text.split():
+        if line and len(line) + len(word) + 1 > _WRAP:
+            layout.label(text=line, icon=icon)
+            line, icon = "", "BLANK1" if icon != "NONE" else "NONE"
+        line = f"{line} {word}".strip()
+    layout.label(text=line, icon=icon)
+
+
+def _draw_models(layout, operator):
+    for name in pack.model_names():
+        button = layout.operator(operator, text=pack.model(name)["label"])
+        button.model = name
+        button.representation = "auto"
+
+
+class NODE_MT_brdfc(Menu):
+    bl_idname = "NODE_MT_brdfc"
+    bl_label = "brdfc"
+
+    def draw(self, context):
+        _draw_models(self.layout, "brdfc.add_node")
+
+
+class MATERIAL_MT_brdfc(Menu):
+    bl_idname = "MATERIAL_MT_brdfc"
+    bl_label = "New Reflection Model"
+
+    def draw(self, context):
+        _draw_models(self.layout, "brdfc.new_material")
+
+
+def draw_add_menu(self, context):
+    self.layout.separator()
+    self.layout.menu(NODE_MT_brdfc.bl_idname)
+
+
+def draw_material_menu(self, context):
+    self.layout.menu(MATERIAL_MT_brdfc.bl_idname, icon="SHADING_RENDERED")
+
+
+def error_text(entry):
+    """The measured error of a representation in a few words."""
+    error = entry["error"]
+    parts = []
+    if error.get("relative_l1") is not None:
+        parts.append(f"L1 {error['relative_l1']:.2g}")
+    if error.get("albedo") is not None:
+        parts.append(f"albedo {error['albedo']:.2g}")
+    if error.get("note"):
+        parts.append(error["note"])
+    return ", ".join(parts) or "not measured"
+
+
+def cost_text(entry):
+    """Render time of a representation in units of Blender's Glossy node."""
+    cost = entry.get("cost")
+    return "not measured" if cost is None else f"{cost:.2f} x Glossy"
+
+
+#: View angles in degrees at which the panel shows energy.
+ANGLES = (0, 45, 75, 85)
+
+
+def energy_text(node):
+    """Directional albedo for the current values at a few view angles, or why there is none."""
+    model_name, _ = nodes.identity(node)
+    values = {}
+    for name, parameter in pack.parameters(model_name).items():
+        value = nodes.get_value(node, name)
+        if value is None:
+            return f"depends on what is linked to {parameter['label']}"
+        values[name] = value
+    numbers = []
+    for angle in ANGLES:
+        rgb = energy.albedo(model_name, values, math.cos(math.radians(angle)))
+        luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+        numbers.append(f"{angle}\u00b0 {luminance:.3f}")
+    return "   ".join(numbers)
+
+
+def _draw_form(layout, node, editable):
+    model_name, representation = nodes.identity(node)
+    entry = pack.model(model_name)
+    row = layout.row(align=True)
+    row.enabled = editable
+    for name in entry["representations"]:
+        button = row.operator(
+            "brdfc.switch", text=name.capitalize(), depress=name == representation
+        )
+        button.node, button.representation = node.name, name
+    form = entry["representations"][representation]
+    column = layout.column(align=True)
+    _wrapped(column, f"Error: {error_text(form)}")
+    _wrapped(column, f"Cost: {cost_text(form)}")
+    if form.get("closures"):
+        _wrapped(column, f"Closures: {form['closures']}")
+    if entry.get("albedo"):
+        _wrapped(column, f"Albedo: {energy_text(node)}")
+
+
+def _draw_values(layout, node):
+    column = layout.column()
+    column.use_property_split = True
+    for socket in nodes.sockets(node).values():
+        if socket.type != "VECTOR":
+            row = column.row()
+            row.enabled = not socket.is_linked
+            row.prop(socket, "default_value", text=socket.name)
+
+
+def draw_node(layout, node, material, editable=True):
+    """Model, form, error, cost, energy and values of one group node."""
+    model_name, representation = nodes.identity(node)
+    layout.label(text=node.label or node.name, icon="MATERIAL")
+    if nodes.is_current(node):
+        entry = pack.model(model_name)
+        _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
+        _draw_form(layout, node, editable)
+    else:
+        button = layout.operator("brdfc.switch", text="Update", icon="FILE_REFRESH")
+        button.node, button.representation = node.name, representation
+    _draw_values(layout, node)
+
+
+def draw_warnings(layout, material, scene):
+    """The findings for a material, with buttons that mend what can be mended."""
+    found = checks.warnings(material, scene)
+    codes = {f.code for f in found}
+    for finding in found:
+        row = layout.column(align=True)
+        row.alert = finding.severity == "ERROR"
+        _wrapped(row, finding.message, "ERROR" if finding.severity == "ERROR" else "INFO")
+    if codes & {"osl_off", "engine", "device"}:
+        layout.operator("brdfc.enable_osl", icon="CHECKMARK")
+    if "bump_correction" in codes:
+        layout.operator("brdfc.fix_material", icon="CHECKMARK")
+    return found
+
+
+def draw_material(layout, material, scene):
+    """Everything the panels show for a material."""
+    draw_warnings(layout, material, scene)
+    for node in nodes.group_nodes(material):
+        draw_node(layout.box(), node, material)
+
+
+class _BrdfcPanel:
+    bl_label = "Reflection Model"
+
+    def draw(self, context):
+        try:
+            draw_material(self.layout, context.object.active_material, context.scene)
+        except pack.PackError as error:
+            _wrapped(self.layout, str(error), "ERROR")
+
+
+def _has_ours(context):
+    material = getattr(context.object, "active_material", None)
+    return material is not None and bool(nodes.group_nodes(material))
+
+
+class MATERIAL_PT_brdfc(_BrdfcPanel, Panel):
+    bl_idname = "MATERIAL_PT_brdfc"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "material"
+
+    @classmethod
+    def poll(cls, context):
+        return _has_ours(context)
+
+
+class NODE_PT_brdfc(_BrdfcPanel, Panel):
+    bl_idname = "NODE_PT_brdfc"
+    bl_space_type = "NODE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "brdfc"
+
+    @classmethod
+    def poll(cls, context):
+        return context.space_data.tree_type == "ShaderNodeTree" and _has_ours(context)
+
+
+_CLASSES = (NODE_MT_brdfc, MATERIAL_MT_brdfc, MATERIAL_PT_brdfc, NODE_PT_brdfc)
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+_MENUS = (
+    ("NODE_MT_category_shader_shader", draw_add_menu),
+    ("MATERIAL_MT_context_menu", draw_material_menu),
+)
+
+
+def register():
+    _register()
+    for menu, draw in _MENUS:
+        getattr(bpy.types, menu).append(draw)
+
+
+def unregister():
+    for menu, draw in reversed(_MENUS):
+        getattr(bpy.types, menu).remove(draw)
+    _unregister()

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Directional-hemispherical reflectance by quadrature, from the model's own eval() and sample().
+//
+// Nothing is clamped: a value that is NaN, infinite or negative is a ValueError that names model, parameters,
+// directions and value.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "analysis/cubature.h"
+#include "model/model.h"
+
+namespace brdfc {
+
+/// A model bound to parameters in double precision, with the text that names both in messages.
+struct BoundModel {
+  const Model* model = nullptr;
+  ParamValues values;  ///< complete
+  std::unique_ptr<Brdf<double>> brdf;
+  std::string label;  ///< "coupled r0=0.05 ..."
+};
+/// Throws InputError for inadmissible values.
+BoundModel bind_model(const Model&, const ParamValues&);
+
+/// Unit vector with z = cos_theta (0 < cos_theta <= 1) and azimuth phi from the tangent.
+Vec3<double> direction(double cos_theta, double phi);
+
+/// Throws ValueError unless every component is finite and >= 0. `what` is "f", "pdf", ...
+void require_value(const Rgb<double>& value, const char* what, const std::string& label, const Vec3<double>& wi,
+                   const Vec3<double>& wo);
+void require_value(double value, const char* what, const std::string& label, const Vec3<double>& wi,
+                   const Vec3<double>& wo);
+
+/// Low-discrepancy points in [0, 1)^3: additive recurrence on the powers of the plastic number's sister in three
+/// dimensions (root of x^4 = x + 1), shifted by numbers drawn from the seed.
+class Sequence3 {
+ public:
+  explicit Sequence3(std::uint64_t seed);
+  Vec3<double> next();
+
+ private:
+  Vec3<double> state_;
+};
+
+/// The same in [0, 1)^2, on the plastic number.
+class Sequence2 {
+ public:
+  explicit Sequence2(std::uint64_t seed);
+  Point2 next();
+
+ private:
+  Point2 state_;
+};
+
+/// Where in the hemisphere a model's samples fall: cells for a cubature over (theta, phi - phi_o), coordinates in which
+/// smooth functions of the direction are smooth up to the pole.
+class Guides {
+ public:
+  /// `each` samples a lobe.
+  Guides(const Brdf<double>&, const Vec3<double>& wo, int each);
+  /// theta in [0, pi], phi in [0, 2 pi) from the azimuth of wo; the mirror direction has phi = pi.
+  Point2 angles(const Vec3<double>& wi) const;
+  Vec3<double> direction_at(double theta, double phi) const;
+  /// Cells that cover the rectangle, cut at the mirror direction and small where samples crowd.
+  std::vector<Rect> cells(const Rect&, std::size_t most) const;
+
+ private:
+  double sin_o_, theta_o_, cos_phi_, sin_phi_;
+  std::vector<std::vector<Point2>> lobes_;
+};
+
+/// Integral over wi in the upper hemisphere, in solid angle. `guide` says by its samples where to look first, so that
+/// a peak is found though it be far narrower than the distance of the rule's nodes. `integrand` writes `components`
+/// numbers.
+CubatureResult integrate_hemisphere(const Brdf<double>& guide, const Vec3<double>& wo, std::size_t components,
+                                    const std::function<void(const Vec3<double>& wi, double*)>& integrand,
+                                    const CubatureOptions&, int guides = 512);
+
+struct AlbedoOptions {
+  double absolute = 1e-8;   ///< aim for the error of each component
+  int max_cells = 10000;    ///< of one cubature
+  int witnesses = 1 << 17;  ///< samples a lobe that judge, where two cubatures differ
+};
+
+struct Albedo {
+  Rgb<double> scattered;  ///< integral of f cos(theta_i) over wi
+  Rgb<double> mirror;     ///< weight of ideal reflection
+  double error = 0;       ///< of `scattered`: estimate, largest component
+  Rgb<double> total() const { return scattered + mirror; }
+};
+/// Albedo for a view direction with 0 < cos_theta_o <= 1. Two cubatures that fail in different places are compared:
+/// one over directions (poor at ridges that are thin and curved), one over the random numbers of sample() (poor at a
+/// narrow lobe seen through the samples of a wide one). Where they differ they are refined, and finally judged by
+/// sampled_albedo(); what then remains between them is the error reported.
+Albedo albedo(const Brdf<double>&, double cos_theta_o, double phi_o = 0, const std::string& label = "",
+              const AlbedoOptions& = {});
+
+struct MeanAlbedo {
+  std::vector<Rgb<double>> scattered, mirror;  ///< of each model
+  double error = 0;                            ///< standard error, largest component
+};
+/// Albedos of several models, averaged over the azimuth of the view direction if `phi_o` is not given, by a
+/// low-discrepancy mean over the samples of `guide`, which must reach every direction where one of the models is not 0.
+/// `count` samples a lobe, in four shifted copies. Quick, and equally good for peaks and ridges: for tables.
+MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<double>*>& models, double cos_theta_o,
+                        std::optional<double> phi_o, const std::string& label, int count, std::uint64_t seed = 0);
+
+struct SampledAlbedo {
+  Rgb<double> scattered;      ///< mean weight of sample()
+  double standard_error = 0;  ///< of its mean, largest component, from independent shifts of the sequence
+  double lost = 0;            ///< fraction of samples with pdf 0 (below the horizon)
+  double lost_error = 0;      ///< standard error of it
+};
+/// Mean weight over low-discrepancy points, `count` in all.
+SampledAlbedo sampled_albedo(const Brdf<double>&, double cos_theta_o, double phi_o = 0, const std::string& label = "",
+                             int count = 1 << 15);
+
+}  // namespace brdfc

@@ -1,0 +1,688 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "analysis/albedo_table.h"
+
+#include <OpenImageIO/imageio.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+
+#include "analysis/albedo.h"
+
+namespace brdfc {
+namespace {
+
+// Below this cosine the end of the axis serves: a view direction within 0.06 degrees of the horizon.
+constexpr double kMinCos = 1e-3;
+// Interpolation is refined until its estimated error is below this, or the grid holds kMaxPoints.
+constexpr double kAimError = 3e-4;
+constexpr std::size_t kMaxPoints = 6000;
+// Two albedos that differ by less, and by less than seven times their own error, count as equal while axes are sought.
+constexpr double kSame = 1e-4;
+
+// Samples a lobe: of a knot, and where a table is proved. Measured on the models here, errors are about 2e-4 and 2e-5.
+constexpr int kGridSamples = 1024;
+constexpr int kProofSamples = 1 << 13;
+// Neighbouring knots use the same samples, so that their errors go together: this share of them does not.
+constexpr double kProfileNoise = 0.05;
+constexpr AlbedoOptions kProofOptions{.absolute = 1e-6, .max_cells = 2000, .witnesses = 1 << 15};
+/// Averaged over the azimuth of the view direction.
+constexpr std::nullopt_t kAllAzimuths = std::nullopt;
+
+double to_scale(AxisScale s, double x) {
+  return s == AxisScale::Log ? std::log(x) : s == AxisScale::Log1p ? std::log1p(x) : x;
+}
+double from_scale(AxisScale s, double x) {
+  return s == AxisScale::Log ? std::exp(x) : s == AxisScale::Log1p ? std::expm1(x) : x;
+}
+
+/// A coordinate of the albedo: the view cosine or a Number parameter.
+struct Coordinate {
+  std::string name;
+  AxisScale scale = AxisScale::Linear;
+  double min = 0, max = 1;
+
+  /// t in [0, 1] to a value, uniform on the scale; the cosine crowds towards grazing, where albedos bend most.
+  double at(double t) const {
+    if (name == "cos_theta_o") return min + (max - min) * t * t;
+    if (t <= 0) return min;
+    if (t >= 1) return max;
+    return std::clamp(from_scale(scale, to_scale(scale, min) + t * (to_scale(scale, max) - to_scale(scale, min))), min,
+                      max);
+  }
+};
+
+Coordinate coordinate(const ParamInfo& p) {
+  Coordinate c{p.name, AxisScale::Linear, p.min, p.max};
+  // A range over more than two decades is looked at by factors, not by differences.
+  if (p.min > 0 && p.max / p.min > 100)
+    c.scale = AxisScale::Log;
+  else if (p.min >= 0 && p.max > 100)
+    c.scale = AxisScale::Log1p;
+  return c;
+}
+
+/// Coefficients of the polynomial in the colours: index = bits of the colours in the monomial.
+struct Coefficients {
+  std::vector<Rgb<double>> scattered, mirror;
+  double error = 0;  // of each coefficient, one standard error
+};
+
+double max_abs(const Rgb<double>& c) { return std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
+
+class Tabulator {
+ public:
+  explicit Tabulator(const Model& model) : model_(model) {
+    coordinates_.push_back({"cos_theta_o", AxisScale::Linear, kMinCos, 1});
+    std::vector<const ParamInfo*> choices;
+    for (const ParamInfo& p : model.info().params) {
+      if (p.kind == ParamKind::Number) coordinates_.push_back(coordinate(p));
+      if (p.kind == ParamKind::Color) colors_.push_back(p.name);
+      if (p.kind == ParamKind::Choice) choices.push_back(&p);
+    }
+    if (colors_.size() > 5)
+      throw ValueError(
+          fmt::format("{}: expected at most 5 colours in an albedo table, got {}", model.info().name, colors_.size()));
+    table_.model = model.info().name;
+    combinations_.push_back({});
+    for (const ParamInfo* p : choices) {
+      table_.choices.push_back(p->name);
+      table_.choice_sizes.push_back(int(p->choices.size()));
+      std::vector<ParamValues> longer;
+      for (const ParamValues& c : combinations_)
+        for (const std::string& text : p->choices) {
+          longer.push_back(c);
+          longer.back()[p->name] = text;
+        }
+      combinations_ = std::move(longer);
+    }
+  }
+
+  AlbedoTable run() {
+    study_azimuth();
+    make_probes();
+    for (const ParamValues& combination : combinations_) add_terms(combination);
+    prove();
+    describe();
+    return std::move(table_);
+  }
+
+ private:
+  using Position = std::vector<double>;  // values of coordinates_
+
+  ParamValues values_at(const ParamValues& combination, const Position& x) const {
+    ParamValues v = combination;
+    for (std::size_t i = 1; i < coordinates_.size(); ++i) v[coordinates_[i].name] = x[i];
+    return v;
+  }
+
+  std::string label(const ParamValues& v) const {
+    return fmt::format("{} {}", model_.info().name, format_values(model_.info(), complete(model_.info(), v)));
+  }
+
+  Coefficients coefficients(const ParamValues& combination, const Position& x, std::optional<double> phi,
+                            int samples = kGridSamples, std::uint64_t seed = 0) const {
+    ParamValues values = values_at(combination, x);
+    for (const std::string& c : colors_) values[c] = 0.5;
+    const auto guide = model_.make_double(values);
+    const std::size_t corners = std::size_t(1) << colors_.size();
+    std::vector<std::unique_ptr<Brdf<double>>> models;
+    std::vector<const Brdf<double>*> pointers;
+    for (std::size_t bits = 0; bits < corners; ++bits) {
+      for (std::size_t c = 0; c < colors_.size(); ++c) values[colors_[c]] = double(bits >> c & 1);
+      models.push_back(model_.make_double(values));
+      pointers.push_back(models.back().get());
+    }
+    const std::string name = label(values_at(combination, x)) + " (colours 0, 0.5 or 1)";
+    if (!depends_on_azimuth_ && !phi) phi = 0;
+    const MeanAlbedo mean = mean_albedos(*guide, pointers, x[0], phi, name, samples, seed);
+    Coefficients out{mean.scattered, mean.mirror, mean.error * double(corners)};
+    // From values at the corners to coefficients of the monomials.
+    for (std::size_t c = 0; c < colors_.size(); ++c)
+      for (std::size_t k = 0; k < corners; ++k)
+        if (k >> c & 1) {
+          const std::size_t without = k & ~(std::size_t(1) << c);
+          out.scattered[k] = out.scattered[k] - out.scattered[without];
+          out.mirror[k] = out.mirror[k] - out.mirror[without];
+        }
+    return out;
+  }
+
+  static double distance(const Coefficients& a, const Coefficients& b) {
+    double d = 0;
+    for (std::size_t k = 0; k < a.scattered.size(); ++k)
+      d = std::max({d, max_abs(a.scattered[k] - b.scattered[k]), max_abs(a.mirror[k] - b.mirror[k])});
+    return d;
+  }
+  static bool differ(const Coefficients& a, const Coefficients& b) {
+    return distance(a, b) > kSame + 7 * (a.error + b.error);
+  }
+
+  Position random_position(std::mt19937_64& random) const {
+    std::uniform_real_distribution<double> uniform;
+    Position x;
+    for (const Coordinate& c : coordinates_) x.push_back(c.at(uniform(random)));
+    return x;
+  }
+
+  /// Finds out whether the albedo depends on the azimuth, and which numbers do nothing but turn it.
+  void study_azimuth() {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> angle(0, 2 * kPi);
+    struct Case {
+      ParamValues combination;
+      Position x;
+      double phi, turn;
+    };
+    std::vector<Case> cases;
+    for (const ParamValues& c : combinations_)
+      for (int i = 0; i < 6; ++i) {
+        const Position x = random_position(random);
+        const double phi = angle(random);
+        cases.push_back({c, x, phi, 0.1 + angle(random) / 8});
+      }
+    std::vector<Coefficients> base(cases.size());
+    depends_on_azimuth_ = true;
+    for_all(cases.size(),
+            [&](std::size_t i) { base[i] = coefficients(cases[i].combination, cases[i].x, cases[i].phi); });
+    const auto all_equal = [&](const std::function<Coefficients(const Case&)>& variant) {
+      std::vector<char> same(cases.size());
+      for_all(cases.size(), [&](std::size_t i) { same[i] = !differ(base[i], variant(cases[i])); });
+      return std::all_of(same.begin(), same.end(), [](char s) { return s; });
+    };
+    if (all_equal([&](const Case& c) { return coefficients(c.combination, c.x, c.phi + c.turn); })) {
+      depends_on_azimuth_ = false;
+      return;
+    }
+    turns_.assign(coordinates_.size(), false);
+    for (std::size_t p = 1; p < coordinates_.size(); ++p) {
+      if (coordinates_[p].max - coordinates_[p].min < 1) continue;
+      // The same samples in the turned frame: equal up to rounding, if it is a turn.
+      turns_[p] = all_equal([&](const Case& c) {
+        Position x = c.x;
+        const double sign = x[p] + c.turn <= coordinates_[p].max ? 1 : -1;
+        x[p] += sign * c.turn;
+        return coefficients(c.combination, x, c.phi + sign * c.turn);
+      });
+    }
+  }
+
+  void freeze_turns(Position& x) const {
+    if (turns_.empty()) return;
+    for (std::size_t p = 1; p < coordinates_.size(); ++p)
+      if (turns_[p]) x[p] = model_.info().param(coordinates_[p].name)->value[0];
+  }
+
+  template <class F> static void for_all(std::size_t n, const F& f) { tbb::parallel_for(std::size_t(0), n, f); }
+
+  void make_probes() {
+    std::mt19937_64 random(7);
+    Position defaults{0.5};
+    for (std::size_t i = 1; i < coordinates_.size(); ++i)
+      defaults.push_back(model_.info().param(coordinates_[i].name)->value[0]);
+    probes_.push_back(defaults);
+    for (int i = 0; i < 7; ++i) probes_.push_back(random_position(random));
+    for (Position& x : probes_) freeze_turns(x);
+  }
+
+  struct NewTerm {
+    bool mirror;
+    std::size_t bits;
+    std::vector<std::size_t> axes;
+  };
+
+  Rgb<double> pick(const Coefficients& c, const NewTerm& t) const {
+    return t.mirror ? c.mirror[t.bits] : c.scattered[t.bits];
+  }
+
+  void add_terms(const ParamValues& combination) {
+    // Coefficients at the probes, and along each coordinate through each of them.
+    constexpr int kSteps = 4;
+    std::vector<Coefficients> at_probe(probes_.size());
+    for_all(probes_.size(), [&](std::size_t i) { at_probe[i] = coefficients(combination, probes_[i], kAllAzimuths); });
+
+    std::vector<NewTerm> wanted;
+    const std::size_t corners = at_probe[0].scattered.size();
+    for (int mirror = 0; mirror < 2; ++mirror)
+      for (std::size_t bits = 0; bits < corners; ++bits) wanted.push_back({mirror == 1, bits, {}});
+    std::erase_if(wanted, [&](const NewTerm& t) {
+      for (const Coefficients& c : at_probe)
+        if (max_abs(pick(c, t)) > 1e-9 + 7 * c.error) return false;
+      return true;
+    });
+
+    std::vector<AlbedoTerm> terms;
+    std::vector<NewTerm> missing;
+    for (const NewTerm& t : wanted) {
+      const int shared = find_shared(t, at_probe);
+      if (shared >= 0)
+        terms.push_back({t.mirror, color_names(t.bits), shared});
+      else
+        missing.push_back(t);
+    }
+    if (!missing.empty()) {
+      std::vector<std::vector<char>> depends(missing.size(), std::vector<char>(coordinates_.size(), 0));
+      std::mutex mutex;
+      for_all(probes_.size() * coordinates_.size() * kSteps, [&](std::size_t job) {
+        const std::size_t step = job % kSteps, p = job / kSteps % coordinates_.size(),
+                          i = job / kSteps / coordinates_.size();
+        if (!turns_.empty() && turns_[p]) return;
+        Position x = probes_[i];
+        x[p] = coordinates_[p].at(double(step) / (kSteps - 1));
+        const Coefficients c = coefficients(combination, x, kAllAzimuths);
+        const std::lock_guard lock(mutex);
+        for (std::size_t t = 0; t < missing.size(); ++t)
+          if (max_abs(pick(c, missing[t]) - pick(at_probe[i], missing[t])) > kSame + 7 * (c.error + at_probe[i].error))
+            depends[t][p] = 1;
+      });
+      for (std::size_t t = 0; t < missing.size(); ++t)
+        for (std::size_t p = 0; p < coordinates_.size(); ++p)
+          if (depends[t][p]) missing[t].axes.push_back(p);
+      while (!missing.empty()) {
+        std::vector<NewTerm> group, rest;
+        for (const NewTerm& t : missing) (t.axes == missing[0].axes ? group : rest).push_back(t);
+        const std::vector<int> grids = tabulate(combination, group, at_probe);
+        for (std::size_t i = 0; i < group.size(); ++i)
+          terms.push_back({group[i].mirror, color_names(group[i].bits), grids[i]});
+        missing = std::move(rest);
+      }
+    }
+    table_.terms.push_back(std::move(terms));
+  }
+
+  std::vector<std::string> color_names(std::size_t bits) const {
+    std::vector<std::string> names;
+    for (std::size_t c = 0; c < colors_.size(); ++c)
+      if (bits >> c & 1) names.push_back(colors_[c]);
+    return names;
+  }
+
+  /// A grid that has this coefficient's values at every probe, or -1.
+  int find_shared(const NewTerm& t, const std::vector<Coefficients>& at_probe) const {
+    for (std::size_t g = 0; g < signatures_.size(); ++g) {
+      bool same = true;
+      for (std::size_t i = 0; i < at_probe.size(); ++i)
+        same = same && max_abs(pick(at_probe[i], t) - signatures_[g][i]) <= kSame + 14 * at_probe[i].error;
+      if (same) return int(g);
+    }
+    return -1;
+  }
+
+  /// One grid per term of the group, all on the same knots.
+  std::vector<int> tabulate(const ParamValues& combination, const std::vector<NewTerm>& group,
+                            const std::vector<Coefficients>& at_probe) {
+    const std::vector<std::size_t>& axes = group[0].axes;
+    const std::vector<TableAxis> knots = place_knots(combination, group);
+    std::size_t points = 1;
+    for (const TableAxis& a : knots) points *= a.values.size();
+    const int samples = int(std::clamp<std::size_t>((std::size_t(1) << 22) / points, kGridSamples, 1 << 14));
+    std::vector<std::vector<Rgb<double>>> values(group.size(), std::vector<Rgb<double>>(points));
+    for_all(points, [&](std::size_t i) {
+      Position x = probes_[0];
+      std::size_t rest = i;
+      for (std::size_t a = axes.size(); a-- > 0;) {
+        x[axes[a]] = knots[a].values[rest % knots[a].values.size()];
+        rest /= knots[a].values.size();
+      }
+      const Coefficients c = coefficients(combination, x, kAllAzimuths, samples);
+      for (std::size_t t = 0; t < group.size(); ++t) values[t][i] = pick(c, group[t]);
+    });
+    std::vector<int> out;
+    for (std::size_t t = 0; t < group.size(); ++t) {
+      AlbedoGrid g;
+      g.axes = knots;
+      double chroma = 0;
+      for (const Rgb<double>& v : values[t]) chroma = std::max({chroma, std::abs(v.r - v.g), std::abs(v.r - v.b)});
+      g.channels = chroma > 1e-12 ? 3 : 1;
+      for (const Rgb<double>& v : values[t]) {
+        g.values.push_back(float(v.r));
+        if (g.channels == 3) {
+          g.values.push_back(float(v.g));
+          g.values.push_back(float(v.b));
+        }
+      }
+      out.push_back(int(table_.grids.size()));
+      table_.grids.push_back(std::move(g));
+      signatures_.emplace_back();
+      for (const Coefficients& c : at_probe) signatures_.back().push_back(pick(c, group[t]));
+    }
+    return out;
+  }
+
+  /// Knots so that linear interpolation errs about equally everywhere: their density follows the square root of the
+  /// second derivative met on lines through the probes.
+  std::vector<TableAxis> place_knots(const ParamValues& combination, const std::vector<NewTerm>& group) const {
+    constexpr int kProfile = 33;
+    const std::vector<std::size_t>& axes = group[0].axes;
+    const std::size_t lines = std::min<std::size_t>(probes_.size(), axes.size() > 1 ? 5 : 1);
+    std::vector<std::vector<double>> density(axes.size(), std::vector<double>(kProfile, 0.));
+    std::vector<std::vector<double>> s(axes.size(), std::vector<double>(kProfile));
+    std::vector<double> bend(axes.size(), 0.);  // error = bend / knots^2
+    for (std::size_t a = 0; a < axes.size(); ++a) {
+      const Coordinate& c = coordinates_[axes[a]];
+      for (int j = 0; j < kProfile; ++j) s[a][std::size_t(j)] = to_scale(c.scale, c.at(double(j) / (kProfile - 1)));
+      std::vector<Coefficients> profile(lines * kProfile);
+      for_all(profile.size(), [&](std::size_t i) {
+        Position x = probes_[i / kProfile];
+        x[axes[a]] = c.at(double(i % kProfile) / (kProfile - 1));
+        profile[i] = coefficients(combination, x, kAllAzimuths, axes.size() > 1 ? kGridSamples : 4 * kProofSamples);
+      });
+      for (std::size_t line = 0; line < lines; ++line)
+        for (int j = 1; j + 1 < kProfile; ++j) {
+          const Coefficients* f = &profile[line * kProfile + std::size_t(j)];
+          const double h0 = s[a][std::size_t(j)] - s[a][std::size_t(j) - 1],
+                       h1 = s[a][std::size_t(j) + 1] - s[a][std::size_t(j)];
+          const double noise = kProfileNoise * (f[-1].error + f[0].error + f[1].error) / (h0 * h1);
+          for (const NewTerm& t : group) {
+            const Rgb<double> f0 = pick(f[-1], t), f1 = pick(f[0], t), f2 = pick(f[1], t);
+            const double second = max_abs((f2 - f1) / h1 - (f1 - f0) / h0) * 2 / (h0 + h1);
+            if (second > noise) density[a][std::size_t(j)] = std::max(density[a][std::size_t(j)], std::sqrt(second));
+          }
+        }
+      density[a].front() = density[a][1];
+      density[a].back() = density[a][kProfile - 2];
+      double total = 0;
+      for (int j = 0; j + 1 < kProfile; ++j)
+        total += 0.5 * (density[a][std::size_t(j)] + density[a][std::size_t(j) + 1]) *
+                 (s[a][std::size_t(j) + 1] - s[a][std::size_t(j)]);
+      bend[a] = total * total / 8;
+      // A little density everywhere: the lines did not see all there is.
+      const double floor = 0.3 * total / (s[a].back() - s[a].front()) + 1e-9;
+      for (double& d : density[a]) d += floor;
+    }
+    // One knot more where it helps most against what it costs, until the aim is reached or the grid is full.
+    std::vector<int> count(axes.size(), 2);
+    for (;;) {
+      double error = 0, best = 0;
+      std::size_t points = 1, choice = 0;
+      for (std::size_t a = 0; a < axes.size(); ++a) {
+        const auto e = [&](int n) { return bend[a] / double((n - 1) * (n - 1)); };
+        error += e(count[a]);
+        points *= std::size_t(count[a]);
+        const double gain = (e(count[a]) - e(count[a] + 1)) / std::log1p(1. / count[a]);
+        if (gain > best) best = gain, choice = a;
+      }
+      if (axes.empty() || error <= kAimError || best <= 0) break;
+      if (points / std::size_t(count[choice]) * std::size_t(count[choice] + 1) > kMaxPoints || count[choice] >= 128)
+        break;
+      ++count[choice];
+    }
+    std::vector<TableAxis> out;
+    for (std::size_t a = 0; a < axes.size(); ++a) {
+      const Coordinate& c = coordinates_[axes[a]];
+      TableAxis axis{c.name, c.scale, {}};
+      std::vector<double> sum{0};
+      for (int j = 0; j + 1 < kProfile; ++j)
+        sum.push_back(sum.back() + 0.5 * (density[a][std::size_t(j)] + density[a][std::size_t(j) + 1]) *
+                                       (s[a][std::size_t(j) + 1] - s[a][std::size_t(j)]));
+      for (int i = 0; i < count[a]; ++i) {
+        if (i == 0) {
+          axis.values.push_back(c.min);
+          continue;
+        }
+        if (i + 1 == count[a]) {
+          axis.values.push_back(c.max);
+          continue;
+        }
+        const double target = sum.back() * i / (count[a] - 1);
+        const std::size_t j = std::min<std::size_t>(
+            std::size_t(std::upper_bound(sum.begin(), sum.end(), target) - sum.begin()) - 1, kProfile - 2);
+        const double t = (target - sum[j]) / (sum[j + 1] - sum[j]);
+        axis.values.push_back(std::clamp(from_scale(c.scale, s[a][j] + t * (s[a][j + 1] - s[a][j])), c.min, c.max));
+      }
+      out.push_back(std::move(axis));
+    }
+    return out;
+  }
+
+  /// Compares at random points: with finer samples the interpolation and the polynomial in the colours, and with
+  /// albedo() that the samples tell the truth.
+  void prove() {
+    struct Proof {
+      std::size_t combination;
+      Position x;
+      std::vector<double> colors;  // 3 each
+      double phi;
+      bool quadrature;
+    };
+    std::mt19937_64 random(23);
+    std::uniform_real_distribution<double> uniform;
+    std::vector<Proof> proofs;
+    for (std::size_t c = 0; c < combinations_.size(); ++c) {
+      // Later combinations share most grids with the first; what depends on nothing needs no search.
+      std::size_t axes = 0;
+      for (const AlbedoTerm& t : table_.terms[c]) axes = std::max(axes, table_.grids[std::size_t(t.grid)].axes.size());
+      const int n = axes == 0 ? 4 : c == 0 ? 64 : 16;
+      for (int i = 0; i < n; ++i) {
+        Position x = random_position(random);
+        freeze_turns(x);
+        std::vector<double> colors;
+        for (std::size_t k = 0; k < 3 * colors_.size(); ++k) colors.push_back(uniform(random));
+        proofs.push_back({c, x, colors, 2 * kPi * uniform(random), i < (c == 0 ? 4 : 1)});
+      }
+    }
+    std::mutex mutex;
+    for_all(proofs.size(), [&](std::size_t i) {
+      const Proof& p = proofs[i];
+      const ParamValues& combination = combinations_[p.combination];
+      ParamValues values = values_at(combination, p.x);
+      for (std::size_t c = 0; c < colors_.size(); ++c)
+        values[colors_[c]] = std::array<double, 3>{p.colors[3 * c], p.colors[3 * c + 1], p.colors[3 * c + 2]};
+      const auto brdf = model_.make_double(values);
+      const Coefficients all = coefficients(combination, p.x, kAllAzimuths, kProofSamples, 1);
+      const Coefficients one = coefficients(combination, p.x, p.phi, kProofSamples, 2);
+      // Random colours, different in every channel: proves that channels are apart and the polynomial is one.
+      const MeanAlbedo direct = mean_albedos(*brdf, {brdf.get()}, p.x[0], p.phi, label(values), kProofSamples, 3);
+      const auto require_equal = [&](const Rgb<double>& wanted, double error, const char* what) {
+        const Rgb<double> got = combine(one, p.colors);
+        if (max_abs(wanted - got) <= kSame + error + 10 * one.error) return;
+        throw ValueError(
+            fmt::format("{}: albedo at cos_theta_o={}, phi_o={}: ({}, {}, {}) from values at colours 0 and 1"
+                        " by sample(), expected {} ({}, {}, {}) within {:.1e}",
+                        label(values), p.x[0], p.phi, got.r, got.g, got.b, what, wanted.r, wanted.g, wanted.b,
+                        kSame + error + 10 * one.error));
+      };
+      require_equal(direct.scattered[0] + direct.mirror[0], 10 * direct.error,
+                    "the albedo at the colours themselves, linear in each and channel by channel,");
+      double error = all.error + one.error;
+      if (p.quadrature) {
+        const Albedo a = albedo(*brdf, p.x[0], p.phi, label(values), kProofOptions);
+        require_equal(a.total(), 10 * a.error, "quadrature over directions,");
+        error = std::max(error, a.error);
+      }
+      const Rgb<double> truth = combine(all, p.colors), interpolated = lookup(table_, model_, values, p.x[0]);
+      const std::lock_guard lock(mutex);
+      table_.error = std::max(table_.error, max_abs(interpolated - truth));
+      table_.quadrature = std::max(table_.quadrature, error);
+      if (depends_on_azimuth_) table_.anisotropy = std::max(table_.anisotropy, max_abs(combine(one, p.colors) - truth));
+      for (const AlbedoTerm& t : table_.terms[p.combination]) {
+        AlbedoGrid& g = table_.grids[std::size_t(t.grid)];
+        g.error =
+            std::max(g.error, max_abs(lookup(g, position_in(g, p.x)) - pick(all, {t.mirror, bits_of(t.colors), {}})));
+      }
+    });
+  }
+
+  std::size_t bits_of(const std::vector<std::string>& names) const {
+    std::size_t bits = 0;
+    for (std::size_t c = 0; c < colors_.size(); ++c)
+      if (std::find(names.begin(), names.end(), colors_[c]) != names.end()) bits |= std::size_t(1) << c;
+    return bits;
+  }
+
+  std::vector<double> position_in(const AlbedoGrid& g, const Position& x) const {
+    std::vector<double> out;
+    for (const TableAxis& a : g.axes)
+      for (std::size_t p = 0; p < coordinates_.size(); ++p)
+        if (coordinates_[p].name == a.name) out.push_back(x[p]);
+    return out;
+  }
+
+  Rgb<double> combine(const Coefficients& c, const std::vector<double>& colors) const {
+    Rgb<double> sum(0);
+    for (std::size_t k = 0; k < c.scattered.size(); ++k) {
+      Rgb<double> product(1);
+      for (std::size_t i = 0; i < colors_.size(); ++i)
+        if (k >> i & 1) product = product * Rgb<double>(colors[3 * i], colors[3 * i + 1], colors[3 * i + 2]);
+      sum += product * (c.scattered[k] + c.mirror[k]);
+    }
+    return sum;
+  }
+
+  void describe() {
+    table_.doc =
+        "Directional albedo, mirror included: sum over terms of the interpolated grid times the product of the "
+        "term's colours. Between knots it is linear on the axis' scale; beyond the ends it is constant.";
+    if (depends_on_azimuth_)
+      table_.doc += fmt::format(
+          " Mean over the azimuth of the view direction; single azimuths differ from it by up to "
+          "{:.3f} at the points looked at.",
+          table_.anisotropy);
+  }
+
+  const Model& model_;
+  std::vector<Coordinate> coordinates_;  // the view cosine first
+  std::vector<std::string> colors_;
+  std::vector<ParamValues> combinations_;
+  bool depends_on_azimuth_ = false;
+  std::vector<char> turns_;  // per coordinate: does nothing but turn the model; empty if nothing does
+  std::vector<Position> probes_;
+  std::vector<std::vector<Rgb<double>>> signatures_;  // of each grid at each probe
+  AlbedoTable table_;
+};
+
+}  // namespace
+
+const char* name_of(AxisScale s) { return s == AxisScale::Linear ? "linear" : s == AxisScale::Log ? "log" : "log1p"; }
+
+std::size_t AlbedoTable::size() const {
+  std::size_t n = 0;
+  for (const AlbedoGrid& g : grids) n += g.values.size();
+  return n;
+}
+
+const std::vector<AlbedoTerm>& AlbedoTable::terms_for(const Model& m, const ParamValues& given) const {
+  const ParamValues values = complete(m.info(), given);
+  std::size_t index = 0;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const ParamInfo& p = *m.info().param(choices[i]);
+    const auto at = std::find(p.choices.begin(), p.choices.end(), std::get<std::string>(values.at(p.name)));
+    index = index * std::size_t(choice_sizes[i]) + std::size_t(at - p.choices.begin());
+  }
+  return terms.at(index);
+}
+
+AlbedoTable tabulate_albedo(const Model& model) { return Tabulator(model).run(); }
+
+Rgb<double> lookup(const AlbedoGrid& g, const std::vector<double>& x) {
+  // Weights of the two knots on every axis, then the sum over the corners of the cell.
+  std::vector<std::size_t> cell;
+  std::vector<double> weight;
+  for (std::size_t a = 0; a < g.axes.size(); ++a) {
+    const TableAxis& axis = g.axes[a];
+    const auto above = std::upper_bound(axis.values.begin() + 1, axis.values.end() - 1, x.at(a));
+    const std::size_t i = std::size_t(above - axis.values.begin()) - 1;
+    const double lo = to_scale(axis.scale, axis.values[i]), hi = to_scale(axis.scale, axis.values[i + 1]);
+    const double clamped = std::clamp(x[a], axis.values.front(), axis.values.back());
+    cell.push_back(i);
+    weight.push_back((to_scale(axis.scale, clamped) - lo) / (hi - lo));
+  }
+  Rgb<double> sum(0);
+  for (std::size_t corner = 0; corner < (std::size_t(1) << cell.size()); ++corner) {
+    std::size_t index = 0;
+    double w = 1;
+    for (std::size_t a = 0; a < cell.size(); ++a) {
+      const bool upper = corner >> a & 1;
+      index = index * g.axes[a].values.size() + cell[a] + (upper ? 1 : 0);
+      w *= upper ? weight[a] : 1 - weight[a];
+    }
+    const float* v = &g.values[index * std::size_t(g.channels)];
+    sum += g.channels == 1 ? Rgb<double>(w * v[0]) : Rgb<double>(w * v[0], w * v[1], w * v[2]);
+  }
+  return sum;
+}
+
+Rgb<double> lookup(const AlbedoTable& table, const Model& m, const ParamValues& given, double cos_theta_o) {
+  const ParamValues values = complete(m.info(), given);
+  Rgb<double> sum(0);
+  for (const AlbedoTerm& t : table.terms_for(m, values)) {
+    const AlbedoGrid& g = table.grids.at(std::size_t(t.grid));
+    std::vector<double> x;
+    for (const TableAxis& a : g.axes)
+      x.push_back(a.name == "cos_theta_o" ? cos_theta_o : std::get<double>(values.at(a.name)));
+    Rgb<double> product = lookup(g, x);
+    for (const std::string& c : t.colors) {
+      const auto& v = std::get<std::array<double, 3>>(values.at(c));
+      product = product * Rgb<double>(v[0], v[1], v[2]);
+    }
+    sum += product;
+  }
+  return sum;
+}
+
+void write_albedo_exr(const AlbedoTable& table, const std::string& path) {
+  using Json = nlohmann::ordered_json;
+  std::size_t width = 1;
+  int channels = 1;
+  for (const AlbedoGrid& g : table.grids) {
+    width = std::max(width, g.values.size() / std::size_t(g.channels));
+    channels = std::max(channels, g.channels);
+  }
+  const std::size_t height = std::max<std::size_t>(1, table.grids.size());
+  std::vector<float> pixels(width * height * std::size_t(channels), 0.f);
+  Json grids = Json::array(), terms = Json::array();
+  for (std::size_t row = 0; row < table.grids.size(); ++row) {
+    const AlbedoGrid& g = table.grids[row];
+    const std::size_t n = g.values.size() / std::size_t(g.channels);
+    for (std::size_t i = 0; i < n; ++i)
+      for (int c = 0; c < channels; ++c)
+        pixels[(row * width + i) * std::size_t(channels) + std::size_t(c)] =
+            g.values[i * std::size_t(g.channels) + std::size_t(g.channels == 1 ? 0 : c)];
+    Json axes = Json::array();
+    for (const TableAxis& a : g.axes)
+      axes.push_back({{"name", a.name}, {"scale", name_of(a.scale)}, {"values", a.values}});
+    grids.push_back({{"row", row}, {"points", n}, {"channels", g.channels}, {"error", g.error}, {"axes", axes}});
+  }
+  for (const auto& combination : table.terms) {
+    Json list = Json::array();
+    for (const AlbedoTerm& t : combination)
+      list.push_back({{"mirror", t.mirror}, {"colors", t.colors}, {"grid", t.grid}});
+    terms.push_back(list);
+  }
+  const Json meta{{"model", table.model},
+                  {"quantity", "directional albedo"},
+                  {"layout", "a row a grid: row-major, first axis slowest, padded with zeros"},
+                  {"doc", table.doc},
+                  {"error", table.error},
+                  {"quadrature_error", table.quadrature},
+                  {"anisotropy", table.anisotropy},
+                  {"choices", table.choices},
+                  {"choice_sizes", table.choice_sizes},
+                  {"terms", terms},
+                  {"grids", grids}};
+
+  OIIO::ImageSpec spec(int(width), int(height), channels, OIIO::TypeDesc::FLOAT);
+  spec.attribute("brdfc:table", meta.dump());
+  spec.attribute("compression", "zip");
+  // OpenImageIO stamps the present time unless one is given: the same table gives the same bytes.
+  spec.attribute("DateTime", "1980:01:01 00:00:00");
+  const std::string beside = path + ".part.exr";
+  const auto out = OIIO::ImageOutput::create(beside);
+  if (!out) input_error("{}: cannot be written: {}", path, OIIO::geterror());
+  if (!out->open(beside, spec) || !out->write_image(OIIO::TypeDesc::FLOAT, pixels.data()) || !out->close()) {
+    const std::string reason = out->geterror();
+    std::error_code ignored;
+    std::filesystem::remove(beside, ignored);
+    input_error("{}: cannot be written: {}", path, reason);
+  }
+  std::error_code error;
+  std::filesystem::rename(beside, path, error);
+  if (error) input_error("{}: cannot be written: {}", path, error.message());
+}
+
+}  // namespace brdfc

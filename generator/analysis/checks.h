@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tries to prove every property that a model declares, for any registered model, with fixed seeds.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "analysis/albedo.h"
+
+namespace brdfc {
+
+/// Outcome of one property of one model over all cases.
+struct CheckRow {
+  std::string model;
+  std::string check;
+  std::string expected;  ///< the limit in words, "<= 1 + error"
+  int cases = 0;         ///< that were judged
+  int skipped = 0;       ///< where quadrature did not converge well enough to judge
+  double worst = 0;      ///< value nearest to failing, or beyond
+  double limit = 0;      ///< what it is compared with
+  bool passed = true;
+  std::string where;  ///< parameters and directions of the worst value
+};
+
+/// Parameters that the checks use: for every combination of choices the defaults and `random` draws (log-uniform where
+/// a range spans decades) within the sliders' ranges; with the default choices also every number at both ends of its
+/// accepted range and colours at 0 and 1.
+std::vector<ParamValues> check_cases(const Model&, int random, std::uint64_t seed);
+
+struct ChiSquare {
+  double p = 1;  ///< probability of a statistic at least as large
+  double statistic = 0;
+  int degrees = 0;        ///< cells after pooling, less one
+  bool converged = true;  ///< whether the expected counts are known well enough
+};
+/// Compares a histogram of sample() with the integral of pdf() over the same cells, lost samples being one more cell.
+/// The cells are drawn around other samples, so that every lobe, however narrow, is cut into several. Cells with fewer
+/// than 5 expected samples are pooled. Same seed, same result.
+ChiSquare chi_square(const BoundModel&, const Vec3<double>& wo, int samples, std::uint64_t seed);
+
+/// How far a scalar type strays from a better one: the largest relative error of eval(), and the same in units of what
+/// rounding the inputs (directions, numbers) of that type alone can cause.
+struct Stability {
+  double relative = 0;
+  double amplified = 0;
+  std::string where;
+  std::string amplified_where;
+};
+/// float against double.
+Stability float_stability(const Model&, const ParamValues&, int points, std::uint64_t seed);
+/// double against Wide.
+Stability double_stability(const Model&, const ParamValues&, int points, std::uint64_t seed);
+
+/// Rows for one model. Throws ValueError where the model gives a value that is NaN, infinite or negative.
+std::vector<CheckRow> check_model(const Model&, std::uint64_t seed = 1);
+
+}  // namespace brdfc

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc albedo: directional-hemispherical reflectance against the view cosine.
+#include <unistd.h>
+
+#include <iostream>
+#include <optional>
+
+#include "analysis/albedo.h"
+#include "app/commands.h"
+#include "app/csv.h"
+
+namespace brdfc {
+
+void add_albedo_command(CLI::App& app) {
+  struct Options {
+    std::string model;
+    std::vector<std::string> values;
+    int count = 0;
+    double phi = 0;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "albedo",
+      "Directional albedo by quadrature: integral of f cos over the light directions plus the mirror weight.\n"
+      "stdin:  CSV with header cos_theta_o (0 < cos <= 1); without input, 64 cosines from 0.01 to 1\n"
+      "stdout: CSV with header cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate\n"
+      "        (the albedo includes the mirror)");
+  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
+  cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
+  cmd->add_option("--count", o->count, "So many cosines from 0.01 to 1; stdin is not read")
+      ->check(CLI::Range(2, 1 << 20));
+  cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
+  cmd->callback([o] {
+    const Model& model = find_model(o->model);
+    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    CsvWriter out("cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate");
+    const auto write = [&](double cos_theta_o) {
+      const Albedo a = albedo(*bound.brdf, cos_theta_o, o->phi, bound.label);
+      const Rgb<double> t = a.total();
+      out.row({cos_theta_o, t.r, t.g, t.b, a.mirror.r, a.mirror.g, a.mirror.b, a.error});
+    };
+    std::optional<CsvReader> in;
+    if (o->count == 0 && !isatty(STDIN_FILENO)) in.emplace(std::cin, "stdin", std::vector<std::string>{"cos_theta_o"});
+    if (!in || in->empty()) {
+      const int n = o->count > 0 ? o->count : 64;
+      for (int i = 0; i < n; ++i) write(i + 1 == n ? 1. : 0.01 + 0.99 * i / (n - 1));
+    } else {
+      std::vector<double> row;
+      while (in->next(row)) {
+        if (!(row[0] > 0 && row[0] <= 1))
+          input_error("{}: cos_theta_o: expected a number in (0, 1], got {}", in->where(), row[0]);
+        write(row[0]);
+      }
+    }
+    out.finish();
+  });
+}
+
+}  // namespace brdfc

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc check: tries to prove what the models declare.
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "analysis/checks.h"
+#include "app/commands.h"
+
+namespace brdfc {
+
+void add_check_command(CLI::App& app) {
+  struct Options {
+    std::string model;
+    bool all = false, json = false;
+    std::uint64_t seed = 1;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "check",
+      "Energy, reciprocity, isotropy, positive values, sampling against density (chi-square), exact closures and\n"
+      "rounding in float and double, over defaults, random and extreme parameters. Exit status 1 if one fails.");
+  CLI::Option* model = cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
+  cmd->add_flag("--all", o->all, "All models, the same as without a model")->excludes(model);
+  cmd->add_flag("--json", o->json, "As JSON: an array of objects, one a row");
+  cmd->add_option("--seed", o->seed, "Seed of the random parameters and directions");
+  cmd->callback([o] {
+    std::vector<const Model*> chosen;
+    if (o->model.empty())
+      for (const auto& [name, m] : models()) chosen.push_back(m.get());
+    else
+      chosen.push_back(&find_model(o->model));
+
+    nlohmann::ordered_json all = nlohmann::ordered_json::array();
+    int failed = 0;
+    for (const Model* m : chosen) {
+      fmt::print(stderr, "checking {} ...\n", m->info().name);
+      const auto start = std::chrono::steady_clock::now();
+      const std::vector<CheckRow> rows = check_model(*m, o->seed);
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      if (!o->json)
+        fmt::print("{} ({:.1f} s)\n  {:<16} {:>6} {:>7} {:>11} {:>11}  {:<6}  {}\n", m->info().name, seconds, "check",
+                   "cases", "skipped", "worst", "limit", "result", "expected");
+      for (const CheckRow& r : rows) {
+        failed += r.passed ? 0 : 1;
+        if (o->json) {
+          all.push_back({{"model", r.model},
+                         {"check", r.check},
+                         {"expected", r.expected},
+                         {"cases", r.cases},
+                         {"skipped", r.skipped},
+                         {"worst", r.worst},
+                         {"limit", r.limit},
+                         {"passed", r.passed},
+                         {"where", r.where}});
+          continue;
+        }
+        fmt::print("  {:<16} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<6}  {}\n", r.check, r.cases, r.skipped, r.worst,
+                   r.limit, r.passed ? "ok" : "FAILED", r.expected);
+        if (!r.passed) fmt::print("    at {}\n", r.where);
+      }
+    }
+    if (o->json) fmt::print("{}\n", all.dump(2));
+    std::fflush(stdout);
+    if (failed > 0) throw CheckFailed(fmt::format("{} of the declared properties failed", failed));
+  });
+}
+
+}  // namespace brdfc

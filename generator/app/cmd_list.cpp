@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc list: the registered models.
+#include <nlohmann/json.hpp>
+
+#include "app/commands.h"
+#include "core/error.h"
+#include "model/model.h"
+
+namespace brdfc {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* kind_name(ParamKind k) {
+  return k == ParamKind::Number ? "number" : k == ParamKind::Color ? "color" : "choice";
+}
+
+std::vector<std::string> representations(const Model& m) {
+  if (m.has_exact()) return {"exact", "sampled"};
+  return {"sampled"};
+}
+
+Json describe(const Model& m) {
+  const ModelInfo& info = m.info();
+  Json params = Json::array();
+  for (const ParamInfo& p : info.params) {
+    Json j{{"name", p.name}, {"label", p.label}, {"kind", kind_name(p.kind)}, {"unit", p.unit}};
+    if (p.kind == ParamKind::Choice) {
+      j["choices"] = p.choices;
+      j["default"] = p.choices[std::size_t(p.value[0])];
+    } else {
+      j["min"] = p.min;
+      j["max"] = p.max;
+      j["soft_min"] = p.soft_min;
+      j["soft_max"] = p.soft_max;
+      if (p.kind == ParamKind::Color)
+        j["default"] = p.value;
+      else
+        j["default"] = p.value[0];
+    }
+    j["doc"] = p.doc;
+    params.push_back(std::move(j));
+  }
+  const ModelProperties& q = info.properties;
+  return {{"name", info.name},
+          {"label", info.label},
+          {"paper", info.paper},
+          {"equations", info.equations},
+          {"doc", info.doc},
+          {"properties",
+           {{"reciprocal", q.reciprocal},
+            {"conserving", q.conserving},
+            {"lossless", q.lossless},
+            {"isotropic", q.isotropic}}},
+          {"mirror", m.has_mirror()},
+          {"representations", representations(m)},
+          {"parameters", std::move(params)}};
+}
+
+void print_text(const Model& m) {
+  const ModelInfo& info = m.info();
+  fmt::print("{}  {}\n  {} ({})\n  {}\n", info.name, info.label, info.paper, info.equations, info.doc);
+  std::string forms;
+  for (const std::string& r : representations(m)) forms += (forms.empty() ? "" : ", ") + r;
+  fmt::print("  representations: {}\n", forms);
+  for (const ParamInfo& p : info.params) {
+    std::string range, value;
+    if (p.kind == ParamKind::Choice) {
+      for (const std::string& c : p.choices) range += (range.empty() ? "" : "|") + c;
+      value = p.choices[std::size_t(p.value[0])];
+    } else {
+      range = fmt::format("{:g}..{:g}{}", p.min, p.max, p.unit.empty() ? "" : " " + p.unit);
+      value = p.kind == ParamKind::Color ? fmt::format("{:g},{:g},{:g}", p.value[0], p.value[1], p.value[2])
+                                         : fmt::format("{:g}", p.value[0]);
+    }
+    fmt::print("    {:<12} {:<7} {:<36} default {:<16} {}\n", p.name, kind_name(p.kind), range, value, p.doc);
+  }
+  fmt::print("\n");
+}
+
+}  // namespace
+
+void add_list_command(CLI::App& app) {
+  auto json = std::make_shared<bool>(false);
+  CLI::App* cmd = app.add_subcommand("list", "The models, their parameters and representations.");
+  cmd->add_flag("--json", *json, "As JSON: an array of objects");
+  cmd->callback([json] {
+    if (*json) {
+      Json all = Json::array();
+      for (const auto& [name, model] : models()) all.push_back(describe(*model));
+      fmt::print("{}\n", all.dump(2));
+    } else {
+      for (const auto& [name, model] : models()) print_text(*model);
+    }
+  });
+}
+
+}  // namespace brdfc

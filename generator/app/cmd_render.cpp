@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+
+#include "app/commands.h"
+#include "reference/render.h"
+
+namespace brdfc {
+
+namespace {
+
+std::atomic<bool> interrupted{false};
+
+/// While it lives, the first Ctrl-C asks the renderer to stop; the second one ends the program as usual.
+class InterruptGuard {
+ public:
+  InterruptGuard() {
+    interrupted = false;
+    struct sigaction action {};
+    action.sa_handler = [](int) { interrupted = true; };
+    action.sa_flags = SA_RESETHAND | SA_RESTART;
+    sigaction(SIGINT, &action, &old_int_);
+    sigaction(SIGTERM, &action, &old_term_);
+  }
+  ~InterruptGuard() {
+    sigaction(SIGINT, &old_int_, nullptr);
+    sigaction(SIGTERM, &old_term_, nullptr);
+  }
+
+ private:
+  struct sigaction old_int_, old_term_;
+};
+
+std::string clock_text(double seconds) {
+  const long s = std::lround(std::ceil(seconds));
+  return s < 3600 ? fmt::format("{}:{:02}", s / 60, s % 60)
+                  : fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+}
+
+/// One line that is rewritten on a terminal; elsewhere a line every ten seconds.
+class ProgressLine {
+ public:
+  explicit ProgressLine(std::string name) : name_(std::move(name)), terminal_(::isatty(2)) {}
+  void show(const Progress& p) {
+    if (!terminal_ && p.seconds < next_) return;
+    next_ = p.seconds + 10;
+    fmt::print(stderr, "{}{}: {:3.0f} %, {} of {} samples, {:.2f} Mpaths/s, {} left{}", terminal_ ? "\r\x1b[K" : "",
+               name_, 100 * p.fraction, p.samples, p.spp, p.paths_per_second * 1e-6, clock_text(p.seconds_left),
+               terminal_ ? "" : "\n");
+    std::fflush(stderr);
+    open_ = terminal_;
+  }
+  void close() {
+    if (open_) fmt::print(stderr, "\n");
+    open_ = false;
+  }
+  ~ProgressLine() { close(); }
+
+ private:
+  std::string name_;
+  bool terminal_, open_ = false;
+  double next_ = 10;
+};
+
+}  // namespace
+
+void add_render_command(CLI::App& app) {
+  struct Options {
+    std::string scene, out, preview, strategy = "mis";
+    int spp = 0, seed = -1, threads = 0, width = 0, height = 0;
+    double max_seconds = 0, scale = 1, exposure = 0;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("render", "Render the reference picture of a scene");
+  command->add_option("SCENE", options->scene, "Scene file (.json)")->required();
+  command->add_option("--out", options->out, "EXR to write, with a variance layer")->required();
+  command->add_option("--spp", options->spp, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 10000000));
+  command->add_option("--seed", options->seed, "Seed of the random numbers (default: the scene's)")
+      ->check(CLI::Range(0, 2147483647));
+  command->add_option("--threads", options->threads, "Threads (default: all); the picture does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  command->add_option("--max-seconds", options->max_seconds, "Stop after this time, with at least one sample a pixel")
+      ->check(CLI::Range(0.001, 1e7));
+  CLI::Option* width = command->add_option("--width", options->width, "Pixels")->check(CLI::Range(1, 16384));
+  CLI::Option* height = command->add_option("--height", options->height, "Pixels")->check(CLI::Range(1, 16384));
+  command->add_option("--scale", options->scale, "Factor on the scene's resolution")
+      ->check(CLI::Range(0.001, 64.0))
+      ->excludes(width)
+      ->excludes(height);
+  command->add_option("--strategy", options->strategy, "Sample both ways (mis), or the BRDF or the lights alone")
+      ->check(CLI::IsMember({"mis", "brdf", "light"}))
+      ->capture_default_str();
+  command->add_option("--preview", options->preview, "Write an sRGB PNG as well");
+  command->add_option("--exposure", options->exposure, "Stops, for the preview")->check(CLI::Range(-64.0, 64.0));
+  command->callback([options] {
+    const std::filesystem::path out(options->out);
+    if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());
+    if (!options->preview.empty() && std::filesystem::path(options->preview).extension() != ".png")
+      input_error("--preview {}: expected a file name that ends in .png", options->preview);
+    const Scene scene = load_scene(options->scene);
+    RenderOptions r;
+    r.settings = scene.settings;
+    if (options->spp) r.settings.spp = options->spp;
+    if (options->seed >= 0) r.settings.seed = options->seed;
+    const auto scaled = [&](int n) { return int(std::clamp(std::lround(n * options->scale), 1L, 16384L)); };
+    r.settings.width = options->width ? options->width : scaled(scene.settings.width);
+    r.settings.height = options->height ? options->height : scaled(scene.settings.height);
+    r.threads = options->threads;
+    r.max_seconds = options->max_seconds;
+    r.strategy = options->strategy == "brdf"    ? Strategy::Brdf
+                 : options->strategy == "light" ? Strategy::Light
+                                                : Strategy::Mis;
+    ProgressLine line(scene.name);
+    r.progress = [&](const Progress& p) { line.show(p); };
+    RenderResult result;
+    {
+      const InterruptGuard guard;
+      r.cancel = &interrupted;
+      result = render(scene, r);
+    }
+    line.close();
+    result.rendering.metadata["strategy"] = options->strategy;
+    write_rendering(out, result.rendering);
+    if (!options->preview.empty()) write_preview(options->preview, result.rendering.mean, options->exposure);
+    const std::string summary =
+        fmt::format("{} has {} of {} samples a pixel", out.string(), result.samples, r.settings.spp);
+    if (result.cancelled) throw CheckFailed("interrupted: " + summary);
+    fmt::print(stderr, "{}: {}, {:.1f} s, {:.2f} Mpaths/s\n", scene.name, summary, result.seconds,
+               result.paths_per_second * 1e-6);
+  });
+}
+
+}  // namespace brdfc

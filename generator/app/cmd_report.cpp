@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app/commands.h"
+#include "report/report.h"
+
+namespace brdfc {
+
+void add_report_command(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "report", "Write index.html, report.json and report.csv about the scenes rendered in the folders of DIR");
+  const auto folder = std::make_shared<std::string>();
+  command->add_option("DIR", *folder, "A folder with one folder a scene, each holding runs.json")->required();
+  command->callback([folder] {
+    const std::vector<SceneReport> scenes = write_report(*folder);
+    fmt::print(stdout, "{}", report_csv(scenes));
+    fmt::print(stderr, "wrote {}/index.html, report.json and report.csv\n", *folder);
+  });
+}
+
+}  // namespace brdfc

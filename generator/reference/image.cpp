@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/image.h"
+
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imageio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "core/error.h"
+
+namespace brdfc {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kMaxSide = 65536;
+constexpr std::size_t kMaxPixels = std::size_t(1) << 30;
+
+struct Channels {
+  int r = -1, g = -1, b = -1;
+};
+
+int channel_index(const OIIO::ImageSpec& spec, const std::string& name) {
+  for (int i = 0; i < spec.nchannels; ++i)
+    if (spec.channelnames[i] == name) return i;
+  return -1;
+}
+
+/// R, G, B without a layer, else those of the first layer that has all three, else the first channel as grey.
+Channels find_channels(const OIIO::ImageSpec& spec) {
+  Channels c{channel_index(spec, "R"), channel_index(spec, "G"), channel_index(spec, "B")};
+  if (c.r >= 0 && c.g >= 0 && c.b >= 0) return c;
+  for (const std::string& name : spec.channelnames) {
+    if (name.size() < 2 || name.substr(name.size() - 2) != ".R") continue;
+    const std::string layer = name.substr(0, name.size() - 1);
+    if (layer == "variance.") continue;
+    c = {channel_index(spec, layer + "R"), channel_index(spec, layer + "G"), channel_index(spec, layer + "B")};
+    if (c.r >= 0 && c.g >= 0 && c.b >= 0) return c;
+  }
+  if (spec.nchannels <= 2) return {0, 0, 0};
+  return {};
+}
+
+struct File {
+  OIIO::ImageSpec spec;
+  std::vector<float> data;  // interleaved, spec.nchannels a pixel
+
+  Image extract(const Channels& c) const {
+    Image image(spec.width, spec.height);
+    const std::size_t pixels = std::size_t(spec.width) * spec.height;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const float* from = &data[i * spec.nchannels];
+      image.rgb[3 * i] = from[c.r];
+      image.rgb[3 * i + 1] = from[c.g];
+      image.rgb[3 * i + 2] = from[c.b];
+    }
+    return image;
+  }
+};
+
+File read_file(const fs::path& path) {
+  if (!fs::exists(path)) input_error("{}: no such image file", path.string());
+  const auto in = OIIO::ImageInput::open(path.string());
+  if (!in) input_error("{}: not an image that OpenImageIO can read ({})", path.string(), OIIO::geterror());
+  File file;
+  file.spec = in->spec();
+  const auto& s = file.spec;
+  if (s.width < 1 || s.height < 1 || s.width > kMaxSide || s.height > kMaxSide || s.depth > 1 || s.nchannels < 1 ||
+      s.nchannels > 1024 || std::size_t(s.width) * s.height * s.nchannels > kMaxPixels)
+    input_error("{}: {} x {} pixels with {} channels: expected a flat image with sides of at most {}", path.string(),
+                s.width, s.height, s.nchannels, kMaxSide);
+  file.data.resize(std::size_t(s.width) * s.height * s.nchannels);
+  if (!in->read_image(0, 0, 0, s.nchannels, OIIO::TypeDesc::FLOAT, file.data.data()))
+    input_error("{}: damaged image ({})", path.string(), in->geterror());
+  return file;
+}
+
+void write_file(const fs::path& path, const OIIO::ImageSpec& spec, const std::vector<float>& data) {
+  write_beside(path, [&](const fs::path& temporary) {
+    const auto out = OIIO::ImageOutput::create(temporary.string());
+    if (!out) input_error("{}: can't write this image format ({})", path.string(), OIIO::geterror());
+    if (!out->open(temporary.string(), spec) || !out->write_image(OIIO::TypeDesc::FLOAT, data.data()) || !out->close())
+      input_error("{}: can't write ({})", path.string(), out->geterror());
+  });
+}
+
+void expect_exr(const fs::path& path) {
+  if (path.extension() != ".exr") input_error("{}: expected a file name that ends in .exr", path.string());
+}
+
+OIIO::ImageSpec exr_spec(int width, int height, std::vector<std::string> names) {
+  OIIO::ImageSpec spec(width, height, int(names.size()), OIIO::TypeDesc::FLOAT);
+  spec.channelnames = std::move(names);
+  spec.attribute("compression", "zip");
+  // OpenImageIO stamps the present time unless one is given: equal pixels give equal files.
+  spec.attribute("DateTime", "1980:01:01 00:00:00");
+  return spec;
+}
+
+void check_finite(const Image& image, const std::string& name) {
+  std::size_t bad = 0, first = 0;
+  for (std::size_t i = 0; i < image.rgb.size(); ++i)
+    if (!std::isfinite(image.rgb[i]) && bad++ == 0) first = i / 3;
+  if (bad)
+    input_error("{}: {} values are not finite, the first at pixel ({}, {})", name, bad, first % image.width,
+                first / image.width);
+}
+
+}  // namespace
+
+void write_beside(const fs::path& path, const std::function<void(const fs::path&)>& write) {
+  std::error_code error;
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) input_error("{}: can't create this folder", folder.string());
+  if (fs::is_directory(path)) input_error("{}: is a folder, expected a file name", path.string());
+  const fs::path temporary =
+      folder / fmt::format(".{}.{}{}", path.stem().string(), ::getpid(), path.extension().string());
+  try {
+    write(temporary);
+    fs::rename(temporary, path, error);
+    if (error) input_error("{}: can't write ({})", path.string(), error.message());
+  } catch (...) {
+    fs::remove(temporary, error);
+    throw;
+  }
+}
+
+Rendering read_rendering(const fs::path& path) {
+  const File file = read_file(path);
+  const Channels color = find_channels(file.spec);
+  if (color.r < 0)
+    input_error("{}: expected channels R, G, B, found {}", path.string(), fmt::join(file.spec.channelnames, ", "));
+  Rendering rendering;
+  rendering.mean = file.extract(color);
+  const Channels variance{channel_index(file.spec, "variance.R"), channel_index(file.spec, "variance.G"),
+                          channel_index(file.spec, "variance.B")};
+  if (variance.r >= 0 && variance.g >= 0 && variance.b >= 0) rendering.variance = file.extract(variance);
+  const std::string prefix = "brdfc:";
+  for (const auto& attribute : file.spec.extra_attribs) {
+    const std::string name = attribute.name().string();
+    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+    const std::string key = name.substr(prefix.size());
+    if (attribute.type() == OIIO::TypeDesc::STRING)
+      rendering.metadata[key] = attribute.get_string();
+    else if (attribute.type() == OIIO::TypeDesc::INT)
+      rendering.metadata[key] = attribute.get_int();
+    else if (attribute.type() == OIIO::TypeDesc::FLOAT)
+      rendering.metadata[key] = attribute.get_float();
+  }
+  return rendering;
+}
+
+void write_rendering(const fs::path& path, const Rendering& rendering) {
+  expect_exr(path);
+  std::vector<std::string> names{"R", "G", "B"};
+  if (rendering.variance) names.insert(names.end(), {"variance.R", "variance.G", "variance.B"});
+  const Image& mean = rendering.mean;
+  OIIO::ImageSpec spec = exr_spec(mean.width, mean.height, names);
+  for (const auto& [key, value] : rendering.metadata.items()) {
+    const std::string name = "brdfc:" + key;
+    if (value.is_string())
+      spec.attribute(name, value.get<std::string>());
+    else if (value.is_number_integer())
+      spec.attribute(name, value.get<int>());
+    else if (value.is_number())
+      spec.attribute(name, value.get<float>());
+    else
+      throw std::logic_error("metadata '" + key + "' must be a string or a number");
+  }
+  const std::size_t pixels = std::size_t(mean.width) * mean.height;
+  std::vector<float> data;
+  data.reserve(pixels * names.size());
+  for (std::size_t i = 0; i < pixels; ++i) {
+    data.insert(data.end(), &mean.rgb[3 * i], &mean.rgb[3 * i] + 3);
+    if (rendering.variance)
+      data.insert(data.end(), &rendering.variance->rgb[3 * i], &rendering.variance->rgb[3 * i] + 3);
+  }
+  write_file(path, spec, data);
+}
+
+Image read_image(const fs::path& path, ColorSpace space) {
+  const File file = read_file(path);
+  const Channels channels = find_channels(file.spec);
+  if (channels.r < 0)
+    input_error("{}: expected channels R, G, B or one grey channel, found {}", path.string(),
+                fmt::join(file.spec.channelnames, ", "));
+  Image image = file.extract(channels);
+  check_finite(image, path.string());
+  const bool decode = space == ColorSpace::Srgb || (space == ColorSpace::Auto && !file.spec.format.is_floating_point());
+  if (decode)
+    for (float& value : image.rgb) value = float(srgb_decode(value));
+  return image;
+}
+
+void write_image(const fs::path& path, const Image& image) {
+  expect_exr(path);
+  write_file(path, exr_spec(image.width, image.height, {"R", "G", "B"}), image.rgb);
+}
+
+Comparison compare(const Rendering& a, const Rendering& b, const std::string& name_a, const std::string& name_b) {
+  if (a.mean.width != b.mean.width || a.mean.height != b.mean.height)
+    input_error("{} has {} x {} pixels, {} has {} x {}: expected equal sizes", name_a, a.mean.width, a.mean.height,
+                name_b, b.mean.width, b.mean.height);
+  check_finite(a.mean, name_a);
+  check_finite(b.mean, name_b);
+  Comparison c;
+  const std::size_t count = a.mean.rgb.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = a.mean.rgb[i], y = b.mean.rgb[i], d = x - y;
+    c.rel_mse += d * d / (y * y + 0.01);
+    c.mse += d * d;
+    c.mean_a += x;
+    c.mean_b += y;
+    if (std::abs(d) > c.max) {
+      c.max = std::abs(d);
+      c.max_x = int(i / 3 % a.mean.width);
+      c.max_y = int(i / 3 / a.mean.width);
+    }
+  }
+  if (a.variance && b.variance) {
+    check_finite(*a.variance, name_a + " (variance)");
+    check_finite(*b.variance, name_b + " (variance)");
+    double sum = 0;
+    for (std::size_t i = 0; i < count; ++i) sum += double(a.variance->rgb[i]) + b.variance->rgb[i];
+    c.noise_mse = sum / double(count);
+  }
+  c.rel_mse /= double(count);
+  c.mse /= double(count);
+  c.mean_a /= double(count);
+  c.mean_b /= double(count);
+  c.bias = c.mean_a - c.mean_b;
+  return c;
+}
+
+nlohmann::json to_json(const Comparison& c) {
+  nlohmann::json j{{"relmse", c.rel_mse}, {"mse", c.mse}, {"mean_a", c.mean_a}, {"mean_b", c.mean_b},
+                   {"bias", c.bias},      {"max", c.max}, {"max_x", c.max_x},   {"max_y", c.max_y}};
+  j["noise_mse"] = c.noise_mse ? nlohmann::json(*c.noise_mse) : nlohmann::json(nullptr);
+  return j;
+}
+
+Image difference_image(const Image& a, const Image& b, double scale) {
+  if (a.width != b.width || a.height != b.height) throw std::logic_error("difference of images of different size");
+  double mean = 0;
+  for (float v : b.rgb) mean += v;
+  mean /= double(b.rgb.size());
+  const double full = std::max(scale * mean, 1e-12);
+  Image out(a.width, a.height);
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x) {
+      const double d = std::clamp((luminance(a.color(x, y)) - luminance(b.color(x, y))) / full, -1.0, 1.0);
+      float* p = out.pixel(x, y);
+      const float fade = float(1 - std::abs(d));
+      p[0] = d > 0 ? 1.0f : fade;
+      p[1] = fade;
+      p[2] = d < 0 ? 1.0f : fade;
+    }
+  return out;
+}
+
+void write_display(const fs::path& path, const Image& display) {
+  if (path.extension() != ".png") input_error("{}: expected a file name that ends in .png", path.string());
+  OIIO::ImageSpec spec(display.width, display.height, 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:ColorSpace", "sRGB");
+  write_file(path, spec, display.rgb);
+}
+
+void write_preview(const fs::path& path, const Image& linear, double exposure) {
+  Image display = linear;
+  const double gain = std::exp2(exposure);
+  for (float& v : display.rgb) v = float(srgb_encode(std::clamp(gain * v, 0.0, 1.0)));
+  write_display(path, display);
+}
+
+double srgb_encode(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055; }
+double srgb_decode(double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); }
+
+Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical) {
+  const auto index = [](long i, int size, Wrap wrap) {
+    if (wrap == Wrap::Clamp) return int(std::clamp(i, 0L, long(size - 1)));
+    const long m = i % size;
+    return int(m < 0 ? m + size : m);
+  };
+  const double x = (u - std::floor(u)) * image.width - 0.5;
+  const double fraction = vertical == Wrap::Repeat ? v - std::floor(v) : std::clamp(v, 0.0, 1.0);
+  const double y = (1 - fraction) * image.height - 0.5;
+  const double floor_x = std::floor(x), floor_y = std::floor(y);
+  const double s = x - floor_x, t = y - floor_y;
+  const int x0 = index(long(floor_x), image.width, horizontal), x1 = index(long(floor_x) + 1, image.width, horizontal);
+  const int y0 = index(long(floor_y), image.height, vertical), y1 = index(long(floor_y) + 1, image.height, vertical);
+  const double w00 = (1 - s) * (1 - t), w10 = s * (1 - t), w01 = (1 - s) * t, w11 = s * t;
+  const float *p00 = image.pixel(x0, y0), *p10 = image.pixel(x1, y0), *p01 = image.pixel(x0, y1),
+              *p11 = image.pixel(x1, y1);
+  return {w00 * p00[0] + w10 * p10[0] + w01 * p01[0] + w11 * p11[0],
+          w00 * p00[1] + w10 * p10[1] + w01 * p01[1] + w11 * p11[1],
+          w00 * p00[2] + w10 * p10[2] + w01 * p01[2] + w11 * p11[2]};
+}
+
+}  // namespace brdfc

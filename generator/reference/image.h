@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pictures: float EXR in and out with layers and metadata, error measures, previews.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace brdfc {
+
+/// Linear RGB pixels. Row 0 is the top row. rgb.size() == 3 * width * height.
+struct Image {
+  int width = 0, height = 0;
+  std::vector<float> rgb;
+
+  Image() = default;
+  Image(int w, int h) : width(w), height(h), rgb(std::size_t(3) * w * h, 0.0f) {}
+  float* pixel(int x, int y) { return &rgb[3 * (std::size_t(y) * width + x)]; }
+  const float* pixel(int x, int y) const { return &rgb[3 * (std::size_t(y) * width + x)]; }
+  Rgb<double> color(int x, int y) const {
+    const float* p = pixel(x, y);
+    return {p[0], p[1], p[2]};
+  }
+};
+
+/// What a renderer leaves: radiance and, if it is known, the variance of each pixel's mean.
+struct Rendering {
+  Image mean;
+  std::optional<Image> variance;
+  /// Flat object of strings and numbers, stored as EXR attributes "brdfc:<key>".
+  nlohmann::json metadata = nlohmann::json::object();
+};
+
+enum class ColorSpace {
+  Auto,    ///< sRGB for integer pixels, linear for floating point
+  Linear,  ///< as stored
+  Srgb     ///< decoded from the sRGB transfer curve
+};
+
+/// Runs write(temporary) with a name beside `path` that keeps its extension, then renames it to `path`, so
+/// that nobody sees half a file. Creates missing folders. Throws InputError if `path` can't be written.
+void write_beside(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);
+
+/// Reads a rendering: channels R, G, B (plain, or of the first layer that has them, such as Blender's
+/// "Combined") and "variance.R/G/B" if present. Throws InputError naming the file.
+Rendering read_rendering(const std::filesystem::path& path);
+/// Writes float EXR with the variance as layer "variance" and the metadata as attributes.
+void write_rendering(const std::filesystem::path& path, const Rendering& rendering);
+
+/// Reads an image for use as texture or environment; grey is repeated. Throws InputError naming the file,
+/// also for values that are not finite.
+Image read_image(const std::filesystem::path& path, ColorSpace space = ColorSpace::Auto);
+/// Writes float EXR without metadata: equal pixels give equal files.
+void write_image(const std::filesystem::path& path, const Image& image);
+
+/// Error of `a` against the reference `b`, over all pixels and the three channels.
+struct Comparison {
+  double rel_mse = 0;  ///< mean of (a - b)^2 / (b^2 + 0.01)
+  double mse = 0;      ///< mean of (a - b)^2
+  double mean_a = 0, mean_b = 0;
+  double bias = 0;  ///< mean_a - mean_b
+  double max = 0;   ///< largest |a - b|
+  int max_x = 0, max_y = 0;
+  std::optional<double> noise_mse;  ///< part of mse explained by the variance layers; only if both have one
+};
+
+/// Throws InputError if the sizes differ or a pixel is not finite; `name_a` and `name_b` are for the message.
+Comparison compare(const Rendering& a, const Rendering& b, const std::string& name_a = "A",
+                   const std::string& name_b = "B");
+nlohmann::json to_json(const Comparison& c);
+
+/// Display-referred picture of (a - b) in luminance relative to `b`: red where a is brighter, blue where it is
+/// darker, full colour at a difference of `scale` times the mean of b.
+Image difference_image(const Image& a, const Image& b, double scale = 0.25);
+
+/// Writes 8 bits: colours are multiplied by 2^exposure, clipped, and encoded with the sRGB curve.
+void write_preview(const std::filesystem::path& path, const Image& linear, double exposure = 0);
+/// Writes 8 bits from values that are already display-referred, in [0, 1].
+void write_display(const std::filesystem::path& path, const Image& display);
+
+/// sRGB transfer curve (IEC 61966-2-1), [0, 1] to [0, 1].
+double srgb_encode(double linear);
+double srgb_decode(double encoded);
+
+enum class Wrap { Repeat, Clamp };
+
+/// Bilinear value at (u, v), v upwards from the bottom edge, texel centres at (i + 1/2) / size, as in Blender.
+Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical);
+
+}  // namespace brdfc

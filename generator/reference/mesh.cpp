@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/mesh.h"
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <assimp/Importer.hpp>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <regex>
+
+#include "core/error.h"
+#include "core/scalar.h"
+#include "reference/image.h"
+
+namespace brdfc {
+
+static_assert(std::endian::native == std::endian::little, "the .npy code writes memory as it is");
+
+namespace {
+
+std::array<float, 3> to_float(double x, double y, double z) { return {float(x), float(y), float(z)}; }
+
+void add_triangle(Mesh& mesh, std::size_t a, std::size_t b, std::size_t c) {
+  mesh.triangles.push_back({std::int32_t(a), std::int32_t(b), std::int32_t(c)});
+}
+
+}  // namespace
+
+Mesh make_sphere(double radius, int segments, int rings, bool smooth) {
+  Mesh mesh;
+  // sin and cos of multiples of a right angle are not exact: clear them, so that poles and seam close exactly.
+  const auto clean = [](double x) { return abs(x) < 1e-15 ? 0.0 : x; };
+  for (int j = 0; j <= rings; ++j) {
+    const double theta = kPi * j / rings;  // 0 at the lower pole
+    const double s = clean(sin(theta)), z = -clean(cos(theta));
+    for (int i = 0; i <= segments; ++i) {
+      const double phi = 2 * kPi * (i % segments) / segments;
+      const double x = s * clean(cos(phi)), y = s * clean(sin(phi));
+      mesh.vertices.push_back(to_float(radius * x, radius * y, radius * z));
+      if (smooth) mesh.normals.push_back(to_float(x, y, z));
+      mesh.uvs.push_back({float(double(i) / segments), float(double(j) / rings)});
+    }
+  }
+  const int row = segments + 1;
+  for (int j = 0; j < rings; ++j)
+    for (int i = 0; i < segments; ++i) {
+      const std::size_t a = std::size_t(j) * row + i, b = a + 1, c = b + row, d = a + row;
+      if (j > 0) add_triangle(mesh, a, b, c);  // the first and the last ring have one triangle a segment
+      if (j < rings - 1) add_triangle(mesh, a, c, d);
+    }
+  return mesh;
+}
+
+Mesh make_quad(double width, double height) {
+  Mesh mesh;
+  const double x = width / 2, y = height / 2;
+  mesh.vertices = {to_float(-x, -y, 0), to_float(x, -y, 0), to_float(x, y, 0), to_float(-x, y, 0)};
+  mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+Mesh make_disk(double radius, int segments) {
+  Mesh mesh;
+  mesh.vertices.push_back({0, 0, 0});
+  mesh.uvs.push_back({0.5f, 0.5f});
+  for (int i = 0; i < segments; ++i) {
+    const double c = cos(2 * kPi * i / segments), s = sin(2 * kPi * i / segments);
+    mesh.vertices.push_back(to_float(radius * c, radius * s, 0));
+    mesh.uvs.push_back({float(0.5 + 0.5 * c), float(0.5 + 0.5 * s)});
+  }
+  for (int i = 0; i < segments; ++i) add_triangle(mesh, 0, 1 + i, 1 + (i + 1) % segments);
+  return mesh;
+}
+
+Mesh make_box(const std::array<double, 3>& size) {
+  Mesh mesh;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = -1; side <= 1; side += 2) {
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+      const std::size_t first = mesh.vertices.size();
+      for (const auto& [s, t] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
+        std::array<float, 3> p;
+        p[axis] = float(side * size[axis] / 2);
+        // The lower side is mirrored, so that its corners are anticlockwise seen from outside.
+        p[u] = float(side * (s - 0.5) * size[u]);
+        p[v] = float((t - 0.5) * size[v]);
+        mesh.vertices.push_back(p);
+        mesh.uvs.push_back({float(s), float(t)});
+      }
+      add_triangle(mesh, first, first + 1, first + 2);
+      add_triangle(mesh, first, first + 2, first + 3);
+    }
+  return mesh;
+}
+
+Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
+  if (!std::filesystem::is_regular_file(path)) input_error("{}: no such mesh file", path.string());
+  Assimp::Importer importer;
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |
+                         aiProcess_JoinIdenticalVertices | (smooth ? aiProcess_GenSmoothNormals : 0u);
+  const aiScene* scene = importer.ReadFile(path.string(), steps);
+  if (!scene) input_error("{}: not a mesh that can be read ({})", path.string(), importer.GetErrorString());
+  Mesh mesh;
+  bool all_uvs = true;
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) all_uvs &= scene->mMeshes[m]->HasTextureCoords(0);
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+    const aiMesh& part = *scene->mMeshes[m];
+    const std::size_t first = mesh.vertices.size();
+    for (unsigned i = 0; i < part.mNumVertices; ++i) {
+      const aiVector3D& p = part.mVertices[i];
+      mesh.vertices.push_back({p.x, p.y, p.z});
+      if (smooth) {
+        const aiVector3D& n = part.mNormals[i];
+        mesh.normals.push_back({n.x, n.y, n.z});
+      }
+      if (all_uvs) mesh.uvs.push_back({part.mTextureCoords[0][i].x, part.mTextureCoords[0][i].y});
+    }
+    for (unsigned i = 0; i < part.mNumFaces; ++i) {
+      const aiFace& face = part.mFaces[i];
+      if (face.mNumIndices == 3)
+        add_triangle(mesh, first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]);
+    }
+  }
+  check_mesh(mesh, path.string());
+  return mesh;
+}
+
+void check_mesh(const Mesh& mesh, const std::string& name) {
+  const std::size_t n = mesh.vertices.size();
+  if (n == 0 || mesh.triangles.empty()) input_error("{}: expected at least one triangle", name);
+  if (!mesh.normals.empty() && mesh.normals.size() != n)
+    input_error("{}: {} normals for {} vertices", name, mesh.normals.size(), n);
+  if (!mesh.uvs.empty() && mesh.uvs.size() != n) input_error("{}: {} uvs for {} vertices", name, mesh.uvs.size(), n);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    for (const std::int32_t v : mesh.triangles[i])
+      if (v < 0 || std::size_t(v) >= n) input_error("{}: triangle {} uses vertex {} of {}", name, i, v, n);
+  const auto check = [&](const auto& list, const char* what) {
+    for (std::size_t i = 0; i < list.size(); ++i)
+      for (const float x : list[i])
+        if (!std::isfinite(x)) input_error("{}: {} {} is not finite", name, what, i);
+  };
+  check(mesh.vertices, "vertex");
+  check(mesh.normals, "normal");
+  check(mesh.uvs, "uv");
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+    const auto& v = mesh.normals[i];
+    if (v[0] == 0 && v[1] == 0 && v[2] == 0) input_error("{}: normal {} has length 0", name, i);
+  }
+}
+
+namespace {
+
+template <class T> const char* npy_type();
+template <> const char* npy_type<float>() { return "<f4"; }
+template <> const char* npy_type<std::int32_t>() { return "<i4"; }
+
+constexpr char kMagic[] = "\x93NUMPY\x01\x00";
+
+}  // namespace
+
+template <class T>
+void write_npy(const std::filesystem::path& path, const T* data, std::size_t rows, std::size_t columns) {
+  std::string header =
+      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", npy_type<T>(), rows, columns);
+  header.append(63 - (10 + header.size()) % 64, ' ');  // the data start at a multiple of 64 bytes
+  header += '\n';
+  write_beside(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream out(temporary, std::ios::binary);
+    const std::uint16_t length = std::uint16_t(header.size());
+    out.write(kMagic, 8);
+    out.write(reinterpret_cast<const char*>(&length), 2);
+    out << header;
+    out.write(reinterpret_cast<const char*>(data), std::streamsize(rows * columns * sizeof(T)));
+    out.close();
+    if (!out) input_error("{}: can't write", path.string());
+  });
+}
+
+template <class T> std::vector<T> read_npy(const std::filesystem::path& path, std::size_t columns) {
+  const std::string name = path.string();
+  if (!std::filesystem::is_regular_file(path)) input_error("{}: no such file", name);
+  const std::string expected = fmt::format("expected a C-ordered array of {} of shape (n, {})", npy_type<T>(), columns);
+  std::ifstream in(path, std::ios::binary);
+  char magic[8];
+  std::uint16_t length = 0;
+  in.read(magic, 8);
+  in.read(reinterpret_cast<char*>(&length), 2);
+  if (!in || std::memcmp(magic, kMagic, 8) != 0) input_error("{}: not a .npy file of version 1.0, {}", name, expected);
+  std::string header(length, ' ');
+  in.read(header.data(), length);
+  static const std::regex form(
+      R"(\{'descr': '(.*)', 'fortran_order': (True|False), 'shape': \((\d{1,9}), (\d{1,9})\), \}\s*)");
+  std::smatch match;
+  if (!in || !std::regex_match(header, match, form) || match[1] != npy_type<T>() || match[2] != "False" ||
+      std::stoul(match[4]) != columns)
+    input_error("{}: {}", name, expected);
+  const std::size_t rows = std::stoul(match[3]);
+  const std::size_t bytes = rows * columns * sizeof(T);
+  if (std::filesystem::file_size(path) != 10 + length + bytes)
+    input_error("{}: {} rows need {} bytes of data, the file has {}", name, rows, bytes,
+                std::filesystem::file_size(path) - 10 - length);
+  std::vector<T> data(rows * columns);
+  in.read(reinterpret_cast<char*>(data.data()), std::streamsize(bytes));
+  if (!in) input_error("{}: can't read this file", name);
+  return data;
+}
+
+template void write_npy<float>(const std::filesystem::path&, const float*, std::size_t, std::size_t);
+template void write_npy<std::int32_t>(const std::filesystem::path&, const std::int32_t*, std::size_t, std::size_t);
+template std::vector<float> read_npy<float>(const std::filesystem::path&, std::size_t);
+template std::vector<std::int32_t> read_npy<std::int32_t>(const std::filesystem::path&, std::size_t);
+
+}  // namespace brdfc

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Triangle meshes: made here once from shapes and files, so that both renderers see the same triangles.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+namespace brdfc {
+
+/// Object space. The corners of a triangle are anticlockwise seen from the front.
+struct Mesh {
+  std::vector<std::array<float, 3>> vertices;
+  std::vector<std::array<float, 3>> normals;  ///< one a vertex, unit length; empty: flat
+  std::vector<std::array<float, 2>> uvs;      ///< one a vertex; empty: none
+  std::vector<std::array<std::int32_t, 3>> triangles;
+};
+
+/// Latitude-longitude sphere about the origin, poles on z; u runs once around from +x towards +y, v from the
+/// lower pole to the upper.
+Mesh make_sphere(double radius, int segments, int rings, bool smooth);
+/// Rectangle in the xy plane about the origin, front towards +z, u along x, v along y.
+Mesh make_quad(double width, double height);
+/// Disk in the xy plane about the origin, front towards +z; uv (1/2, 1/2) at the centre.
+Mesh make_disk(double radius, int segments);
+/// Box about the origin with flat faces; each face has the whole unit square as uv.
+Mesh make_box(const std::array<double, 3>& size);
+/// OBJ, PLY or another format that assimp reads. `smooth`: normals of the file, or averaged where it has none;
+/// otherwise flat. Throws InputError naming the file.
+Mesh read_mesh(const std::filesystem::path& path, bool smooth);
+
+/// NumPy's format 1.0, C order, little endian: float32 or int32 of shape (rows, columns).
+template <class T>
+void write_npy(const std::filesystem::path& path, const T* data, std::size_t rows, std::size_t columns);
+/// Throws InputError naming the file, the shape that was expected and what was found.
+template <class T> std::vector<T> read_npy(const std::filesystem::path& path, std::size_t columns);
+
+/// Checks indices, counts and that all is finite; throws InputError that starts with `name`.
+void check_mesh(const Mesh& mesh, const std::string& name);
+
+}  // namespace brdfc

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Environments and textures made by this project's own code; no third-party art.
+#pragma once
+
+#include "reference/image.h"
+
+namespace brdfc {
+
+/// Blender's equirectangular convention, seen from inside: u = 1/2 - atan2(y, x) / (2 pi), so that +x is the
+/// middle of the picture and +y a quarter to the left; v = atan2(z, hypot(x, y)) / pi + 1/2.
+void direction_to_equirectangular(const Vec3<double>& direction, double& u, double& v);
+Vec3<double> equirectangular_to_direction(double u, double v);
+
+/// Radiance of the named environment in a direction: "sky", "interior" or "checker".
+Rgb<double> procedural_radiance(const std::string& name, const Vec3<double>& direction);
+
+/// The same as a latitude-longitude picture, `width` x `width / 2`, 16 samples a texel.
+Image procedural_environment(const std::string& name, int width);
+
+/// Squares of two colours in turn, `cells` along each side of the unit square of uv, 16 texels a cell.
+Image checker_texture(const Rgb<double>& a, const Rgb<double>& b, int cells);
+
+}  // namespace brdfc

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Scenes as both renderers see them. The file format is described in scenes/schema.json.
+//
+// Lengths are in scene units, z is up, angles in degrees. Lights have Blender's units and conventions, measured
+// with a white Lambert plane in Cycles:
+//   point  power P: intensity P / (4 pi), that is, radiance P / (4 pi^2 r^2) for a sphere of radius r > 0
+//   sun    irradiance E on a surface that faces it, whatever its angular diameter
+//   area   power P: radiance P / (pi A), one-sided, for the rectangle and the disk
+// Lamps are invisible to the camera unless "camera_visible" says otherwise; they block no light.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "model/model.h"
+#include "reference/image.h"
+#include "reference/mesh.h"
+
+namespace brdfc {
+
+struct RenderSettings {
+  int width = 256, height = 256;
+  int spp = 64;
+  int seed = 0;
+  /// Scatterings after the first: 0 is direct light alone, as in Cycles.
+  int max_bounces = 8;
+};
+
+struct Camera {
+  bool orthographic = false;
+  Vec3<double> position, right, up, forward;  ///< orthonormal
+  double half_height = 1;  ///< perspective: tangent of half the vertical angle; orthographic: scene units
+};
+
+struct Material {
+  std::string id;
+  const Model* model = nullptr;
+  ParamValues values;  ///< complete; for a textured parameter the mean of its texture
+  std::map<std::string, std::shared_ptr<const Image>> textures;
+  std::string representation = "auto";
+};
+
+/// world = matrix * object + translation
+struct Transform {
+  std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  Vec3<double> translation;
+
+  Vec3<double> vector(const Vec3<double>& v) const;
+  Vec3<double> point(const Vec3<double>& p) const { return vector(p) + translation; }
+  /// Direction of a normal: by the inverse transpose.
+  Vec3<double> normal(const Vec3<double>& n) const;
+};
+
+struct Object {
+  std::string name;
+  std::shared_ptr<const Mesh> mesh;
+  Transform transform;
+  int material = 0;
+  bool camera_only = false;  ///< unseen by all rays but those from the camera; casts no shadow
+};
+
+struct Light {
+  enum class Kind { Point, Sun, Rectangle, Disk };
+  Kind kind = Kind::Point;
+  std::string key;         ///< place in the file, for messages
+  Vec3<double> position;   ///< centre
+  Vec3<double> direction;  ///< in which it shines; unit length
+  Vec3<double> u, v;       ///< area: half axes
+  double radius = 0;       ///< point: of the sphere; sun: sine of half the angular diameter
+  Rgb<double> radiance;    ///< of what has an extent
+  Rgb<double> intensity;   ///< point of radius 0: W/sr; sun of angle 0: W/m^2 facing it
+  bool camera_visible = false;
+};
+
+struct Environment {
+  Rgb<double> color{0, 0, 0};          ///< constant radiance, if there is no image
+  std::shared_ptr<const Image> image;  ///< equirectangular, bilinear
+  double strength = 1;                 ///< factor on the image
+
+  Rgb<double> radiance(const Vec3<double>& direction) const;
+};
+
+struct Scene {
+  std::string name, description;
+  RenderSettings settings;
+  Camera camera;
+  std::vector<Material> materials;
+  std::vector<Object> objects;
+  std::vector<Light> lights;
+  Environment environment;
+
+  /// The same scene with every default written out and meshes and images named by their content.
+  nlohmann::json resolved;
+  std::map<std::string, std::shared_ptr<const Mesh>> mesh_files;    ///< by the stem of their names
+  std::map<std::string, std::shared_ptr<const Image>> image_files;  ///< by file name
+  /// 16 hexadecimal digits: equal for scenes that look the same at equal settings.
+  std::string hash;
+};
+
+/// Throws InputError naming the file, the key and what was expected.
+Scene load_scene(const std::filesystem::path& path);
+
+/// Writes scene.json, the meshes as .npy and the images as .exr into the folder, scene.json last.
+void write_resolved(const Scene& scene, const std::filesystem::path& folder);
+
+}  // namespace brdfc

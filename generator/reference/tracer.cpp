@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/tracer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace brdfc {
+
+namespace {
+
+using Vector = Vec3<double>;
+
+/// One division instead of three.
+Vector unit(const Vector& v) { return v * (1 / sqrt(dot(v, v))); }
+
+template <class A> Vector to_vector(const A& a) { return {a[0], a[1], a[2]}; }
+std::array<float, 3> to_floats(const Vector& v) { return {float(v.x), float(v.y), float(v.z)}; }
+
+RTCRay make_ray(const Vector& p, const Vector& d, double distance) {
+  RTCRay ray;
+  ray.org_x = float(p.x), ray.org_y = float(p.y), ray.org_z = float(p.z);
+  ray.dir_x = float(d.x), ray.dir_y = float(d.y), ray.dir_z = float(d.z);
+  ray.tnear = 0;
+  ray.tfar = float(distance);
+  ray.time = 0;
+  ray.mask = ~0u;
+  ray.id = 0;
+  ray.flags = 0;
+  return ray;
+}
+
+}  // namespace
+
+Tracer::Tracer(const Scene& scene) {
+  device_ = rtcNewDevice(nullptr);
+  if (!device_) throw std::runtime_error("Embree can't start on this machine");
+  parts_.reserve(scene.objects.size());
+  for (const Object& object : scene.objects) {
+    Part part{object.mesh.get(), {}, {}, {}, {}, object.material};
+    for (const auto& v : object.mesh->vertices)
+      part.vertices.push_back(to_floats(object.transform.point(to_vector(v))));
+    for (const auto& n : object.mesh->normals) part.normals.push_back(to_floats(object.transform.normal(to_vector(n))));
+    part.x_axis = normalize(object.transform.vector({1, 0, 0}));
+    part.z_axis = normalize(object.transform.vector({0, 0, 1}));
+    parts_.push_back(std::move(part));
+  }
+  const auto build = [&](bool for_camera) {
+    RTCScene out = rtcNewScene(device_);
+    rtcSetSceneFlags(out, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(out, RTC_BUILD_QUALITY_HIGH);
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      if (scene.objects[i].camera_only && !for_camera) continue;
+      const Part& part = parts_[i];
+      RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+      // Embree may read 16 bytes at the last vertex, hence its own buffer.
+      auto* vertices = static_cast<float*>(
+          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, part.vertices.size()));
+      auto* indices = static_cast<std::int32_t*>(rtcSetNewGeometryBuffer(
+          geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, part.mesh->triangles.size()));
+      if (!vertices || !indices) throw std::bad_alloc();
+      std::copy_n(part.vertices.front().data(), 3 * part.vertices.size(), vertices);
+      std::copy_n(part.mesh->triangles.front().data(), 3 * part.mesh->triangles.size(), indices);
+      rtcCommitGeometry(geometry);
+      rtcAttachGeometryByID(out, geometry, unsigned(i));
+      rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(out);
+    return out;
+  };
+  camera_scene_ = build(true);
+  const bool split =
+      std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return o.camera_only; });
+  scene_ = split ? build(false) : camera_scene_;
+  if (rtcGetDeviceError(device_) != RTC_ERROR_NONE) throw std::runtime_error("Embree could not build the scene");
+}
+
+Tracer::~Tracer() {
+  if (scene_ && scene_ != camera_scene_) rtcReleaseScene(scene_);
+  if (camera_scene_) rtcReleaseScene(camera_scene_);
+  if (device_) rtcReleaseDevice(device_);
+}
+
+bool Tracer::intersect(const Vector& p, const Vector& direction, bool from_camera, Hit& hit) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit query;
+  query.ray = make_ray(p, direction, kInfinity);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(from_camera ? camera_scene_ : scene_, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+
+  const Part& part = parts_[query.hit.geomID];
+  const auto& triangle = part.mesh->triangles[query.hit.primID];
+  const Vector a = to_vector(part.vertices[triangle[0]]), b = to_vector(part.vertices[triangle[1]]),
+               c = to_vector(part.vertices[triangle[2]]);
+  const double wb = query.hit.u, wc = query.hit.v, wa = 1 - wb - wc;
+  hit.material = part.material;
+  // From the corners, not along the ray: so that the point is in the plane of the triangle.
+  hit.p = a * wa + b * wb + c * wc;
+  hit.distance = length(hit.p - p);
+  hit.geometric = unit(cross(b - a, c - a));
+  hit.normal = hit.geometric;
+  if (!part.normals.empty())
+    hit.normal = unit(to_vector(part.normals[triangle[0]]) * wa + to_vector(part.normals[triangle[1]]) * wb +
+                      to_vector(part.normals[triangle[2]]) * wc);
+  if (!part.mesh->uvs.empty()) {
+    const auto &ua = part.mesh->uvs[triangle[0]], &ub = part.mesh->uvs[triangle[1]], &uc = part.mesh->uvs[triangle[2]];
+    hit.u = ua[0] * wa + ub[0] * wb + uc[0] * wc;
+    hit.v = ua[1] * wa + ub[1] * wb + uc[1] * wc;
+  } else {
+    hit.u = hit.v = 0;
+  }
+  if (dot(hit.geometric, direction) > 0) {
+    hit.geometric = -hit.geometric;
+    hit.normal = -hit.normal;
+  }
+  Vector tangent = part.z_axis - hit.normal * dot(part.z_axis, hit.normal);
+  if (dot(tangent, tangent) < 1e-8) tangent = part.x_axis - hit.normal * dot(part.x_axis, hit.normal);
+  hit.tangent = unit(tangent);
+  return true;
+}
+
+bool Tracer::occluded(const Vector& p, const Vector& direction, double distance) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRay ray = make_ray(p, direction, distance);
+  rtcOccluded1(scene_, &context, &ray);
+  return ray.tfar < 0;
+}
+
+Vec3<double> Tracer::leave(const Vector& p, const Vector& geometric, const Vector& direction) {
+  // Eight units in the last place of the largest coordinate cover the rounding of the corners and of the origin.
+  const double step = std::max({abs(p.x), abs(p.y), abs(p.z), 1e-3}) * 0x1p-20;
+  return p + geometric * (dot(geometric, direction) > 0 ? step : -step);
+}
+
+}  // namespace brdfc

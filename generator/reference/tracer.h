@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Triangles of a scene behind Embree.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include "reference/lights.h"
+#include "reference/scene.h"
+
+namespace brdfc {
+
+/// A point on a surface as seen along a ray. Unit vectors, both normals on the viewer's side.
+struct Hit {
+  Vec3<double> p;
+  Vec3<double> geometric, normal, tangent;
+  double u = 0, v = 0;  ///< texture coordinates
+  double distance = kInfinity;
+  int material = 0;
+};
+
+class Tracer {
+ public:
+  explicit Tracer(const Scene& scene);
+  ~Tracer();
+  Tracer(const Tracer&) = delete;
+  Tracer& operator=(const Tracer&) = delete;
+
+  /// Nearest triangle, or false. `direction` is a unit vector.
+  bool intersect(const Vec3<double>& p, const Vec3<double>& direction, bool from_camera, Hit& hit) const;
+  /// Is anything nearer than `distance`?
+  bool occluded(const Vec3<double>& p, const Vec3<double>& direction, double distance) const;
+  /// `p` moved off its surface by a few units in the last place of float, to the side of `direction`.
+  static Vec3<double> leave(const Vec3<double>& p, const Vec3<double>& geometric, const Vec3<double>& direction);
+
+ private:
+  struct Part {
+    const Mesh* mesh;
+    std::vector<std::array<float, 3>> vertices, normals;  // world space, as Embree sees them
+    Vec3<double> x_axis, z_axis;
+    int material;
+  };
+
+  RTCDevice device_ = nullptr;
+  RTCScene camera_scene_ = nullptr, scene_ = nullptr;  // equal unless an object is for the camera only
+  std::vector<Part> parts_;
+};
+
+}  // namespace brdfc

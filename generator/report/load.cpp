@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <set>
+
+#include "core/error.h"
+#include "reference/json_view.h"
+#include "report/report.h"
+
+namespace brdfc {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMost = 1e12;  // seconds, samples, error: no sensible figure is larger
+constexpr int kMostCount = 1'000'000'000;
+
+Rendering read_picture(const fs::path& folder, const JsonView& name) {
+  const fs::path file = folder / name.text();
+  if (!fs::exists(file)) name.fail("the name of an image in " + folder.string());
+  return read_rendering(file);
+}
+
+std::vector<double> read_times(const JsonView& view, std::size_t count) {
+  std::vector<double> out;
+  for (const JsonView& element : view.elements()) out.push_back(element.number(0, kMost));
+  if (out.size() != count) view.fail(fmt::format("{} numbers, one an image", count));
+  return out;
+}
+
+/// null = not measured.
+std::optional<double> read_error(const JsonView& view) {
+  return view.json().is_null() ? std::nullopt : std::optional(view.number(0, kMost));
+}
+
+MaterialForm read_material(const JsonView& view) {
+  MaterialForm m;
+  m.id = view.at("id").text();
+  m.model = view.at("model").text();
+  m.representation = view.at("representation").text();
+  m.closures = view.at("closures").integer(0, kMostCount);
+  const JsonView error = view.at("error");
+  if (!error.json().is_null()) {
+    m.relative_l1 = read_error(error.at("relative_l1"));
+    m.albedo_error = read_error(error.at("albedo"));
+  }
+  return m;
+}
+
+FormReport read_form(const fs::path& folder, const JsonView& view, const SceneReport& scene) {
+  FormReport form;
+  form.form = view.at("form").text();
+  // It becomes part of file names.
+  if (form.form == "reference" || form.form.find_first_of("/\\") != std::string::npos)
+    view.at("form").fail("a name without slashes other than \"reference\"");
+  const JsonView images = view.at("images");
+  std::vector<Rendering> pictures;
+  for (const JsonView& image : images.elements()) {
+    form.images.push_back(image.text());
+    pictures.push_back(read_picture(folder, image));
+    const Image& mean = pictures.back().mean;
+    if (mean.width != scene.width || mean.height != scene.height)
+      image.error(fmt::format("expected an image of {} x {} pixels, this one has {} x {}", scene.width, scene.height,
+                              mean.width, mean.height));
+  }
+  if (pictures.empty()) images.fail("at least one image");
+  form.spp = view.at("spp").integer(1, kMostCount / int(pictures.size())) * int(pictures.size());
+  form.cpu_seconds = read_times(view.at("cpu_seconds"), pictures.size());
+  form.wall_seconds = read_times(view.at("wall_seconds"), pictures.size());
+  for (const JsonView& material : view.at("materials").elements()) form.materials.push_back(read_material(material));
+  form.picture = mean_of(pictures);
+  form.difference = measure_difference(form.picture, scene.reference, (folder / form.images.front()).string(),
+                                       (folder / scene.reference_image).string());
+  return form;
+}
+
+double median(std::vector<double> v) {
+  std::sort(v.begin(), v.end());
+  const std::size_t half = v.size() / 2;
+  return v.size() % 2 ? v[half] : (v[half - 1] + v[half]) / 2;
+}
+
+/// Times are paired by index: what slows the machine for a while slows both of a pair.
+void set_costs(std::vector<FormReport>& forms) {
+  const auto glossy =
+      std::find_if(forms.begin(), forms.end(), [](const FormReport& f) { return f.form == kNativeForm; });
+  if (glossy == forms.end()) return;
+  const std::vector<double> unit = glossy->cpu_seconds;
+  for (FormReport& form : forms) {
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < std::min(unit.size(), form.cpu_seconds.size()); ++i)
+      if (unit[i] > 0) ratios.push_back(form.cpu_seconds[i] / unit[i]);
+    if (!ratios.empty()) form.cost = median(ratios);
+  }
+}
+
+SceneReport load_scene(const fs::path& folder) {
+  const fs::path file = folder / "runs.json";
+  if (!fs::exists(file)) input_error("{}: missing, although {} holds a scene", file.string(), folder.string());
+  const nlohmann::json content = read_json(file);
+  const JsonView top(content, file.string());
+  top.at("format").integer(1, 1);
+
+  SceneReport scene;
+  scene.scene = top.at("scene").choice({folder.filename().string()});
+  scene.description = top.at("description").text();
+  const JsonView settings = top.at("settings");
+  scene.width = settings.at("width").integer(1, kMostCount);
+  scene.height = settings.at("height").integer(1, kMostCount);
+  scene.max_bounces = settings.at("max_bounces").integer(0, kMostCount);
+  const JsonView reference = top.at("reference");
+  scene.reference_image = reference.at("image").text();
+  scene.reference_spp = reference.at("spp").integer(1, kMostCount);
+  scene.reference_seconds = reference.at("wall_seconds").number(0, kMost);
+  scene.reference = read_picture(folder, reference.at("image"));
+  if (scene.reference.mean.width != scene.width || scene.reference.mean.height != scene.height)
+    reference.at("image").error(fmt::format("expected an image of {} x {} pixels, this one has {} x {}", scene.width,
+                                            scene.height, scene.reference.mean.width, scene.reference.mean.height));
+  if (!scene.reference.variance) reference.at("image").error("expected an image with a variance layer");
+
+  std::set<std::string> seen;
+  const JsonView runs = top.at("runs");
+  for (const JsonView& run : runs.elements()) {
+    scene.forms.push_back(read_form(folder, run, scene));
+    if (!seen.insert(scene.forms.back().form).second) run.at("form").fail("each form once");
+  }
+  if (scene.forms.empty()) runs.fail("at least one form");
+  set_costs(scene.forms);
+  for (const auto& [name, value] : top.at("provenance").members()) scene.provenance[name] = value.text();
+  for (const JsonView& command : top.at("commands").elements()) scene.commands.push_back(command.text());
+  return scene;
+}
+
+}  // namespace
+
+std::optional<int> FormReport::closures() const {
+  std::optional<int> most;
+  for (const MaterialForm& m : materials) most = std::max(most.value_or(0), m.closures);
+  return most;
+}
+
+std::optional<double> FormReport::relative_l1() const {
+  std::optional<double> worst;
+  for (const MaterialForm& m : materials)
+    if (m.relative_l1) worst = std::max(worst.value_or(0), *m.relative_l1);
+  return worst;
+}
+
+std::vector<SceneReport> load_report(const fs::path& folder) {
+  if (!fs::is_directory(folder)) input_error("{}: not a folder", folder.string());
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_directory() && (fs::exists(entry.path() / "runs.json") || fs::exists(entry.path() / "scene.json")))
+      folders.push_back(entry.path());
+  if (folders.empty()) input_error("{}: no folder in it holds a runs.json", folder.string());
+  std::sort(folders.begin(), folders.end());
+  std::vector<SceneReport> scenes;
+  for (const fs::path& scene : folders) scenes.push_back(load_scene(scene));
+  return scenes;
+}
+
+}  // namespace brdfc

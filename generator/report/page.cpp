@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "report/page_style.h"
+#include "report/report.h"
+
+namespace brdfc {
+namespace {
+
+/// Appends formatted text.
+template <class... Args> void put(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
+  fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  return out;
+}
+
+constexpr const char* kMinus = "\xe2\x88\x92";
+constexpr const char* kDash = "\xe2\x80\x93";
+
+std::string with_minus(std::string text) {
+  if (!text.empty() && text.front() == '-') text.replace(0, 1, kMinus);
+  return text;
+}
+
+/// 0.00123 -> 1.2·10^−3
+std::string scientific(double v) {
+  if (v == 0) return "0";
+  int exponent = int(std::floor(std::log10(std::abs(v))));
+  std::string mantissa = fmt::format("{:.1f}", v / std::pow(10, exponent));
+  if (mantissa == "10.0" || mantissa == "-10.0") {  // 9.96 rounds up into the next decade
+    ++exponent;
+    mantissa = fmt::format("{:.1f}", v / std::pow(10, exponent));
+  }
+  return fmt::format(
+      "{}\xc2\xb7"
+      "10<sup>{}</sup>",
+      with_minus(mantissa), with_minus(std::to_string(exponent)));
+}
+
+template <class T> std::string or_dash(const std::optional<T>& v, const std::string& text) { return v ? text : kDash; }
+
+std::string cost(const FormReport& f) { return or_dash(f.cost, fmt::format("{:.2f}", f.cost.value_or(0))); }
+
+/// More than three standard deviations away: noise alone explains it once in 370 cases.
+bool biased(const Difference& d) { return std::abs(d.bias) > 3 * d.bias_error && std::abs(d.bias) > 1e-5; }
+
+std::string bias(const Difference& d) {
+  return fmt::format("{} % \xc2\xb1 {:.3f}", with_minus(fmt::format("{:+.3f}", 100 * d.bias)), 100 * d.bias_error);
+}
+
+std::string models_of(const FormReport& f) {
+  std::string out;
+  for (const MaterialForm& m : f.materials) {
+    const std::string text = m.model + " (" + m.representation + ")";
+    if (out.find(text) == std::string::npos) out += (out.empty() ? "" : ", ") + text;
+  }
+  return out;
+}
+
+std::string label(const FormReport& f) { return f.form == kNativeForm ? "Blender's Glossy node" : f.form; }
+
+void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
+  out += R"(<div class="wide"><table>
+<thead><tr><th class="left">Scene</th><th class="left">Form</th><th>relMSE</th><th>of which<br>noise</th>
+<th>Mean, against<br>the reference</th><th>CPU time /<br>Glossy node</th><th>Samples<br>a pixel</th><th>Closures</th>
+<th>Form's own<br>error (L1)</th></tr></thead>
+)";
+  for (const SceneReport& s : scenes) {
+    put(out, "<tbody class=\"scene\">\n");
+    for (std::size_t i = 0; i < s.forms.size(); ++i) {
+      const FormReport& f = s.forms[i];
+      put(out, "<tr{}>", f.form == kNativeForm ? " class=\"native\"" : "");
+      if (i == 0)
+        put(out, "<td class=\"left\" rowspan=\"{}\"><a href=\"#{}\">{}</a></td>", s.forms.size(), escaped(s.scene),
+            escaped(s.scene));
+      put(out, "<td class=\"left\" title=\"{}\">{}</td><td>{}</td><td>{}</td><td{}>{}</td>", escaped(models_of(f)),
+          escaped(label(f)), scientific(f.difference.rel_mse), scientific(f.difference.noise),
+          biased(f.difference) ? " class=\"bad\"" : "", bias(f.difference));
+      put(out, "<td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cost(f), f.spp,
+          or_dash(f.closures(), fmt::format("{}", f.closures().value_or(0))),
+          or_dash(f.relative_l1(), scientific(f.relative_l1().value_or(0))));
+    }
+    out += "</tbody>\n";
+  }
+  out += "</table></div>\n";
+}
+
+/// Error (logarithmic) over cost: one point a form, the expected noise as a dashed line each.
+void put_chart(std::string& out, const SceneReport& s) {
+  std::vector<const FormReport*> points;
+  for (const FormReport& f : s.forms)
+    if (f.cost && f.difference.rel_mse > 0) points.push_back(&f);
+  if (points.size() < 2) return;
+  constexpr double kWidth = 560, kHeight = 240, kLeft = 70, kRight = 130, kTop = 16, kBottom = 42;
+  double most = 1, low = 1e300, high = 0;
+  for (const FormReport* f : points) {
+    most = std::max(most, *f->cost);
+    low = std::min({low, f->difference.rel_mse, f->difference.noise > 0 ? f->difference.noise : 1e300});
+    high = std::max(high, f->difference.rel_mse);
+  }
+  const double x_end = std::ceil(most * 1.05 * 2) / 2;
+  const double bottom = std::floor(std::log10(low)), top = std::max(bottom + 1, std::ceil(std::log10(high)));
+  const auto x = [&](double c) { return kLeft + c / x_end * (kWidth - kLeft - kRight); };
+  const auto y = [&](double e) { return kTop + (top - std::log10(e)) / (top - bottom) * (kHeight - kTop - kBottom); };
+  put(out, "<svg viewBox=\"0 0 {} {}\" width=\"{}\" role=\"img\" aria-label=\"relMSE over CPU time\">\n", kWidth,
+      kHeight, kWidth);
+  for (double decade = bottom; decade <= top; ++decade) {
+    const double at = y(std::pow(10, decade));
+    put(out, "<line class=\"axis\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", kLeft, kWidth - kRight, at, at);
+    put(out, "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">10<tspan dy=\"-5\">{}</tspan></text>\n", kLeft - 8,
+        at + 5, with_minus(fmt::format("{:.0f}", decade)));
+  }
+  for (double tick = 0; tick <= x_end; tick += x_end > 4 ? 1 : 0.5)
+    put(out, "<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:g}</text>\n", x(tick), kHeight - kBottom + 18, tick);
+  put(out, "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">CPU time / Glossy node</text>\n",
+      (kLeft + kWidth - kRight) / 2, kHeight - 6);
+  put(out, "<text x=\"14\" y=\"{}\" transform=\"rotate(-90 14 {})\" text-anchor=\"middle\">relMSE</text>\n",
+      kHeight / 2 - 10, kHeight / 2 - 10);
+  for (const FormReport* f : points) {
+    const double at_x = x(*f->cost), at_y = y(f->difference.rel_mse);
+    if (f->difference.noise > 0)
+      put(out, "<line class=\"floor\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", at_x - 12, at_x + 12,
+          y(f->difference.noise), y(f->difference.noise));
+    put(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
+        at_x, at_y, at_x + 9, at_y + 4, escaped(label(*f)));
+  }
+  out += "</svg>\n";
+}
+
+std::string number(double v) { return fmt::format("{:.3g}", v); }
+
+void put_scale(std::string& out, double at) {
+  // The colours of difference_image().
+  put(out,
+      "<div class=\"scale\">Difference of radiance: darker in Blender {}{} <span class=\"bar\" style=\"background:"
+      "linear-gradient(to right,#00f,#fff,#f00)\"></span> +{} brighter in Blender</div>\n",
+      kMinus, number(at), number(at));
+}
+
+void put_scene(std::string& out, const SceneReport& s, const Previews& p) {
+  put(out, "<section id=\"{}\"><h2>{}</h2>\n<p>{}</p>\n", escaped(s.scene), escaped(s.scene), escaped(s.description));
+  put(out,
+      "<p class=\"soft\">{} \xc3\x97 {} pixels, at most {} bounces; pictures are sRGB{}. Point at a picture to see "
+      "the reference in its place.</p>\n",
+      s.width, s.height, s.max_bounces,
+      p.exposure == 0 ? "" : fmt::format(", exposure {} stops", with_minus(fmt::format("{:.2f}", p.exposure))));
+  put(out,
+      "<div class=\"pictures\">\n<figure><a href=\"{}\"><img src=\"{}\" alt=\"Reference of {}\" width=\"{}\" "
+      "height=\"{}\"></a><figcaption><b>Reference</b><br>{} samples a pixel, {:.1f} s</figcaption></figure>\n",
+      escaped(p.reference), escaped(p.reference), escaped(s.scene), s.width, s.height, s.reference_spp,
+      s.reference_seconds);
+  for (std::size_t i = 0; i < s.forms.size(); ++i) {
+    const FormReport& f = s.forms[i];
+    const std::string picture = escaped(p.forms[i].picture), difference = escaped(p.forms[i].difference);
+    put(out,
+        "<figure><a class=\"flip\" href=\"{}\"><img src=\"{}\" alt=\"{} in Blender\" width=\"{}\" height=\"{}\">"
+        "<img class=\"under\" src=\"{}\" alt=\"\"></a>\n",
+        picture, picture, escaped(label(f)), s.width, s.height, escaped(p.reference));
+    put(out, "<a href=\"{}\"><img src=\"{}\" alt=\"{} minus reference\" width=\"{}\" height=\"{}\"></a>\n", difference,
+        difference, escaped(label(f)), s.width, s.height);
+    put(out, "<figcaption><b>{}</b>{}{}<br>relMSE {} (noise {}), mean {}, CPU {}</figcaption></figure>\n",
+        escaped(label(f)), f.materials.empty() ? "" : "<br>", escaped(models_of(f)), scientific(f.difference.rel_mse),
+        scientific(f.difference.noise), bias(f.difference), or_dash(f.cost, cost(f) + "\xc3\x97"));
+  }
+  out += "</div>\n";
+  put_scale(out, p.difference_at);
+  out += "<p></p>\n";
+  put_chart(out, s);
+  out += "</section>\n";
+}
+
+void put_method(std::string& out) {
+  put(out, R"(<section><h2>How to read this</h2><dl>
+<dt>relMSE</dt><dd>Mean over pixels and channels of (picture {minus} reference)<sup>2</sup> /
+(reference<sup>2</sup> + {epsilon:g}).</dd>
+<dt>Of which noise</dt><dd>The relMSE that two pictures with equal expectation would have: the reference's variance layer plus,
+where a form was rendered with several seeds, the variance of their mean. A relMSE close to it means that no difference
+but noise was found.</dd>
+<dt>Mean, against the reference</dt><dd>Relative difference of the sums over all pixels, with one standard deviation; marked
+when it is more than three.</dd>
+<dt>CPU time / Glossy node</dt><dd>Median over the seeds of the CPU time of rendering, divided by that of the same scene with
+Blender's own Glossy node on every material, rendered in turns in the same process.</dd>
+<dt>Closures</dt><dd>The most closures a point of any material gives to Cycles.</dd>
+<dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Sampled forms are exact in
+expectation: their error is noise.</dd>
+<dt>Blender's Glossy node</dt><dd>The unit of cost, and what a scene looks like without these models.</dd>
+</dl></section>
+)",
+      fmt::arg("minus", kMinus), fmt::arg("epsilon", kRelMseEpsilon));
+}
+
+void put_provenance(std::string& out, const std::vector<SceneReport>& scenes) {
+  out += "<section><h2>Provenance</h2>\n";
+  put(out,
+      "<p>Page written by brdfc {}. The same figures are in <a href=\"report.json\">report.json</a> and "
+      "<a href=\"report.csv\">report.csv</a>.</p>\n",
+      BRDFC_VERSION);
+  // What all scenes share is said once.
+  std::map<std::string, std::string> shared = scenes.front().provenance;
+  for (const SceneReport& s : scenes)
+    std::erase_if(shared, [&](const auto& item) {
+      const auto it = s.provenance.find(item.first);
+      return it == s.provenance.end() || it->second != item.second;
+    });
+  const auto row = [&](const std::string& scene, const std::string& name, const std::string& value) {
+    put(out, "<tr><td class=\"left\">{}</td><td class=\"left\">{}</td><td class=\"left mono\">{}</td></tr>\n",
+        escaped(scene), escaped(name), escaped(value));
+  };
+  out +=
+      "<div class=\"wide\"><table><thead><tr><th class=\"left\">Scene</th><th class=\"left\">What</th>"
+      "<th class=\"left\">Value</th></tr></thead><tbody>\n";
+  for (const auto& [name, value] : shared) row("all", name, value);
+  for (const SceneReport& s : scenes)
+    for (const auto& [name, value] : s.provenance)
+      if (!shared.count(name)) row(s.scene, name, value);
+  out += "</tbody></table></div>\n";
+  for (const SceneReport& s : scenes) {
+    put(out, "<p>{}</p><pre>", escaped(s.scene));
+    for (const std::string& command : s.commands) put(out, "{}\n", escaped(command));
+    out += "</pre>\n";
+  }
+  out += "</section>\n";
+}
+
+}  // namespace
+
+std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews) {
+  std::string out;
+  put(out,
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>brdfc: error against run time</title>\n<style>{}</style></head>\n<body>\n",
+      kPageStyle);
+  std::size_t forms = 0;
+  for (const SceneReport& s : scenes) forms += s.forms.size();
+  put(out,
+      "<h1>Error against run time</h1>\n<p>Every form of every model, rendered in Blender's Cycles and compared "
+      "with an independent path tracer that evaluates the model itself in double precision. {} scenes, {} pictures. "
+      "<span class=\"soft\">What the columns mean is <a href=\"#method\">explained below</a>.</span></p>\n",
+      scenes.size(), forms);
+  put_summary(out, scenes);
+  for (std::size_t i = 0; i < scenes.size(); ++i) put_scene(out, scenes[i], previews[i]);
+  out += "<div id=\"method\"></div>\n";
+  put_method(out);
+  put_provenance(out, scenes);
+  out += "</body></html>\n";
+  return out;
+}
+
+}  // namespace brdfc

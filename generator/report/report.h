@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Error against run time for every scene and form: a page to look at, JSON and CSV to compute with.
+//
+// Input: a folder with one folder a scene, each holding `runs.json` and the images it names:
+//
+//   {
+//     "format": 1,
+//     "scene": "as-fig2",                    the name of the folder
+//     "description": "...",
+//     "settings": {"width": 256, "height": 256, "max_bounces": 4},
+//     "reference": {
+//       "image": "reference.exr",            radiance, with its variance layer
+//       "spp": 1024, "wall_seconds": 3.1
+//     },
+//     "runs": [                              one element a form; "glossy" is Blender's own Glossy node
+//       {
+//         "form": "exact",                   unique within the scene
+//         "images": ["exact-0.exr", ...],    equal samples, different seeds; their mean is shown
+//         "spp": 64,                         samples a pixel of each image
+//         "cpu_seconds": [1.9, ...],         one an image: rendering alone, all threads together
+//         "wall_seconds": [1.0, ...],        one an image
+//         "materials": [                     may be empty (Blender's own nodes)
+//           {"id": "ball", "model": "coupled", "representation": "exact", "closures": 3,
+//            "error": {"relative_l1": 0.0, "albedo": 1e-7, "note": "..."}}     error: null = not measured
+//         ]
+//       }
+//     ],
+//     "provenance": {"Blender": "4.5.15", ...},   text by name, shown at the end of the page
+//     "commands": ["build/brdfc render ...", ...]
+//   }
+//
+// CPU times of different forms are comparable when images with the same index were rendered in turns in one
+// process; the cost of a form is the median over the images of its time divided by the time of "glossy".
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "report/statistics.h"
+
+namespace brdfc {
+
+/// The form that is Blender's own Glossy node.
+inline constexpr const char* kNativeForm = "glossy";
+
+struct MaterialForm {
+  std::string id, model, representation;
+  int closures = 0;
+  std::optional<double> relative_l1, albedo_error;  ///< of the form, as measured when it was compiled
+};
+
+struct FormReport {
+  std::string form;
+  std::vector<std::string> images;
+  int spp = 0;  ///< of all images together
+  std::vector<double> cpu_seconds, wall_seconds;
+  std::vector<MaterialForm> materials;
+  Difference difference;
+  std::optional<double> cost;  ///< CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered
+  Rendering picture;           ///< mean of the images
+
+  /// Largest over the materials; nothing if there is none.
+  std::optional<int> closures() const;
+  std::optional<double> relative_l1() const;
+};
+
+struct SceneReport {
+  std::string scene, description;
+  int width = 0, height = 0, max_bounces = 0;
+  std::string reference_image;
+  int reference_spp = 0;
+  double reference_seconds = 0;
+  Rendering reference;
+  std::vector<FormReport> forms;
+  std::map<std::string, std::string> provenance;
+  std::vector<std::string> commands;
+};
+
+/// Reads every scene under `folder`, in alphabetical order. Throws InputError naming the file and the key where
+/// something is missing, malformed or, in an image, not finite.
+std::vector<SceneReport> load_report(const std::filesystem::path& folder);
+
+/// Previews made for the page; names are relative to the report's folder.
+struct Previews {
+  struct Form {
+    std::string picture, difference;
+  };
+  std::string reference;
+  std::vector<Form> forms;   ///< in the order of the scene's forms
+  double exposure = 1;       ///< factor before the sRGB curve, common to all pictures of the scene
+  double difference_at = 0;  ///< radiance difference at the ends of the colour map
+};
+
+/// Writes the PNG files of one scene into folder/scene.
+Previews write_previews(const std::filesystem::path& folder, const SceneReport&);
+
+/// The page's text; `previews` in the order of `scenes`.
+std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews);
+std::string report_json(const std::vector<SceneReport>& scenes);
+std::string report_csv(const std::vector<SceneReport>& scenes);
+
+/// Writes index.html, report.json, report.csv and the previews. Throws as load_report, and InputError when the
+/// folder can't be written. Returns what it measured.
+std::vector<SceneReport> write_report(const std::filesystem::path& folder);
+
+}  // namespace brdfc

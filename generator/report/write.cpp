@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "report/report.h"
+
+namespace brdfc {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+template <class T> ordered_json or_null(const std::optional<T>& v) { return v ? ordered_json(*v) : ordered_json(); }
+
+ordered_json form_json(const FormReport& f) {
+  ordered_json materials = ordered_json::array();
+  for (const MaterialForm& m : f.materials)
+    materials.push_back({{"id", m.id},
+                         {"model", m.model},
+                         {"representation", m.representation},
+                         {"closures", m.closures},
+                         {"relative_l1", or_null(m.relative_l1)},
+                         {"albedo_error", or_null(m.albedo_error)}});
+  return {{"form", f.form},
+          {"rel_mse", f.difference.rel_mse},
+          {"noise_floor", f.difference.noise},
+          {"bias", f.difference.bias},
+          {"bias_standard_error", f.difference.bias_error},
+          {"cost", or_null(f.cost)},
+          {"spp", f.spp},
+          {"closures", or_null(f.closures())},
+          {"relative_l1", or_null(f.relative_l1())},
+          {"cpu_seconds", f.cpu_seconds},
+          {"wall_seconds", f.wall_seconds},
+          {"images", f.images},
+          {"materials", materials}};
+}
+
+/// RFC 4180: quoted when it holds a separator, a quote or a line break.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
+void write_text(const fs::path& file, const std::string& text) {
+  write_beside(file, [&](const fs::path& temporary) {
+    std::ofstream out(temporary, std::ios::binary);
+    out << text;
+    out.close();
+    if (!out) input_error("{}: can't be written", file.string());
+  });
+}
+
+}  // namespace
+
+std::string report_json(const std::vector<SceneReport>& scenes) {
+  ordered_json out{{"format", 1}, {"generator", "brdfc " BRDFC_VERSION}, {"rel_mse_epsilon", kRelMseEpsilon}};
+  out["scenes"] = ordered_json::array();
+  for (const SceneReport& s : scenes) {
+    ordered_json forms = ordered_json::array();
+    for (const FormReport& f : s.forms) forms.push_back(form_json(f));
+    out["scenes"].push_back(
+        {{"scene", s.scene},
+         {"description", s.description},
+         {"settings", {{"width", s.width}, {"height", s.height}, {"max_bounces", s.max_bounces}}},
+         {"reference", {{"image", s.reference_image}, {"spp", s.reference_spp}, {"wall_seconds", s.reference_seconds}}},
+         {"forms", forms},
+         {"provenance", s.provenance},
+         {"commands", s.commands}});
+  }
+  return out.dump(2) + "\n";
+}
+
+std::string report_csv(const std::vector<SceneReport>& scenes) {
+  const auto number = [](const auto& v) { return v ? fmt::format("{}", *v) : std::string(); };
+  std::string out = "scene,form,rel_mse,noise_floor,bias,bias_standard_error,cost,spp,closures,relative_l1\n";
+  for (const SceneReport& s : scenes)
+    for (const FormReport& f : s.forms)
+      out += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(s.scene), csv_field(f.form), f.difference.rel_mse,
+                         f.difference.noise, f.difference.bias, f.difference.bias_error, number(f.cost), f.spp,
+                         number(f.closures()), number(f.relative_l1()));
+  return out;
+}
+
+std::vector<SceneReport> write_report(const fs::path& folder) {
+  std::vector<SceneReport> scenes = load_report(folder);
+  std::vector<Previews> previews;
+  for (const SceneReport& scene : scenes) previews.push_back(write_previews(folder, scene));
+  write_text(folder / "report.json", report_json(scenes));
+  write_text(folder / "report.csv", report_csv(scenes));
+  write_text(folder / "index.html", report_html(scenes, previews));
+  return scenes;
+}
+
+}  // namespace brdfc

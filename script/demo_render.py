@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders scenes in Blender, in every form, and by the reference renderer; leaves a runs.json each.
+
+Runs in a Python that has `bpy`. For scenes/NAME.json it fills OUT/NAME with the resolved scene, the
+reference, an EXR for every form and seed, and runs.json (described in generator/report/report.h).
+What was rendered before from the same inputs by the same programs is kept.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+RENDER_SCENE = ROOT / "script" / "render_scene.py"
+
+
+def digest(*parts):
+    """SHA-256 over texts and the contents of files, with their order and lengths."""
+    total = hashlib.sha256()
+    for part in parts:
+        data = part.read_bytes() if isinstance(part, Path) else str(part).encode()
+        total.update(f"{len(data)}:".encode() + data)
+    return total.hexdigest()
+
+
+def resolved_files(folder):
+    """scene.json of a resolved scene and every file it names, in a stable order."""
+    scene = folder / "scene.json"
+    found = set()
+
+    def walk(value):
+        if isinstance(value, dict):
+            for item in value.values():
+                walk(item)
+        elif isinstance(value, list):
+            for item in value:
+                walk(item)
+        elif isinstance(value, str) and value and (folder / value).is_file():
+            found.add(folder / value)
+
+    walk(json.loads(scene.read_text(encoding="utf-8")))
+    return [scene, *sorted(found)]
+
+
+def run(command, **options):
+    """Runs a command; a failure ends this program with the command's status."""
+    done = subprocess.run([str(c) for c in command], **options)
+    if done.returncode != 0:
+        print(f"demo_render: failed: {shown(command)}", file=sys.stderr)
+        sys.exit(done.returncode if done.returncode > 0 else 1)
+    return done
+
+
+def shown(command):
+    """A command as a person would type it in the root of the repository."""
+    short = []
+    for word in command:
+        path = Path(word)
+        inside = path.is_absolute() and path.is_relative_to(ROOT)
+        short.append(str(path.relative_to(ROOT)) if inside else str(word))
+    return shlex.join(short)
+
+
+def write_json(path, value):
+    beside = path.with_name(f".{path.name}.part")
+    beside.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
+    beside.replace(path)
+
+
+def forms_of(scene, models):
+    """Forms to render: each kind that every material has, a mixture where only some have the exact
+    one, what the scene itself asks for, and Blender's own node as the unit of cost."""
+    forms = ["glossy"]
+    available = [models[m["model"]]["representations"] for m in scene["materials"].values()]
+    if all("exact" in a for a in available):
+        forms.append("exact")
+    elif any("exact" in a for a in available):
+        forms.append("auto")
+    if all("sampled" in a for a in available):
+        forms.append("sampled")
+    if any(m.get("representation", "auto") != "auto" for m in scene["materials"].values()):
+        forms.append("scene")
+    return forms
+
+
+def render_reference(tool, folder, spp):
+    """Renders folder/reference.exr; returns the command and the wall time."""
+    command = [tool, "render", folder / "scene.json", "--out", folder / "reference.exr"]
+    command += ["--spp", spp]
+    start = time.perf_counter()
+    run(command)
+    return {"command": shown(map(str, command)), "wall_seconds": time.perf_counter() - start}
+
+
+def render_blender(extension, folder, forms, spp, seeds):
+    """Renders every form with every seed, in turns in one process; returns command and records."""
+    jobs = [
+        {
+            "name": f"{folder.name} {form} {seed}/{seeds}",
+            "scene": str(folder / "scene.json"),
+            "out": str(folder / f"{form}-{seed}.exr"),
+            "representation": form,
+            "spp": spp,
+            "seed": seed,
+        }
+        for seed in range(1, seeds + 1)
+        for form in forms
+    ]
+    write_json(folder / "jobs.json", jobs)
+    command = [sys.executable, RENDER_SCENE, "--extension", extension]
+    command += ["--jobs", folder / "jobs.json"]
+    records = json.loads(run(command, stdout=subprocess.PIPE).stdout)
+    return {"command": shown(map(str, command)), "records": records}
+
+
+def materials_of(record):
+    """The materials of a record in the form of runs.json; Blender's own nodes have no entry."""
+    out = []
+    for name, groups in record["materials"].items():
+        for group in groups:
+            if "model" in group:
+                keys = ("model", "representation", "closures", "error")
+                out.append({"id": name} | {key: group[key] for key in keys})
+    return out
+
+
+def form_run(form, records):
+    return {
+        "form": form,
+        "images": [Path(r["out"]).name for r in records],
+        "spp": records[0]["settings"]["spp"],
+        "cpu_seconds": [r["sampling_cpu_seconds"] for r in records],
+        "wall_seconds": [r["wall_seconds"] for r in records],
+        "materials": materials_of(records[0]),
+    }
+
+
+def cpu_model():
+    info = Path("/proc/cpuinfo")
+    for line in info.read_text().splitlines() if info.exists() else []:
+        if line.startswith("model name"):
+            return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def cached(state, part, key, outputs, make):
+    """state[part] if it was made with this key and its outputs exist, else made now."""
+    if state.get(part, {}).get("key") == key and all(o.is_file() for o in outputs):
+        return state[part], True
+    state.pop(part, None)
+    state[part] = make() | {"key": key}
+    return state[part], False
+
+
+def render_scene(source, options, models, versions):
+    folder = options.out / source.stem
+    folder.mkdir(parents=True, exist_ok=True)
+    run([options.tool, "scene", source, "--out", folder])
+    inputs = digest(*resolved_files(folder))
+    scene = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
+    settings = scene["settings"]
+    blender_spp = max(1, settings["spp"] // options.seeds)
+    reference_spp = settings["spp"] * options.reference_factor
+    forms = forms_of(scene, models)
+
+    state_file = folder / "state.json"
+    state = json.loads(state_file.read_text(encoding="utf-8")) if state_file.exists() else {}
+    key = digest(versions["tool"], inputs, reference_spp)
+    reference, kept_reference = cached(
+        state,
+        "reference",
+        key,
+        [folder / "reference.exr"],
+        lambda: render_reference(options.tool, folder, reference_spp),
+    )
+    write_json(state_file, state)
+    key = digest(versions["extension"], inputs, RENDER_SCENE, forms, blender_spp, options.seeds)
+    images = [folder / f"{f}-{s}.exr" for f in forms for s in range(1, options.seeds + 1)]
+    blender, kept_blender = cached(
+        state,
+        "blender",
+        key,
+        images,
+        lambda: render_blender(options.extension, folder, forms, blender_spp, options.seeds),
+    )
+    write_json(state_file, state)
+
+    records = blender["records"]
+    runs = [form_run(f, [r for r in records if r["representation"] == f]) for f in forms]
+    provenance = {
+        "Blender": records[0]["blender"],
+        "Extension": f"{options.extension.name}, sha256 {versions['extension']}",
+        "Tool": f"{versions['tool_version']}, sha256 {versions['tool']}",
+        "Processor": f"{cpu_model()}, {os.cpu_count()} threads",
+        "Scene": f"scenes/{source.name}, sha256 when resolved {inputs}",
+    }
+    warnings = sorted({w for r in records for w in r["warnings"]})
+    if warnings:
+        provenance["Warnings of the extension"] = "; ".join(warnings)
+    write_json(
+        folder / "runs.json",
+        {
+            "format": 1,
+            "scene": source.stem,
+            "description": scene["description"],
+            "settings": {k: settings[k] for k in ("width", "height", "max_bounces")},
+            "reference": {
+                "image": "reference.exr",
+                "spp": reference_spp,
+                "wall_seconds": reference["wall_seconds"],
+            },
+            "runs": runs,
+            "provenance": provenance,
+            "commands": [
+                shown([str(options.tool), "scene", str(source), "--out", str(folder)]),
+                reference["command"],
+                blender["command"],
+            ],
+        },
+    )
+    kept = [n for n, k in (("reference", kept_reference), ("Blender", kept_blender)) if k]
+    note = f" (kept: {', '.join(kept)})" if kept else ""
+    print(f"    {source.stem}: {', '.join(forms)}{note}", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scenes", nargs="+", type=Path, help="scenes/NAME.json")
+    parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
+    parser.add_argument("--extension", required=True, type=Path, help="brdfc_shaders-<version>.zip")
+    parser.add_argument("--out", required=True, type=Path, help="folder of the results")
+    parser.add_argument(
+        "--seeds", type=int, default=4, help="pictures a form; share the scene's samples (4)"
+    )
+    parser.add_argument(
+        "--reference-factor", type=int, default=4, help="times the scene's samples (4)"
+    )
+    options = parser.parse_args()
+    if options.seeds < 2:
+        parser.error("--seeds: expected at least 2, noise is estimated from their spread")
+    if options.reference_factor < 1:
+        parser.error("--reference-factor: expected at least 1")
+    for name in ("tool", "extension", "out"):
+        setattr(options, name, getattr(options, name).resolve())
+    for path in (options.tool, options.extension, *options.scenes):
+        if not path.is_file():
+            parser.error(f"{path}: no such file")
+
+    with zipfile.ZipFile(options.extension) as archive:
+        models = json.loads(archive.read("manifest.json"))["models"]
+    version = run([options.tool, "--version"], stdout=subprocess.PIPE, text=True)
+    versions = {
+        "tool": digest(options.tool),
+        "tool_version": f"brdfc {version.stdout.strip().removeprefix('brdfc ')}",
+        "extension": digest(options.extension),
+    }
+    for source in options.scenes:
+        render_scene(source.resolve(), options, models, versions)
+    # A scene that is gone would stay in the report for ever.
+    known = {s.stem for s in (ROOT / "scenes").glob("*.json")} | {s.stem for s in options.scenes}
+    for folder in options.out.iterdir():
+        if folder.is_dir() and (folder / "runs.json").exists() and folder.name not in known:
+            print(f"    {folder.name}: no such scene any more, left out of the report")
+            (folder / "runs.json").unlink()
+            (folder / "scene.json").unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    main()

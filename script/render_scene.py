@@ -1,0 +1,260 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders resolved scenes in Blender, headless, with the extension installed as a person would.
+
+Runs in a Python that has the `bpy` module. One job from the command line, or several from a file,
+whose repetitions take turns so that their run times can be compared:
+
+    python script/render_scene.py --extension ZIP --scene DIR/scene.json --out OUT.exr
+    python script/render_scene.py --extension ZIP --jobs jobs.json
+
+jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
+"repeat": ...}, ...]; all but scene and out are optional and default to the options of the command
+line. Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
+usage or input.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import resource
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+
+class UsageError(Exception):
+    """Something the user can mend; one line."""
+
+
+@contextlib.contextmanager
+def quiet():
+    """Sends what Blender prints, from Python or not, to a file that is shown when a step fails."""
+    sys.stdout.flush()
+    with tempfile.TemporaryFile() as sink:
+        saved = os.dup(1)
+        os.dup2(sink.fileno(), 1)
+        try:
+            yield
+        except BaseException:
+            sink.seek(0)
+            sys.stderr.write(sink.read().decode(errors="replace")[-4000:])
+            raise
+        finally:
+            sys.stdout.flush()
+            os.dup2(saved, 1)
+            os.close(saved)
+
+
+def start_blender(extension, resources):
+    """Imports bpy with scratch user folders, installs the extension; returns bpy, scene_loader."""
+    os.environ["BLENDER_USER_RESOURCES"] = str(resources)
+    import bpy
+
+    with quiet():
+        bpy.ops.preferences.addon_enable(module="bl_pkg")
+        bpy.ops.extensions.package_install_files(
+            filepath=str(extension), repo="user_default", enable_on_install=True
+        )
+    try:
+        from bl_ext.user_default.brdfc_shaders import scene_loader
+    except ImportError as error:
+        raise UsageError(f"{extension}: not the brdfc_shaders extension: {error}") from error
+    return bpy, scene_loader
+
+
+def cpu_seconds():
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def timed_render(bpy, samples, path=None):
+    """CPU and wall seconds of one render of the active scene."""
+    scene = bpy.context.scene
+    scene.cycles.samples = samples
+    if path is not None:
+        scene.render.filepath = str(path)
+    with quiet():
+        cpu, wall = cpu_seconds(), time.perf_counter()
+        bpy.ops.render.render(write_still=path is not None)
+        return cpu_seconds() - cpu, time.perf_counter() - wall
+
+
+def render_once(bpy, loader, job, repetition):
+    """Loads and renders one job. Returns its times and, from the first repetition, a description.
+
+    Compiling, building the BVH and the like happen in every render. They are told apart from
+    sampling by a render with one sample: sampling = (T(spp) - T(1)) * spp / (spp - 1).
+    """
+    with quiet():
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    start = time.perf_counter()
+    scene = loader.load_scene(job["scene"], representation=job["representation"])
+    load_wall = time.perf_counter() - start
+    samples = job["spp"] or scene.cycles.samples
+    if job["seed"] is not None:
+        scene.cycles.seed = job["seed"]
+    one_cpu, one_wall = timed_render(bpy, 1)
+    out = Path(job["out"]).resolve()
+    partial = out.with_name(f".{out.stem}.partial.exr")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    cpu, wall = timed_render(bpy, samples, partial if repetition == 0 else None)
+    factor = samples / max(samples - 1, 1)
+    times = {
+        "cpu_seconds": cpu,
+        "wall_seconds": wall,
+        "sampling_cpu_seconds": max(cpu - one_cpu, 0.0) * factor if samples > 1 else cpu,
+        "one_sample_cpu_seconds": one_cpu,
+        "one_sample_wall_seconds": one_wall,
+        "load_wall_seconds": load_wall,
+    }
+    if repetition > 0:
+        return times, None
+    if not partial.exists():
+        raise UsageError(f"{job['scene']}: Blender wrote no picture")
+    os.replace(partial, out)
+    return times, describe(bpy, loader, scene, job, samples)
+
+
+def describe(bpy, loader, scene, job, samples):
+    """What was rendered, and under which settings."""
+    api, nodes, pack = loader.api, loader.nodes, loader.pack
+    materials, warnings = {}, []
+    used = {s.material for o in scene.objects for s in o.material_slots if s.material}
+    for material in sorted(used, key=lambda m: m.name):
+        forms = []
+        for node in nodes.group_nodes(material):
+            model, representation = nodes.identity(node)
+            entry = pack.representation(model, representation)
+            keep = ("closures", "slots", "statements", "error", "warnings")
+            forms.append(
+                {"model": model, "representation": representation}
+                | {key: entry.get(key) for key in keep}
+            )
+        materials[material.name] = forms or [{"representation": job["representation"]}]
+        warnings += [f"{material.name}: {w.message}" for w in api.warnings(material, scene)]
+    cycles, render = scene.cycles, scene.render
+    return {
+        "scene": str(job["scene"]),
+        "out": str(job["out"]),
+        "representation": job["representation"] or "scene",
+        "blender": bpy.app.version_string,
+        "materials": materials,
+        "warnings": warnings,
+        "settings": {
+            "width": render.resolution_x,
+            "height": render.resolution_y,
+            "spp": samples,
+            "seed": cycles.seed,
+            "max_bounces": cycles.max_bounces,
+            "device": cycles.device,
+            "pixel_filter": cycles.pixel_filter_type,
+            "threads": render.threads,
+        },
+    }
+
+
+def read_jobs(options):
+    """List of complete jobs. Raises UsageError."""
+    defaults = {
+        "representation": options.representation,
+        "spp": options.spp,
+        "seed": options.seed,
+        "repeat": options.repeat,
+    }
+    if options.jobs:
+        try:
+            jobs = json.loads(Path(options.jobs).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise UsageError(f"{options.jobs}: {error}") from error
+        if not isinstance(jobs, list) or not all(isinstance(j, dict) for j in jobs) or not jobs:
+            raise UsageError(f"{options.jobs}: expected a list of jobs")
+    elif options.scene and options.out:
+        jobs = [{"scene": options.scene, "out": options.out}]
+    else:
+        raise UsageError("expected --scene and --out, or --jobs")
+    complete = []
+    for index, job in enumerate(jobs):
+        for key in ("scene", "out"):
+            if not isinstance(job.get(key), str):
+                raise UsageError(f"{options.jobs}: job {index}: {key}: expected a path")
+        if unknown := sorted(set(job) - set(defaults) - {"scene", "out", "name"}):
+            raise UsageError(f"{options.jobs}: job {index}: unknown key {unknown[0]}")
+        merged = defaults | job
+        for key, least in (("spp", 1), ("seed", 0), ("repeat", 1)):
+            value = merged[key]
+            if value is not None and (not isinstance(value, int) or value < least):
+                raise UsageError(
+                    f"job {index}: {key}: expected a whole number from {least}, got {value!r}"
+                )
+        if merged["representation"] == "scene":
+            merged["representation"] = None
+        complete.append(merged)
+    return complete
+
+
+def run(options):
+    """Renders every job, repetitions taking turns, and returns their records."""
+    jobs = read_jobs(options)
+    extension = Path(options.extension).resolve()
+    if not extension.is_file():
+        raise UsageError(f"{extension}: no such file")
+    records = [None] * len(jobs)
+    times = [[] for _ in jobs]
+    with tempfile.TemporaryDirectory(prefix="brdfc-blender-") as resources:
+        bpy, loader = start_blender(extension, resources)
+        total = sum(job["repeat"] for job in jobs)
+        done = 0
+        for repetition in range(max(job["repeat"] for job in jobs)):
+            for index, job in enumerate(jobs):
+                if repetition >= job["repeat"]:
+                    continue
+                try:
+                    taken, record = render_once(bpy, loader, job, repetition)
+                except ValueError as error:
+                    raise UsageError(str(error)) from error
+                times[index].append(taken)
+                records[index] = records[index] or record
+                done += 1
+                name = job.get("name", job["out"])
+                print(f"[{done}/{total}] {name}: {taken['cpu_seconds']:.1f} s", file=sys.stderr)
+    for record, job, taken in zip(records, jobs, times, strict=True):
+        if "name" in job:
+            record["name"] = job["name"]
+        record["repeats"] = taken
+        for key in taken[0]:
+            record[key] = statistics.median(t[key] for t in taken)
+    return records
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--extension", required=True, help="brdfc_shaders-<version>.zip")
+    parser.add_argument("--scene", help="resolved scene.json")
+    parser.add_argument("--out", help="EXR to write, 32-bit float, scene linear")
+    parser.add_argument("--jobs", help="JSON file with a list of jobs")
+    parser.add_argument(
+        "--representation",
+        default="scene",
+        help="scene (as the file says), auto, exact, sampled, or glossy for Blender's own node",
+    )
+    parser.add_argument("--spp", type=int, help="samples a pixel; default: as the scene says")
+    parser.add_argument("--seed", type=int, help="random numbers; default: as the scene says")
+    parser.add_argument("--repeat", type=int, default=1, help="renders a job; times are medians")
+    options = parser.parse_args()
+    try:
+        records = run(options)
+    except UsageError as error:
+        print(f"render_scene: {error}", file=sys.stderr)
+        sys.exit(2)
+    json.dump(records, sys.stdout, indent=2)
+    sys.stdout.write("\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Quadrature against closed forms, tables against quadrature, and the checks against models that are wrong on purpose.
+#include <OpenImageIO/imageio.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+
+#include "analysis/albedo_table.h"
+#include "analysis/checks.h"
+#include "model/sampling.h"
+
+namespace brdfc {
+
+// Not in the anonymous namespace: the model adapter has members of these types.
+namespace faulty {
+
+// ---- models made for these tests: they are not registered ------------------------------------------------
+
+// Lambert's reflector with one thing wrong at a time.
+enum Defect {
+  kNone,
+  kPdf,
+  kSampler,
+  kReciprocity,
+  kNegative,
+  kNan,
+  kUnstable,
+  kGain,
+  kTurn,
+  kColorSquared,
+  kClosure,
+  kModest
+};
+
+template <Defect D> struct Faulty {
+  template <class T> struct Type {
+    Rgb<T> rho;
+    T level;
+
+    static ModelInfo info() {
+      return {.name = "faulty",
+              .label = "Faulty",
+              .paper = "",
+              .equations = "",
+              .doc = "",
+              .properties =
+                  D == kModest ? ModelProperties{false, false, false, false} : ModelProperties{true, true, true, true},
+              .params = {}};
+    }
+    template <class Visitor> void parameters(const Visitor& v) {
+      v(rho, ColorSpec{"rho", "Reflectance", {0.8, 0.8, 0.8}, ""});
+      v(level, NumberSpec{"level", "Level", 1, 0, 1000, 0, 1000, ""});
+    }
+    Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+      Rgb<T> f = rho / pi<T>();
+      if (D == kReciprocity) f = f * (T(1) + T(0.01) * wo.x);
+      if (D == kNegative) f = f * select(wi.z < T(0.2), T(-1e-3), T(1));
+      if (D == kNan) f = f * select(wi.z < T(0.2) && level > T(900), T(std::numeric_limits<double>::quiet_NaN()), T(1));
+      if (D == kUnstable) f = f * (T(1) + (T(1e6) + wi.z * wi.z) - (T(1e6) + wi.z * wi.z * T(0.999)));
+      if (D == kGain) f = f * T(1.01);
+      if (D == kTurn) f = f * (T(1) + T(0.01) * wi.x * wo.x);
+      if (D == kColorSquared) f = f * rho;
+      return select(above(wi, wo), f, Rgb<T>(T(0)));
+    }
+    T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+      return select(above(wi, wo), D == kPdf ? T(1) / (T(2) * pi<T>()) : cosine_pdf(wi), T(0));
+    }
+    Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+      const Vec3<T> wi = sample_cosine(D == kSampler ? T(0.98) * u.y : u.y, u.z);
+      const T p = pdf(wi, wo);
+      return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
+    }
+    ClosureSum<T> exact(const Vec3<T>&) const {
+      Closure<T> c(ClosureKind::Diffuse, rho);
+      if (D == kClosure) c.weight = c.weight * T(1.0001);
+      return {c};
+    }
+  };
+};
+
+}  // namespace faulty
+
+namespace {
+
+using namespace faulty;
+
+using testing::HasSubstr;
+
+// ---- cubature --------------------------------------------------------------------------------------------
+
+TEST(Cubature, IsExactForPolynomialsOfDegreeSeven) {
+  const Integrand2 f = [](double x, double y, double* out) {
+    out[0] = std::pow(x, 4) * std::pow(y, 3);
+    out[1] = 1;
+  };
+  const CubatureResult r = integrate(f, 2, {{0, 2, 1, 3}}, {1e300, 0, 1});
+  EXPECT_NEAR(r.value[0], 32. / 5 * (81 - 1) / 4, 1e-12);
+  EXPECT_NEAR(r.value[1], 4, 1e-14);
+  EXPECT_EQ(r.cells, 1);
+}
+
+TEST(Cubature, ReachesItsToleranceAtAKinkAndSaysWhenItCannot) {
+  const Integrand2 kink = [](double x, double y, double* out) { out[0] = std::abs(x + y - 0.9); };
+  // Over the unit square: 2 * 0.9^3 / 6 + (mean of x + y - 0.9 = 0.1)
+  const double exact = 0.1 + std::pow(0.9, 3) / 3;
+  const CubatureResult r = integrate(kink, 1, {{}}, {1e-7, 0, 100000});
+  EXPECT_TRUE(r.converged);
+  EXPECT_NEAR(r.value[0], exact, 1e-7);
+  const CubatureResult few = integrate(kink, 1, {{}}, {1e-12, 0, 20});
+  EXPECT_FALSE(few.converged);
+  EXPECT_GT(few.error[0], 1e-12);
+}
+
+TEST(Cubature, PartitionCoversTheRectangleAndClosesInOnCrowds) {
+  std::vector<Point2> points;
+  for (int i = 0; i < 64; ++i) points.push_back({0.3 + 1e-9 * i, 0.7 - 1e-9 * (i % 8)});
+  const std::vector<Rect> parts = partition({0, 1, 0, 2}, points, 4);
+  double area = 0, smallest = 1;
+  for (const Rect& r : parts) {
+    area += (r.x1 - r.x0) * (r.y1 - r.y0);
+    smallest = std::min(smallest, r.x1 - r.x0);
+  }
+  EXPECT_NEAR(area, 2, 1e-12);
+  EXPECT_LT(smallest, 1e-7);
+  // Points that coincide end the search.
+  EXPECT_LT(partition({0, 1, 0, 1}, std::vector<Point2>(100, {0.3, 0.3}), 4).size(), 200u);
+}
+
+TEST(Cubature, FindsAPeakFarNarrowerThanTheNodesAreApart) {
+  // A density on the hemisphere that only its sampler knows the place of.
+  const Model& m = find_model("radziszewski_alda");
+  const BoundModel b = bind_model(m, parse_values(m.info(), {"n=1e7", "tint=1"}));
+  const Vec3<double> wo = direction(0.6, 2);
+  const CubatureResult r = integrate_hemisphere(
+      *b.brdf, wo, 1, [&](const Vec3<double>& wi, double* out) { out[0] = b.brdf->pdf(wi, wo); }, {1e-8, 0, 10000});
+  EXPECT_TRUE(r.converged);
+  EXPECT_NEAR(r.value[0], 1, 1e-7);
+}
+
+// ---- checks ----------------------------------------------------------------------------------------------
+
+template <Defect D> std::map<std::string, bool> outcome() {
+  const detail::ModelOf<Faulty<D>::template Type> model;
+  std::map<std::string, bool> passed;
+  for (const CheckRow& r : check_model(model)) passed[r.check] = r.passed;
+  return passed;
+}
+
+TEST(Checks, PassARightModel) {
+  for (const auto& [check, passed] : outcome<kNone>()) EXPECT_TRUE(passed) << check;
+}
+TEST(Checks, SeeAPdfThatIsNotTheSamplers) {
+  const auto r = outcome<kPdf>();
+  EXPECT_FALSE(r.at("chi-square"));
+  EXPECT_FALSE(r.at("sampled albedo"));
+  EXPECT_TRUE(r.at("pdf integral"));
+}
+TEST(Checks, SeeASamplerThatLeavesTwoPercentOut) {
+  // All its weights are the reflectance, so that no furnace can tell.
+  const auto r = outcome<kSampler>();
+  EXPECT_FALSE(r.at("chi-square"));
+  EXPECT_TRUE(r.at("sampled albedo"));
+}
+TEST(Checks, SeeMissingReciprocity) { EXPECT_FALSE(outcome<kReciprocity>().at("reciprocal")); }
+TEST(Checks, SeeMissingIsotropy) { EXPECT_FALSE(outcome<kTurn>().at("isotropic")); }
+TEST(Checks, SeeEnergyFromNowhere) {
+  const auto r = outcome<kGain>();
+  EXPECT_FALSE(r.at("conserving"));
+  EXPECT_FALSE(r.at("lossless"));
+}
+TEST(Checks, SeeCancellation) {
+  const auto r = outcome<kUnstable>();
+  EXPECT_FALSE(r.at("float rounding"));
+  EXPECT_FALSE(r.at("double rounding"));
+}
+TEST(Checks, SeeClosuresThatAreNotTheModel) { EXPECT_FALSE(outcome<kClosure>().at("exact closures")); }
+TEST(Checks, SeePropertiesDeclaredAbsentThatHold) {
+  const auto passed = outcome<kModest>();
+  EXPECT_FALSE(passed.at("not reciprocal"));
+  EXPECT_FALSE(passed.at("not conserving"));
+  EXPECT_FALSE(passed.at("not lossless"));
+  EXPECT_FALSE(passed.at("not isotropic"));
+}
+
+template <class F> std::string message(const F& f) {
+  try {
+    f();
+  } catch (const ValueError& e) {
+    return e.what();
+  }
+  return "no ValueError";
+}
+
+TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
+  const detail::ModelOf<Faulty<kNegative>::Type> negative;
+  const detail::ModelOf<Faulty<kNan>::Type> nan;
+  for (const std::string& text :
+       {message([&] { check_model(negative); }), message([&] { tabulate_albedo(negative); }),
+        message([&] { albedo(*bind_model(negative, {}).brdf, 0.5, 0, bind_model(negative, {}).label); })}) {
+    EXPECT_THAT(text, HasSubstr("faulty rho="));
+    EXPECT_THAT(text, HasSubstr("level="));
+    EXPECT_THAT(text, HasSubstr("f(wi=("));
+    EXPECT_THAT(text, HasSubstr("wo=("));
+    EXPECT_THAT(text, HasSubstr("-0.000"));
+    EXPECT_THAT(text, HasSubstr("expected finite and >= 0"));
+  }
+  // Only at some parameters, which the table has to come across.
+  EXPECT_THAT(message([&] { tabulate_albedo(nan); }), HasSubstr("nan"));
+}
+
+// ---- albedo ----------------------------------------------------------------------------------------------
+
+TEST(AlbedoValue, CountsMirrorApart) {
+  const Model& m = find_model("coupled");
+  const BoundModel b = bind_model(m, parse_values(m.info(), {"r0=0.2", "rm=1,0.5,0"}));
+  const double c = 0.3, rf = 0.2 + 0.8 * std::pow(0.7, 5);
+  const Albedo a = albedo(*b.brdf, c);
+  EXPECT_NEAR(a.mirror.r, rf, 1e-15);
+  EXPECT_NEAR(a.scattered.r, 1 - rf, 1e-9);
+  EXPECT_NEAR(a.scattered.g, 0.5 * (1 - rf), 1e-9);
+  EXPECT_NEAR(a.scattered.b, 0, 1e-15);
+  EXPECT_LE(a.error, 1e-7);
+}
+
+TEST(AlbedoValue, IsGoodToItsErrorForRidgesThatAreThinAndCurved) {
+  // Extreme anisotropy: no reference but another method; the mean over many samples.
+  const Model& m = find_model("ashikhmin_shirley");
+  for (const auto& values : {std::vector<std::string>{"nu=1e8", "nv=1"}, {"nu=1", "nv=1e5"}, {"nu=10", "nv=1e5"}})
+    for (const double c : {1., 0.5, 0.05}) {
+      const BoundModel b = bind_model(m, parse_values(m.info(), values));
+      const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
+      const MeanAlbedo mean = mean_albedos(*b.brdf, {b.brdf.get()}, c, 0.3, b.label, 1 << 19, 77);
+      EXPECT_LT(a.error, 2e-3) << b.label << " cos_theta_o=" << c;
+      EXPECT_NEAR(a.scattered.r, mean.scattered[0].r, 2 * a.error + 10 * mean.error) << b.label << " cos_theta_o=" << c;
+    }
+}
+
+// ---- tables ----------------------------------------------------------------------------------------------
+
+TEST(AlbedoTableOf, LambertIsOneNumberTimesItsColour) {
+  const Model& m = find_model("lambert");
+  const AlbedoTable t = tabulate_albedo(m);
+  ASSERT_EQ(t.terms.size(), 1u);
+  ASSERT_EQ(t.terms[0].size(), 1u);
+  EXPECT_THAT(t.terms[0][0].colors, testing::ElementsAre("rho"));
+  EXPECT_FALSE(t.terms[0][0].mirror);
+  ASSERT_EQ(t.grids.size(), 1u);
+  EXPECT_TRUE(t.grids[0].axes.empty());
+  EXPECT_NEAR(t.grids[0].values.at(0), 1, 1e-6);
+  EXPECT_LT(t.error, 1e-6);
+}
+
+TEST(AlbedoTableOf, CoupledHasTheClosedFormsTermsAndStatedError) {
+  const Model& m = find_model("coupled");
+  const AlbedoTable t = tabulate_albedo(m);
+  ASSERT_EQ(t.terms.size(), 1u);
+  ASSERT_EQ(t.terms[0].size(), 2u);
+  EXPECT_LT(t.error, 1e-3);
+  EXPECT_LE(t.size(), 1024u);
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> u;
+  for (int i = 0; i < 500; ++i) {
+    const double r0 = u(random), c = 0.001 + 0.999 * u(random);
+    const std::array<double, 3> rm{u(random), u(random), u(random)};
+    const Rgb<double> a = lookup(t, m, {{"r0", r0}, {"rm", rm}}, c);
+    const double rf = r0 + (1 - r0) * std::pow(1 - c, 5);
+    // The stated error was met at other random points: the same law, not the same numbers.
+    EXPECT_NEAR(a.r, rf + rm[0] * (1 - rf), 1.5 * t.error);
+    EXPECT_NEAR(a.b, rf + rm[2] * (1 - rf), 1.5 * t.error);
+  }
+}
+
+TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const AlbedoTable t = tabulate_albedo(m);
+  EXPECT_LE(t.size(), 32768u);
+  EXPECT_LT(t.error, 0.05);
+  EXPECT_GT(t.anisotropy, 0.01);
+  EXPECT_THAT(t.doc, HasSubstr("azimuth"));
+  for (const AlbedoGrid& g : t.grids)
+    for (const TableAxis& a : g.axes) EXPECT_NE(a.name, "rotation");
+  const auto& both = t.terms_for(m, parse_values(m.info(), {"part=both"}));
+  const auto& specular = t.terms_for(m, parse_values(m.info(), {"part=specular"}));
+  std::set<int> in_both;
+  for (const AlbedoTerm& term : both) in_both.insert(term.grid);
+  for (const AlbedoTerm& term : specular) EXPECT_TRUE(in_both.count(term.grid));
+
+  // Isotropic exponents in the slider's range, against quadrature.
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> u;
+  double worst = 0;
+  for (int i = 0; i < 24; ++i) {
+    const double n = std::expm1(std::log1p(1e4) * u(random)), c = 0.02 + 0.98 * u(random);
+    const ParamValues v{{"nu", n}, {"nv", n}, {"rs", u(random)}, {"rd", u(random)}, {"rotation", u(random)}};
+    const Albedo a = albedo(*bind_model(m, v).brdf, c, 0.2, "", {1e-6, 4000, 1 << 15});
+    worst = std::max(worst, std::abs(lookup(t, m, v, c).r - a.total().r));
+  }
+  EXPECT_LT(worst, t.error + 1e-3);
+}
+
+TEST(AlbedoTableOf, AModelNotLinearInItsColoursIsRefused) {
+  const detail::ModelOf<Faulty<kColorSquared>::Type> model;
+  EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("linear in each"));
+}
+
+TEST(AlbedoTableOf, APdfThatIsNotTheSamplersIsRefused) {
+  const detail::ModelOf<Faulty<kPdf>::Type> model;
+  EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("quadrature over directions"));
+}
+
+TEST(AlbedoTableFile, HoldsTheNumbersAndTheirMeaning) {
+  const Model& m = find_model("coupled");
+  const AlbedoTable t = tabulate_albedo(m);
+  const auto path = std::filesystem::temp_directory_path() / fmt::format("brdfc_albedo_{}.exr", ::getpid());
+  write_albedo_exr(t, path.string());
+  const auto in = OIIO::ImageInput::open(path.string());
+  ASSERT_TRUE(in) << OIIO::geterror();
+  const OIIO::ImageSpec& spec = in->spec();
+  EXPECT_EQ(spec.format, OIIO::TypeDesc::FLOAT);
+  ASSERT_EQ(spec.height, int(t.grids.size()));
+  std::vector<float> pixels(std::size_t(spec.width) * std::size_t(spec.height) * std::size_t(spec.nchannels));
+  ASSERT_TRUE(in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, pixels.data()));
+  const auto meta = nlohmann::json::parse(spec.get_string_attribute("brdfc:table"));
+  in->close();
+  std::filesystem::remove(path);
+  EXPECT_EQ(meta["model"], "coupled");
+  EXPECT_EQ(meta["error"].get<double>(), t.error);
+  for (std::size_t g = 0; g < t.grids.size(); ++g) {
+    EXPECT_EQ(meta["grids"][g]["axes"][0]["name"], t.grids[g].axes[0].name);
+    EXPECT_EQ(meta["grids"][g]["axes"][0]["values"].get<std::vector<double>>(), t.grids[g].axes[0].values);
+    for (std::size_t i = 0; i < t.grids[g].values.size(); ++i)
+      EXPECT_EQ(pixels[(g * std::size_t(spec.width) + i) * std::size_t(spec.nchannels)], t.grids[g].values[i]);
+  }
+  EXPECT_THROW(write_albedo_exr(t, "/nowhere/at/all.exr"), InputError);
+}
+
+TEST(AlbedoTableFile, LookUpClampsAtItsEndsAndMeetsItsKnots) {
+  AlbedoGrid g;
+  g.axes = {{"a", AxisScale::Linear, {0, 1, 4}}, {"b", AxisScale::Log1p, {0, 9, 99}}};
+  g.values = {0, 1, 2, 10, 11, 12, 40, 41, 42};
+  EXPECT_NEAR(lookup(g, {1, 9}).r, 11, 1e-12);
+  EXPECT_NEAR(lookup(g, {2.5, 0}).r, 25, 1e-12);
+  EXPECT_NEAR(lookup(g, {4, std::sqrt(10.) * 10 - 1}).r, 41.5, 1e-12);
+  EXPECT_NEAR(lookup(g, {-5, 1e9}).r, 2, 1e-12);
+  EXPECT_NEAR(lookup(g, {77, -1}).r, 40, 1e-12);
+}
+
+}  // namespace
+}  // namespace brdfc

@@ -1,0 +1,720 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension as a user meets it: installation, nodes, menus, panels, operators, saved files."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import helpers
+import numpy as np
+import pytest
+
+SCRIPTS = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
+
+
+def forms(extension):
+    return [
+        (model, representation)
+        for model, entry in extension.api.models().items()
+        for representation in entry["representations"]
+    ]
+
+
+def sampled_forms(extension):
+    pairs = forms(extension)
+    return [p for p in pairs if extension.pack.representation(*p)["lobes"]]
+
+
+def counts():
+    return {
+        kind: len(getattr(bpy.data, kind))
+        for kind in ("materials", "node_groups", "texts", "images")
+    }
+
+
+def test_official_validator_accepts_the_zip(extension_zip):
+    command = [
+        sys.executable,
+        SCRIPTS / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py",
+        "validate",
+        f"--valid-tags={SCRIPTS / 'modules' / '_bpy_internal' / 'extensions' / 'tags.py'}",
+        extension_zip,
+    ]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_zip_holds_no_binary(extension_zip):
+    import zipfile
+
+    with zipfile.ZipFile(extension_zip) as archive:
+        suffixes = {Path(name).suffix for name in archive.namelist()}
+    assert suffixes <= {".py", ".toml", ".json", ".osl", ".exr"}
+
+
+def test_every_form_compiles_and_renders(extension, empty, subtests):
+    # One file for all: it also shows that groups live beside each other.
+    pairs = forms(extension)
+    assert len(pairs) >= 4
+    for model, representation in pairs:
+        with subtests.test(model=model, representation=representation):
+            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+            scene = bpy.context.scene
+            material = extension.api.new_material(model, representation)
+            node = extension.nodes.group_nodes(material)[0]
+            assert extension.nodes.identity(node) == (model, representation)
+            script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
+            found = {s.identifier: s.type for s in script.inputs}
+            expected = extension.nodes.expected_inputs(model, representation)
+            assert expected.items() <= found.items()
+            assert [s.identifier for s in script.outputs] == ["BSDF", "Albedo"]
+            assert script.mode == "INTERNAL" and script.bytecode
+            for name in expected:
+                assert next(s for s in script.inputs if s.identifier == name).is_linked
+
+            extension.api.enable_osl(scene)
+            helpers.sphere_scene(scene, material)
+            picture = helpers.render(scene)
+            assert np.isfinite(picture).all()
+            centre = picture[6:10, 6:10, :3]
+            assert centre.min() > 0.01
+            assert centre.max() < 1.5  # a white world can't be outshone, but for noise
+
+
+def test_every_choice_reaches_the_shader(extension, empty, subtests):
+    """Each choice of a parameter gives the picture of its own index: the script node's own input
+    set by hand must render the same as the group's socket."""
+    scene = empty
+    extension.api.enable_osl(scene)
+    tested = 0
+    for model, representation in forms(extension):
+        for parameter in extension.pack.parameters(model).values():
+            if parameter["kind"] != "choice" or len(parameter["choices"]) < 2:
+                continue
+            for index, choice in enumerate(parameter["choices"]):
+                with subtests.test(model=model, representation=representation, choice=choice):
+                    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+                    scene = bpy.context.scene
+                    extension.api.enable_osl(scene)
+                    name = parameter["name"]
+                    material = extension.api.new_material(model, representation, **{name: choice})
+                    helpers.sphere_scene(scene, material, size=8, samples=4)
+                    by_socket = helpers.render(scene)
+                    tree = extension.nodes.group_nodes(material)[0].node_tree
+                    script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
+                    socket = next(s for s in script.inputs if s.identifier == name)
+                    tree.links.remove(socket.links[0])
+                    socket.default_value = index
+                    assert np.array_equal(helpers.render(scene), by_socket)
+                    tested += 1
+    assert tested
+
+
+def test_sockets_equal_the_manifest(extension, empty, subtests):
+    manifest = json.loads((extension.pack.ROOT / "manifest.json").read_text())
+    for model, representation in forms(extension):
+        material = extension.api.new_material(model, representation)
+        node = extension.nodes.group_nodes(material)[0]
+        sockets = extension.nodes.sockets(node)
+        interface = {
+            item.identifier: item
+            for item in node.node_tree.interface.items_tree
+            if item.item_type == "SOCKET" and item.in_out == "INPUT"
+        }
+        for parameter in manifest["models"][model]["parameters"]:
+            name = parameter["name"]
+            with subtests.test(model=model, representation=representation, parameter=name):
+                if parameter["kind"] == "choice" and len(parameter["choices"]) == 1:
+                    assert name not in sockets
+                    continue
+                socket = sockets[name]
+                item = interface[socket.identifier]
+                assert socket.name == item.name == parameter["label"]
+                assert item.description.startswith(parameter["doc"].rstrip("."))
+                if parameter["kind"] == "number":
+                    assert socket.type == "VALUE"
+                    assert item.min_value == np.float32(parameter["soft_min"])
+                    assert item.max_value == np.float32(parameter["soft_max"])
+                    assert socket.default_value == np.float32(parameter["default"])
+                    assert f"{parameter['min']:g} to {parameter['max']:g}" in item.description
+                elif parameter["kind"] == "color":
+                    assert socket.type == "RGBA"
+                    expected = np.float32((*parameter["default"], 1))
+                    assert np.array_equal(np.float32(socket.default_value), expected)
+                elif socket.type == "MENU":
+                    label = extension.nodes.choice_label
+                    assert socket.default_value == label(parameter["default"])
+                    for choice in parameter["choices"]:
+                        socket.default_value = label(choice)
+                        assert extension.nodes.get_value(node, name) == choice
+                    with pytest.raises(TypeError):
+                        socket.default_value = "No Such Choice"
+                else:
+                    assert socket.type == "INT"
+                    assert (item.min_value, item.max_value) == (0, len(parameter["choices"]) - 1)
+                    assert socket.default_value == parameter["choices"].index(parameter["default"])
+                    assert all(choice in item.description for choice in parameter["choices"])
+        for name in ("Normal", "Tangent"):
+            assert sockets[name].hide_value and not sockets[name].is_linked
+        lobes = manifest["models"][model]["representations"][representation]["lobes"]
+        assert ("Lobes" in sockets) == bool(lobes)
+        if lobes:
+            item = interface[sockets["Lobes"].identifier]
+            assert (item.min_value, item.max_value) == (1, lobes["max"])
+            assert sockets["Lobes"].default_value == lobes["default"]
+        assert [s.name for s in node.outputs] == ["BSDF", "Albedo"]
+
+
+def test_one_group_a_form(extension, empty):
+    first = extension.api.new_material("coupled", r0=0.1)
+    second = extension.api.new_material("coupled", r0=0.2)
+    groups = [extension.nodes.group_nodes(m)[0].node_tree for m in (first, second)]
+    assert groups[0] == groups[1]
+    assert extension.api.get_parameters(first)["r0"] == pytest.approx(0.1)
+    assert extension.api.get_parameters(second)["r0"] == pytest.approx(0.2)
+
+
+def test_values_round_trip(extension, empty, subtests):
+    for model, entry in extension.api.models().items():
+        values = {}
+        for p in entry["parameters"]:
+            if p["kind"] == "choice":
+                values[p["name"]] = p["choices"][-1]
+            elif p["kind"] == "color":
+                values[p["name"]] = (0.25, 0.5, 0.75)
+            else:
+                values[p["name"]] = p["soft_min"] + 0.25 * (p["soft_max"] - p["soft_min"])
+        with subtests.test(model=model):
+            material = extension.api.new_material(model, **values)
+            found = extension.api.get_parameters(material)
+            assert found.keys() == values.keys()
+            for name, value in values.items():
+                expected = value if isinstance(value, str) else pytest.approx(value, rel=1e-6)
+                assert found[name] == expected
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((["gloss"], {}), r"unknown model 'gloss'; expected one of .*lambert"),
+        ((["coupled", "fitted"], {}), r"'coupled' has no representation 'fitted'.*auto, exact"),
+        ((["coupled"], {"r1": 0.1}), r"'coupled' has no parameter 'r1'; expected one of r0, rm"),
+        ((["coupled"], {"r0": 1.5}), r"coupled\.r0: expected a number from 0 to 1, got 1\.5"),
+        ((["coupled"], {"r0": -0.1}), r"coupled\.r0: expected a number from 0 to 1"),
+        ((["coupled"], {"r0": math.nan}), r"coupled\.r0: expected a number .* got nan"),
+        ((["coupled"], {"r0": "high"}), r"coupled\.r0: expected a number .* got 'high'"),
+        ((["coupled"], {"r0": True}), r"coupled\.r0: expected a number .* got True"),
+        ((["coupled"], {"rm": (0.1, 0.2)}), r"coupled\.rm: expected a number or three"),
+        ((["coupled"], {"rm": "red"}), r"coupled\.rm: expected a number or three"),
+        ((["coupled"], {"rm": (0.1, 0.2, 7)}), r"coupled\.rm \(b\): expected .* got 7"),
+        (
+            (["coupled"], {"fresnel": "snell"}),
+            r"coupled\.fresnel: expected one of schlick.*'snell'",
+        ),
+        ((["lambert", "exact"], {"lobes": 2}), r"'exact' of 'lambert' has no lobes"),
+        (
+            (["lambert", "sampled"], {"lobes": 99}),
+            r"lambert\.lobes: expected a whole number from 1",
+        ),
+    ],
+)
+def test_bad_arguments(extension, empty, arguments, message):
+    before = counts()
+    with pytest.raises(ValueError, match=message):
+        extension.api.new_material(*arguments[0], **arguments[1])
+    assert counts() == before
+
+
+def test_set_parameters_is_all_or_nothing(extension, empty):
+    material = extension.api.new_material("coupled", r0=0.1)
+    with pytest.raises(ValueError, match="coupled.rm"):
+        extension.api.set_parameters(material, r0=0.2, rm="red")
+    assert extension.api.get_parameters(material)["r0"] == pytest.approx(0.1)
+    extension.api.set_parameters(material, r0=0.2, rm=0.5)
+    values = extension.api.get_parameters(material)
+    assert values["r0"] == pytest.approx(0.2) and values["rm"] == (0.5, 0.5, 0.5)
+    tree = material.node_tree
+    node = extension.nodes.group_nodes(material)[0]
+    number = tree.nodes.new("ShaderNodeValue")
+    tree.links.new(number.outputs[0], extension.nodes.sockets(node)["r0"])
+    with pytest.raises(ValueError, match="'r0'.*controlled by a link"):
+        extension.api.set_parameters(material, r0=0.3)
+    with pytest.raises(ValueError, match="has 0 nodes"):
+        extension.api.set_parameters(bpy.data.materials.new("other"), r0=0.3)
+
+
+BROKEN = {
+    "does not parse": ("shader x(output closure color BSDF = 0) { BSDF = ; }", "failed to compile"),
+    "unknown function": (
+        "shader x(color rho = 0, output closure color BSDF = 0) { BSDF = nonsense(N); }",
+        "nonsense",
+    ),
+    "lacks sockets": (
+        "shader x(output closure color BSDF = 0) { BSDF = diffuse(N); }",
+        "lacks the sockets .*rho",
+    ),
+    "missing include": ('#include "beside.h"\nshader x(output closure color BSDF = 0) {}', "fail"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_shader_is_an_error(extension, empty, monkeypatch, case):
+    source, message = BROKEN[case]
+    monkeypatch.setattr(extension.pack, "source", lambda model, form: ("broken", source))
+    before = counts()
+    with pytest.raises(extension.api.CompileError, match=message):
+        extension.api.new_material("lambert")
+    assert counts() == before
+
+
+def test_broken_shader_under_another_engine(extension, empty, monkeypatch):
+    empty.render.engine = "BLENDER_WORKBENCH"
+    monkeypatch.setattr(extension.pack, "source", lambda *_: ("broken", BROKEN["lacks sockets"][0]))
+    with pytest.raises(extension.api.CompileError):
+        extension.api.new_material("lambert")
+    monkeypatch.undo()
+    assert extension.api.new_material("lambert").node_tree is not None
+
+
+def test_switch_keeps_values_and_links(extension, empty):
+    model = "lambert"
+    parameter = extension.pack.parameters(model)["rho"]
+    material = extension.api.new_material(model, "exact", rho=(0.1, 0.2, 0.3))
+    tree = material.node_tree
+    node = extension.nodes.group_nodes(material)[0]
+    bump = tree.nodes.new("ShaderNodeBump")
+    tree.links.new(bump.outputs[0], extension.nodes.sockets(node)["Normal"])
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    material.cycles.use_bump_map_correction = True
+    for form in ("sampled", "exact", "sampled"):
+        extension.api.switch_representation(material, form)
+        assert extension.nodes.identity(node) == (model, form)
+        sockets = extension.nodes.sockets(node)
+        assert extension.nodes.get_value(node, parameter["name"]) == pytest.approx((0.1, 0.2, 0.3))
+        assert sockets["Normal"].links[0].from_node == bump
+        assert output.inputs["Surface"].links[0].from_node == node
+    assert material.cycles.use_bump_map_correction is False
+    with pytest.raises(ValueError, match="no representation"):
+        extension.api.switch_representation(material, "twin")
+    assert extension.nodes.identity(node) == (model, "sampled")
+
+
+def test_group_of_another_version_is_offered_for_update(extension, empty, monkeypatch):
+    material = extension.api.new_material("coupled", r0=0.3)
+    node = extension.nodes.group_nodes(material)[0]
+    node.node_tree[extension.nodes.TAG]["digest"] = "of an older version"
+    extension.api.enable_osl(empty)
+    assert [w.code for w in extension.api.warnings(material, empty)] == ["outdated"]
+    old = node.node_tree
+    extension.api.switch_representation(material, "exact")
+    assert node.node_tree != old
+    assert extension.api.get_parameters(material)["r0"] == pytest.approx(0.3)
+    assert extension.api.warnings(material, empty) == []
+
+
+# Warnings
+
+
+def clean(extension, scene, model="lambert", form="exact"):
+    """A material with nothing to warn of."""
+    material = extension.api.new_material(model, form)
+    extension.api.enable_osl(scene)
+    scene.cycles.sample_clamp_indirect = scene.cycles.sample_clamp_direct = 0
+    assert extension.api.warnings(material, scene) == []
+    return material
+
+
+def codes(extension, material, scene):
+    return [w.code for w in extension.api.warnings(material, scene)]
+
+
+def test_declared_sensitivities_are_known(extension):
+    for pair in forms(extension):
+        declared = set(extension.pack.representation(*pair)["warnings"])
+        assert declared <= extension.checks.DECLARED.keys()
+
+
+def test_no_warnings_for_other_materials(extension, empty):
+    assert extension.api.warnings(bpy.data.materials.new("plain"), empty) == []
+
+
+def test_warning_engine_and_osl(extension, empty):
+    material = clean(extension, empty)
+    empty.render.engine = "BLENDER_WORKBENCH"
+    assert codes(extension, material, empty) == ["engine"]
+    empty.render.engine = "CYCLES"
+    empty.cycles.shading_system = False
+    assert codes(extension, material, empty) == ["osl_off"]
+    assert extension.api.enable_osl(empty) == ["Open Shading Language turned on"]
+    assert codes(extension, material, empty) == []
+    assert extension.api.enable_osl(empty) == []
+
+
+@pytest.mark.parametrize(
+    ("backend", "works"),
+    [("CUDA", False), ("HIP", False), ("METAL", False), ("OPTIX", True), ("NONE", True)],
+)
+def test_warning_device(extension, empty, monkeypatch, backend, works):
+    # This machine may not have the device: only the preference is pretended.
+    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: backend)
+    material = clean(extension, empty)
+    empty.cycles.device = "GPU"
+    assert codes(extension, material, empty) == ([] if works else ["device"])
+    extension.api.enable_osl(empty)
+    assert empty.cycles.device == ("GPU" if works else "CPU")
+    assert codes(extension, material, empty) == []
+
+
+def test_gpu_backend_is_the_preference(extension, empty):
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    assert extension.checks.gpu_backend() == preferences.compute_device_type
+
+
+def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
+    material = clean(extension, empty)
+    monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
+    assert codes(extension, material, empty) == ["blender_version"]
+    monkeypatch.undo()
+    monkeypatch.setattr(extension.checks, "osl_available", lambda: False)
+    assert codes(extension, material, empty) == ["no_osl"]
+    with pytest.raises(RuntimeError, match="without Open Shading Language"):
+        extension.api.enable_osl(empty)
+
+
+def test_warning_bump_correction(extension, empty):
+    model, form = sampled_forms(extension)[0]
+    material = clean(extension, empty, model, form)
+    assert material.cycles.use_bump_map_correction is False
+    material.cycles.use_bump_map_correction = True
+    assert codes(extension, material, empty) == ["bump_correction"]
+    assert extension.api.prepare_material(material) != []
+    assert codes(extension, material, empty) == []
+
+
+def test_warning_clamp_indirect(extension, empty):
+    material = clean(extension, empty, *sampled_forms(extension)[0])
+    empty.cycles.sample_clamp_indirect = 10
+    assert codes(extension, material, empty) == ["clamp_indirect"]
+
+
+def test_warning_path_guiding(extension, empty):
+    material = clean(extension, empty, *sampled_forms(extension)[0])
+    empty.cycles.use_guiding = True
+    assert codes(extension, material, empty) == ["path_guiding"]
+    assert codes(extension, extension.api.new_material("lambert", "exact"), empty) == []
+
+
+def test_warning_small_lamps(extension, empty):
+    material = clean(extension, empty, *sampled_forms(extension)[0])
+    data = bpy.data.lights.new("tiny", "POINT")
+    data.shadow_soft_size = 0
+    empty.collection.objects.link(bpy.data.objects.new("tiny", data))
+    found = extension.api.warnings(material, empty)
+    assert [w.code for w in found] == ["zero_size_lights"] and "tiny" in found[0].message
+    data.shadow_soft_size = 0.5
+    assert codes(extension, material, empty) == []
+    sun = bpy.data.lights.new("sun", "SUN")
+    sun.angle = 0
+    empty.collection.objects.link(bpy.data.objects.new("sun", sun))
+    assert codes(extension, material, empty) == ["zero_size_lights"]
+
+
+def test_warning_far_orthographic_camera(extension, empty):
+    material = clean(extension, empty, *sampled_forms(extension)[0])
+    camera = helpers.add_camera(empty, location=(0, -10, 0), orthographic=4)
+    bpy.context.view_layer.update()
+    assert codes(extension, material, empty) == []
+    empty.camera.location = (0, -10000, 0)
+    bpy.context.view_layer.update()
+    assert codes(extension, material, empty) == ["orthographic_far"]
+    camera.type = "PERSP"
+    assert codes(extension, material, empty) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "spoil"),
+    [
+        ("path_guiding", {"use_guiding": True}),
+        ("clamp_direct", {"sample_clamp_direct": 1.0}),
+        ("caustics", {"caustics_reflective": False}),
+        ("filter_glossy", {"blur_glossy": 1.0}),
+    ],
+)
+def test_warnings_a_form_may_declare(extension, empty, monkeypatch, code, spoil):
+    material = clean(extension, empty)
+    entry = extension.pack.representation("lambert", "exact")
+    for name, value in {
+        "blur_glossy": 0,
+        "use_guiding": False,
+        "caustics_reflective": True,
+    }.items():
+        setattr(empty.cycles, name, value)
+    monkeypatch.setitem(entry, "warnings", [code])
+    assert codes(extension, material, empty) == []
+    for name, value in spoil.items():
+        setattr(empty.cycles, name, value)
+    assert codes(extension, material, empty) == [code]
+
+
+def test_warning_script_failed(extension, empty):
+    material = clean(extension, empty)
+    group = extension.nodes.group_nodes(material)[0].node_tree
+    script = next(n for n in group.nodes if n.bl_idname == "ShaderNodeScript")
+    script.inputs.remove(next(s for s in script.inputs if s.identifier == "rho"))
+    found = extension.api.warnings(material, empty)
+    assert [w.code for w in found] == ["script_failed"] and "rho" in found[0].message
+    script.bytecode = ""
+    assert "not compiled" in extension.api.warnings(material, empty)[0].message
+    group.nodes.remove(script)
+    assert "no script node" in extension.api.warnings(material, empty)[0].message
+    # A broken group is not used for the next material.
+    assert extension.nodes.group_nodes(extension.api.new_material("lambert"))[0].node_tree != group
+
+
+def test_warning_out_of_range(extension, empty):
+    material = clean(extension, empty, "coupled")
+    node = extension.nodes.group_nodes(material)[0]
+    extension.nodes.sockets(node)["r0"].default_value = 1.5
+    found = extension.api.warnings(material, empty)
+    assert [w.code for w in found] == ["out_of_range"] and "1.5" in found[0].message
+    extension.nodes.sockets(node)["r0"].default_value = 1.0
+    assert codes(extension, material, empty) == []
+
+
+def test_warnings_reach_nested_groups(extension, empty):
+    inner = bpy.data.node_groups.new("mine", "ShaderNodeTree")
+    extension.nodes.add_group_node(inner, "coupled")
+    material = bpy.data.materials.new("outer")
+    if material.node_tree is None:
+        material.use_nodes = True
+    material.node_tree.nodes.new("ShaderNodeGroup").node_tree = inner
+    assert "engine" in codes(extension, material, bpy.data.scenes.new("other"))
+
+
+# Saved files
+
+
+FACTORY_RENDER = """
+import sys
+import bpy
+blend, picture = sys.argv[1:]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.open_mainfile(filepath=blend)
+assert not [a for a in bpy.context.preferences.addons if "brdfc" in a.module]
+assert not [m for m in sys.modules if "brdfc" in m]
+scene = bpy.context.scene
+scene.render.filepath = picture
+bpy.ops.render.render(write_still=True)
+"""
+
+
+def test_saved_file_renders_without_the_extension(extension, empty, tmp_path):
+    scene = empty
+    extension.api.enable_osl(scene)
+    for x, (model, representation) in enumerate(forms(extension)):
+        ball = helpers.add_sphere(scene, extension.api.new_material(model, representation))
+        ball.location.x = 2.1 * x
+    width = 2.1 * len(forms(extension))
+    helpers.add_camera(scene, location=(width / 2 - 1, -8, 0), orthographic=width)
+    helpers.add_world(scene)
+    scene.render.resolution_x, scene.render.resolution_y = 16 * len(forms(extension)), 16
+    scene.cycles.samples = 8
+    expected = helpers.render(scene)
+    assert (expected[6:10, :, :3].max(axis=(0, 2)) > 0.01).all()
+
+    blend, picture = tmp_path / "saved.blend", tmp_path / "picture.exr"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "nothing")}
+    done = subprocess.run(
+        [sys.executable, "-c", FACTORY_RENDER, blend, picture],
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert np.array_equal(helpers.read_picture(picture), expected)
+
+
+# Menus, panels, operators
+
+
+class Layout:
+    """Stands in for a UILayout and keeps what is drawn."""
+
+    def __init__(self, log=None):
+        self.log = log if log is not None else []
+        self.alert = self.enabled = self.use_property_split = False
+
+    def label(self, text="", **_):
+        self.log.append(text)
+
+    def _sub(self, **_):
+        return Layout(self.log)
+
+    row = column = box = _sub
+
+    def separator(self, **_):
+        pass
+
+    def menu(self, name, **_):
+        self.log.append(f"menu {name}")
+
+    def operator(self, name, text="", **_):
+        from types import SimpleNamespace
+
+        self.log.append(f"operator {name} {text}")
+        return SimpleNamespace()
+
+    def prop(self, data, name, text="", **_):
+        self.log.append(f"value {text}: {getattr(data, name)}")
+
+
+def draw_functions(menu):
+    return [f.__name__ for f in getattr(bpy.types, menu)._dyn_ui_initialize()]
+
+
+def test_add_menu_lists_every_model(extension, empty):
+    from types import SimpleNamespace
+
+    assert draw_functions("NODE_MT_category_shader_shader").count("draw_add_menu") == 1
+    layout = Layout()
+    extension.ui.draw_add_menu(SimpleNamespace(layout=layout), bpy.context)
+    assert layout.log == ["menu NODE_MT_brdfc"]
+    layout = Layout()
+    bpy.types.NODE_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
+    labels = [e["label"] for e in extension.api.models().values()]
+    assert layout.log == [f"operator brdfc.add_node {label}" for label in labels]
+    layout = Layout()
+    bpy.types.MATERIAL_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
+    assert layout.log == [f"operator brdfc.new_material {label}" for label in labels]
+
+
+def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
+    for model, representation in forms(extension):
+        with subtests.test(model=model, representation=representation):
+            material = extension.api.new_material(model, representation)
+            empty.cycles.shading_system = False
+            layout = Layout()
+            extension.ui.draw_material(layout, material, empty)
+            text = "\n".join(layout.log)
+            entry = extension.pack.model(model)
+            assert entry["label"] in text
+            for part in ("Error:", "Cost:", "Closures:", "Albedo: 0\u00b0"):
+                assert part in text
+            for form in entry["representations"]:
+                assert f"operator brdfc.switch {form.capitalize()}" in text
+            for parameter in entry["parameters"]:
+                if extension.pack.has_socket(parameter):
+                    assert f"value {parameter['label']}:" in text
+            assert "Open Shading Language is off" in text
+            assert "operator brdfc.enable_osl" in text
+
+
+def test_panel_says_why_there_is_no_albedo(extension, empty):
+    material = extension.api.new_material("coupled")
+    tree = material.node_tree
+    node = extension.nodes.group_nodes(material)[0]
+    tree.links.new(
+        tree.nodes.new("ShaderNodeValue").outputs[0], extension.nodes.sockets(node)["r0"]
+    )
+    assert "Normal Reflectance" in extension.ui.energy_text(node)
+
+
+def test_operator_new_material(extension, empty):
+    mesh = bpy.data.meshes.new("mesh")
+    target = bpy.data.objects.new("target", mesh)
+    empty.collection.objects.link(target)
+    bpy.context.view_layer.objects.active = target
+    model, form = sampled_forms(extension)[0]
+    assert bpy.ops.brdfc.new_material(model=model, representation=form) == {"FINISHED"}
+    material = target.active_material
+    node = extension.nodes.group_nodes(material)[0]
+    assert extension.nodes.identity(node) == (model, form)
+    assert material.cycles.use_bump_map_correction is False
+    assert bpy.ops.brdfc.enable_osl() == {"FINISHED"}
+    assert empty.cycles.shading_system is True
+    material.cycles.use_bump_map_correction = True
+    assert bpy.ops.brdfc.fix_material() == {"FINISHED"}
+    assert material.cycles.use_bump_map_correction is False
+    with pytest.raises(RuntimeError, match="unknown model"):
+        bpy.ops.brdfc.new_material(model="nonsense")
+    assert target.active_material == material
+
+
+def test_operator_switch(extension, empty):
+    mesh = bpy.data.meshes.new("mesh")
+    target = bpy.data.objects.new("target", mesh)
+    empty.collection.objects.link(target)
+    bpy.context.view_layer.objects.active = target
+    first, second = (extension.api.new_material("lambert", "exact") for _ in range(2))
+    mesh.materials.append(first)
+    name = extension.nodes.group_nodes(first)[0].name
+
+    def form(material):
+        return extension.nodes.identity(extension.nodes.group_nodes(material)[0])[1]
+
+    bpy.ops.brdfc.switch(node=name, representation="sampled")
+    assert (form(first), form(second)) == ("sampled", "exact")
+    bpy.ops.brdfc.switch(node=name, representation="exact")
+    bpy.ops.brdfc.switch(node=name, representation="sampled", all_users=True)
+    assert (form(first), form(second)) == ("sampled", "sampled")
+    with pytest.raises(RuntimeError, match="no model node"):
+        bpy.ops.brdfc.switch(node="nonsense", representation="exact")
+
+
+def test_operator_add_node(extension, empty):
+    material = bpy.data.materials.new("mine")
+    if material.node_tree is None:
+        material.use_nodes = True
+    mesh = bpy.data.meshes.new("mesh")
+    mesh.materials.append(material)
+    target = bpy.data.objects.new("target", mesh)
+    empty.collection.objects.link(target)
+    bpy.context.view_layer.objects.active = target
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    area.type = "NODE_EDITOR"
+    area.ui_type = "ShaderNodeTree"
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        space = bpy.context.space_data
+        space.shader_type = "OBJECT"
+        space.pin = True
+        space.node_tree = material.node_tree
+        assert bpy.types.NODE_PT_brdfc.poll(bpy.context) is False
+        assert bpy.ops.brdfc.add_node(model="coupled") == {"FINISHED"}
+        assert bpy.types.NODE_PT_brdfc.poll(bpy.context) is True
+    assert len(extension.nodes.group_nodes(material)) == 1
+
+
+def test_disable_leaves_nothing_behind(extension, empty):
+    names = [
+        name
+        for module in (extension.ui, extension.operators)
+        for name in dir(module)
+        if isinstance(getattr(module, name), type) and "brdfc" in name.lower() and name[0] != "_"
+    ]
+    handlers = {
+        name: list(getattr(bpy.app.handlers, name))
+        for name in dir(bpy.app.handlers)
+        if isinstance(getattr(bpy.app.handlers, name), list)
+    }
+    assert len(names) == 9
+    menus = ("NODE_MT_category_shader_shader", "MATERIAL_MT_context_menu")
+    with_extension = [draw_functions(menu) for menu in menus]
+    try:
+        bpy.ops.preferences.addon_disable(module=extension.package)
+        for menu in menus:
+            assert not {"draw_add_menu", "draw_material_menu"} & set(draw_functions(menu))
+        for name in names:
+            assert not hasattr(bpy.types, name)
+        assert not hasattr(bpy.types, "BRDFC_OT_add_node")
+        assert handlers == {name: list(getattr(bpy.app.handlers, name)) for name in handlers}
+    finally:
+        bpy.ops.preferences.addon_enable(module=extension.package)
+    assert [draw_functions(menu) for menu in menus] == with_extension
+    for name in names:
+        assert hasattr(bpy.types, name)

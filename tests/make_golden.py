@@ -1,0 +1,369 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes golden.csv: values of the models by an implementation that shares nothing with the generator.
+
+The formulas are typed in from the papers as printed (with their errata, see the models' headers) and
+evaluated with mpmath in as many digits as they need; albedos are integrated by mpmath. Run it after
+adding a model:  python3 tests/make_golden.py
+
+A row's tolerance is what the rounding of its inputs to double precision can cause (measured here, by
+moving each input by half a unit in the last place), times a small factor, plus a floor.
+"""
+
+import csv
+import math
+import random
+from pathlib import Path
+
+import mpmath as mp
+
+OUT = Path(__file__).with_name("golden.csv")
+FLOOR = 1e-14
+ROUNDINGS = 16  # how many such roundings a formula may add up
+
+
+normalise = True
+
+
+def vec(w):
+    v = [mp.mpf(c) for c in w]
+    n = mp.sqrt(sum(c * c for c in v)) if normalise else 1
+    return [c / n for c in v]
+
+
+def unit(v):
+    n = mp.sqrt(sum(c * c for c in v))
+    return [c / n for c in v]
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+# ---- Lambert -----------------------------------------------------------------------------------
+
+
+def lambert_f(p, wi, wo):
+    return [c / mp.pi for c in p["rho"]]
+
+
+def lambert_pdf(p, wi, wo):
+    return vec(wi)[2] / mp.pi
+
+
+# ---- Ashikhmin and Shirley, eqs. 5, 10, 11, 14, 15; eq. 18 inverted ----------------------------
+
+
+def as_half(wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    return k1, k2, unit([a + b for a, b in zip(k1, k2, strict=True)])
+
+
+def as_ph(p, h):
+    hn = h[2]
+    u = [mp.cos(p["rotation"]), mp.sin(p["rotation"])]
+    hu = h[0] * u[0] + h[1] * u[1]
+    hv = -h[0] * u[1] + h[1] * u[0]
+    sin2 = 1 - hn**2
+    exponent = 0 if sin2 < mp.mpf(10) ** -30 else (p["nu"] * hu**2 + p["nv"] * hv**2) / sin2
+    return mp.sqrt((p["nu"] + 1) * (p["nv"] + 1)) / (2 * mp.pi) * hn**exponent
+
+
+def as_f(p, wi, wo):
+    k1, k2, h = as_half(wi, wo)
+    hk = dot(h, k1)
+    out = []
+    for rs, rd in zip(p["rs"], p["rd"], strict=True):
+        f = mp.mpf(0)
+        if p["part"] != "diffuse":
+            fresnel = rs + (1 - rs) * (1 - hk) ** 5
+            f += as_ph(p, h) / (4 * hk * max(k1[2], k2[2])) * fresnel
+        if p["part"] != "specular":
+            fade = [1 - (1 - k[2] / 2) ** 5 for k in (k1, k2)]
+            f += 28 * rd / (23 * mp.pi) * (1 - rs) * fade[0] * fade[1]
+        out.append(f)
+    return out
+
+
+def as_pdf(p, wi, wo):
+    """Of one part alone: how often "both" takes each is the sampler's choice, not the paper's."""
+    k1, k2, h = as_half(wi, wo)
+    if p["part"] == "specular":
+        return as_ph(p, h) / (4 * dot(h, k2))
+    if p["part"] == "diffuse":
+        return k1[2] / mp.pi
+    return None
+
+
+def as_albedo(p, cos_o):
+    """Specular part, rotation 0, view in the x-z plane: integrated over half vectors, where p_h is smooth."""
+    fp, rs, nu, nv = mp.fp, p["rs"][0], p["nu"], p["nv"]
+    sin_o = math.sqrt(1 - cos_o**2)
+
+    def integrand(t, phi):
+        # d omega_i = 4 (k.h) d omega_h, so f cos_i d omega_i = p_h F cos_i / max(cos_i, cos_o) d omega_h.
+        hn, s, c = math.cos(t), math.sin(t), math.cos(phi)
+        kh = sin_o * s * c + cos_o * hn
+        cos_i = 2 * kh * hn - cos_o
+        if kh <= 0 or cos_i <= 0:
+            return 0.0
+        p_h = math.sqrt((nu + 1) * (nv + 1)) / (2 * math.pi) * hn ** (nu * c**2 + nv * (1 - c**2))
+        return p_h * (rs + (1 - rs) * (1 - kh) ** 5) * cos_i / max(cos_i, cos_o) * s
+
+    def ring(phi):
+        # cos_i / cos_o = cos 2t + a sin 2t = r cos(2t - s): the edge of the support is where it is 0, the kink
+        # of max() where it is 1. Between these theta_h = t is smooth; the lobe's own width needs cuts as well.
+        a = sin_o * math.cos(phi) / cos_o
+        r, s = math.hypot(1, a), math.atan(a)
+        width = 6 / math.sqrt(max(nu, nv) + 1)
+        cuts = {0.0, math.pi / 2, width / 4, width / 2, width}
+        for level in (0, 1):
+            for sign in (-1, 1):
+                cuts.add((s + sign * math.acos(level / r)) / 2 % math.pi)
+        inside = sorted(c for c in cuts if 0 <= c <= math.pi / 2)
+        ends = [c for c, d in zip(inside, [-1.0, *inside], strict=False) if c - d > 1e-9]
+        return fp.quad(lambda t: integrand(t, phi), ends, maxdegree=4)
+
+    a = 2 * fp.quad(ring, [math.pi * k / 8 for k in range(9)], maxdegree=4)
+    return [a, a, a]
+
+
+# ---- Shirley, Smits, Hu and Lafortune, eqs. 1 and 5 with k mended ------------------------------
+
+
+def coupled_f(p, wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    k = 21 * (1 - p["r0"]) / (20 * mp.pi)
+    return [k * rm * (1 - (1 - k1[2]) ** 5) * (1 - (1 - k2[2]) ** 5) for rm in p["rm"]]
+
+
+def coupled_pdf(p, wi, wo):
+    """Eq. 6 differentiated: proportional to (1 - (1 - c)^5) c."""
+    c = vec(wi)[2]
+    return 21 / (20 * mp.pi) * (1 - (1 - c) ** 5) * c
+
+
+def coupled_albedo(p, cos_o):
+    rf = p["r0"] + (1 - p["r0"]) * (1 - mp.mpf(cos_o)) ** 5
+    return [rf + rm * (1 - rf) for rm in p["rm"]]
+
+
+# ---- Radziszewski and Alda, eqs. 17 to 19, factor 2 and nbar mended -----------------------------
+
+
+def ra_digits(n):
+    return 50 if n == 0 or n >= 1 else 60 + int(-6 * math.log10(n))
+
+
+def ra_f(p, wi, wo):
+    n = p["n"]
+    mp.mp.dps = ra_digits(n)
+    n = mp.mpf(n)
+    ki, ko = vec(wi), vec(wo)
+    kr = [-ko[0], -ko[1], ko[2]]
+    si, sr = mp.sqrt(ki[0] ** 2 + ki[1] ** 2), mp.sqrt(kr[0] ** 2 + kr[1] ** 2)
+    x, y = ki[2] ** 2, kr[2] ** 2
+    n_theta = p["n_theta"] if p["proportion"] == "custom" else n
+    n_theta = mp.mpf(n_theta)
+    if p["proportion"] == "paper":
+        n_phi = mp.mpf("0.75") * n * mp.sqrt(n * si * sr)
+    else:
+        n_phi = n if p["proportion"] == "equal" else mp.mpf(p["n_phi"])
+    if n_theta == 0:
+        f_theta = mp.mpf(2)
+    else:
+        m = 2 * mp.log(mp.cosh(n_theta))
+        # tanh^2 n = 1 - e^-m, so that the printed denominator is this difference of exponentials.
+        d = mp.exp(-m * x) + mp.exp(-m * y) - mp.exp(-m * (x + y)) - mp.exp(-m)
+        f_theta = 2 * m * mp.tanh(n_theta) ** 2 * mp.exp(-m * (x + y)) / d**2
+    nbar = n_phi * si * sr
+    if si == 0 or sr == 0:
+        cos_dphi = mp.mpf(1)
+    else:
+        cos_dphi = (ki[0] * kr[0] + ki[1] * kr[1]) / (si * sr)
+    p5 = sum(mp.mpf(c) * nbar**k for k, c in enumerate((1, 5, 15, 25, "21.875", "7.875")))
+    f_phi = (2 * nbar + 1) ** mp.mpf("5.5") / (2 * mp.pi * p5)
+    f_phi /= (nbar * (1 - cos_dphi) + 1) ** 6
+    if p["part"] == "latitudinal":
+        f = f_theta / (2 * mp.pi)
+    elif p["part"] == "longitudinal":
+        f = 2 * f_phi
+    else:
+        f = f_theta * f_phi
+    return [f * c for c in p["tint"]]
+
+
+def ra_pdf(p, wi, wo):
+    """The cosine-weighted lobe."""
+    white = dict(p, tint=(1, 1, 1))
+    return ra_f(white, wi, wo)[0] * vec(wi)[2]
+
+
+MODELS = {
+    "lambert": dict(
+        f=lambert_f,
+        pdf=lambert_pdf,
+        albedo=lambda p, c: p["rho"],
+        defaults={"rho": (0.8, 0.8, 0.8)},
+        cases=[{"rho": (1, 1, 1)}, {"rho": (0.2, 0.5, 0.9)}],
+        cosines=[1, 0.3],
+    ),
+    "ashikhmin_shirley": dict(
+        f=as_f,
+        pdf=as_pdf,
+        albedo=as_albedo,
+        defaults={
+            "rs": (0.05, 0.05, 0.05),
+            "rd": (0.5, 0.5, 0.5),
+            "nu": 100,
+            "nv": 100,
+            "rotation": 0,
+            "part": "both",
+        },
+        cases=[
+            {},
+            {"rs": (0.05, 0.2, 0.9), "rd": (1, 0.5, 0.1), "nu": 10, "nv": 1000, "rotation": 0.7},
+            {"part": "diffuse", "rd": (1, 0.3, 0), "rs": (0, 0.05, 1)},
+            {"part": "specular", "rs": (1, 1, 1), "nu": 0, "nv": 0},
+            {"part": "specular", "rs": (1, 0.5, 0.04), "nu": 3, "nv": 40, "rotation": -2},
+            {"part": "specular", "rs": (1, 1, 1), "nu": 10000, "nv": 10000},
+            {"part": "specular", "rs": (0.5, 0.5, 0.5), "nu": 1e6, "nv": 1e6},
+            {"part": "specular", "rs": (0.5, 0.5, 0.5), "nu": 1e8, "nv": 1e4, "rotation": 1},
+        ],
+        albedo_cases=[
+            {"part": "specular", "rs": (1, 1, 1), "nu": 10, "nv": 10},
+            {"part": "specular", "rs": (0.05, 0.05, 0.05), "nu": 10, "nv": 10},
+            {"part": "specular", "rs": (1, 1, 1), "nu": 4, "nv": 30},
+            {"part": "specular", "rs": (0.3, 0.3, 0.3), "nu": 400, "nv": 400},
+        ],
+        cosines=[1, 0.5, math.cos(math.radians(80)), 0.09],
+    ),
+    "coupled": dict(
+        f=coupled_f,
+        pdf=coupled_pdf,
+        albedo=coupled_albedo,
+        defaults={"r0": 0.05, "rm": (0.8, 0.8, 0.8)},
+        cases=[{}, {"r0": 0.5, "rm": (1, 0.5, 0.1)}, {"r0": 0, "rm": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "radziszewski_alda": dict(
+        f=ra_f,
+        pdf=ra_pdf,
+        albedo=lambda p, c: p["tint"],
+        defaults={
+            "n": 4,
+            "n_theta": 4,
+            "n_phi": 4,
+            "proportion": "paper",
+            "part": "product",
+            "tint": (1, 1, 1),
+        },
+        cases=[
+            *({"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)),
+            {"n": 2, "proportion": "equal", "tint": (0.9, 0.5, 0.1)},
+            {"n_theta": 7, "n_phi": 0.3, "proportion": "custom"},
+            {"n_theta": 0, "n_phi": 100, "proportion": "custom"},
+            {"n": 3, "part": "latitudinal"},
+            {"n": 30, "part": "longitudinal"},
+        ],
+        albedo_cases=[{"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)],
+        cosines=[1, 0.5, 0.05],
+    ),
+}
+
+
+def direction(theta, phi):
+    return (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
+
+
+def pairs(rng):
+    """Anywhere, near the mirror direction at several distances, near the normal, near grazing."""
+    out = []
+    for _ in range(3):
+        out.append([direction(rng.uniform(0, 1.5), rng.uniform(0, 6.28)) for _ in range(2)])
+    for distance in (1e-1, 1e-3, 1e-5):
+        theta, phi = rng.uniform(0.3, 1.2), rng.uniform(0, 6.28)
+        wi = direction(theta + rng.uniform(-1, 1) * distance, phi + math.pi + rng.uniform(-1, 1) * distance)
+        out.append([wi, direction(theta, phi)])
+    out.append([(0.0, 0.0, 1.0), direction(1e-3, 1.0)])
+    out.append([direction(1.57, 2.0), direction(1.2, 5.0)])
+    return out
+
+
+def values(function, p, wi, wo):
+    mp.mp.dps = 60
+    r = function(p, wi, wo)
+    return r if r is None or isinstance(r, (list, tuple)) else [r, r, r]
+
+
+def tolerance(function, p, wi, wo, base):
+    """What half a unit in the last place of every input changes, relatively, added up.
+
+    Rounded components make a vector whose length is 1 only nearly: formulas that are equal on the sphere
+    may differ then, which counts as well.
+    """
+    global normalise
+    ulp = mp.mpf(2) ** -53
+    total = mp.mpf(0)
+    moves = [("wi", i) for i in range(3)] + [("wo", i) for i in range(3)]
+    moves += [(k, None) for k, v in p.items() if isinstance(v, (int, float))]
+    for what, i in moves:
+        q, a, b = dict(p), [mp.mpf(c) for c in wi], [mp.mpf(c) for c in wo]
+        if what == "wi":
+            a[i] *= 1 + ulp
+        elif what == "wo":
+            b[i] *= 1 + ulp
+        else:
+            q[what] = mp.mpf(q[what]) * (1 + ulp)
+        for normalise in (False, True):
+            moved = values(function, q, a, b)
+            total += max(abs(m - v) / v if v > 0 else abs(m) for m, v in zip(moved, base, strict=True))
+    return float(FLOOR + ROUNDINGS * total)
+
+
+def text(p):
+    def one(v):
+        return ":".join(repr(c) for c in v) if isinstance(v, tuple) else str(v)
+
+    return " ".join(f"{k}={one(v)}" for k, v in p.items())
+
+
+def main():
+    rows = []
+    for name, m in MODELS.items():
+        rng = random.Random(name)
+        for case in m["cases"]:
+            p = {**m["defaults"], **case}
+            for wi, wo in pairs(rng):
+                for kind in ("f", "pdf"):
+                    v = values(m[kind], p, wi, wo)
+                    # Below the normal numbers of double precision there is nothing to compare.
+                    if v is None or max(v) < mp.mpf("1e-290"):
+                        continue
+                    t = tolerance(m[kind], p, wi, wo, v)
+                    if t > 1e-3:
+                        continue  # says nothing: the inputs' own rounding decides the value
+                    rows.append(
+                        [name, text(case), kind, *map(repr, wi), *map(repr, wo)]
+                        + [mp.nstr(c, 17) for c in v]
+                        + [f"{t:.2e}"]
+                    )
+        for case in m.get("albedo_cases", m["cases"]):
+            p = {**m["defaults"], **case}
+            for c in m["cosines"]:
+                mp.mp.dps = 30
+                a = m["albedo"](p, c)
+                wo = (math.sqrt(1 - c * c), 0.0, c)
+                rows.append(
+                    [name, text(case), "albedo", "", "", "", *map(repr, wo)]
+                    + [mp.nstr(mp.mpf(v), 12) for v in a]
+                    + ["1e-06"]
+                )
+        print(name, len(rows))
+    with OUT.open("w", newline="") as f:
+        w = csv.writer(f, lineterminator="\n")
+        w.writerow("model parameters kind wi_x wi_y wi_z wo_x wo_y wo_z r g b tolerance".split())
+        w.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The report measures what it says, against pictures whose error and noise are known by construction.
+#include "report/report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "core/error.h"
+
+namespace brdfc {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr int kSize = 64;
+constexpr float kNoise = 0.05f;
+
+/// A gradient in [0.2, 0.8], `factor` times as bright, with Gaussian noise.
+Rendering picture(double factor, float noise, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal(0, noise > 0 ? noise : 1);
+  Rendering out;
+  out.mean = Image(kSize, kSize);
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c)
+        out.mean.pixel(x, y)[c] = float(factor * (0.2 + 0.6 * x / (kSize - 1))) + (noise > 0 ? normal(random) : 0.0f);
+  return out;
+}
+
+Rendering reference() {
+  Rendering out = picture(1, 0, 0);
+  out.variance = Image(kSize, kSize);
+  return out;
+}
+
+class ReportTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(testing::TempDir()) / (std::string("brdfc-report-") + info->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "ball");
+    write_rendering(folder_ / "ball/reference.exr", reference());
+    for (unsigned i = 0; i < 4; ++i) {
+      write_rendering(folder_ / fmt::format("ball/glossy-{}.exr", i), picture(1.1, kNoise, 10 + i));
+      write_rendering(folder_ / fmt::format("ball/exact-{}.exr", i), picture(1, kNoise, 20 + i));
+    }
+    runs_ = json::parse(R"({
+      "format": 1, "scene": "ball", "description": "a <ball> & more",
+      "settings": {"width": 64, "height": 64, "max_bounces": 4},
+      "reference": {"image": "reference.exr", "spp": 1024, "wall_seconds": 2.5},
+      "runs": [
+        {"form": "glossy", "spp": 16, "images": ["glossy-0.exr", "glossy-1.exr", "glossy-2.exr", "glossy-3.exr"],
+         "cpu_seconds": [1.0, 2.0, 1.0, 1.0], "wall_seconds": [1, 1, 1, 1], "materials": []},
+        {"form": "exact", "spp": 16, "images": ["exact-0.exr", "exact-1.exr", "exact-2.exr", "exact-3.exr"],
+         "cpu_seconds": [1.5, 3.0, 1.5, 9.0], "wall_seconds": [1, 1, 1, 1],
+         "materials": [
+           {"id": "a", "model": "coupled", "representation": "exact", "closures": 3,
+            "error": {"relative_l1": 1e-5, "albedo": 1e-6}},
+           {"id": "b", "model": "lambert", "representation": "exact", "closures": 1, "error": null}]}],
+      "provenance": {"Blender": "4.5.15"}, "commands": ["brdfc render ball.json"]})");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::vector<SceneReport> load() {
+    std::ofstream(folder_ / "ball/runs.json") << runs_;
+    return load_report(folder_);
+  }
+  std::string load_error() {
+    try {
+      load();
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  }
+
+  fs::path folder_;
+  json runs_;
+};
+
+TEST_F(ReportTest, SeparatesErrorFromNoise) {
+  const auto scenes = load();
+  ASSERT_EQ(scenes.size(), 1u);
+  const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
+  EXPECT_NEAR(glossy.difference.bias, 0.1, 5 * glossy.difference.bias_error);
+  EXPECT_GT(glossy.difference.rel_mse, 2 * glossy.difference.noise);
+  EXPECT_NEAR(exact.difference.bias, 0, 5 * exact.difference.bias_error);
+  EXPECT_NEAR(exact.difference.rel_mse / exact.difference.noise, 1, 0.05);
+  // Four pictures, so the standard deviation of a pixel is half that of one; then the mean over all channels.
+  EXPECT_NEAR(exact.difference.bias_error, kNoise / 2 / std::sqrt(3.0 * kSize * kSize) / 0.5, 2e-5);
+  EXPECT_EQ(exact.spp, 64);
+}
+
+TEST_F(ReportTest, RelMseOfKnownPictures) {
+  runs_["runs"].erase(1);
+  runs_["runs"][0]["images"] = {"brighter.exr"};
+  runs_["runs"][0]["cpu_seconds"] = {1};
+  runs_["runs"][0]["wall_seconds"] = {1};
+  write_rendering(folder_ / "ball/brighter.exr", picture(1.5, 0, 0));
+  double expected = 0;
+  for (int x = 0; x < kSize; ++x) {
+    const double b = 0.2 + 0.6 * x / (kSize - 1);
+    expected += 0.25 * b * b / (b * b + kRelMseEpsilon) / kSize;
+  }
+  const Difference d = load()[0].forms[0].difference;
+  EXPECT_NEAR(d.rel_mse, expected, 1e-6);
+  EXPECT_NEAR(d.bias, 0.5, 1e-6);
+  EXPECT_EQ(d.noise, 0);
+}
+
+TEST_F(ReportTest, CostIsTheMedianOfPairs) {
+  const auto scenes = load();
+  EXPECT_DOUBLE_EQ(scenes[0].forms[0].cost.value(), 1);
+  EXPECT_DOUBLE_EQ(scenes[0].forms[1].cost.value(), 1.5);  // 1.5, 1.5, 1.5, 9: one disturbed run changes nothing
+  runs_["runs"].erase(0);
+  EXPECT_FALSE(load()[0].forms[0].cost.has_value());
+}
+
+TEST_F(ReportTest, TakesTheWorstMaterial) {
+  const FormReport exact = load()[0].forms[1];
+  EXPECT_EQ(exact.closures(), 3);
+  EXPECT_EQ(exact.relative_l1(), 1e-5);
+  EXPECT_EQ(load()[0].forms[0].closures(), std::nullopt);
+}
+
+TEST_F(ReportTest, WritesPageJsonAndCsv) {
+  load();
+  write_report(folder_);
+  std::ifstream json_file(folder_ / "report.json");
+  const json report = json::parse(json_file);
+  EXPECT_EQ(report["scenes"][0]["forms"][1]["cost"], 1.5);
+  EXPECT_EQ(report["scenes"][0]["forms"][0]["closures"], json());
+  const auto text = [&](const char* name) {
+    std::ifstream in(folder_ / name);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  EXPECT_THAT(text("report.csv"), HasSubstr("\nball,exact,"));
+  const std::string page = text("index.html");
+  EXPECT_THAT(page, HasSubstr("a &lt;ball&gt; &amp; more"));
+  for (const char* name : {"ball/reference.png", "ball/exact.png", "ball/exact-difference.png", "ball/glossy.png"}) {
+    EXPECT_THAT(page, HasSubstr(fmt::format("src=\"{}\"", name)));
+    const Image preview = read_image(folder_ / name);
+    EXPECT_EQ(preview.width, kSize);
+  }
+  EXPECT_THAT(page, testing::Not(HasSubstr("http")));  // self-contained
+  for (const auto& entry : fs::recursive_directory_iterator(folder_))
+    EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << ": a temporary file was left";
+}
+
+TEST_F(ReportTest, PreviewsShowThePicturesAndTheSignOfTheDifference) {
+  load();
+  write_report(folder_);
+  const Image shown = read_image(folder_ / "ball/reference.png");
+  EXPECT_NEAR(shown.pixel(kSize / 2, 3)[0], reference().mean.pixel(kSize / 2, 3)[0], 0.01);
+  const Image difference = read_image(folder_ / "ball/glossy-difference.png");
+  double red = 0, blue = 0;
+  for (int y = 0; y < kSize; ++y) {
+    red += difference.pixel(kSize - 1, y)[0];
+    blue += difference.pixel(kSize - 1, y)[2];
+  }
+  EXPECT_GT(red, blue + 0.1 * kSize);  // 10 % too bright at the bright end
+}
+
+TEST_F(ReportTest, ErrorsNameFileAndKey) {
+  EXPECT_EQ(load_error(), "no error");
+  const json good = runs_;
+  const auto with = [&](const char* pointer, json value) {
+    runs_ = good;
+    runs_[json::json_pointer(pointer)] = std::move(value);
+    return load_error();
+  };
+  EXPECT_THAT(with("/format", 2), HasSubstr("ball/runs.json: format"));
+  EXPECT_THAT(with("/scene", "other"), HasSubstr("runs.json: scene"));
+  EXPECT_THAT(with("/reference/spp", "many"), HasSubstr("reference.spp"));
+  EXPECT_THAT(with("/runs/0/images/1", "absent.exr"), HasSubstr("runs[0].images[1]"));
+  EXPECT_THAT(with("/runs/0/form", "exact"), HasSubstr("runs[1].form"));
+  EXPECT_THAT(with("/runs/0/form", "../up"), HasSubstr("runs[0].form"));
+  EXPECT_THAT(with("/runs/1/cpu_seconds", {1, 2}), HasSubstr("runs[1].cpu_seconds: expected 4 numbers"));
+  EXPECT_THAT(with("/runs/1/materials/0/closures", -1), HasSubstr("runs[1].materials[0].closures"));
+  EXPECT_THAT(with("/settings/width", 32), HasSubstr("reference.image"));
+  EXPECT_THAT(with("/runs", json::array()), HasSubstr("runs: expected at least one form"));
+  runs_ = good;
+  runs_["runs"][1].erase("wall_seconds");
+  EXPECT_THAT(load_error(), HasSubstr("wall_seconds"));
+
+  runs_ = good;
+  Rendering broken = picture(1, 0, 0);
+  broken.mean.pixel(5, 7)[1] = std::nanf("");
+  write_rendering(folder_ / "ball/exact-0.exr", broken);
+  EXPECT_THAT(load_error(), HasSubstr("(5, 7)"));
+}
+
+TEST_F(ReportTest, ASceneThatWasNotRenderedIsAnError) {
+  load();
+  fs::create_directories(folder_ / "unfinished");
+  std::ofstream(folder_ / "unfinished/scene.json") << "{}";
+  EXPECT_THAT(load_error(), HasSubstr("unfinished/runs.json"));
+  fs::remove_all(folder_ / "unfinished");
+  fs::remove_all(folder_ / "ball");
+  EXPECT_THROW(load_report(folder_), InputError);
+  EXPECT_THROW(load_report(folder_ / "nowhere"), InputError);
+}
+
+TEST(Statistics, RefusesWhatDoesNotFit) {
+  const std::vector<Rendering> none;
+  EXPECT_THROW(mean_of(none), std::invalid_argument);
+  const std::vector<Rendering> different{picture(1, 0, 0), Rendering{Image(2, 2), {}, {}}};
+  EXPECT_THROW(mean_of(different), std::invalid_argument);
+  Rendering black = reference();
+  black.mean = Image(kSize, kSize);
+  EXPECT_THROW(measure_difference(picture(1, 0, 0), black, "a", "b"), InputError);
+}
+
+}  // namespace
+}  // namespace brdfc

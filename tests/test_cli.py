@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: what it prints where, and that wrong use is told in one line."""
+
+import csv
+import io
+import json
+import math
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+TOOL = Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc"))
+MODELS = ["ashikhmin_shirley", "coupled", "lambert", "radziszewski_alda"]
+DIRECTIONS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0.6,0.8\n0.6,0,0.8,0,0,1\n"
+
+
+def brdfc(*arguments, text="", cwd=None):
+    return subprocess.run(
+        [TOOL, *map(str, arguments)], input=text, capture_output=True, text=True, cwd=cwd
+    )
+
+
+def table(*arguments, text=""):
+    done = brdfc(*arguments, text=text)
+    assert done.returncode == 0, done.stderr
+    return list(csv.DictReader(io.StringIO(done.stdout)))
+
+
+def scene(**changes):
+    """A scene of one sphere; a change of None removes the key."""
+    content = {
+        "name": "s",
+        "description": "a sphere",
+        "settings": {"width": 8, "height": 8, "spp": 4, "seed": 1, "max_bounces": 1},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -4, 0],
+            "look_at": [0, 0, 0],
+            "up": [0, 0, 1],
+            "fov_y_degrees": 25,
+        },
+        "materials": {"m": {"model": "lambert", "parameters": {"rho": [0.5, 0.5, 0.5]}}},
+        "objects": [{"name": "o", "shape": {"type": "sphere"}, "material": "m"}],
+        "environment": {"color": [1, 1, 1]},
+    } | changes
+    return {k: v for k, v in content.items() if v is not None}
+
+
+def test_list_names_every_model():
+    assert [m["name"] for m in json.loads(brdfc("list", "--json").stdout)] == MODELS
+    text = brdfc("list")
+    assert text.returncode == 0 and text.stderr == ""
+    assert all(name in text.stdout for name in MODELS)
+
+
+def test_eval_reads_and_writes_csv():
+    rows = table("eval", "lambert", "rho=0.2,0.5,0.8", text=DIRECTIONS)
+    assert len(rows) == 2
+    assert [float(rows[1][c]) for c in ("f_r", "f_g", "f_b", "pdf")] == pytest.approx(
+        [0.2 / math.pi, 0.5 / math.pi, 0.8 / math.pi, 0.8 / math.pi], rel=1e-14
+    )
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_defaults_are_what_list_says(model):
+    entry = next(m for m in json.loads(brdfc("list", "--json").stdout) if m["name"] == model)
+    given = []
+    for p in entry["parameters"]:
+        value = p["default"]
+        text = ",".join(map(repr, value)) if isinstance(value, list) else str(value)
+        given.append(f"{p['name']}={text}")
+    assert table("eval", model, text=DIRECTIONS) == table("eval", model, *given, text=DIRECTIONS)
+
+
+def test_help_goes_to_stdout():
+    done = brdfc("--help")
+    assert done.returncode == 0 and done.stderr == ""
+    for command in "list eval sample albedo check build render scene compare report".split():
+        assert command in done.stdout
+        explained = brdfc(command, "--help")
+        assert explained.returncode == 0 and explained.stdout and explained.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "subcommand"),
+        (["frobnicate"], "subcommand"),
+        (["list", "--frobnicate"], "--frobnicate"),
+        (["eval"], "model"),
+        (["eval", "unknown"], "unknown"),
+        (["eval", "lambert", "rho=7"], "rho: expected a number in [0, 1]"),
+        (["eval", "lambert", "rho=nan"], "rho"),
+        (["eval", "lambert", "gloss=1"], "gloss"),
+        (["eval", "lambert", "rho"], "rho"),
+        (["eval", "ashikhmin_shirley", "part=half"], "part"),
+        (["check", "unknown"], "unknown"),
+        (["build", "--all"], "--out"),
+        (["build", "--out", "x"], "--all"),
+        (["render", "absent.json", "--out", "a.exr"], "absent.json"),
+        (["compare", "absent-a.exr", "absent-b.exr"], "absent-a.exr"),
+        (["report", "absent"], "absent"),
+    ],
+)
+def test_wrong_use_exits_2_with_one_line(arguments, says, tmp_path):
+    done = brdfc(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("brdfc: ") and done.stderr.count("\n") == 1
+    assert says in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("wi_x,wi_y,wi_z\n0,0,1\n", "wo_x"),
+        (DIRECTIONS + "0,0,1,0,0\n", "4"),
+        (DIRECTIONS + "0,0,up,0,0,1\n", "up"),
+        (DIRECTIONS + "0,0,nan,0,0,1\n", "nan"),
+    ],
+)
+def test_malformed_csv_names_the_line(text, says):
+    done = brdfc("eval", "lambert", text=text)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and says in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("{ not json", "JSON"),
+        (scene(camera=None), "camera"),
+        (scene(materials={"m": {"model": "unknown"}}), "unknown"),
+        (scene(materials={"m": {"model": "lambert", "parameters": {"gloss": 1}}}), "gloss"),
+        (scene(materials={"m": {"model": "lambert", "parameters": {"rho": 2}}}), "rho"),
+        (
+            scene(
+                materials={
+                    "m": {"model": "lambert", "parameters": {"rho": {"texture": "absent.png"}}}
+                }
+            ),
+            "absent.png",
+        ),
+        (scene(environment={"image": "absent.exr"}), "absent.exr"),
+        (scene(objects=[{"name": "o", "shape": {"type": "blob"}, "material": "m"}]), "blob"),
+        (scene(lamps=[]), "lamps"),
+    ],
+)
+def test_a_bad_scene_names_file_and_key(content, says, tmp_path):
+    file = tmp_path / "bad.json"
+    file.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+    for arguments in (
+        ["scene", file, "--out", tmp_path / "out"],
+        ["render", file, "--out", "a.exr"],
+    ):
+        done = brdfc(*arguments, cwd=tmp_path)
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert "bad.json" in done.stderr or "absent" in done.stderr
+        assert says in done.stderr
+        assert [p.name for p in tmp_path.iterdir()] == ["bad.json"]
+
+
+def test_render_and_compare(tmp_path):
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(scene()), encoding="utf-8")
+    for name, seed in (("a.exr", 1), ("b.exr", 1), ("c.exr", 2)):
+        done = brdfc("render", file, "--out", tmp_path / name, "--seed", seed)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == ""
+    same = json.loads(brdfc("compare", tmp_path / "a.exr", tmp_path / "b.exr", "--json").stdout)
+    assert same["max"] == 0
+    other = json.loads(brdfc("compare", tmp_path / "a.exr", tmp_path / "c.exr", "--json").stdout)
+    assert 0 < other["relmse"] < 0.1
+
+
+def test_a_resolved_scene_is_the_same_bytes_again(tmp_path):
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(scene(environment={"procedural": "sky"})), encoding="utf-8")
+    out = [tmp_path / "one", tmp_path / "two"]
+    for folder in out:
+        time.sleep(1.1)  # time stamps, if there were any, have a resolution of a second
+        assert brdfc("scene", file, "--out", folder).returncode == 0
+    names = sorted(p.name for p in out[0].iterdir())
+    assert "scene.json" in names and any(n.endswith(".exr") for n in names)
+    assert names == sorted(p.name for p in out[1].iterdir())
+    for name in names:
+        assert (out[0] / name).read_bytes() == (out[1] / name).read_bytes()
