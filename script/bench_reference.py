@@ -176,7 +176,13 @@ def run_mitsuba(variant, folder, args):
     """(seconds, mean), or None: an LLVM that does not fit aborts the process, so it is another."""
     command = [sys.executable, __file__, "--size", args.size, "--spp", args.spp]
     command += ["--runs", args.runs, "--threads", args.threads, "--in-process", variant, folder]
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+    try:
+        done = subprocess.run(
+            [str(c) for c in command], capture_output=True, text=True, timeout=600
+        )
+    except subprocess.TimeoutExpired:
+        print(f"bench_reference: mitsuba {variant}: no result in 600 s", file=sys.stderr)
+        return None
     if done.returncode == 0:
         return tuple(json.loads(done.stdout.splitlines()[-1]))
     lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]

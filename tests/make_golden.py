@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes golden.csv: values of the models by an implementation that shares nothing with the generator.
+"""Writes golden.csv: values by an implementation that shares nothing with the generator.
 
-The formulas are typed in from the papers as printed (with their errata, see the models' headers) and
-evaluated with mpmath in as many digits as they need; albedos are integrated by mpmath. Run it after
-adding a model:  python3 tests/make_golden.py
+The formulas are typed in from the papers as printed (with their errata, see the models'
+headers) and evaluated with mpmath in as many digits as they need; albedos are integrated by
+mpmath. Run it after adding a model:  python3 tests/make_golden.py
 
-A row's tolerance is what the rounding of its inputs to double precision can cause (measured here, by
-moving each input by half a unit in the last place), times a small factor, plus a floor.
+A row's tolerance is what the rounding of its inputs to double precision can cause (measured
+here, by moving each input by half a unit in the last place), times a small factor, plus a floor.
 """
 
 import csv
@@ -95,12 +95,13 @@ def as_pdf(p, wi, wo):
 
 
 def as_albedo(p, cos_o):
-    """Specular part, rotation 0, view in the x-z plane: integrated over half vectors, where p_h is smooth."""
+    """Specular part, rotation 0, view in the x-z plane, over half vectors: p_h is smooth there."""
     fp, rs, nu, nv = mp.fp, p["rs"][0], p["nu"], p["nv"]
     sin_o = math.sqrt(1 - cos_o**2)
 
     def integrand(t, phi):
-        # d omega_i = 4 (k.h) d omega_h, so f cos_i d omega_i = p_h F cos_i / max(cos_i, cos_o) d omega_h.
+        # d omega_i = 4 (k.h) d omega_h, so
+        # f cos_i d omega_i = p_h F cos_i / max(cos_i, cos_o) d omega_h.
         hn, s, c = math.cos(t), math.sin(t), math.cos(phi)
         kh = sin_o * s * c + cos_o * hn
         cos_i = 2 * kh * hn - cos_o
@@ -110,8 +111,9 @@ def as_albedo(p, cos_o):
         return p_h * (rs + (1 - rs) * (1 - kh) ** 5) * cos_i / max(cos_i, cos_o) * s
 
     def ring(phi):
-        # cos_i / cos_o = cos 2t + a sin 2t = r cos(2t - s): the edge of the support is where it is 0, the kink
-        # of max() where it is 1. Between these theta_h = t is smooth; the lobe's own width needs cuts as well.
+        # cos_i / cos_o = cos 2t + a sin 2t = r cos(2t - s): the edge of the support is where it
+        # is 0, the kink of max() where it is 1. Between these theta_h = t is smooth; the lobe's
+        # own width needs cuts as well.
         a = sin_o * math.cos(phi) / cos_o
         r, s = math.hypot(1, a), math.atan(a)
         width = 6 / math.sqrt(max(nu, nv) + 1)
@@ -282,7 +284,9 @@ def pairs(rng):
         out.append([direction(rng.uniform(0, 1.5), rng.uniform(0, 6.28)) for _ in range(2)])
     for distance in (1e-1, 1e-3, 1e-5):
         theta, phi = rng.uniform(0.3, 1.2), rng.uniform(0, 6.28)
-        wi = direction(theta + rng.uniform(-1, 1) * distance, phi + math.pi + rng.uniform(-1, 1) * distance)
+        wi = direction(
+            theta + rng.uniform(-1, 1) * distance, phi + math.pi + rng.uniform(-1, 1) * distance
+        )
         out.append([wi, direction(theta, phi)])
     out.append([(0.0, 0.0, 1.0), direction(1e-3, 1.0)])
     out.append([direction(1.57, 2.0), direction(1.2, 5.0)])
@@ -298,8 +302,8 @@ def values(function, p, wi, wo):
 def tolerance(function, p, wi, wo, base):
     """What half a unit in the last place of every input changes, relatively, added up.
 
-    Rounded components make a vector whose length is 1 only nearly: formulas that are equal on the sphere
-    may differ then, which counts as well.
+    Rounded components make a vector whose length is 1 only nearly: formulas that are equal on the
+    sphere may differ then, which counts as well.
     """
     global normalise
     ulp = mp.mpf(2) ** -53
@@ -314,9 +318,11 @@ def tolerance(function, p, wi, wo, base):
             b[i] *= 1 + ulp
         else:
             q[what] = mp.mpf(q[what]) * (1 + ulp)
-        for normalise in (False, True):
+        for normalise in (False, True):  # noqa: B007, a switch of this module
             moved = values(function, q, a, b)
-            total += max(abs(m - v) / v if v > 0 else abs(m) for m, v in zip(moved, base, strict=True))
+            total += max(
+                abs(m - v) / v if v > 0 else abs(m) for m, v in zip(moved, base, strict=True)
+            )
     return float(FLOOR + ROUNDINGS * total)
 
 

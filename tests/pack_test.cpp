@@ -57,6 +57,11 @@ class TempFolder {
   fs::path path_;
 };
 
+}  // namespace
+
+// Not anonymous: templates of other files are instantiated with these.
+namespace pack_test {
+
 /// Lambert with faults that a build must not hide.
 template <class T> struct Broken {
   Rgb<T> rho;
@@ -82,6 +87,10 @@ template <class T> struct Greedy : Broken<T> {
   }
 };
 
+}  // namespace pack_test
+
+namespace {
+
 TEST(Shader, SumIsABalancedTree) {
   std::vector<std::string> terms;
   for (int i = 0; i < 64; ++i) terms.push_back(fmt::format("t{}", i));
@@ -93,7 +102,7 @@ TEST(Shader, SumIsABalancedTree) {
 }
 
 TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
-  const detail::ModelOf<Greedy> greedy;
+  const detail::ModelOf<pack_test::Greedy> greedy;
   try {
     write_shader(greedy, RepresentationKind::Exact, empty_table(greedy));
     FAIL() << "not refused";
@@ -145,7 +154,7 @@ TEST(Shader, TextOnlyHoldsTheLibraryItCalls) {
 }
 
 TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
-  const detail::ModelOf<Broken> broken;
+  const detail::ModelOf<pack_test::Broken> broken;
   try {
     tabulate_albedo(broken);
     FAIL() << "NaN reached a table";

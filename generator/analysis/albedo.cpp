@@ -154,12 +154,20 @@ Vec3<double> Guides::direction_at(double theta, double phi) const {
   return {cos_phi_ * x - sin_phi_ * y, sin_phi_ * x + cos_phi_ * y, std::cos(theta)};
 }
 
+std::vector<Rect> Guides::cells(std::size_t most) const {
+  // Cut at the mirror direction, where a lobe's peak or a kink of max(cos_i, cos_o) lies.
+  std::vector<Rect> out;
+  for (const double phi : {0., kPi})
+    for (const Rect& r : {Rect{0, theta_o_, phi, phi + kPi}, Rect{theta_o_, kPi / 2, phi, phi + kPi}})
+      if (r.x1 > r.x0) {
+        const std::vector<Rect> parts = cells(r, most);
+        out.insert(out.end(), parts.begin(), parts.end());
+      }
+  return out;
+}
+
 std::vector<Rect> Guides::cells(const Rect& whole, std::size_t most) const {
-  std::vector<Rect> parts;
-  const double t = std::clamp(theta_o_, whole.x0, whole.x1), p = std::clamp(kPi, whole.y0, whole.y1);
-  for (const Rect& r : {Rect{whole.x0, t, whole.y0, p}, Rect{t, whole.x1, whole.y0, p}, Rect{whole.x0, t, p, whole.y1},
-                        Rect{t, whole.x1, p, whole.y1}})
-    if (r.x1 > r.x0 && r.y1 > r.y0) parts.push_back(r);
+  std::vector<Rect> parts{whole};
   // Each lobe for itself: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
   for (const std::vector<Point2>& points : lobes_) {
     std::vector<Rect> finer;
@@ -180,7 +188,7 @@ CubatureResult integrate_hemisphere(const Brdf<double>& guide, const Vec3<double
     integrand(g.direction_at(theta, phi), out);
     for (std::size_t k = 0; k < components; ++k) out[k] *= std::sin(theta);
   };
-  return integrate(in_angles, components, g.cells({0, kPi / 2, 0, 2 * kPi}, 8), options);
+  return integrate(in_angles, components, g.cells(8), options);
 }
 
 namespace {

@@ -65,7 +65,9 @@ class Guides {
   /// theta in [0, pi], phi in [0, 2 pi) from the azimuth of wo; the mirror direction has phi = pi.
   Point2 angles(const Vec3<double>& wi) const;
   Vec3<double> direction_at(double theta, double phi) const;
-  /// Cells that cover the rectangle, cut at the mirror direction and small where samples crowd.
+  /// Cells that cover the hemisphere: cut at the mirror direction, small where samples crowd.
+  std::vector<Rect> cells(std::size_t most) const;
+  /// Cells that cover a rectangle that holds many samples.
   std::vector<Rect> cells(const Rect&, std::size_t most) const;
 
  private:

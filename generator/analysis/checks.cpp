@@ -332,8 +332,6 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
       }
     }
   }
-  if (getenv("DBG")) for (std::size_t k = 0; k < cells.size(); ++k) { const double zz = (observed[k] - expected[k]) / std::sqrt(expected[k] + 1e-9); if (std::abs(zz) > 3) fmt::print("cell {:.7f} {:.7f} {:.7f} {:.7f} exp {:.2f} obs {} parts {} {}\n", cells[k].rect.x0, cells[k].rect.x1, cells[k].rect.y0, cells[k].rect.y1, expected[k], observed[k], guides.cells(cells[k].rect, 8).size(), guides.cells(cells[k].rect, 2).size()); }
-  if (getenv("DBG")) fmt::print("total {} lost exp {} obs {}\n", total, expected.back(), observed.back());
   std::vector<std::size_t> order(expected.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return expected[a] < expected[b]; });

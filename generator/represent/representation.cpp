@@ -49,7 +49,9 @@ Recording finish(const Program& program, int indent, std::vector<ClosureKind> ki
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
 
-void set_input(FloatInputs& inputs, const std::string& name, double v) { inputs[name] = {float(v), float(v), float(v)}; }
+void set_input(FloatInputs& inputs, const std::string& name, double v) {
+  inputs[name] = {float(v), float(v), float(v)};
+}
 
 FloatInputs float_inputs(const ParamValues& values, const Vec3<double>& wo) {
   FloatInputs inputs;
