@@ -71,12 +71,12 @@ template <class T> struct Broken {
   template <class Visitor> void parameters(const Visitor& v) {
     v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
   }
-  // log(z - 1/2): NaN for grazing light.
-  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>&) const { return rho * log(wi.z - T(0.5)); }
+  // NaN for light more than 60 degrees from the normal.
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>&) const { return rho * sqrt(wi.z - T(0.5)); }
   T pdf(const Vec3<T>& wi, const Vec3<T>&) const { return cosine_pdf(wi); }
   Sample<T> sample(const Vec3<T>&, const Vec3<T>& u) const {
     const Vec3<T> wi = sample_cosine(u.y, u.z);
-    return {wi, rho * log(wi.z - T(0.5)), cosine_pdf(wi)};
+    return {wi, rho * sqrt(wi.z - T(0.5)), cosine_pdf(wi)};
   }
 };
 

@@ -25,7 +25,7 @@ constexpr double kNormalisation = 1e-6;
 // A property declared absent must visibly be.
 constexpr double kVisible = 1e-3;
 // Rounding errors a good formula may add to those of its inputs, in units of them.
-constexpr double kAmplified = 100;
+constexpr double kAmplified = 32;
 constexpr double kSignificance = 0.01;
 constexpr AlbedoOptions kAlbedoOptions{.absolute = 1e-7, .max_cells = 4000, .witnesses = 1 << 16};
 
@@ -252,7 +252,7 @@ std::vector<ParamValues> check_cases(const Model& model, int random_draws, std::
 
 ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int samples, std::uint64_t seed) {
   const Brdf<double>& brdf = *bound.brdf;
-  const Guides guides(brdf, wo, 2048);
+  const Guides guides(brdf, wo, 8192);
   const auto draw = [&](Random& random, Point2& p) {
     const Sample<double> s = brdf.sample(wo, uniform_cube(random));
     require_value(s.pdf, "pdf", bound.label, s.wi, wo);
@@ -307,7 +307,7 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
     const auto probability = [&](std::size_t most) {
       return integrate(density, 1, guides.cells(c.rect, most), {1e-7, 0, 3000});
     };
-    const CubatureResult coarse = probability(8), r = probability(2);
+    const CubatureResult coarse = probability(16), r = probability(4);
     uncertain += std::abs(r.value[0] - coarse.value[0]);
     expected.push_back(r.value[0] * samples);
     total += r.value[0];

@@ -163,8 +163,19 @@ std::vector<Rect> partition(const Rect& whole, const std::vector<Point2>& points
       out.push_back(r);
       continue;
     }
-    // Halve where the points fill least of the cell: that closes in on a peak fastest.
-    const double fill_x = (x1 - x0) / (r.x1 - r.x0), fill_y = (y1 - y0) / (r.y1 - r.y0);
+    // Halve where the bulk of the points fills least of the cell: that closes in on a peak fastest. Halving the other
+    // way first would leave parts with a single point that still reach from the peak to far away. Quartiles, so that a
+    // point in the tail does not hide the crowd.
+    const auto spread = [&](double Point2::*axis) {
+      std::vector<double> v;
+      for (const Point2& p : part.points) v.push_back(p.*axis);
+      const std::size_t low = v.size() / 4, high = v.size() - 1 - low;
+      std::nth_element(v.begin(), v.begin() + std::ptrdiff_t(low), v.end());
+      const double a = v[low];
+      std::nth_element(v.begin(), v.begin() + std::ptrdiff_t(high), v.end());
+      return v[high] - a;
+    };
+    const double fill_x = spread(&Point2::x) / (r.x1 - r.x0), fill_y = spread(&Point2::y) / (r.y1 - r.y0);
     bool split_x = fill_x < fill_y;
     // Points that coincide (a mirror's, or those crowded against a border) can't be told apart by halving for ever.
     const auto thick = [&](bool x) {

@@ -137,7 +137,7 @@ def _along(tree, background, axis, shape):
     tree.links.new(shape(dot.outputs["Value"]), background.inputs["Strength"])
 
 
-def hemisphere(cosines=96, azimuths=192):
+def hemisphere(cosines=64, azimuths=128):
     """Nodes and solid-angle weights: Gauss-Legendre in the polar angle, equal steps in azimuth."""
     x, w = np.polynomial.legendre.leggauss(cosines)
     theta = (x + 1) * math.pi / 4

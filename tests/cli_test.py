@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The built tool's commands list, eval, sample, albedo and check: output, exit status, messages.
+
+The tool is the program in the environment variable BRDFC_TOOL, build/brdfc if that is not set.
+"""
+
+import csv
+import io
+import json
+import math
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+TOOL = os.environ.get("BRDFC_TOOL", str(ROOT / "build" / "brdfc"))
+MODELS = ["ashikhmin_shirley", "coupled", "lambert", "radziszewski_alda"]
+EVAL_HEADER = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
+SAMPLE_HEADER = "wo_x,wo_y,wo_z,u1,u2,u3"
+
+
+def run(*args, stdin=""):
+    return subprocess.run([TOOL, *args], input=stdin, capture_output=True, text=True, timeout=300)
+
+
+def rows(result):
+    assert result.returncode == 0, result.stderr
+    return [
+        {k: float(v) for k, v in row.items()} for row in csv.DictReader(io.StringIO(result.stdout))
+    ]
+
+
+def refused(result, *words, status=2):
+    """One line on stderr with every word, nothing like a table on stdout, the exit status."""
+    assert result.returncode == status, (result.returncode, result.stderr)
+    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert result.stderr.startswith("brdfc: ")
+    for word in words:
+        assert word in result.stderr, result.stderr
+    return result.stderr
+
+
+# ---- list ---------------------------------------------------------------------------------------
+
+
+def test_list_names_models_parameters_and_representations():
+    out = run("list").stdout
+    for name in [*MODELS, "rotation", "both|specular|diffuse", "exact, sampled"]:
+        assert name in out
+
+
+def test_list_json_is_the_schema():
+    models = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
+    assert set(MODELS) <= set(models)
+    assert models["coupled"]["representations"] == ["exact", "sampled"]
+    assert models["ashikhmin_shirley"]["representations"] == ["sampled"]
+    assert models["coupled"]["mirror"] is True
+    parameters = {p["name"]: p for p in models["ashikhmin_shirley"]["parameters"]}
+    assert parameters["rs"]["kind"] == "color" and parameters["rs"]["default"] == [0.05] * 3
+    assert parameters["nu"]["kind"] == "number" and parameters["nu"]["min"] == 0
+    assert parameters["part"]["choices"] == ["both", "specular", "diffuse"]
+    for m in models.values():
+        for p in m["parameters"]:
+            assert p["label"] and p["doc"], (m["name"], p["name"])
+
+
+# ---- eval ---------------------------------------------------------------------------------------
+
+
+def test_eval_lambert_to_the_last_digit():
+    line = "0,0,1,0.6,0,0.8"
+    (row,) = rows(run("eval", "lambert", "rho=0.25,0.5,1", stdin=f"{EVAL_HEADER}\n{line}\n"))
+    assert row == {
+        "f_r": 0.25 / math.pi,
+        "f_g": 0.5 / math.pi,
+        "f_b": 1 / math.pi,
+        "pdf": 1 / math.pi,
+    }
+
+
+def test_eval_takes_columns_in_any_order_blank_lines_and_windows_line_ends():
+    text = "wo_z,wo_y,wo_x,note,wi_x,wi_y,wi_z\r\n0.8,0,0.6,7,0,0,1\r\n\r\n"
+    (row,) = rows(run("eval", "lambert", "rho=1", stdin=text))
+    assert row["f_r"] == 1 / math.pi
+
+
+def test_eval_is_zero_below_the_surface():
+    (row,) = rows(run("eval", "lambert", stdin=f"{EVAL_HEADER}\n0,0,-1,0,0,1\n"))
+    assert row["f_r"] == 0 and row["pdf"] == 0
+
+
+def test_eval_normalises_what_is_nearly_a_unit_vector():
+    text = f"{EVAL_HEADER}\n0,0,1.0000005,0.6,0,0.8\n"
+    (row,) = rows(run("eval", "coupled", "rm=1", "r0=0", stdin=text))
+    exact = 21 / (20 * math.pi) * (1 - 0.2**5)
+    assert row["f_g"] == pytest.approx(exact, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("stdin", "words"),
+    [
+        ("", ["stdin", "header", "wi_x"]),
+        ("a,b,c\n1,2,3\n", ["stdin line 1", "'wi_x' is missing"]),
+        (f"{EVAL_HEADER}\n0,0,1,0,0\n", ["stdin line 2", "expected 6 values", "got 5"]),
+        (f"{EVAL_HEADER}\n0,0,1,0,0,1\n0,0,1,0,x,1\n", ["stdin line 3", "wo_y", "'x'"]),
+        (f"{EVAL_HEADER}\n0,0,nan,0,0,1\n", ["stdin line 2", "wi_z", "finite", "'nan'"]),
+        (f"{EVAL_HEADER}\n0,0,1,inf,0,1\n", ["stdin line 2", "wo_x", "finite", "'inf'"]),
+        (f"{EVAL_HEADER}\n0,0,1,0,1,1\n", ["stdin line 2", "wo_x, wo_y, wo_z", "unit vector"]),
+        (f"{EVAL_HEADER}\n0,0,1,0,0,1e0x\n", ["stdin line 2", "wo_z"]),
+    ],
+)
+def test_eval_says_what_is_wrong_with_its_input(stdin, words):
+    refused(run("eval", "lambert", stdin=stdin), *words)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["eval", "phng"], ["'phng'", *MODELS]),
+        (["eval", "lambert", "rh=1"], ["lambert", "'rh'", "rho"]),
+        (["eval", "lambert", "rho=2"], ["lambert", "rho", "[0, 1]", "2"]),
+        (["eval", "lambert", "rho=nan"], ["lambert", "rho"]),
+        (["eval", "lambert", "rho=red"], ["lambert", "rho", "'red'"]),
+        (["eval", "lambert", "rho=0.1,0.2"], ["lambert", "rho", "r,g,b"]),
+        (["eval", "lambert", "rho"], ["lambert", "name=value", "'rho'"]),
+        (["eval", "lambert", "rho=1", "rho=1"], ["lambert", "rho", "twice"]),
+        (["eval", "ashikhmin_shirley", "part=all"], ["part", "both, specular, diffuse", "'all'"]),
+        (["eval"], ["model"]),
+        (["evil"], ["subcommand"]),
+        (["eval", "lambert", "--frob"], ["--frob"]),
+        (["sample", "lambert", "--count", "0", "--wo", "0,0,1"], ["--count"]),
+        (["sample", "lambert", "--count", "3"], ["--wo"]),
+        (["sample", "lambert", "--count", "3", "--wo", "0,0,2"], ["--wo", "unit vector"]),
+        (["sample", "lambert", "--seed", "3"], ["--count"]),
+        (["albedo", "lambert", "--count", "1"], ["--count"]),
+        (["check", "lambert", "--all"], ["--all"]),
+        (["check", "phng"], ["'phng'", *MODELS]),
+    ],
+)
+def test_wrong_usage_is_one_line_and_status_2(args, words):
+    refused(run(*args, stdin=f"{EVAL_HEADER}\n0,0,1,0,0,1\n"), *words)
+
+
+# ---- sample -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_sample_agrees_with_eval(model):
+    wo = (0.36, -0.48, 0.8)
+    args = ["--count", "200", "--seed", "7", "--wo", ",".join(map(str, wo))]
+    samples = rows(run("sample", model, *args))
+    assert len(samples) == 200
+    kept = [s for s in samples if s["pdf"] > 0]
+    assert len(kept) > 100
+    for s in samples:
+        if s["pdf"] == 0:
+            assert s["weight_r"] == s["weight_g"] == s["weight_b"] == 0
+    lines = "\n".join(
+        ",".join(repr(s[k]) for k in ("wi_x", "wi_y", "wi_z")) + "," + ",".join(map(str, wo))
+        for s in kept
+    )
+    values = rows(run("eval", model, stdin=f"{EVAL_HEADER}\n{lines}\n"))
+    for s, v in zip(kept, values, strict=True):
+        assert v["pdf"] == pytest.approx(s["pdf"], rel=1e-9)
+        for c in "rgb":
+            assert s[f"weight_{c}"] * s["pdf"] == pytest.approx(v[f"f_{c}"] * s["wi_z"], rel=1e-9)
+
+
+def test_sample_is_reproducible_and_its_seed_matters():
+    args = ["sample", "radziszewski_alda", "--count", "20", "--wo", "0,0.6,0.8", "--seed"]
+    first, again, other = (run(*args, seed).stdout for seed in ("1", "1", "2"))
+    assert first == again != other
+
+
+def test_sample_takes_random_numbers_from_stdin():
+    text = f"{SAMPLE_HEADER}\n0,0,1,0.5,0,0.3\n0,0,1,0.5,0.75,0\n"
+    a, b = rows(run("sample", "lambert", "rho=0.5", stdin=text))
+    assert a["wi_z"] == 1 and a["weight_r"] == 0.5
+    assert b["wi_z"] == pytest.approx(0.5, rel=1e-15)
+    assert b["pdf"] == pytest.approx(0.5 / math.pi, rel=1e-15)
+
+
+def test_sample_refuses_random_numbers_outside_the_unit_interval():
+    text = f"{SAMPLE_HEADER}\n0,0,1,0.5,1,0.3\n"
+    refused(run("sample", "lambert", stdin=text), "stdin line 2", "u2", "[0, 1)", "1")
+
+
+# ---- albedo -------------------------------------------------------------------------------------
+
+
+def test_albedo_without_input_covers_64_cosines():
+    for stdin in ("", "\n"):
+        table = rows(run("albedo", "coupled", "rm=1", stdin=stdin))
+        assert len(table) == 64
+        assert table[0]["cos_theta_o"] == 0.01 and table[-1]["cos_theta_o"] == 1
+        for row in table:
+            assert row["albedo_g"] == pytest.approx(1, abs=1e-7)
+            schlick = 0.05 + 0.95 * (1 - row["cos_theta_o"]) ** 5
+            assert row["mirror_g"] == pytest.approx(schlick, abs=1e-12)
+            assert 0 <= row["error_estimate"] < 1e-6
+
+
+def test_albedo_landmarks_of_the_anisotropic_phong_furnace():
+    args = ["albedo", "ashikhmin_shirley", "part=specular", "rs=1", "nu=10", "nv=10"]
+    stdin = f"cos_theta_o\n1\n0.5\n{math.cos(math.radians(80))!r}\n"
+    normal, at60, at80 = (row["albedo_r"] for row in rows(run(*args, stdin=stdin)))
+    assert normal == pytest.approx(0.6957, abs=1e-4)
+    assert at60 == pytest.approx(0.613, abs=1e-3)
+    assert at80 == pytest.approx(0.539, abs=1e-3)
+
+
+def test_albedo_turns_with_the_azimuth_of_an_anisotropic_model():
+    args = ["albedo", "ashikhmin_shirley", "part=specular", "rs=1", "nu=3", "nv=300"]
+    stdin = "cos_theta_o\n0.3\n"
+    (along,) = rows(run(*args, "--phi", "0", stdin=stdin))
+    (across,) = rows(run(*args, "--phi", str(math.pi / 2), stdin=stdin))
+    (turned,) = rows(run(*args, f"rotation={math.pi / 2}", "--phi", str(math.pi / 2), stdin=stdin))
+    assert abs(along["albedo_r"] - across["albedo_r"]) > 0.01
+    assert turned["albedo_r"] == pytest.approx(along["albedo_r"], abs=1e-5)
+
+
+@pytest.mark.parametrize("cosine", ["0", "-0.5", "1.0001", "nan", "abc"])
+def test_albedo_refuses_a_cosine_out_of_range(cosine):
+    refused(
+        run("albedo", "lambert", stdin=f"cos_theta_o\n0.5\n{cosine}\n"),
+        "stdin line 3",
+        "cos_theta_o",
+    )
+
+
+# ---- check --------------------------------------------------------------------------------------
+
+
+def test_check_passes_and_prints_a_table():
+    result = run("check", "lambert")
+    assert result.returncode == 0, result.stdout + result.stderr
+    for name in ("reciprocal", "chi-square", "pdf integral", "exact closures", "float rounding"):
+        assert name in result.stdout
+    assert "FAILED" not in result.stdout
+
+
+def test_check_json():
+    result = run("check", "coupled", "--json")
+    assert result.returncode == 0, result.stderr
+    table = json.loads(result.stdout)
+    assert {row["model"] for row in table} == {"coupled"}
+    assert all(row["passed"] and row["cases"] > 0 for row in table)
