@@ -192,6 +192,27 @@ TEST_F(PackFiles, ManifestAndFilesAgree) {
   for (const auto& entry : fs::recursive_directory_iterator(pack.folder)) EXPECT_NE(entry.path().extension(), ".oso");
 }
 
+TEST_F(PackFiles, CostsComeFromTheMeasuredTable) {
+  const fs::path addon = temp.path() / "addon";
+  fs::copy(BRDFC_SOURCE_DIR "/blender_addon", addon);
+  PackOptions o = options(temp.path() / "out");
+  o.addon = addon;
+  const auto cost = [&](const char* form) {
+    const auto manifest = nlohmann::json::parse(read(build_pack(o).folder / "manifest.json"));
+    return manifest.at("models").at("lambert").at("representations").at(form).at("cost");
+  };
+  std::ofstream(addon / "costs.csv") << "model,form,cost\nlambert,exact,0.75\n";
+  EXPECT_EQ(cost("exact"), 0.75);
+  EXPECT_TRUE(cost("sampled").is_null());
+  std::ofstream(addon / "costs.csv") << "model,form,cost\nlambert,exact,fast\n";
+  try {
+    build_pack(o);
+    FAIL() << "not refused";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("costs.csv: line 2"));
+  }
+}
+
 TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   const PackResult pack = build_pack(options(temp.path()));
   const std::string before = read(pack.zip);

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -65,6 +66,31 @@ Json parameter_json(const ParamInfo& p) {
   }
   j["doc"] = p.doc;
   return j;
+}
+
+/// CPU time of each "model,form" in units of Blender's Glossy node, from the table that script/bench prints.
+using Costs = std::map<std::string, double>;
+
+/// No file, no costs. Throws InputError naming file, line and what was expected.
+Costs read_costs(const fs::path& path) {
+  Costs costs;
+  if (!fs::exists(path)) return costs;
+  std::istringstream lines(read_text(path));
+  std::string line;
+  std::getline(lines, line);  // heading
+  for (int number = 2; std::getline(lines, line); ++number) {
+    std::istringstream fields(line);
+    std::string model, form, cost;
+    std::getline(fields, model, ',');
+    std::getline(fields, form, ',');
+    std::getline(fields, cost, ',');
+    double value = 0;
+    const auto [end, error] = std::from_chars(cost.data(), cost.data() + cost.size(), value);
+    if (error != std::errc() || end != cost.data() + cost.size() || !(value > 0))
+      input_error("{}: line {}: expected model,form,cost with a positive cost, got '{}'", path.string(), number, line);
+    costs[model + "," + form] = value;
+  }
+  return costs;
 }
 
 Json error_json(const RepresentationError& e) {
@@ -158,7 +184,7 @@ struct BuiltModel {
   std::vector<PackLine> lines;
 };
 
-BuiltModel build_model(const Model& model, const fs::path& scratch) {
+BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& scratch) {
   const ModelInfo& info = model.info();
   BuiltModel built;
   Json& j = built.manifest;
@@ -182,6 +208,7 @@ BuiltModel build_model(const Model& model, const fs::path& scratch) {
   for (RepresentationKind kind : kinds) {
     const Shader shader = write_shader(model, kind, table);
     const RepresentationError error = measure_error(model, kind);
+    const auto cost = costs.find(info.name + "," + name_of(kind));
     const std::string file = "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
@@ -192,7 +219,7 @@ BuiltModel build_model(const Model& model, const fs::path& scratch) {
         {"slots", shader.slots},
         {"statements", shader.operations},
         {"error", error_json(error)},
-        {"cost", nullptr},
+        {"cost", cost == costs.end() ? Json() : Json(cost->second)},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", kMaxLobes}} : Json()},
         {"warnings", warnings(kind)},
         {"sha256", sha256(shader.source)}};
@@ -216,11 +243,12 @@ PackResult build_pack(const PackOptions& options) {
   if (error || !fs::is_directory(options.out))
     input_error("{}: expected a folder that can be written", options.out.string());
 
+  const Costs costs = read_costs(options.addon / "costs.csv");
   const Staging staging(options.out);
   std::vector<BuiltModel> built(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (options.progress) options.progress(chosen[i]->info().name, int(i), int(chosen.size()));
-    built[i] = build_model(*chosen[i], staging.path());
+    built[i] = build_model(*chosen[i], costs, staging.path());
   }
 
   PackResult result;
