@@ -29,6 +29,10 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
+    if (argc > 1 && argv[1][0] != '-' && !app.get_subcommand_no_throw(argv[1])) {
+      fmt::print(stderr, "brdfc: unknown command '{}': see brdfc --help\n", argv[1]);
+      return 2;
+    }
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 2;
   } catch (const brdfc::InputError& e) {

@@ -293,13 +293,14 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
     cosines = np.linspace(0.02, 1, 50)
     panel = np.array([extension.api.albedo(model, c, **values) for c in cosines])
     entry = extension.pack.model(model)
-    error = entry["albedo"]["error"]
-    if not entry["isotropic"] and values.get("nu", 0) != values.get("nv", 1):
-        error += entry["albedo"]["anisotropy"]  # the table holds the mean over azimuth
-    off = np.abs(panel - albedo(tool, model, values, cosines)).max()
-    print(f"{model}: {off:.3g}, table says {error:.3g}")
-    # The table's error is the largest at random points of its own, so it is no strict bound.
-    assert off <= 2 * error + 1e-6
+    complete = {p["name"]: p["default"] for p in entry["parameters"]} | values
+    # The table holds the mean over azimuth: quadrature at one azimuth is that only without stretch.
+    if entry["isotropic"] or ("nu" in complete and complete["nu"] == complete["nv"]):
+        error = entry["albedo"]["error"]
+        off = np.abs(panel - albedo(tool, model, values, cosines)).max()
+        print(f"{model}: {off:.3g}, table says {error:.3g}")
+        # The table's error is the largest at random points of its own, so it is no strict bound.
+        assert off <= 2 * error + 1e-6
 
     for form in extension.pack.model(model)["representations"]:
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
