@@ -16,7 +16,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 TOOL = os.environ.get("BRDFC_TOOL", str(ROOT / "build" / "brdfc"))
-MODELS = ["ashikhmin_shirley", "coupled", "lambert", "radziszewski_alda"]
+MODELS = [
+    m["name"]
+    for m in json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
+]
 EVAL_HEADER = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
 SAMPLE_HEADER = "wo_x,wo_y,wo_z,u1,u2,u3"
 
@@ -128,7 +131,7 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
         (["eval", "lambert", "rho=1", "rho=1"], ["lambert", "rho", "twice"]),
         (["eval", "ashikhmin_shirley", "part=all"], ["part", "both, specular, diffuse", "'all'"]),
         (["eval"], ["model"]),
-        (["evil"], ["subcommand"]),
+        (["evil"], ["unknown command", "'evil'"]),
         (["eval", "lambert", "--frob"], ["--frob"]),
         (["sample", "lambert", "--count", "0", "--wo", "0,0,1"], ["--count"]),
         (["sample", "lambert", "--count", "3"], ["--wo"]),
