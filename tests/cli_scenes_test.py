@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built tool's help, and its commands on scenes and files: build, scene, render, compare, report.
+"""The built tool's help, and what it says of scenes, files and wrong use.
 
 tests/cli_test.py has list, eval, sample, albedo and check.
 """
