@@ -39,12 +39,19 @@ struct ParamInfo {
   ParamKind kind = ParamKind::Number;
 };
 
-/// A property the paper or this project claims; tests try to prove each one, also the negative ones.
+/// What the paper or this project claims of a model; tests try to prove each claim, also the negative ones.
 struct ModelProperties {
-  bool reciprocal = true;  ///< f(wi, wo) = f(wo, wi)
-  bool conserving = true;  ///< albedo <= 1 for every view direction and admissible parameter
-  bool lossless = false;   ///< albedo = 1 (colours at 1, no other loss) for every view direction
-  bool isotropic = true;   ///< unchanged when both directions turn about the normal
+  bool reciprocal = true;      ///< f(wi, wo) = f(wo, wi)
+  bool conserving = true;      ///< albedo <= 1 for every view direction and admissible parameter
+  bool lossless = false;       ///< albedo = 1 (colours at 1, no other loss) for every view direction
+  bool isotropic = true;       ///< unchanged when both directions turn about the normal
+  bool positive = true;        ///< f > 0 for all directions above the surface, colours > 0, inside the sliders' ranges
+  bool smooth = true;          ///< first derivatives of f are continuous above the surface: no visible edges
+  bool exact_sampling = true;  ///< sample()'s density is proportional to f cos: its weight does not depend on wi
+  /// Assignments ("n=0") that make f constant, in the form parse_values reads, separated by spaces; "" if none do.
+  std::string diffuse_limit = "";
+  /// Assignments ("n=1e8") at which nearly all of the light leaves in the direction of ideal reflection; "" if none do.
+  std::string specular_limit = "";
 };
 
 struct ModelInfo {

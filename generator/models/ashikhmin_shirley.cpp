@@ -29,7 +29,10 @@ template <class T> struct AshikhminShirley {
         .paper = "M. Ashikhmin, P. Shirley: An Anisotropic Phong Light Reflection Model, 2000",
         .equations = "eqs. 11, 14-16, 19, 20; eq. 18 inverted",
         .doc = "Anisotropic Phong lobe with Fresnel reflection over a diffuse base that gives way at grazing angles.",
-        .properties = {.reciprocal = true, .conserving = true, .lossless = false, .isotropic = false},
+        .properties = {.isotropic = false,
+                       .smooth = false,  // max(wi.z, wo.z) of eq. 16
+                       .exact_sampling = false,
+                       .specular_limit = "part=specular nu=1e8 nv=1e8"},
         .params = {}};
   }
 

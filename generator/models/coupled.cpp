@@ -27,7 +27,7 @@ template <class T> struct Coupled {
                 "Models, Pacific Graphics 1997",
             .equations = "eqs. 1, 5, 6; k of eq. 4 mended",
             .doc = "Polished surface: a mirror-like coat over a matte base, whose shares trade off with the angle.",
-            .properties = {.reciprocal = true, .conserving = true, .lossless = true, .isotropic = true},
+            .properties = {.lossless = true, .specular_limit = "r0=1"},
             .params = {}};
   }
 

@@ -15,7 +15,7 @@ template <class T> struct Lambert {
             .paper = "J. H. Lambert, Photometria, 1760",
             .equations = "f = rho / pi",
             .doc = "Ideal diffuse reflection: the same radiance in every direction.",
-            .properties = {.reciprocal = true, .conserving = true, .lossless = true, .isotropic = true},
+            .properties = {.lossless = true, .diffuse_limit = "rho=0.8"},
             .params = {}};
   }
 
