@@ -144,6 +144,7 @@ TEST(Model, TwoModelsOfOneNameAreRefused) {
   struct Twin : Model {
     ModelInfo info_ = find_model("lambert").info();
     const ModelInfo& info() const override { return info_; }
+    bool has_scatter() const override { return true; }
     bool has_mirror() const override { return false; }
     bool has_exact() const override { return false; }
     std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override { return nullptr; }

@@ -87,6 +87,19 @@ template <class T> struct Greedy : Broken<T> {
   }
 };
 
+/// Delta terms alone.
+template <class T> struct MirrorOnly {
+  Rgb<T> ks;
+  static ModelInfo info() {
+    return {
+        .name = "mirror_only", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(ks, ColorSpec{"ks", "Reflectance", {0.5, 0.5, 0.5}, ""});
+  }
+  Rgb<T> mirror(const Vec3<T>& wo) const { return ks * (T(1) - wo.z / T(2)); }
+};
+
 }  // namespace pack_test
 
 namespace {
@@ -120,6 +133,17 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       EXPECT_LT(s.operations, 600) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
+}
+
+TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
+  const detail::ModelOf<pack_test::MirrorOnly> model;
+  EXPECT_FALSE(model.has_scatter());
+  EXPECT_EQ(representations(model), std::vector{RepresentationKind::Exact});
+  const Shader s = write_shader(model, RepresentationKind::Exact, empty_table(model));
+  EXPECT_THAT(s.source, HasSubstr("BSDF = weight_0 * reflection(frame_n);"));
+  EXPECT_LT(measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
+  const AlbedoTable table = tabulate_albedo(model);
+  EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
 }
 
 TEST(Shader, AFixedParameterLeavesTheText) {

@@ -16,6 +16,7 @@ const char* kind_name(ParamKind k) {
 }
 
 std::vector<std::string> representations(const Model& m) {
+  if (!m.has_scatter()) return {"exact"};
   if (m.has_exact()) return {"exact", "sampled"};
   return {"sampled"};
 }
@@ -52,6 +53,7 @@ Json describe(const Model& m) {
             {"conserving", q.conserving},
             {"lossless", q.lossless},
             {"isotropic", q.isotropic}}},
+          {"scatter", m.has_scatter()},
           {"mirror", m.has_mirror()},
           {"representations", representations(m)},
           {"parameters", std::move(params)}};

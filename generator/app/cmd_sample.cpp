@@ -45,6 +45,8 @@ void add_sample_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    if (!model.has_scatter())
+      input_error("{}: expected a model that scatters; this one has ideal reflection alone", o->model);
     CsvWriter out("wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
     if (o->count > 0) {
       if (o->wo.size() != 3) input_error("--wo: expected a view direction x,y,z with --count");

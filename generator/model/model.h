@@ -6,6 +6,9 @@
 // without delta terms; pdf() is the density of sample() in solid angle at wi, for the same wo, delta terms
 // left out; mirror() is the weight of the delta term in the direction of ideal reflection. Albedo is the
 // integral of f cos(theta_i) over wi, plus the mirror weight. Colours are linear scene-referred RGB.
+//
+// A model has eval(), pdf() and sample(), or none of them: then it has delta terms alone, f and pdf are 0 and every
+// sample is lost.
 #pragma once
 
 #include <array>
@@ -90,7 +93,7 @@ template <class T> class Brdf {
   virtual Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const = 0;
   /// Weight of ideal reflection; 0 for a model without a mirror term.
   virtual Rgb<T> mirror(const Vec3<T>& wo) const = 0;
-  /// The closures that equal the model, or nothing if no such sum is known.
+  /// The closures that equal the model, or nothing if no such sum is known. Delta terms alone are always known.
   virtual std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const = 0;
 };
 
@@ -99,6 +102,8 @@ class Model {
  public:
   virtual ~Model() = default;
   virtual const ModelInfo& info() const = 0;
+  /// False for a model with delta terms alone.
+  virtual bool has_scatter() const = 0;
   virtual bool has_mirror() const = 0;
   virtual bool has_exact() const = 0;
   /// Throws InputError naming model, parameter and what was expected.
@@ -213,6 +218,12 @@ struct RecordVisitor {
 };
 
 template <class M>
+concept HasScatter = requires(const M& m, const Vec3<double>& w) {
+  m.eval(w, w);
+  m.pdf(w, w);
+  m.sample(w, w);
+};
+template <class M>
 concept HasMirror = requires(const M& m, const Vec3<double>& w) {
   m.mirror(w);
 };
@@ -222,11 +233,29 @@ concept HasExact = requires(const M& m, const Vec3<double>& w) {
 };
 
 template <template <class> class M, class T> class BrdfOf final : public Brdf<T> {
+  static constexpr bool kScatters = HasScatter<M<double>>;
+  static_assert(kScatters || HasMirror<M<double>>, "a model needs eval, pdf and sample, or a delta term");
+
  public:
   explicit BrdfOf(M<T> m) : m_(std::move(m)) {}
-  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const override { return m_.eval(wi, wo); }
-  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const override { return m_.pdf(wi, wo); }
-  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const override { return m_.sample(wo, u); }
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const override {
+    if constexpr (kScatters)
+      return m_.eval(wi, wo);
+    else
+      return Rgb<T>(T(0));
+  }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const override {
+    if constexpr (kScatters)
+      return m_.pdf(wi, wo);
+    else
+      return T(0);
+  }
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const override {
+    if constexpr (kScatters)
+      return m_.sample(wo, u);
+    else
+      return {{T(0), T(0), T(1)}, Rgb<T>(T(0)), T(0)};
+  }
   Rgb<T> mirror(const Vec3<T>& wo) const override {
     if constexpr (HasMirror<M<double>>)
       return m_.mirror(wo);
@@ -236,6 +265,8 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
   std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const override {
     if constexpr (HasExact<M<double>>)
       return m_.exact(wo);
+    else if constexpr (!kScatters)
+      return ClosureSum<T>{Closure<T>(ClosureKind::Reflection, mirror(wo))};
     else
       return std::nullopt;
   }
@@ -251,8 +282,9 @@ template <template <class> class M> class ModelOf final : public Model {
     prototype.parameters(SchemaVisitor{info_.params});
   }
   const ModelInfo& info() const override { return info_; }
+  bool has_scatter() const override { return HasScatter<M<double>>; }
   bool has_mirror() const override { return HasMirror<M<double>>; }
-  bool has_exact() const override { return HasExact<M<double>>; }
+  bool has_exact() const override { return HasExact<M<double>> || !has_scatter(); }
   std::unique_ptr<Brdf<double>> make_double(const ParamValues& v) const override { return make<double>(v); }
   std::unique_ptr<Brdf<float>> make_float(const ParamValues& v) const override { return make<float>(v); }
   std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues& v) const override { return make<Wide>(v); }

@@ -32,7 +32,9 @@ class Surface {
   explicit Surface(const Material& material)
       : material_(material),
         brdf_(material.model->make_double(material.values)),
+        has_scatter_(material.model->has_scatter()),
         has_mirror_(material.model->has_mirror()) {
+    if (!has_scatter_) return;
     Random random(0, 0, 0);
     for (int i = 0; i < kCosines; ++i) {
       double sum = 0;
@@ -46,12 +48,14 @@ class Surface {
     }
   }
 
+  bool has_scatter() const { return has_scatter_; }
   bool has_mirror() const { return has_mirror_; }
 
   /// Chance to follow the mirror rather than to sample the rest. Any number strictly between 0 and 1 is unbiased
   /// where both exist; the estimate of the rest's albedo only keeps the weights even.
   double mirror_chance(const Color& mirror, double cosine) const {
     const double m = luminance(mirror);
+    if (!has_scatter_) return 1;
     if (!(m > 0)) return 0;
     const double rest = albedo_[std::min(int(cosine * kCosines), kCosines - 1)];
     return std::min(std::max(m / (m + rest), 0.05), 0.95);
@@ -89,8 +93,8 @@ class Surface {
   static constexpr int kCosines = 32, kSamples = 128;
   const Material& material_;
   std::unique_ptr<Brdf<double>> brdf_;
-  const bool has_mirror_;
-  std::array<double, kCosines> albedo_;
+  const bool has_scatter_, has_mirror_;
+  std::array<double, kCosines> albedo_{};
 };
 
 class PathTracer {
@@ -146,7 +150,7 @@ class PathTracer {
         mirror_chance = surface.mirror_chance(mirror, wo.z);
       }
 
-      const bool lit = !lights_.empty() && lights_.chances(hit.p, normal, chance);
+      const bool lit = surface.has_scatter() && !lights_.empty() && lights_.chances(hit.p, normal, chance);
       if (lit) light += throughput * direct(hit, surface, brdf, to_local, wo, 1 - mirror_chance, chance, random);
 
       // Drawn in any case, so that a stream's place does not depend on the material.

@@ -101,6 +101,7 @@ RepresentationKind representation_named(const std::string& name) {
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
+  if (!model.has_scatter()) return {RepresentationKind::Exact};
   if (model.has_exact()) return {RepresentationKind::Exact, RepresentationKind::Sampled};
   return {RepresentationKind::Sampled};
 }
@@ -193,6 +194,11 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
         }
       }
       Rgb<double> albedo_difference(0.0);
+      if (kind == RepresentationKind::Exact) {
+        for (const Closure<double>& c : closures)
+          if (c.kind == ClosureKind::Reflection) albedo_difference += c.weight;
+        albedo_difference = albedo_difference - truth.brdf->mirror(wo);
+      }
       Sequence3 points(std::uint64_t(view) + 1);
       for (int i = 0; i < kPoints; ++i) {
         const Vec3<double> u = points.next();
