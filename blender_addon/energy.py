@@ -53,9 +53,11 @@ def albedo(model_name, values, cos_theta_o):
     """Directional albedo (r, g, b) for a view cosine in (0, 1], mirror term included.
 
     `values` has the model's parameters in the form of pack.check_value; what is missing takes its
-    default. Raises ValueError for an unknown model.
+    default. Raises ValueError for an unknown model, and for one without a table.
     """
-    table, schema = pack.model(model_name)["albedo"], pack.parameters(model_name)
+    table, schema = pack.model(model_name).get("albedo"), pack.parameters(model_name)
+    if table is None:
+        raise ValueError(f"{model_name}: its albedo is not tabulated")
     complete = {name: p["default"] for name, p in schema.items()} | values
     coordinates = complete | {"cos_theta_o": cos_theta_o}
     total = [0.0, 0.0, 0.0]

@@ -200,6 +200,21 @@ def ra_pdf(p, wi, wo):
     return ra_f(white, wi, wo)[0] * vec(wi)[2]
 
 
+# ---- Fresnel's equations by complex numbers ------------------------------------------------------
+
+
+def fresnel(c, eta):
+    """Both polarisations' mean reflectance for a complex relative index."""
+    c = mp.mpf(c)
+    root = mp.sqrt(eta**2 - 1 + c**2)
+    rs, rp = (c - root) / (c + root), (eta**2 * c - root) / (eta**2 * c + root)
+    return (abs(rs) ** 2 + abs(rp) ** 2) / 2
+
+
+def conductor_albedo(p, cos_o):
+    return [fresnel(cos_o, mp.mpc(p[f"n_{c}"], p[f"k_{c}"])) for c in "rgb"]
+
+
 MODELS = {
     "lambert": dict(
         f=lambert_f,
@@ -270,6 +285,26 @@ MODELS = {
         albedo_cases=[{"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)],
         cosines=[1, 0.5, 0.05],
     ),
+    "fresnel_conductor": dict(
+        albedo=conductor_albedo,
+        defaults={"metal": "custom"}
+        | {f"n_{c}": n for c, n in zip("rgb", (0.2, 0.9, 1.1), strict=True)}
+        | {f"k_{c}": k for c, k in zip("rgb", (3.9, 2.4, 2.2), strict=True)},
+        cases=[
+            {"metal": "custom"},
+            {
+                "metal": "custom",
+                "n_r": 1.5,
+                "k_r": 0,
+                "n_g": 0.001,
+                "k_g": 100,
+                "n_b": 100,
+                "k_b": 0,
+            },
+            {"metal": "custom", "n_r": 0.5, "k_r": 1e-9, "n_g": 1.0001, "k_g": 0, "k_b": 1e-4},
+        ],
+        cosines=[1, 0.5, 0.1, 0.001],
+    ),
 }
 
 
@@ -339,7 +374,8 @@ def main():
         rng = random.Random(name)
         for case in m["cases"]:
             p = {**m["defaults"], **case}
-            for wi, wo in pairs(rng):
+            # A model without f has delta terms alone.
+            for wi, wo in pairs(rng) if "f" in m else []:
                 for kind in ("f", "pdf"):
                     v = values(m[kind], p, wi, wo)
                     # Below the normal numbers of double precision there is nothing to compare.

@@ -184,6 +184,14 @@ struct BuiltModel {
   std::vector<PackLine> lines;
 };
 
+/// Delta terms alone need no table: the shader adds up their weights. With few parameters they still get one, for the
+/// panel, which can't run the formula.
+bool has_table(const Model& model) {
+  const std::vector<ParamInfo>& params = model.info().params;
+  return model.has_scatter() ||
+         std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;
+}
+
 BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& scratch) {
   const ModelInfo& info = model.info();
   BuiltModel built;
@@ -192,16 +200,20 @@ BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& s
        {"paper", info.paper},
        {"equations", info.equations},
        {"doc", info.doc},
-       {"isotropic", info.properties.isotropic}};
+       {"isotropic", info.properties.isotropic},
+       {"scatter", model.has_scatter()}};
   j["parameters"] = Json::array();
   for (const ParamInfo& p : info.params) j["parameters"].push_back(parameter_json(p));
 
-  const AlbedoTable table = tabulate_albedo(model);
+  AlbedoTable table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
-  const fs::path exr = scratch / (info.name + ".exr");
-  write_albedo_exr(table, exr.string());
-  built.files[table_file] = read_text(exr);
-  fs::remove(exr);
+  if (has_table(model)) {
+    table = tabulate_albedo(model);
+    const fs::path exr = scratch / (info.name + ".exr");
+    write_albedo_exr(table, exr.string());
+    built.files[table_file] = read_text(exr);
+    fs::remove(exr);
+  }
 
   const std::vector<RepresentationKind> kinds = representations(model);
   j["auto"] = name_of(kinds.front());
@@ -224,7 +236,7 @@ BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& s
         {"warnings", warnings(kind)},
         {"sha256", sha256(shader.source)}};
   }
-  j["albedo"] = table_json(table, table_file);
+  if (has_table(model)) j["albedo"] = table_json(table, table_file);
   return built;
 }
 

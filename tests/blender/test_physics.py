@@ -51,6 +51,9 @@ def test_exact_form_under_a_sun(extension, empty, tool, model, values):
         measured.append(meter.measure()[clear])
         expected.append(f_cos[clear])
     measured, expected = np.concatenate(measured), np.concatenate(expected)
+    if not extension.pack.model(model)["scatter"]:
+        assert measured.max() == 0, "a delta term can't meet a lamp without size"
+        return
     assert (expected > 0).mean() > 0.3
     error = np.abs(measured - expected).sum() / np.abs(expected).sum()
     print(f"relative L1 of {model}: {error:.3g}")
@@ -291,6 +294,8 @@ TABLES = with_every_model(
 @pytest.mark.parametrize(("model", "values"), TABLES)
 def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, values):
     cosines = np.linspace(0.02, 1, 50)
+    if not extension.pack.model(model).get("albedo"):
+        pytest.skip("delta terms alone, with more parameters than a table has axes")
     panel = np.array([extension.api.albedo(model, c, **values) for c in cosines])
     entry = extension.pack.model(model)
     complete = {p["name"]: p["default"] for p in entry["parameters"]} | values

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fresnel's equations for unpolarised light, in forms without cancellation.
+//
+// cosTheta > 0 and sin2 = sin^2 theta belong to the side of the light; indices are relative to that side.
+#pragma once
+
+#include "core/vec.h"
+
+namespace brdfc {
+
+/// Reflectance of a conductor n + i k. With u + i v = sqrt((n + i k)^2 - sin^2),
+///   R_s = ((u - c)^2 + v^2) / ((u + c)^2 + v^2),  R_p = R_s ((u c - s^2)^2 + v^2 c^2) / ((u c + s^2)^2 + v^2 c^2):
+/// quotients of sums of squares. Of u^2 and v^2 the larger comes from the root and the smaller from u v = n k.
+template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T& n, const T& k) {
+  const T nk = n * k;
+  const T real = named("real", (n - k) * (n + k) - sin2);
+  const T modulus = named("modulus", sqrt(real * real + T(4) * nk * nk));
+  const T large = named("large", (modulus + abs(real)) / T(2));
+  const T small = named("small", nk * nk / maximum(large, tiny<T>()));
+  const T u = named("u_root", sqrt(select(real > T(0), large, small)));
+  const T v2 = named("v2", select(real > T(0), small, large));
+  const T Rs = named("R_s", (sqr(u - cosTheta) + v2) / (sqr(u + cosTheta) + v2));
+  const T uc = named("uc", u * cosTheta), vc2 = named("vc2", v2 * cosTheta * cosTheta);
+  const T Rp = named("R_p", Rs * ((sqr(uc - sin2) + vc2) / (sqr(uc + sin2) + vc2)));
+  return (Rs + Rp) / T(2);
+}
+
+/// What a smooth boundary of two dielectrics reflects and lets through; R + T = 1.
+template <class T> struct Dielectric { T R, T_; };
+
+/// `eta`: index of the far side over that of the side of the light. With g^2 = eta^2 - sin^2,
+///   r_s = (1 - eta^2) / (c + g)^2,  r_p = (eta^2 - 1) (eta^2 c^2 - s^2) / (eta^2 c + g)^2,
+/// differences of like numbers multiplied out, and T from its own formula instead of from 1 - R.
+template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& sin2, const T& eta) {
+  const T sine = sqrt(sin2);
+  const T g2 = named("g2", (eta - sine) * (eta + sine));
+  const auto total = g2 <= T(0);  // total internal reflection
+  const T g = named("g", sqrt(maximum(g2, T(0))));
+  const T eta2 = eta * eta;
+  const T ds = named("d_s", sqr(cosTheta + g)), dp = named("d_p", sqr(eta2 * cosTheta + g));
+  const T step = (eta - T(1)) * (eta + T(1));
+  const T rs = named("r_s", step / ds);
+  const T ec = eta * cosTheta;
+  const T rp = named("r_p", step * ((ec - sine) * (ec + sine)) / dp);
+  const T through = T(2) * cosTheta * g * (T(1) / ds + eta2 / dp);
+  return {named("R_f", select(total, T(1), (rs * rs + rp * rp) / T(2))), named("T_f", select(total, T(0), through))};
+}
+
+}  // namespace brdfc
