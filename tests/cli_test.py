@@ -153,6 +153,10 @@ def test_wrong_usage_is_one_line_and_status_2(args, words):
 def test_sample_agrees_with_eval(model):
     wo = (0.36, -0.48, 0.8)
     args = ["--count", "200", "--seed", "7", "--wo", ",".join(map(str, wo))]
+    listed = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
+    if not listed[model]["scatter"]:
+        refused(run("sample", model, *args), model, "expected a model that scatters")
+        return
     samples = rows(run("sample", model, *args))
     assert len(samples) == 200
     kept = [s for s in samples if s["pdf"] > 0]
