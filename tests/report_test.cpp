@@ -219,5 +219,106 @@ TEST(Statistics, RefusesWhatDoesNotFit) {
   EXPECT_THROW(measure_difference(picture(1, 0, 0), black, "a", "b"), InputError);
 }
 
+std::vector<Rendering> noisy(double factor, int count, unsigned seed) {
+  std::vector<Rendering> out;
+  for (int i = 0; i < count; ++i) out.push_back(picture(factor, kNoise, seed + unsigned(i)));
+  return out;
+}
+
+/// A picture with grey noise of its own, which its variance layer tells.
+Rendering noisy_reference() {
+  Rendering out = reference();
+  std::mt19937 random(99);
+  std::normal_distribution<float> normal(0, kNoise / 4);
+  for (std::size_t i = 0; i < out.mean.rgb.size(); i += 3) {
+    const float noise = normal(random);
+    for (std::size_t c = 0; c < 3; ++c) out.mean.rgb[i + c] += noise;
+  }
+  std::fill(out.variance->rgb.begin(), out.variance->rgb.end(), float(sqr(kNoise / 4)));
+  out.metadata = {{"samples", 1024}};
+  return out;
+}
+
+TEST(Welch, AcceptsPicturesThatDifferInNoiseAlone) {
+  const WelchTest t = welch_test(noisy(1, 8, 1), noisy_reference(), "a", "b");
+  EXPECT_TRUE(t.passed());
+  EXPECT_EQ(t.pixels, kSize * kSize);
+  EXPECT_EQ(t.tiles, sqr(kSize / kTestTile));
+  EXPECT_GT(t.uniform, 0.01);
+  EXPECT_GE(t.accepted(), kTestAccepted);
+}
+
+TEST(Welch, PValuesAreUniformWhereTheReferenceHasNoNoise) {
+  EXPECT_GT(welch_test(noisy(1, 8, 1), reference(), "a", "b").uniform, 0.01);
+}
+
+TEST(Welch, RejectsABiasThatNoiseHides) {
+  // Seven times less than the noise of a pixel's mean: no pixel shows it, every tile does.
+  const std::vector<Rendering> pictures = noisy(1.01, 8, 1);
+  const WelchTest t = welch_test(pictures, reference(), "a", "b");
+  EXPECT_FALSE(t.passed());
+  EXPECT_GT(t.rejected_tiles, 0);
+  EXPECT_LT(t.uniform, 0.01);
+}
+
+TEST(Welch, RejectsAFewWrongPixels) {
+  std::vector<Rendering> pictures = noisy(1, 8, 1);
+  for (Rendering& r : pictures)
+    for (int x = 0; x < kSize / 4; ++x)
+      for (int c = 0; c < 3; ++c) r.mean.pixel(x, 5)[c] += 1;
+  const WelchTest t = welch_test(pictures, reference(), "a", "b");
+  EXPECT_FALSE(t.passed());
+  EXPECT_GE(t.rejected_pixels, kSize / 4);
+  EXPECT_LT(t.p.pixel(3, 5)[0], 1e-6);
+}
+
+TEST(Welch, WithoutNoiseOnlyRoundingIsForgiven) {
+  std::vector<Rendering> pictures(2, picture(1, 0, 0));
+  EXPECT_EQ(welch_test(pictures, reference(), "a", "b").worst_pixel, 1);
+  pictures.assign(2, picture(1 + 1e-6, 0, 0));
+  EXPECT_TRUE(welch_test(pictures, reference(), "a", "b").passed());
+  pictures.assign(2, picture(1 + 1e-3, 0, 0));
+  EXPECT_EQ(welch_test(pictures, reference(), "a", "b").rejected_pixels, kSize * kSize);
+}
+
+TEST(Welch, RefusesWhatItCannotJudge) {
+  EXPECT_THROW(welch_test(noisy(1, 1, 1), reference(), "a", "b"), std::invalid_argument);
+  EXPECT_THROW(welch_test(noisy(1, 2, 1), picture(1, 0, 0), "a", "b"), std::invalid_argument);
+}
+
+TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
+  // Noise falls as 1/n for both forms; "exact" starts at twice the noise and costs as much a sample.
+  runs_["convergence"] = json::array();
+  for (const int spp : {16, 256, 1024})
+    for (const char* form : {"glossy", "exact"}) {
+      const bool native = std::string(form) == "glossy";
+      json images = json::array();
+      for (unsigned i = 0; i < 4; ++i) {
+        const std::string name = fmt::format("{}-{}-{}.exr", form, spp, i);
+        const float noise = kNoise * float(std::sqrt((native ? 1. : 2.) * 16 / spp));
+        write_rendering(folder_ / "ball" / name, picture(1, noise, 1000 + unsigned(spp) * 10 + i + (native ? 0 : 5)));
+        images.push_back(name);
+      }
+      runs_["convergence"].push_back(
+          {{"form", form}, {"spp", spp}, {"images", images}, {"cpu_seconds", json::array({spp, spp, spp, spp})}});
+    }
+  const auto scenes = load();
+  const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
+  ASSERT_EQ(exact.equal_error.size(), 3u);
+  for (const auto& cost : glossy.equal_error) EXPECT_NEAR(cost.value(), 1, 1e-9);
+  for (const auto& cost : exact.equal_error) EXPECT_NEAR(cost.value(), 2, 0.1);
+  runs_["convergence"][0]["form"] = "fitted";
+  EXPECT_THAT(load_error(), HasSubstr("convergence[0].form"));
+}
+
+TEST_F(ReportTest, ReadsFlipBesideTheRuns) {
+  std::ofstream(folder_ / "ball/flip.json") << R"({"exact": 0.25})";
+  const auto scenes = load();
+  EXPECT_EQ(scenes[0].forms[1].flip, 0.25);
+  EXPECT_EQ(scenes[0].forms[0].flip, std::nullopt);
+  std::ofstream(folder_ / "ball/flip.json") << R"({"exact": 2})";
+  EXPECT_THAT(load_error(), HasSubstr("flip.json: exact: expected"));
+}
+
 }  // namespace
 }  // namespace brdfc

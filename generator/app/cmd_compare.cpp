@@ -2,38 +2,104 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "core/error.h"
 #include "reference/image.h"
+#include "report/statistics.h"
 
 namespace brdfc {
 
+namespace {
+
+/// Brighter or darker throughout: a known bias, to learn whether a test would find one.
+void inject(Rendering& r, double bias) {
+  for (float& v : r.mean.rgb) v = float(v * (1 + bias));
+}
+
+/// What a person needs to see why two renderers disagree.
+void keep_evidence(const std::filesystem::path& folder, const Rendering& picture, const Rendering& reference,
+                   const WelchTest& test) {
+  write_rendering(folder / "picture.exr", picture);
+  write_rendering(folder / "reference.exr", reference);
+  write_image(folder / "p-values.exr", test.p);
+  write_preview(folder / "picture.png", picture.mean, 0);
+  write_preview(folder / "reference.png", reference.mean, 0);
+  write_display(folder / "difference.png", difference_image(picture.mean, reference.mean, 0.1));
+  write_display(folder / "p-values.png", test.p);
+}
+
+}  // namespace
+
 void add_compare_command(CLI::App& app) {
   struct Options {
-    std::string a, b, diff;
-    bool json = false;
-    double scale = 0.25;
+    std::vector<std::string> files;
+    std::string diff, keep;
+    bool json = false, test = false;
+    double scale = 0.25, inject = 0;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("compare", "Error of picture A against the reference picture B");
-  command->add_option("A", options->a, "EXR to judge")->required();
-  command->add_option("B", options->b, "EXR taken as truth")->required();
+  CLI::App* command = app.add_subcommand(
+      "compare",
+      "Error of picture A against the reference picture B. With several A, rendered from different seeds, their mean\n"
+      "is judged, and --test tells error from noise.");
+  command->add_option("A... B", options->files, "EXR to judge, one or more; then the EXR taken as truth")
+      ->required()
+      ->expected(2, 1 << 16);
   command->add_flag("--json", options->json, "Print JSON instead of a table");
   command->add_option("--diff", options->diff,
                       "Write the difference as PNG: red where A is brighter, blue where darker");
   command->add_option("--diff-scale", options->scale, "Difference shown in full colour, relative to the mean of B")
       ->check(CLI::Range(1e-9, 1e9))
       ->capture_default_str();
+  CLI::Option* test = command->add_flag(
+      "--test", options->test,
+      "Welch's t-test per pixel and per tile of 16 x 16, Sidak-corrected at 0.01; exit status 1 unless 99.75 % of the\n"
+      "pixels and all tiles are accepted. Needs two A or more, and a B with a variance layer");
+  command->add_option("--keep", options->keep, "Where the test fails: folder for both pictures, difference, p-values")
+      ->needs(test);
+  command->add_option("--inject", options->inject, "Brighten A by this fraction first, to see whether the test notices")
+      ->check(CLI::Range(-1.0, 1.0))
+      ->needs(test);
   command->callback([options] {
-    const Rendering a = read_rendering(options->a), b = read_rendering(options->b);
-    const Comparison c = compare(a, b, options->a, options->b);
-    if (!options->diff.empty()) write_display(options->diff, difference_image(a.mean, b.mean, options->scale));
-    if (options->json) {
-      fmt::print("{}\n", to_json(c).dump(2));
-      return;
+    const std::string name_a = options->files.front(), name_b = options->files.back();
+    std::vector<Rendering> pictures;
+    for (std::size_t i = 0; i + 1 < options->files.size(); ++i) {
+      pictures.push_back(read_rendering(options->files[i]));
+      if (pictures.back().mean.width != pictures.front().mean.width ||
+          pictures.back().mean.height != pictures.front().mean.height)
+        input_error("{}: expected {} x {} pixels as in {}", options->files[i], pictures.front().mean.width,
+                    pictures.front().mean.height, name_a);
+      inject(pictures.back(), options->inject);
     }
-    fmt::print("relMSE     {:.6g}\nMSE        {:.6g}\nmean A     {:.6g}\nmean B     {:.6g}\nbias       {:.6g}\n",
-               c.rel_mse, c.mse, c.mean_a, c.mean_b, c.bias);
-    fmt::print("max        {:.6g} at pixel ({}, {})\n", c.max, c.max_x, c.max_y);
-    if (c.noise_mse) fmt::print("noise MSE  {:.6g}\n", *c.noise_mse);
+    const Rendering a = mean_of(pictures), b = read_rendering(name_b);
+    const Comparison c = compare(a, b, name_a, name_b);
+    std::optional<WelchTest> t;
+    if (options->test) {
+      if (pictures.size() < 2) input_error("--test: expected at least two pictures and a reference");
+      if (!b.variance) input_error("{}: --test needs a variance layer, as `brdfc render` writes", name_b);
+      t = welch_test(pictures, b, name_a, name_b);
+    }
+    if (!options->diff.empty()) write_display(options->diff, difference_image(a.mean, b.mean, options->scale));
+    if (t && !t->passed() && !options->keep.empty()) keep_evidence(options->keep, a, b, *t);
+    if (options->json) {
+      nlohmann::ordered_json out = to_json(c);
+      if (t) out["test"] = to_json(*t);
+      fmt::print("{}\n", out.dump(2));
+    } else {
+      fmt::print("relMSE     {:.6g}\nMSE        {:.6g}\nmean A     {:.6g}\nmean B     {:.6g}\nbias       {:.6g}\n",
+                 c.rel_mse, c.mse, c.mean_a, c.mean_b, c.bias);
+      fmt::print("max        {:.6g} at pixel ({}, {})\n", c.max, c.max_x, c.max_y);
+      if (c.noise_mse) fmt::print("noise MSE  {:.6g}\n", *c.noise_mse);
+      if (t)
+        fmt::print(
+            "pixels     {:.4f} % of {} accepted, smallest p {:.3g}\ntiles      {} of {} rejected, smallest p {:.3g}\n"
+            "p-values   uniform with p = {:.3g}\n",
+            100 * t->accepted(), t->pixels, t->worst_pixel, t->rejected_tiles, t->tiles, t->worst_tile, t->uniform);
+    }
+    std::fflush(stdout);
+    if (t && !t->passed())
+      throw CheckFailed(
+          fmt::format("{} differs from {} by more than noise: {} of {} pixels and {} of {} tiles rejected", name_a,
+                      name_b, t->rejected_pixels, t->pixels, t->rejected_tiles, t->tiles));
   });
 }
 

@@ -73,7 +73,13 @@ File read_file(const fs::path& path) {
       s.nchannels > 1024 || std::size_t(s.width) * s.height * s.nchannels > kMaxPixels)
     input_error("{}: {} x {} pixels with {} channels: expected a flat image with sides of at most {}", path.string(),
                 s.width, s.height, s.nchannels, kMaxSide);
-  file.data.resize(std::size_t(s.width) * s.height * s.nchannels);
+  // A few bytes may claim to be a picture of gigabytes. Nothing that is read here packs a value into less than a
+  // thousandth of its size (deflate, the densest of the codecs, ends at 1 : 1032).
+  const std::size_t values = std::size_t(s.width) * s.height * s.nchannels;
+  if (values > (std::size_t(1) << 20) + 1032 * fs::file_size(path))
+    input_error("{}: damaged image: {} x {} pixels with {} channels do not fit into {} bytes", path.string(), s.width,
+                s.height, s.nchannels, fs::file_size(path));
+  file.data.resize(values);
   if (!in->read_image(0, 0, 0, s.nchannels, OIIO::TypeDesc::FLOAT, file.data.data()))
     input_error("{}: damaged image ({})", path.string(), in->geterror());
   return file;

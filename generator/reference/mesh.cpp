@@ -4,8 +4,10 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
 #include <bit>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -99,6 +101,11 @@ Mesh make_box(const std::array<double, 3>& size) {
 
 Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
   if (!std::filesystem::is_regular_file(path)) input_error("{}: no such mesh file", path.string());
+  std::string type = path.extension().string();
+  std::transform(type.begin(), type.end(), type.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  // The importer knows some fifty formats more, many of them poorly guarded against damaged files.
+  if (type != ".obj" && type != ".ply" && type != ".stl")
+    input_error("{}: expected a mesh file that ends in .obj, .ply or .stl", path.string());
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "core/error.h"
@@ -13,6 +14,12 @@ namespace fs = std::filesystem;
 
 constexpr double kMost = 1e12;  // seconds, samples, error: no sensible figure is larger
 constexpr int kMostCount = 1'000'000'000;
+
+double median(std::vector<double> v) {
+  std::sort(v.begin(), v.end());
+  const std::size_t half = v.size() / 2;
+  return v.size() % 2 ? v[half] : (v[half - 1] + v[half]) / 2;
+}
 
 Rendering read_picture(const fs::path& folder, const JsonView& name) {
   const fs::path file = folder / name.text();
@@ -68,15 +75,12 @@ FormReport read_form(const fs::path& folder, const JsonView& view, const SceneRe
   form.wall_seconds = read_times(view.at("wall_seconds"), pictures.size());
   for (const JsonView& material : view.at("materials").elements()) form.materials.push_back(read_material(material));
   form.picture = mean_of(pictures);
+  if (pictures.size() > 1)
+    form.test = welch_test(pictures, scene.reference, (folder / form.images.front()).string(),
+                           (folder / scene.reference_image).string());
   form.difference = measure_difference(form.picture, scene.reference, (folder / form.images.front()).string(),
                                        (folder / scene.reference_image).string());
   return form;
-}
-
-double median(std::vector<double> v) {
-  std::sort(v.begin(), v.end());
-  const std::size_t half = v.size() / 2;
-  return v.size() % 2 ? v[half] : (v[half - 1] + v[half]) / 2;
 }
 
 /// Times are paired by index: what slows the machine for a while slows both of a pair.
@@ -91,6 +95,69 @@ void set_costs(std::vector<FormReport>& forms) {
       if (unit[i] > 0) ratios.push_back(form.cpu_seconds[i] / unit[i]);
     if (!ratios.empty()) form.cost = median(ratios);
   }
+}
+
+ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view) {
+  ConvergencePoint point;
+  point.spp = view.at("spp").integer(1, kMostCount);
+  const JsonView images = view.at("images");
+  std::vector<Rendering> pictures;
+  for (const JsonView& image : images.elements()) {
+    pictures.push_back(read_picture(folder, image));
+    if (pictures.back().mean.width != pictures.front().mean.width ||
+        pictures.back().mean.height != pictures.front().mean.height)
+      image.fail("an image of the size of the others");
+  }
+  if (pictures.size() < 2) images.fail("at least two images");
+  const Rendering mean = mean_of(pictures);
+  for (std::size_t i = 0; i < mean.mean.rgb.size(); ++i)
+    // The variance is that of the mean of all the images; a single one has so many times more.
+    point.noise += double(mean.variance->rgb[i]) * double(pictures.size()) /
+                   (sqr(double(mean.mean.rgb[i])) + kRelMseEpsilon) / double(mean.mean.rgb.size());
+  if (!std::isfinite(point.noise)) images.fail("images of finite numbers");
+  point.cpu_seconds = median(read_times(view.at("cpu_seconds"), pictures.size()));
+  return point;
+}
+
+/// Samples a pixel to a noise, on straight lines between the points of a doubly logarithmic plot, extended at its ends.
+std::optional<double> samples_for(const std::vector<ConvergencePoint>& points, double noise) {
+  if (points.size() < 2 || !(noise > 0)) return std::nullopt;
+  for (const ConvergencePoint& p : points)
+    if (!(p.noise > 0)) return std::nullopt;
+  std::size_t i = 1;
+  while (i + 1 < points.size() && points[i].noise > noise) ++i;
+  const double x0 = std::log(points[i - 1].spp), x1 = std::log(points[i].spp);
+  const double y0 = std::log(points[i - 1].noise), y1 = std::log(points[i].noise);
+  if (!(y1 < y0)) return std::nullopt;
+  return std::exp(x0 + (std::log(noise) - y0) / (y1 - y0) * (x1 - x0));
+}
+
+void set_equal_error(std::vector<FormReport>& forms) {
+  const auto glossy =
+      std::find_if(forms.begin(), forms.end(), [](const FormReport& f) { return f.form == kNativeForm; });
+  if (glossy == forms.end()) return;
+  const std::vector<ConvergencePoint> unit = glossy->convergence;
+  const auto seconds_a_sample = [](const ConvergencePoint& p) { return p.cpu_seconds / p.spp; };
+  for (FormReport& form : forms) {
+    if (form.convergence.empty()) continue;
+    for (const int spp : kEqualErrorAt) {
+      form.equal_error.emplace_back();
+      const auto at = std::find_if(unit.begin(), unit.end(), [&](const ConvergencePoint& p) { return p.spp == spp; });
+      if (at == unit.end() || !(at->cpu_seconds > 0)) continue;
+      // The time of a sample is known best where most were taken.
+      if (const auto needed = samples_for(form.convergence, at->noise))
+        form.equal_error.back() =
+            *needed * seconds_a_sample(form.convergence.back()) / (spp * seconds_a_sample(unit.back()));
+    }
+  }
+}
+
+void read_flip(const fs::path& file, std::vector<FormReport>& forms) {
+  if (!fs::exists(file)) return;
+  const nlohmann::json content = read_json(file);
+  const JsonView top(content, file.string());
+  for (FormReport& form : forms)
+    if (const auto v = top.find(form.form)) form.flip = v->number(0, 1);
 }
 
 SceneReport load_scene(const fs::path& folder) {
@@ -125,6 +192,23 @@ SceneReport load_scene(const fs::path& folder) {
   }
   if (scene.forms.empty()) runs.fail("at least one form");
   set_costs(scene.forms);
+  if (const auto convergence = top.find("convergence")) {
+    for (const JsonView& point : convergence->elements()) {
+      const std::string name = point.at("form").text();
+      const auto form =
+          std::find_if(scene.forms.begin(), scene.forms.end(), [&](const FormReport& f) { return f.form == name; });
+      if (form == scene.forms.end()) point.at("form").fail("the name of a form among the runs");
+      form->convergence.push_back(read_convergence(folder, point));
+    }
+    for (FormReport& form : scene.forms) {
+      std::sort(form.convergence.begin(), form.convergence.end(),
+                [](const ConvergencePoint& a, const ConvergencePoint& b) { return a.spp < b.spp; });
+      for (std::size_t i = 1; i < form.convergence.size(); ++i)
+        if (form.convergence[i].spp == form.convergence[i - 1].spp) convergence->fail("each number of samples once");
+    }
+    set_equal_error(scene.forms);
+  }
+  read_flip(folder / "flip.json", scene.forms);
   for (const auto& [name, value] : top.at("provenance").members()) scene.provenance[name] = value.text();
   for (const JsonView& command : top.at("commands").elements()) scene.commands.push_back(command.text());
   return scene;

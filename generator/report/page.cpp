@@ -82,11 +82,34 @@ std::string models_of(const FormReport& f) {
 
 std::string label(const FormReport& f) { return f.form == kNativeForm ? "Blender's Glossy node" : f.form; }
 
+std::string accepted(const FormReport& f) {
+  if (!f.test) return kDash;
+  return fmt::format("{:.2f} %{}", 100 * f.test->accepted(),
+                     f.test->rejected_tiles ? fmt::format(", {} of {} tiles not", f.test->rejected_tiles, f.test->tiles)
+                                            : std::string());
+}
+
+std::string equal_error(const FormReport& f) {
+  std::string out;
+  for (const std::optional<double>& v : f.equal_error)
+    out += (out.empty() ? "" : " \xc2\xb7 ") + or_dash(v, fmt::format("{:.2f}", v.value_or(0)));
+  return out.empty() ? kDash : out;
+}
+
+/// Pareto: no form of the scene is better in error and not worse in time, or the other way round.
+bool on_front(const SceneReport& s, const FormReport& f) {
+  if (!f.cost) return false;
+  return std::none_of(s.forms.begin(), s.forms.end(), [&](const FormReport& g) {
+    return g.cost && *g.cost <= *f.cost && g.difference.rel_mse <= f.difference.rel_mse &&
+           (*g.cost < *f.cost || g.difference.rel_mse < f.difference.rel_mse);
+  });
+}
+
 void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
   out += R"(<div class="wide"><table>
 <thead><tr><th class="left">Scene</th><th class="left">Form</th><th>relMSE</th><th>of which<br>noise</th>
-<th>Mean, against<br>the reference</th><th>CPU time /<br>Glossy node</th><th>Samples<br>a pixel</th><th>Closures</th>
-<th>Form's own<br>error (L1)</th></tr></thead>
+<th>Mean, against<br>the reference</th><th>Pixels<br>accepted</th><th>FLIP</th><th>CPU time /<br>Glossy node</th><th>Samples<br>a pixel</th><th>Closures</th>
+<th>Form's own<br>error (L1)</th><th>CPU time to equal error<br>at 16, 256, 1024 samples</th></tr></thead>
 )";
   for (const SceneReport& s : scenes) {
     put(out, "<tbody class=\"scene\">\n");
@@ -99,9 +122,12 @@ void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
       put(out, "<td class=\"left\" title=\"{}\">{}</td><td>{}</td><td>{}</td><td{}>{}</td>", escaped(models_of(f)),
           escaped(label(f)), scientific(f.difference.rel_mse), scientific(f.difference.noise),
           biased(f.difference) ? " class=\"bad\"" : "", bias(f.difference));
-      put(out, "<td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cost(f), f.spp,
+      put(out, "<td{}>{}</td><td>{}</td>", f.test && !f.test->passed() ? " class=\"bad\"" : "", accepted(f),
+          or_dash(f.flip, fmt::format("{:.4f}", f.flip.value_or(0))));
+      put(out, "<td>{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cost(f),
+          on_front(s, f) ? " <b title=\"no form has less error for less time\">\xe2\x97\x86</b>" : "", f.spp,
           or_dash(f.closures(), fmt::format("{}", f.closures().value_or(0))),
-          or_dash(f.relative_l1(), scientific(f.relative_l1().value_or(0))));
+          or_dash(f.relative_l1(), scientific(f.relative_l1().value_or(0))), equal_error(f));
     }
     out += "</tbody>\n";
   }
@@ -144,8 +170,9 @@ void put_chart(std::string& out, const SceneReport& s) {
     if (f->difference.noise > 0)
       put(out, "<line class=\"floor\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", at_x - 12, at_x + 12,
           y(f->difference.noise), y(f->difference.noise));
-    put(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-        at_x, at_y, at_x + 9, at_y + 4, escaped(label(*f)));
+    put(out,
+        "<circle{} cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
+        on_front(s, *f) ? "" : " class=\"behind\"", at_x, at_y, at_x + 9, at_y + 4, escaped(label(*f)));
   }
   out += "</svg>\n";
 }
@@ -181,9 +208,12 @@ void put_scene(std::string& out, const SceneReport& s, const Previews& p) {
         picture, picture, escaped(label(f)), s.width, s.height, escaped(p.reference));
     put(out, "<a href=\"{}\"><img src=\"{}\" alt=\"{} minus reference\" width=\"{}\" height=\"{}\"></a>\n", difference,
         difference, escaped(label(f)), s.width, s.height);
-    put(out, "<figcaption><b>{}</b>{}{}<br>relMSE {} (noise {}), mean {}, CPU {}</figcaption></figure>\n",
+    put(out, "<figcaption><b>{}</b>{}{}<br>relMSE {} (noise {}), mean {}, CPU {}{}</figcaption></figure>\n",
         escaped(label(f)), f.materials.empty() ? "" : "<br>", escaped(models_of(f)), scientific(f.difference.rel_mse),
-        scientific(f.difference.noise), bias(f.difference), or_dash(f.cost, cost(f) + "\xc3\x97"));
+        scientific(f.difference.noise), bias(f.difference), or_dash(f.cost, cost(f) + "\xc3\x97"),
+        p.forms[i].p_values.empty() ? std::string()
+                                    : fmt::format("<br><a href=\"{}\">p-values</a>: {} of the pixels",
+                                                  escaped(p.forms[i].p_values), accepted(f)));
   }
   out += "</div>\n";
   put_scale(out, p.difference_at);
@@ -201,15 +231,23 @@ where a form was rendered with several seeds, the variance of their mean. A relM
 but noise was found.</dd>
 <dt>Mean, against the reference</dt><dd>Relative difference of the sums over all pixels, with one standard deviation; marked
 when it is more than three.</dd>
-<dt>CPU time / Glossy node</dt><dd>Median over the seeds of the CPU time of rendering, divided by that of the same scene with
+<dt>Pixels accepted</dt><dd>Welch's t-test of each pixel's luminance against the reference, at 0.01 after Sidak's correction
+for their number; the same for the means of tiles of {tile} {times} {tile} pixels. Marked where fewer than {least:g} % of the
+pixels, or not all tiles, are accepted. The map of the p-values of each form is linked below its pictures: even grey noise
+is agreement, dark patches are not.</dd>
+<dt>FLIP</dt><dd>Mean of HDR-FLIP, the difference that people would see between picture and reference, noise included.</dd>
+<dt>CPU time / Glossy node</dt><dd>A diamond marks the forms that no other beats in both error and time. Median over the seeds of the CPU time of rendering, divided by that of the same scene with
 Blender's own Glossy node on every material, rendered in turns in the same process.</dd>
 <dt>Closures</dt><dd>The most closures a point of any material gives to Cycles.</dd>
+<dt>CPU time to equal error</dt><dd>Until the form's noise is as small as that of Blender's Glossy node with 16, 256 or 1024
+samples a pixel, in units of the time which that takes.</dd>
 <dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Sampled forms are exact in
 expectation: their error is noise.</dd>
 <dt>Blender's Glossy node</dt><dd>The unit of cost, and what a scene looks like without these models.</dd>
 </dl></section>
 )",
-      fmt::arg("minus", kMinus), fmt::arg("epsilon", kRelMseEpsilon));
+      fmt::arg("minus", kMinus), fmt::arg("epsilon", kRelMseEpsilon), fmt::arg("tile", kTestTile),
+      fmt::arg("times", "\xc3\x97"), fmt::arg("least", 100 * kTestAccepted));
 }
 
 void put_provenance(std::string& out, const std::vector<SceneReport>& scenes) {

@@ -43,6 +43,7 @@ svg .name { fill: var(--ink); }
 svg .axis { stroke: var(--line); }
 svg .floor { stroke: var(--soft); stroke-dasharray: 4 4; }
 svg circle { fill: var(--accent); }
+svg circle.behind { fill: var(--card); stroke: var(--accent); }
 dt { font-weight: 600; margin-top: .7rem; }
 dd { margin: 0; max-width: 48rem; color: var(--soft); }
 pre { background: var(--card); border: 1px solid var(--line); border-radius: 6px; padding: .8rem; overflow-x: auto;

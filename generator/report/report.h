@@ -25,9 +25,14 @@
 //         ]
 //       }
 //     ],
+//     "convergence": [                       optional: the same scene, smaller, with more and more samples
+//       {"form": "exact", "spp": 16, "images": ["convergence/exact-16-1.exr", ...], "cpu_seconds": [0.4, ...]}
+//     ],
 //     "provenance": {"Blender": "4.5.15", ...},   text by name, shown at the end of the page
 //     "commands": ["build/brdfc render ...", ...]
 //   }
+//
+// A file flip.json beside it, if there is one, holds {"FORM": mean FLIP of its picture against the reference, ...}.
 //
 // CPU times of different forms are comparable when images with the same index were rendered in turns in one
 // process; the cost of a form is the median over the images of its time divided by the time of "glossy".
@@ -52,6 +57,16 @@ struct MaterialForm {
   std::optional<double> relative_l1, albedo_error;  ///< of the form, as measured when it was compiled
 };
 
+/// Noise of one picture with so many samples a pixel, and what it cost.
+struct ConvergencePoint {
+  int spp = 0;
+  double noise = 0;        ///< relMSE of one picture against its own expectation
+  double cpu_seconds = 0;  ///< of one picture, median
+};
+
+/// Samples a pixel at which forms are compared at equal error.
+inline constexpr int kEqualErrorAt[] = {16, 256, 1024};
+
 struct FormReport {
   std::string form;
   std::vector<std::string> images;
@@ -59,6 +74,11 @@ struct FormReport {
   std::vector<double> cpu_seconds, wall_seconds;
   std::vector<MaterialForm> materials;
   Difference difference;
+  std::optional<WelchTest> test;              ///< of several images against the reference
+  std::optional<double> flip;                 ///< mean FLIP, if flip.json has it
+  std::vector<ConvergencePoint> convergence;  ///< by increasing samples
+  /// CPU time to the noise that Blender's Glossy node has with kEqualErrorAt samples, in units of the time that takes.
+  std::vector<std::optional<double>> equal_error;
   std::optional<double> cost;  ///< CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered
   Rendering picture;           ///< mean of the images
 
@@ -87,6 +107,7 @@ std::vector<SceneReport> load_report(const std::filesystem::path& folder);
 struct Previews {
   struct Form {
     std::string picture, difference;
+    std::string p_values;  ///< empty if there was no test
   };
   std::string reference;
   std::vector<Form> forms;   ///< in the order of the scene's forms

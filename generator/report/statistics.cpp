@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "report/statistics.h"
 
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "core/error.h"
@@ -51,6 +55,122 @@ Difference measure_difference(const Rendering& picture, const Rendering& referen
   // First order in both means, which are independent of each other.
   d.bias_error = std::sqrt(variance_a + sqr(ratio) * variance_b) / double(count) / comparison.mean_b;
   return d;
+}
+
+namespace {
+
+/// Rounding in single precision, there and here: relative to the reference, one standard deviation.
+constexpr double kRounding = 1e-5;
+
+/// A mean with its variance and the degrees of freedom of that variance.
+struct Estimate {
+  double mean = 0, variance = 0, degrees = 1;
+};
+
+/// Two-sided p of Welch's test; 1 where both agree without noise, 0 where they differ without noise.
+double welch_p(const Estimate& a, const Estimate& b) {
+  const double rounding = sqr(kRounding * b.mean);
+  const double variance = a.variance + b.variance + rounding;
+  const double d = std::abs(a.mean - b.mean);
+  if (!(variance > 0)) return d > 0 ? 0 : 1;
+  // Rounding has no degrees of freedom to lose; a variance of 0 has none to give.
+  const double lost = sqr(a.variance) / a.degrees + sqr(b.variance) / b.degrees;
+  const double degrees = lost > 0 ? std::min(sqr(variance) / lost, 1e9) : 1e9;
+  const boost::math::students_t t(degrees);
+  return 2 * boost::math::cdf(boost::math::complement(t, d / std::sqrt(variance)));
+}
+
+double sidak(int tests) { return 1 - std::pow(1 - kTestSignificance, 1.0 / std::max(tests, 1)); }
+
+/// Of the mean of equally good pictures, from their spread.
+template <class Value> Estimate estimate(std::size_t count, const Value& value) {
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < count; ++i) sum += value(i);
+  const double mean = sum / double(count);
+  for (std::size_t i = 0; i < count; ++i) squares += sqr(value(i) - mean);
+  return {mean, squares / double(count - 1) / double(count), double(count - 1)};
+}
+
+}  // namespace
+
+bool WelchTest::passed() const { return accepted() >= kTestAccepted && rejected_tiles == 0; }
+
+nlohmann::ordered_json to_json(const WelchTest& t) {
+  return {{"passed", t.passed()},
+          {"pixels", t.pixels},
+          {"rejected_pixels", t.rejected_pixels},
+          {"accepted", t.accepted()},
+          {"worst_pixel_p", t.worst_pixel},
+          {"tiles", t.tiles},
+          {"rejected_tiles", t.rejected_tiles},
+          {"worst_tile_p", t.worst_tile},
+          {"uniform_p", t.uniform},
+          {"histogram", t.histogram}};
+}
+
+WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& reference, const std::string& picture_name,
+                     const std::string& reference_name) {
+  if (pictures.size() < 2) throw std::invalid_argument("Welch's test needs two pictures at least");
+  if (!reference.variance) throw std::invalid_argument("Welch's test needs the reference's variance");
+  for (const Rendering& r : pictures) compare(r, reference, picture_name, reference_name);  // sizes, finite values
+
+  const int width = reference.mean.width, height = reference.mean.height;
+  const double samples = reference.metadata.is_object() ? reference.metadata.value("samples", 1e6) : 1e6;
+  const auto reference_at = [&](int x, int y) {
+    const Rgb<double> v = reference.variance->color(x, y);
+    const double deviation = luminance(Rgb<double>(std::sqrt(v.r), std::sqrt(v.g), std::sqrt(v.b)));
+    return Estimate{luminance(reference.mean.color(x, y)), sqr(deviation), std::max(samples - 1, 1.0)};
+  };
+  const auto picture_at = [&](std::size_t i, int x, int y) { return luminance(pictures[i].mean.color(x, y)); };
+
+  WelchTest test;
+  test.p = Image(width, height);
+  int noisy = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const Estimate a = estimate(pictures.size(), [&](std::size_t i) { return picture_at(i, x, y); });
+      const Estimate b = reference_at(x, y);
+      const double p = welch_p(a, b);
+      for (int c = 0; c < 3; ++c) test.p.pixel(x, y)[c] = float(p);
+      test.worst_pixel = std::min(test.worst_pixel, p);
+      ++test.pixels;
+      if (a.variance + b.variance > sqr(kRounding * b.mean)) {
+        ++noisy;
+        ++test.histogram[std::min(std::size_t(p * double(test.histogram.size())), test.histogram.size() - 1)];
+      }
+    }
+  const double pixel_limit = sidak(test.pixels);
+  for (std::size_t i = 0; i < test.p.rgb.size(); i += 3) test.rejected_pixels += double(test.p.rgb[i]) < pixel_limit;
+
+  std::vector<double> tile_p;
+  for (int y0 = 0; y0 < height; y0 += kTestTile)
+    for (int x0 = 0; x0 < width; x0 += kTestTile) {
+      const int x1 = std::min(x0 + kTestTile, width), y1 = std::min(y0 + kTestTile, height);
+      const double n = double(x1 - x0) * (y1 - y0);
+      std::vector<double> means(pictures.size(), 0);
+      Estimate b{0, 0, std::max(samples - 1, 1.0)};
+      for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x) {
+          for (std::size_t i = 0; i < pictures.size(); ++i) means[i] += picture_at(i, x, y) / n;
+          const Estimate e = reference_at(x, y);
+          b.mean += e.mean / n;
+          b.variance += e.variance / n / n;
+        }
+      tile_p.push_back(welch_p(estimate(means.size(), [&](std::size_t i) { return means[i]; }), b));
+      test.worst_tile = std::min(test.worst_tile, tile_p.back());
+    }
+  test.tiles = int(tile_p.size());
+  const double tile_limit = sidak(test.tiles);
+  test.rejected_tiles = int(std::count_if(tile_p.begin(), tile_p.end(), [&](double p) { return p < tile_limit; }));
+
+  const double expected = double(noisy) / double(test.histogram.size());
+  if (expected >= 5) {
+    double statistic = 0;
+    for (const int n : test.histogram) statistic += sqr(n - expected) / expected;
+    const boost::math::chi_squared distribution(double(test.histogram.size() - 1));
+    test.uniform = boost::math::cdf(boost::math::complement(distribution, statistic));
+  }
+  return test;
 }
 
 }  // namespace brdfc

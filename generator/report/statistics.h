@@ -2,7 +2,10 @@
 // How far a rendered picture is from its reference, with the part that noise alone explains.
 #pragma once
 
+#include <array>
+#include <nlohmann/json.hpp>
 #include <span>
+#include <string>
 
 #include "reference/image.h"
 
@@ -27,5 +30,30 @@ struct Difference {
 /// sizes differ, a pixel is not finite, or the reference is black; the names are for the message.
 Difference measure_difference(const Rendering& picture, const Rendering& reference, const std::string& picture_name,
                               const std::string& reference_name);
+
+/// Welch's t-test of "both have the same expectation" on luminance, for every pixel and for the mean of every tile of
+/// kTestTile x kTestTile pixels. A family of n tests rejects where p < 1 - (1 - kTestSignificance)^(1/n) (Sidak).
+struct WelchTest {
+  int pixels = 0, tiles = 0;
+  int rejected_pixels = 0, rejected_tiles = 0;
+  double worst_pixel = 1, worst_tile = 1;  ///< smallest p
+  std::array<int, 20> histogram{};         ///< of the p of the pixels that have noise
+  double uniform = 1;                      ///< p of a chi-square test that the histogram is flat
+  Image p;                                 ///< p of every pixel, in all three channels
+
+  double accepted() const { return pixels > 0 ? 1 - double(rejected_pixels) / pixels : 1; }
+  /// At least kTestAccepted of the pixels and all tiles accepted.
+  bool passed() const;
+};
+nlohmann::ordered_json to_json(const WelchTest&);
+inline constexpr int kTestTile = 16;
+inline constexpr double kTestSignificance = 0.01, kTestAccepted = 0.9975;
+
+/// `pictures` differ in their random numbers alone, two at least; the reference needs a variance layer (its channels
+/// are taken to vary together, which for luminance is the largest variance they allow). What single precision rounds
+/// counts as noise. Throws std::invalid_argument for too few pictures or no variance, InputError when sizes differ or
+/// a pixel is not finite.
+WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& reference, const std::string& picture_name,
+                     const std::string& reference_name);
 
 }  // namespace brdfc

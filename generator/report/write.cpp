@@ -22,12 +22,21 @@ ordered_json form_json(const FormReport& f) {
                          {"closures", m.closures},
                          {"relative_l1", or_null(m.relative_l1)},
                          {"albedo_error", or_null(m.albedo_error)}});
+  ordered_json convergence = ordered_json::array(), equal_error = ordered_json::object();
+  for (const ConvergencePoint& p : f.convergence)
+    convergence.push_back({{"spp", p.spp}, {"noise", p.noise}, {"cpu_seconds", p.cpu_seconds}});
+  for (std::size_t i = 0; i < f.equal_error.size(); ++i)
+    equal_error[std::to_string(kEqualErrorAt[i])] = or_null(f.equal_error[i]);
   return {{"form", f.form},
           {"rel_mse", f.difference.rel_mse},
           {"noise_floor", f.difference.noise},
           {"bias", f.difference.bias},
           {"bias_standard_error", f.difference.bias_error},
+          {"flip", or_null(f.flip)},
+          {"test", f.test ? to_json(*f.test) : ordered_json()},
           {"cost", or_null(f.cost)},
+          {"equal_error_cost", equal_error},
+          {"convergence", convergence},
           {"spp", f.spp},
           {"closures", or_null(f.closures())},
           {"relative_l1", or_null(f.relative_l1())},
@@ -76,12 +85,21 @@ std::string report_json(const std::vector<SceneReport>& scenes) {
 
 std::string report_csv(const std::vector<SceneReport>& scenes) {
   const auto number = [](const auto& v) { return v ? fmt::format("{}", *v) : std::string(); };
-  std::string out = "scene,form,rel_mse,noise_floor,bias,bias_standard_error,cost,spp,closures,relative_l1\n";
+  const auto equal_error = [&](const FormReport& f) {
+    std::vector<std::string> fields(std::size(kEqualErrorAt));
+    for (std::size_t i = 0; i < f.equal_error.size(); ++i) fields[i] = number(f.equal_error[i]);
+    return fmt::format("{}", fmt::join(fields, ","));
+  };
+  std::string out =
+      "scene,form,rel_mse,noise_floor,bias,bias_standard_error,cost,spp,closures,relative_l1,"
+      "flip,accepted_pixels,rejected_tiles,equal_error_16,equal_error_256,equal_error_1024\n";
   for (const SceneReport& s : scenes)
     for (const FormReport& f : s.forms)
-      out += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(s.scene), csv_field(f.form), f.difference.rel_mse,
-                         f.difference.noise, f.difference.bias, f.difference.bias_error, number(f.cost), f.spp,
-                         number(f.closures()), number(f.relative_l1()));
+      out += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(s.scene), csv_field(f.form),
+                         f.difference.rel_mse, f.difference.noise, f.difference.bias, f.difference.bias_error,
+                         number(f.cost), f.spp, number(f.closures()), number(f.relative_l1()), number(f.flip),
+                         f.test ? fmt::format("{:.6f},{}", f.test->accepted(), f.test->rejected_tiles) : ",",
+                         equal_error(f));
   return out;
 }
 
