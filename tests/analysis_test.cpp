@@ -34,6 +34,9 @@ enum Defect {
   kTurn,
   kColorSquared,
   kClosure,
+  kDark,
+  kEdge,
+  kShadow,
   kModest
 };
 
@@ -48,8 +51,15 @@ template <Defect D> struct Faulty {
               .paper = "",
               .equations = "",
               .doc = "",
-              .properties =
-                  D == kModest ? ModelProperties{false, false, false, false} : ModelProperties{true, true, true, true},
+              .properties = D == kModest ? ModelProperties{.reciprocal = false,
+                                                           .conserving = false,
+                                                           .lossless = false,
+                                                           .isotropic = false,
+                                                           .positive = false,
+                                                           .smooth = false,
+                                                           .exact_sampling = false,
+                                                           .specular_limit = "level=1000"}
+                                         : ModelProperties{.lossless = true, .diffuse_limit = "level=1"},
               .params = {}};
     }
     template <class Visitor> void parameters(const Visitor& v) {
@@ -65,6 +75,10 @@ template <Defect D> struct Faulty {
       if (D == kGain) f = f * T(1.01);
       if (D == kTurn) f = f * (T(1) + T(0.01) * wi.x * wo.x);
       if (D == kColorSquared) f = f * rho;
+      if (D == kDark) f = f * sqr(maximum(wi.x * wo.x + wi.y * wo.y + T(0.5), T(0)));
+      if (D == kEdge) f = f * (T(1) - T(0.05) * abs(wi.x + wo.x));
+      // Fades so quickly that it underflows, and smoothly.
+      if (D == kShadow) f = f * exp(-level * level * (sqr(wi.x) + sqr(wo.x)));
       return select(above(wi, wo), f, Rgb<T>(T(0)));
     }
     T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -185,7 +199,29 @@ TEST(Checks, SeePropertiesDeclaredAbsentThatHold) {
   EXPECT_FALSE(passed.at("not conserving"));
   EXPECT_FALSE(passed.at("not lossless"));
   EXPECT_FALSE(passed.at("not isotropic"));
+  EXPECT_FALSE(passed.at("not positive"));
+  EXPECT_FALSE(passed.at("not smooth"));
+  EXPECT_FALSE(passed.at("not exact sampling"));
 }
+
+TEST(Checks, SeeDarkPlacesAndTellThemFromUnderflow) {
+  EXPECT_FALSE(outcome<kDark>().at("positive"));
+  const auto r = outcome<kShadow>();
+  EXPECT_TRUE(r.at("positive"));
+  EXPECT_TRUE(r.at("smooth"));
+}
+TEST(Checks, SeeEdgesOfAFewPercent) {
+  const auto r = outcome<kEdge>();
+  EXPECT_FALSE(r.at("smooth"));
+  EXPECT_TRUE(r.at("positive"));
+}
+TEST(Checks, SeeLimitsThatAreNone) {
+  EXPECT_FALSE(outcome<kShadow>().at("diffuse limit"));
+  const auto r = outcome<kModest>();
+  EXPECT_FALSE(r.at("specular limit"));
+  EXPECT_FALSE(r.at("no diffuse limit"));
+}
+TEST(Checks, SeeWeightsThatVary) { EXPECT_FALSE(outcome<kPdf>().at("exact sampling")); }
 
 template <class F> std::string message(const F& f) {
   try {

@@ -254,3 +254,23 @@ def test_check_json():
     table = json.loads(result.stdout)
     assert {row["model"] for row in table} == {"coupled"}
     assert all(row["passed"] and row["cases"] > 0 for row in table)
+
+
+def test_check_markdown_is_the_table_of_the_readme():
+    result = run("check", "--markdown")
+    assert result.returncode == 0, result.stderr
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = readme.split("<!-- properties -->\n")[1].split("<!-- end of properties -->")[0]
+    assert result.stdout == table, "run script/properties"
+    for name in MODELS:
+        assert f"| `{name}` |" in table
+
+
+def test_check_scales_with_the_effort_asked_for():
+    def cases(effort):
+        table = json.loads(run("check", "lambert", "--json", "--effort", effort).stdout)
+        return {row["check"]: row["cases"] for row in table}
+
+    few, many = cases("0.1"), cases("1")
+    assert few.keys() == many.keys()
+    assert few["values"] < many["values"] / 4

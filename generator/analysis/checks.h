@@ -23,11 +23,6 @@ struct CheckRow {
   std::string where;  ///< parameters and directions of the worst value
 };
 
-/// Parameters that the checks use: for every combination of choices the defaults and `random` draws (log-uniform where
-/// a range spans decades) within the sliders' ranges; with the default choices also every number at both ends of its
-/// accepted range and colours at 0 and 1.
-std::vector<ParamValues> check_cases(const Model&, int random, std::uint64_t seed);
-
 struct ChiSquare {
   double p = 1;  ///< probability of a statistic at least as large
   double statistic = 0;
@@ -52,7 +47,13 @@ Stability float_stability(const Model&, const ParamValues&, int points, std::uin
 /// double against Wide.
 Stability double_stability(const Model&, const ParamValues&, int points, std::uint64_t seed);
 
-/// Rows for one model. Throws ValueError where the model gives a value that is NaN, infinite or negative.
-std::vector<CheckRow> check_model(const Model&, std::uint64_t seed = 1);
+struct CheckOptions {
+  std::uint64_t seed = 1;
+  double effort = 1;  ///< scales the numbers of cases, directions and samples
+};
+/// Rows for one model: what it declares, tried at defaults, random and extreme parameters, and what every model must
+/// keep. A property declared absent must visibly be absent somewhere. Throws ValueError where the model gives a value
+/// that is NaN, infinite or negative.
+std::vector<CheckRow> check_model(const Model&, const CheckOptions& = {});
 
 }  // namespace brdfc

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/checks.h"
+#include "analysis/properties.h"
 #include "app/commands.h"
 
 namespace brdfc {
@@ -11,19 +12,32 @@ namespace brdfc {
 void add_check_command(CLI::App& app) {
   struct Options {
     std::string model;
-    bool all = false, json = false;
-    std::uint64_t seed = 1;
+    bool all = false, json = false, markdown = false;
+    CheckOptions check;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "check",
-      "Energy, reciprocity, isotropy, positive values, sampling against density (chi-square), exact closures and\n"
-      "rounding in float and double, over defaults, random and extreme parameters. Exit status 1 if one fails.");
+      "Tries to prove what the models declare (energy, reciprocity, isotropy, positive values, smoothness, limits; a\n"
+      "declared failure must show) and what all must keep (sampling against density, exact closures, rounding in "
+      "float\n"
+      "and double), over defaults, random and extreme parameters. Of all models it then prints the table of "
+      "properties.\n"
+      "Exit status 1 if one fails.");
   CLI::Option* model = cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
   cmd->add_flag("--all", o->all, "All models, the same as without a model")->excludes(model);
-  cmd->add_flag("--json", o->json, "As JSON: an array of objects, one a row");
-  cmd->add_option("--seed", o->seed, "Seed of the random parameters and directions");
+  CLI::Option* json = cmd->add_flag("--json", o->json, "As JSON: an array of objects, one a row");
+  cmd->add_flag("--markdown", o->markdown, "Only the table of properties of all models, for a Markdown page")
+      ->excludes(model)
+      ->excludes(json);
+  cmd->add_option("--effort", o->check.effort, "Scales the numbers of cases, directions and samples")
+      ->check(CLI::Range(0.01, 1000.));
+  cmd->add_option("--seed", o->check.seed, "Seed of the random parameters and directions");
   cmd->callback([o] {
+    if (o->markdown) {
+      fmt::print("{}", property_table(true));
+      return;
+    }
     std::vector<const Model*> chosen;
     if (o->model.empty())
       for (const auto& [name, m] : models()) chosen.push_back(m.get());
@@ -35,10 +49,10 @@ void add_check_command(CLI::App& app) {
     for (const Model* m : chosen) {
       fmt::print(stderr, "checking {} ...\n", m->info().name);
       const auto start = std::chrono::steady_clock::now();
-      const std::vector<CheckRow> rows = check_model(*m, o->seed);
+      const std::vector<CheckRow> rows = check_model(*m, o->check);
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       if (!o->json)
-        fmt::print("{} ({:.1f} s)\n  {:<16} {:>6} {:>7} {:>11} {:>11}  {:<6}  {}\n", m->info().name, seconds, "check",
+        fmt::print("{} ({:.1f} s)\n  {:<18} {:>6} {:>7} {:>11} {:>11}  {:<6}  {}\n", m->info().name, seconds, "check",
                    "cases", "skipped", "worst", "limit", "result", "expected");
       for (const CheckRow& r : rows) {
         failed += r.passed ? 0 : 1;
@@ -54,12 +68,13 @@ void add_check_command(CLI::App& app) {
                          {"where", r.where}});
           continue;
         }
-        fmt::print("  {:<16} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<6}  {}\n", r.check, r.cases, r.skipped, r.worst,
+        fmt::print("  {:<18} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<6}  {}\n", r.check, r.cases, r.skipped, r.worst,
                    r.limit, r.passed ? "ok" : "FAILED", r.expected);
         if (!r.passed) fmt::print("    at {}\n", r.where);
       }
     }
     if (o->json) fmt::print("{}\n", all.dump(2));
+    if (!o->json && o->model.empty()) fmt::print("\n{}", property_table(false));
     std::fflush(stdout);
     if (failed > 0) throw CheckFailed(fmt::format("{} of the declared properties failed", failed));
   });

@@ -10,16 +10,13 @@
 #pragma once
 
 #include <array>
-#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 #include <concepts>
 #include <type_traits>
 
-namespace brdfc {
+#include "core/wide.h"
 
-/// IEEE binary128 significand (113 bits): the reference for conditioning and rounding tests.
-using Wide = boost::multiprecision::number<boost::multiprecision::cpp_bin_float_quad::backend_type,
-                                           boost::multiprecision::et_off>;
+namespace brdfc {
 
 /// float, double, Wide: types whose comparisons are decided at once.
 template <class T>
@@ -42,9 +39,10 @@ inline constexpr double kInvPi = 0.31830988618379067154;
 
 /// pi to the precision of T.
 template <class T> T pi() {
-  if constexpr (std::same_as<T, Wide>)
-    return boost::math::constants::pi<Wide>();
-  else
+  if constexpr (std::same_as<T, Wide>) {
+    static const Wide value = Wide(4) * atan(Wide(1));
+    return value;
+  } else
     return T(kPi);
 }
 
