@@ -20,6 +20,8 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+#: Samples a pixel, pictures of each, pixels along the longer side.
+CONVERGENCE_SPP, CONVERGENCE_SEEDS, CONVERGENCE_SIZE = (16, 256, 1024), 4, 64
 RENDER_SCENE = ROOT / "script" / "render_scene.py"
 
 
@@ -122,6 +124,59 @@ def render_blender(extension, folder, forms, spp, seeds):
     return {"command": shown(map(str, command)), "records": records}
 
 
+def smaller(scene, longest):
+    """The scene with at most so many pixels along its longer side."""
+    settings = scene["settings"]
+    factor = min(1, longest / max(settings["width"], settings["height"]))
+    size = {k: max(1, round(settings[k] * factor)) for k in ("width", "height")}
+    return scene | {"settings": settings | size}
+
+
+def render_convergence(extension, folder, scene, forms):
+    """A smaller picture in every form with more and more samples; returns command and records."""
+    out = folder / "convergence"
+    out.mkdir(exist_ok=True)
+    # Beside the scene, so that its meshes and images are found.
+    write_json(folder / "convergence.json", smaller(scene, CONVERGENCE_SIZE))
+    jobs = [
+        {
+            "name": f"{folder.name} {form}, {spp} samples, {seed}/{CONVERGENCE_SEEDS}",
+            "scene": str(folder / "convergence.json"),
+            "out": str(out / f"{form}-{spp}-{seed}.exr"),
+            "representation": form,
+            "spp": spp,
+            "seed": seed,
+        }
+        for spp in CONVERGENCE_SPP
+        for seed in range(1, CONVERGENCE_SEEDS + 1)
+        for form in forms
+    ]
+    write_json(folder / "convergence-jobs.json", jobs)
+    command = [sys.executable, RENDER_SCENE, "--extension", extension]
+    command += ["--jobs", folder / "convergence-jobs.json"]
+    records = json.loads(run(command, stdout=subprocess.PIPE).stdout)
+    return {"command": shown(map(str, command)), "records": records}
+
+
+def convergence_runs(forms, records):
+    """The records in the form of runs.json."""
+    out = []
+    for form in forms:
+        for spp in CONVERGENCE_SPP:
+            chosen = [
+                r for r in records if r["representation"] == form and r["settings"]["spp"] == spp
+            ]
+            out.append(
+                {
+                    "form": form,
+                    "spp": spp,
+                    "images": [f"convergence/{Path(r['out']).name}" for r in chosen],
+                    "cpu_seconds": [r["sampling_cpu_seconds"] for r in chosen],
+                }
+            )
+    return out
+
+
 def materials_of(record):
     """The materials of a record in the form of runs.json; Blender's own nodes have no entry."""
     out = []
@@ -194,6 +249,18 @@ def render_scene(source, options, models, versions):
     )
     write_json(state_file, state)
 
+    convergence, kept_convergence = None, False
+    if options.convergence:
+        key = digest(key, CONVERGENCE_SPP, CONVERGENCE_SEEDS, CONVERGENCE_SIZE)
+        convergence, kept_convergence = cached(
+            state,
+            "convergence",
+            key,
+            [],
+            lambda: render_convergence(options.extension, folder, scene, forms),
+        )
+        write_json(state_file, state)
+
     records = blender["records"]
     runs = [form_run(f, [r for r in records if r["representation"] == f]) for f in forms]
     provenance = {
@@ -219,15 +286,22 @@ def render_scene(source, options, models, versions):
                 "wall_seconds": reference["wall_seconds"],
             },
             "runs": runs,
+            "convergence": convergence_runs(forms, convergence["records"]) if convergence else [],
             "provenance": provenance,
             "commands": [
                 shown([str(options.tool), "scene", str(source), "--out", str(folder)]),
                 reference["command"],
                 blender["command"],
+                *([convergence["command"]] if convergence else []),
             ],
         },
     )
-    kept = [n for n, k in (("reference", kept_reference), ("Blender", kept_blender)) if k]
+    parts = {
+        "reference": kept_reference,
+        "Blender": kept_blender,
+        "convergence": kept_convergence,
+    }
+    kept = [name for name, was_kept in parts.items() if was_kept]
     note = f" (kept: {', '.join(kept)})" if kept else ""
     print(f"    {source.stem}: {', '.join(forms)}{note}", flush=True)
 
@@ -242,6 +316,11 @@ def main():
     parser.add_argument("--out", required=True, type=Path, help="folder of the results")
     parser.add_argument(
         "--seeds", type=int, default=4, help="pictures a form; share the scene's samples (4)"
+    )
+    parser.add_argument(
+        "--convergence",
+        action="store_true",
+        help="also smaller pictures with 16, 256 and 1024 samples a pixel, for cost at equal error",
     )
     parser.add_argument(
         "--reference-factor", type=int, default=4, help="times the scene's samples (4)"
