@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <system_error>
 
 #include "app/commands.h"
 #include "core/error.h"
@@ -37,6 +38,10 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 2;
   } catch (const brdfc::InputError& e) {
+    fmt::print(stderr, "brdfc: {}\n", e.what());
+    return 2;
+  } catch (const std::system_error& e) {
+    // A file or pipe that the system refuses to read or write: no fault of a model's.
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 2;
   } catch (const std::exception& e) {

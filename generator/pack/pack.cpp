@@ -3,9 +3,13 @@
 
 #include <archive.h>
 #include <archive_entry.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <fstream>
 #include <map>
@@ -155,8 +159,9 @@ void write_zip(const fs::path& path, const std::map<std::string, std::string>& m
 /// A folder beside the target that goes away unless renamed.
 class Staging {
  public:
-  explicit Staging(const fs::path& out) : path_(out / fmt::format(".brdfc-build-{}", getpid())) {
+  explicit Staging(const fs::path& out) : path_(out / fmt::format("{}{}", kPrefix, getpid())) {
     std::error_code error;
+    remove_abandoned(out);
     fs::create_directories(path_, error);
     if (error) input_error("{}: cannot be created: {}", path_.string(), error.message());
   }
@@ -169,12 +174,34 @@ class Staging {
   const fs::path& path() const { return path_; }
 
  private:
+  static constexpr const char* kPrefix = ".brdfc-build-";
+
+  /// What a build that was killed left behind: its process is gone.
+  static void remove_abandoned(const fs::path& out) {
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(out, ignored)) {
+      const std::string name = entry.path().filename().string();
+      if (!name.starts_with(kPrefix)) continue;
+      pid_t process = 0;
+      const char* first = name.data() + std::string_view(kPrefix).size();
+      const auto [end, bad] = std::from_chars(first, name.data() + name.size(), process);
+      if (bad != std::errc() || end != name.data() + name.size() || process <= 0) continue;
+      if (kill(process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), ignored);
+    }
+  }
+
   fs::path path_;
 };
 
-/// Puts `fresh` where `target` is; the old folder goes only once the new one stands.
+/// Puts `fresh` where `target` is, in one step where the file system can exchange two names, so that at no time there
+/// is none; elsewhere the old folder steps aside first. It goes with the staging folder.
 void replace_folder(const fs::path& fresh, const fs::path& target, const fs::path& scratch) {
-  if (fs::exists(target)) fs::rename(target, scratch);
+  if (fs::exists(target)) {
+#ifdef RENAME_EXCHANGE
+    if (renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) return;
+#endif
+    fs::rename(target, scratch);
+  }
   fs::rename(fresh, target);
 }
 

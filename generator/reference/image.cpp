@@ -91,6 +91,11 @@ void write_file(const fs::path& path, const OIIO::ImageSpec& spec, const std::ve
     if (!out) input_error("{}: can't write this image format ({})", path.string(), OIIO::geterror());
     if (!out->open(temporary.string(), spec) || !out->write_image(OIIO::TypeDesc::FLOAT, data.data()) || !out->close())
       input_error("{}: can't write ({})", path.string(), out->geterror());
+    // OpenEXR hands the end of a small file to the system when it closes it, and does not tell if that fails.
+    const auto back = OIIO::ImageInput::open(temporary.string());
+    std::vector<float> same(data.size());
+    if (!back || !back->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, same.data()))
+      input_error("{}: can't write (what was written can't be read: is the disk full?)", path.string());
   });
 }
 

@@ -13,12 +13,13 @@ namespace {
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxBytes = std::size_t(64) << 20;
 
-/// nlohmann's messages start with "[json.exception.parse_error.101] "; people need only the rest.
+/// nlohmann's messages start with "[json.exception.parse_error.101] "; people need only the rest, of which they can't
+/// read what was quoted from a file that is no text.
 std::string plain_message(const std::string& what) {
   const auto end = what.find("] ");
   std::string text = end == std::string::npos ? what : what.substr(end + 2);
   for (char& c : text)
-    if (c == '\n' || c == '\r') c = ' ';
+    if (c < ' ' || c > '~') c = ' ';
   return text;
 }
 

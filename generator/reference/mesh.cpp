@@ -108,8 +108,11 @@ Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
     input_error("{}: expected a mesh file that ends in .obj, .ply or .stl", path.string());
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |
-                         aiProcess_JoinIdenticalVertices | (smooth ? aiProcess_GenSmoothNormals : 0u);
+  // Triangles without area reflect nothing, and have no normal.
+  importer.SetPropertyInteger(AI_CONFIG_PP_FD_REMOVE, 1);
+  const unsigned steps = aiProcess_Triangulate | aiProcess_FindDegenerates | aiProcess_SortByPType |
+                         aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices |
+                         (smooth ? aiProcess_GenSmoothNormals : 0u);
   const aiScene* scene = importer.ReadFile(path.string(), steps);
   if (!scene) input_error("{}: not a mesh that can be read ({})", path.string(), importer.GetErrorString());
   Mesh mesh;
@@ -117,8 +120,14 @@ Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) all_uvs &= scene->mMeshes[m]->HasTextureCoords(0);
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
     const aiMesh& part = *scene->mMeshes[m];
-    const std::size_t first = mesh.vertices.size();
+    // Vertices that no triangle uses may lack a normal.
+    std::vector<bool> used(part.mNumVertices, false);
+    for (unsigned i = 0; i < part.mNumFaces; ++i)
+      for (unsigned k = 0; k < part.mFaces[i].mNumIndices; ++k) used.at(part.mFaces[i].mIndices[k]) = true;
+    std::vector<std::size_t> index(part.mNumVertices, 0);
     for (unsigned i = 0; i < part.mNumVertices; ++i) {
+      if (!used[i]) continue;
+      index[i] = mesh.vertices.size();
       const aiVector3D& p = part.mVertices[i];
       mesh.vertices.push_back({p.x, p.y, p.z});
       if (smooth) {
@@ -130,7 +139,7 @@ Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
     for (unsigned i = 0; i < part.mNumFaces; ++i) {
       const aiFace& face = part.mFaces[i];
       if (face.mNumIndices == 3)
-        add_triangle(mesh, first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]);
+        add_triangle(mesh, index[face.mIndices[0]], index[face.mIndices[1]], index[face.mIndices[2]]);
     }
   }
   check_mesh(mesh, path.string());

@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that are damaged, huge or hostile, and disks that take nothing: one line says why, exit
+status 2, quickly, and nothing half-written stays. What the readers do with arbitrary bytes is
+fuzzed by script/fuzz.
+"""
+
+import json
+import os
+import resource
+import signal
+import struct
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+TOOL = os.environ.get("BRDFC_TOOL", str(ROOT / "build" / "brdfc"))
+#: Seconds for a refusal; the aim is one, the rest allows for a busy machine.
+QUICK = 5
+
+
+def run(*arguments, file_limit=None, **options):
+    def limit():
+        # Writing beyond the limit fails with an error, as on a full disk, instead of a signal.
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (file_limit, file_limit))
+
+    return subprocess.run(
+        [TOOL, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        preexec_fn=limit if file_limit is not None else None,
+        **options,
+    )
+
+
+def refused(done, *words):
+    errors = [line for line in done.stderr.splitlines() if not line.startswith("brdfc build: ")]
+    assert done.returncode == 2, (done.returncode, done.stderr)
+    assert len(errors) == 1 and errors[0].startswith("brdfc: "), done.stderr
+    for word in words:
+        assert str(word) in errors[0], errors[0]
+
+
+def scene(**changes):
+    return {
+        "name": "s",
+        "description": "a sphere",
+        "settings": {"width": 64, "height": 64, "spp": 1, "seed": 1, "max_bounces": 1},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -4, 0],
+            "look_at": [0, 0, 0],
+            "up": [0, 0, 1],
+            "fov_y_degrees": 60,
+        },
+        "materials": {"m": {"model": "lambert"}},
+        "objects": [{"name": "o", "shape": {"type": "sphere"}, "material": "m"}],
+        "environment": {"color": [1, 1, 1]},
+    } | changes
+
+
+def in_time(*arguments, **options):
+    start = time.perf_counter()
+    done = run(*arguments, **options)
+    assert time.perf_counter() - start < QUICK
+    return done
+
+
+# ---- JSON ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "JSON"),
+        ("[" * 100000, "deep"),
+        ('{"a":' * 100000, "deep"),
+        ("{" * 3, "JSON"),
+        (json.dumps(scene())[:-20], "JSON"),
+        ('{"name": "a", "name": "b"}', "twice"),
+        (json.dumps(scene()).replace('"spp": 1', '"spp": 1e999'), "1e999"),
+        (json.dumps(scene()).replace('"spp": 1', '"spp": -1'), "settings.spp"),
+        (json.dumps(scene()).replace('"spp": 1', '"spp": 1' + "0" * 400), ""),
+        (json.dumps(scene()).replace('"spp": 1', '"spp": "1"'), "settings.spp"),
+        (json.dumps(scene()).replace('"width": 64', '"width": 1000000000'), "settings.width"),
+        (json.dumps(scene(objects={})), "objects"),
+        (json.dumps(scene(materials=[])), "materials"),
+        (json.dumps(scene(name=None)), "name"),
+        ("\x00\x01\x02", "JSON"),
+        ('"\ud800"', "JSON"),
+    ],
+    ids=range(16),
+)
+def test_a_scene_that_is_no_scene(text, word, tmp_path):
+    file = tmp_path / "bad.json"
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
+    refused(in_time("render", file, "--out", tmp_path / "a.exr"), "bad.json", word)
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.json"]
+
+
+def test_names_reach_no_path(tmp_path):
+    """Names of a scene are text, whatever they look like."""
+    name = '../../e"vil\n$(touch x)'
+    content = scene(name=name, materials={name: {"model": "lambert"}})
+    content["objects"][0] |= {"name": name, "material": name}
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(content))
+    out = tmp_path / "out"
+    done = run("scene", file, "--out", out)
+    assert done.returncode in (0, 2)
+    written = {p.relative_to(tmp_path).parts[0] for p in tmp_path.rglob("*")}
+    assert written <= {"s.json", "out"}
+
+
+# ---- EXR ----------------------------------------------------------------------------------------
+
+
+def exr_header(width, height):
+    """A header without pixels: scan lines, three channels of 32 bits, no compression."""
+
+    def attribute(name, kind, data):
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(data)) + data
+
+    channels = b"".join(c + b"\0" + struct.pack("<iB3xii", 2, 0, 1, 1) for c in (b"B", b"G", b"R"))
+    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    return (
+        struct.pack("<ii", 20000630, 2)
+        + attribute("channels", "chlist", channels + b"\0")
+        + attribute("compression", "compression", b"\0")
+        + attribute("dataWindow", "box2i", box)
+        + attribute("displayWindow", "box2i", box)
+        + attribute("lineOrder", "lineOrder", b"\0")
+        + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+        + attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0))
+        + attribute("screenWindowWidth", "float", struct.pack("<f", 1))
+        + b"\0"
+    )
+
+
+@pytest.fixture
+def picture(tmp_path):
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(scene()))
+    done = run("render", file, "--out", tmp_path / "good.exr")
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "good.exr"
+
+
+@pytest.mark.parametrize("kept", [0, 3, 100, 0.5, 0.99])
+def test_a_truncated_picture(picture, kept, tmp_path):
+    data = picture.read_bytes()
+    bad = tmp_path / "bad.exr"
+    bad.write_bytes(data[: int(len(data) * kept) if kept < 1 else kept])
+    refused(in_time("compare", bad, picture), "bad.exr")
+
+
+@pytest.mark.parametrize(("width", "height"), [(60000, 60000), (2**31 - 1, 1), (30000, 1), (0, 5)])
+def test_a_header_that_promises_too_much(picture, width, height, tmp_path):
+    bad = tmp_path / "bad.exr"
+    bad.write_bytes(exr_header(width, height))
+    refused(in_time("compare", bad, picture), "bad.exr")
+
+
+def test_a_picture_with_nan(tmp_path, picture):
+    header = exr_header(2, 1)
+    offset = len(header) + 8
+    line = struct.pack("<q", offset) + struct.pack("<ii", 0, 24)
+    bad = tmp_path / "bad.exr"
+    bad.write_bytes(header + line + struct.pack("<6f", 1, 1, 1, 1, float("nan"), 1))
+    refused(in_time("compare", bad, bad), "bad.exr", "not finite")
+
+
+# ---- meshes -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "accepted"),
+    [
+        ("empty.obj", "", False),
+        ("points.obj", "v 0 0 0\nv 1 0 0\n", False),
+        ("missing.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n", False),
+        ("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", False),
+        ("other.blend", "BLENDER", False),
+        ("binary.ply", "\x00\x01\x02", False),
+        # No area: nothing to see, and nothing to divide by.
+        ("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\nv 0 1 0\nf 1 2 4\n", True),
+        # Three faces on one edge, and one turned over.
+        (
+            "fan.obj",
+            "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 0 0\nf 1 2 3\nf 1 2 4\nf 2 1 5\n",
+            True,
+        ),
+    ],
+)
+def test_a_mesh(name, text, accepted, tmp_path):
+    (tmp_path / name).write_text(text)
+    content = scene()
+    content["objects"][0]["shape"] = {"type": "mesh", "file": name}
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(content))
+    done = in_time("render", file, "--out", tmp_path / "a.exr")
+    if accepted:
+        assert done.returncode == 0, done.stderr
+    else:
+        refused(done, name)
+        assert not (tmp_path / "a.exr").exists()
+
+
+# ---- disks --------------------------------------------------------------------------------------
+
+
+def contents(folder):
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def pack(tmp_path_factory):
+    """A folder with a pack in it, and what the pack consists of."""
+    folder = tmp_path_factory.mktemp("pack")
+    done = run("build", "--model", "lambert", "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return folder, contents(folder)
+
+
+@pytest.mark.parametrize("limit", [0, 1000, 20000])
+def test_a_full_disk_leaves_the_old_pack(pack, limit):
+    folder, before = pack
+    refused(run("build", "--model", "lambert", "--out", folder, file_limit=limit), "written")
+    assert contents(folder) == before
+
+
+def test_a_killed_build_leaves_the_old_pack(pack):
+    folder, before = pack
+    for delay in (0.05, 0.2, 0.4):
+        process = subprocess.Popen(
+            [TOOL, "build", "--model", "ashikhmin_shirley", "--out", folder],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        time.sleep(delay)
+        process.kill()
+        process.wait()
+        kept = {k: v for k, v in contents(folder).items() if not k.startswith(".brdfc-build-")}
+        assert kept == before
+    done = run("build", "--model", "lambert", "--out", folder)
+    assert done.returncode == 0, done.stderr
+    # Equal bytes, and what the killed builds left is gone.
+    assert contents(folder) == before
+    assert not list(folder.glob(".brdfc-build-*"))
+
+
+def test_a_full_disk_leaves_the_old_picture(tmp_path):
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(scene()))
+    out = tmp_path / "a.exr"
+    assert run("render", file, "--out", out).returncode == 0
+    before = contents(tmp_path)
+    refused(run("render", file, "--out", out, "--seed", 5, file_limit=100), "a.exr")
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("build", "--model", "lambert", "--out", "/proc/brdfc"),
+        ("render", "s.json", "--out", "/proc/brdfc/a.exr"),
+        ("scene", "s.json", "--out", "/proc/brdfc"),
+    ],
+)
+def test_a_place_that_takes_no_files(arguments, tmp_path):
+    (tmp_path / "s.json").write_text(json.dumps(scene()))
+    refused(in_time(*arguments, cwd=tmp_path), "/proc/brdfc")
+
+
+def test_output_that_nobody_takes():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([TOOL, "list"], stdout=full, stderr=subprocess.PIPE, text=True)
+    refused(done, "No space left")
