@@ -149,6 +149,116 @@ def coupled_albedo(p, cos_o):
     return [rf + rm * (1 - rf) for rm in p["rm"]]
 
 
+# ---- Suffern, eqs. 25.1, 25.2 and 25.7 ---------------------------------------------------------
+
+
+def cos_alpha(wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    return k1, k2, dot(k1, [-k2[0], -k2[1], k2[2]])
+
+
+def gr_pdf(p, wi, wo):
+    k1, k2, c = cos_alpha(wi, wo)
+    if c <= 0:
+        return mp.mpf(0)
+    density = (p["e"] + 1) / (2 * mp.pi) * c ** p["e"]
+    # The ray that is turned to k1 starts out at 2 (r.k1) r - k1.
+    folded = p["below"] == "mirror" and 2 * c * k2[2] - k1[2] < 0
+    return density * (2 if folded else 1)
+
+
+def gr_f(p, wi, wo):
+    return [p["kr"] * c * gr_pdf(p, wi, wo) / vec(wi)[2] for c in p["cr"]]
+
+
+def lobe_above(e, cos_o, cosine):
+    """Integral of cos^e alpha, times the cosine if wanted, over the lobe's part above the surface.
+
+    About r the cosine is a + b cos(phi), positive on an arc that is known for each alpha.
+    """
+    cos_o, e = mp.mpf(cos_o), mp.mpf(e)
+    sin_o = mp.sqrt(1 - cos_o**2)
+
+    def ring(alpha):
+        a, b = mp.cos(alpha) * cos_o, mp.sin(alpha) * sin_o
+        half = mp.pi if a >= b else mp.acos(-a / b)
+        arc = 2 * (a * half + b * mp.sin(half)) if cosine else 2 * half
+        return mp.cos(alpha) ** e * mp.sin(alpha) * arc
+
+    whole = mp.acos(sin_o) if sin_o < 1 else mp.mpf(0)  # rings up to here are whole
+    width = min(mp.pi / 2, 8 / mp.sqrt(e))
+    cuts = sorted({mp.mpf(0), width / 3, width, whole, mp.pi / 2})
+    return mp.quad(ring, cuts)
+
+
+def gr_albedo(p, cos_o):
+    kept = mp.mpf(1)
+    if p["below"] == "lose":
+        kept = (p["e"] + 1) / (2 * mp.pi) * lobe_above(p["e"], cos_o, cosine=False)
+    return [p["kr"] * c * kept for c in p["cr"]]
+
+
+def gs_c(p):
+    e = mp.mpf(p["e"])
+    scales = {"book": 1, "estimator": (e + 1) / (2 * mp.pi), "conserving": (e + 2) / (2 * mp.pi)}
+    return scales[p["normalisation"]] * p["ks"]
+
+
+def gs_f(p, wi, wo):
+    _, _, c = cos_alpha(wi, wo)
+    return [gs_c(p) * cs * (c ** p["e"] if c > 0 else 0) for cs in p["cs"]]
+
+
+def gs_pdf(p, wi, wo):
+    return gr_pdf({"e": p["e"], "below": "lose"}, wi, wo)
+
+
+def gs_albedo(p, cos_o):
+    return [gs_c(p) * cs * lobe_above(p["e"], cos_o, cosine=True) for cs in p["cs"]]
+
+
+# ---- The three models that Shirley, Smits, Hu and Lafortune compare with, their section 5 ------
+
+
+def schlick(p, c):
+    return p["r0"] + (1 - mp.mpf(p["r0"])) * (1 - c) ** 5
+
+
+def s91_f(p, wi, wo):
+    return [rd * (1 - schlick(p, vec(wo)[2])) / mp.pi for rd in p["rd"]]
+
+
+def s91_albedo(p, cos_o):
+    r = schlick(p, mp.mpf(cos_o))
+    return [r + rd * (1 - r) for rd in p["rd"]]
+
+
+def sd_f(p, wi, wo):
+    half = mp.acos(dot(vec(wi), vec(wo))) / 2
+    return [rd * (1 - schlick(p, mp.cos(half))) / mp.pi for rd in p["rd"]]
+
+
+def sd_albedo(p, cos_o):
+    fp, sin_o = mp.fp, math.sqrt(1 - cos_o**2)
+
+    def integrand(t, phi):
+        cos_angle = math.sin(t) * math.cos(phi) * sin_o + math.cos(t) * cos_o
+        cos_half = math.sqrt(max(0.0, (1 + cos_angle) / 2))
+        r = p["r0"] + (1 - p["r0"]) * (1 - cos_half) ** 5
+        return (1 - r) * math.cos(t) * math.sin(t) / math.pi
+
+    ends = [math.pi * k / 4 for k in range(5)]
+    matte = 2 * fp.quad(
+        lambda phi: fp.quad(
+            lambda t: integrand(t, phi), [0, math.pi / 4, math.pi / 2], maxdegree=4
+        ),
+        ends,
+        maxdegree=4,
+    )
+    mirror = p["r0"] + (1 - p["r0"]) * (1 - cos_o) ** 5
+    return [mirror + rd * matte for rd in p["rd"]]
+
+
 # ---- Radziszewski and Alda, eqs. 17 to 19, factor 2 and nbar mended -----------------------------
 
 
@@ -260,6 +370,72 @@ MODELS = {
         albedo=coupled_albedo,
         defaults={"r0": 0.05, "rm": (0.8, 0.8, 0.8)},
         cases=[{}, {"r0": 0.5, "rm": (1, 0.5, 0.1)}, {"r0": 0, "rm": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "glossy_reflector": dict(
+        f=gr_f,
+        pdf=gr_pdf,
+        albedo=gr_albedo,
+        defaults={"kr": 0.9, "cr": (1, 1, 1), "e": 100, "below": "mirror"},
+        cases=[
+            {},
+            {"e": 1, "kr": 1},
+            {"e": 1, "kr": 1, "below": "lose"},
+            {"e": 5, "cr": (0.9, 0.5, 0.1)},
+            {"e": 25, "below": "lose"},
+            {"e": 1e5},
+            {"e": 1e7, "kr": 1},
+        ],
+        albedo_cases=[
+            {"e": 1, "kr": 1},
+            {"e": 25, "kr": 1},
+            *({"e": e, "kr": 1, "below": "lose"} for e in (1, 5, 100, 1e4)),
+        ],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "glossy_specular": dict(
+        f=gs_f,
+        pdf=gs_pdf,
+        albedo=gs_albedo,
+        defaults={"ks": 0.65, "cs": (1, 1, 1), "e": 25, "normalisation": "book"},
+        cases=[
+            {},
+            {"e": 1, "ks": 1},
+            {"e": 7, "normalisation": "estimator", "cs": (0.9, 0.5, 0.1)},
+            {"e": 1000, "normalisation": "conserving", "ks": 1},
+            {"e": 1e5},
+            {"e": 1e7, "normalisation": "conserving"},
+        ],
+        albedo_cases=[
+            {"e": 1, "ks": 1},
+            {},
+            {"e": 7, "normalisation": "estimator", "ks": 1},
+            {"e": 1000, "normalisation": "conserving", "ks": 1},
+        ],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "lambertian_specular": dict(
+        f=lambda p, wi, wo: [c / mp.pi for c in p["rd"]],
+        pdf=lambert_pdf,
+        albedo=lambda p, c: [rd + mp.mpf(p["rs"]) for rd in p["rd"]],
+        defaults={"rs": 0.05, "rd": (0.8, 0.8, 0.8)},
+        cases=[{}, {"rs": 0.5, "rd": (0.2, 0.5, 0.9)}],
+        cosines=[1, 0.3],
+    ),
+    "shirley_1991": dict(
+        f=s91_f,
+        pdf=lambert_pdf,
+        albedo=s91_albedo,
+        defaults={"r0": 0.05, "rd": (0.8, 0.8, 0.8)},
+        cases=[{}, {"r0": 0.5, "rd": (1, 0.5, 0.1)}, {"r0": 0, "rd": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "schlick_double": dict(
+        f=sd_f,
+        pdf=lambert_pdf,
+        albedo=sd_albedo,
+        defaults={"r0": 0.05, "rd": (0.8, 0.8, 0.8)},
+        cases=[{}, {"r0": 0.5, "rd": (1, 0.5, 0.1)}, {"r0": 0, "rd": (1, 1, 1)}],
         cosines=[1, 0.5, 0.1, 0.01],
     ),
     "radziszewski_alda": dict(

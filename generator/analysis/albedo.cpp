@@ -51,6 +51,42 @@ std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& w
   return borders;
 }
 
+/// Directions on both sides of a jump of sample() as its third number goes round, of one lobe. Where a model folds rays
+/// back, its density jumps along the image of the fold: a curve that a cubature must be led to.
+std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo, double u1) {
+  constexpr int kTrial = 8, kLines = 192, kSteps = 16;
+  constexpr std::size_t kMost = 768;
+  std::vector<Vec3<double>> out;
+  Sequence2 sequence(3);
+  for (int line = 0; line < kLines; ++line) {
+    if ((line == kTrial && out.empty()) || out.size() >= kMost) break;
+    const Point2 p = sequence.next();
+    const auto at = [&](double z) { return brdf.sample(wo, {u1, p.x, wrap(z)}); };
+    std::array<double, kSteps> steps;
+    for (int i = 0; i < kSteps; ++i)
+      steps[std::size_t(i)] = length(at(p.y + double(i + 1) / kSteps).wi - at(p.y + double(i) / kSteps).wi);
+    std::array<double, kSteps> sorted = steps;
+    std::sort(sorted.begin(), sorted.end());
+    for (int i = 0; i < kSteps; ++i) {
+      // A smooth map goes round in steps of about equal length.
+      if (!(steps[std::size_t(i)] > 4 * sorted[kSteps / 4])) continue;
+      double lo = p.y + double(i) / kSteps, hi = p.y + double(i + 1) / kSteps, halfway = 0;
+      for (int k = 0; k < 40; ++k) {
+        const double mid = 0.5 * (lo + hi), left = length(at(mid).wi - at(lo).wi),
+                     right = length(at(hi).wi - at(mid).wi);
+        (left > right ? hi : lo) = mid;
+        if (k == 20) halfway = std::max(left, right);
+      }
+      const Sample<double> a = at(lo), b = at(hi);
+      // A jump stays as large as it is, however near its two sides are looked at.
+      if (!(length(a.wi - b.wi) > 0.9 * halfway)) continue;
+      for (const Sample<double>& s : {a, b})
+        if (s.pdf > 0) out.push_back(s.wi);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 BoundModel bind_model(const Model& model, const ParamValues& values) {
@@ -141,6 +177,10 @@ Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) {
           {points[i].x + t * (points[i].x - points[i + 1].x), points[i].y + t * (points[i].y - points[i + 1].y)});
     }
   }
+  std::vector<Point2> edges;
+  for (std::size_t lobe = 0; lobe + 1 < borders.size(); ++lobe)
+    for (const Vec3<double>& w : folds(brdf, wo, 0.5 * (borders[lobe] + borders[lobe + 1]))) edges.push_back(angles(w));
+  if (!edges.empty()) lobes_.push_back(std::move(edges));
 }
 
 Point2 Guides::angles(const Vec3<double>& wi) const {

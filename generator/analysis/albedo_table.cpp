@@ -227,7 +227,14 @@ class Tabulator {
       defaults.push_back(model_.info().param(coordinates_[i].name)->value[0]);
     probes_.push_back(defaults);
     for (int i = 0; i < 7; ++i) probes_.push_back(random_position(random));
+    // Coefficients that agree elsewhere may part at grazing views, where lobes lose what falls below the surface.
+    places_ = probes_;
+    for (int i = 0; i < 12; ++i) {
+      places_.push_back(random_position(random));
+      places_.back()[0] = 0.05;
+    }
     for (Position& x : probes_) freeze_turns(x);
+    for (Position& x : places_) freeze_turns(x);
   }
 
   struct NewTerm {
@@ -243,8 +250,8 @@ class Tabulator {
   void add_terms(const ParamValues& combination) {
     // Coefficients at the probes, and along each coordinate through each of them.
     constexpr int kSteps = 4;
-    std::vector<Coefficients> at_probe(probes_.size());
-    for_all(probes_.size(), [&](std::size_t i) { at_probe[i] = coefficients(combination, probes_[i], kAllAzimuths); });
+    std::vector<Coefficients> at_probe(places_.size());
+    for_all(places_.size(), [&](std::size_t i) { at_probe[i] = coefficients(combination, places_[i], kAllAzimuths); });
 
     std::vector<NewTerm> wanted;
     const std::size_t corners = at_probe[0].scattered.size();
@@ -302,7 +309,7 @@ class Tabulator {
     return names;
   }
 
-  /// A grid that has this coefficient's values at every probe, or -1.
+  /// A grid that has this coefficient's values at every place, or -1.
   int find_shared(const NewTerm& t, const std::vector<Coefficients>& at_probe) const {
     for (std::size_t g = 0; g < signatures_.size(); ++g) {
       bool same = true;
@@ -550,9 +557,10 @@ class Tabulator {
   std::vector<std::string> colors_;
   std::vector<ParamValues> combinations_;
   bool depends_on_azimuth_ = false;
-  std::vector<char> turns_;  // per coordinate: does nothing but turn the model; empty if nothing does
-  std::vector<Position> probes_;
-  std::vector<std::vector<Rgb<double>>> signatures_;  // of each grid at each probe
+  std::vector<char> turns_;       // per coordinate: does nothing but turn the model; empty if nothing does
+  std::vector<Position> probes_;  // lines through these tell what a coefficient depends on
+  std::vector<Position> places_;  // the probes and more: where equal coefficients must agree
+  std::vector<std::vector<Rgb<double>>> signatures_;  // of each grid at each place
   AlbedoTable table_;
 };
 

@@ -179,7 +179,8 @@ std::vector<Rect> partition(const Rect& whole, const std::vector<Point2>& points
     bool split_x = fill_x < fill_y;
     // Points that coincide (a mirror's, or those crowded against a border) can't be told apart by halving for ever.
     const auto thick = [&](bool x) {
-      return x ? r.x1 - r.x0 > 1e-12 * (whole.x1 - whole.x0) : r.y1 - r.y0 > 1e-12 * (whole.y1 - whole.y0);
+      return splittable(r, x) &&
+             (x ? r.x1 - r.x0 > 1e-12 * (whole.x1 - whole.x0) : r.y1 - r.y0 > 1e-12 * (whole.y1 - whole.y0));
     };
     if (!thick(split_x)) split_x = !split_x;
     if (!thick(split_x)) {

@@ -31,4 +31,9 @@ Sample<T> sample_if(const Flag& exists, const Vec3<T>& wi, const Rgb<T>& weight,
 /// (1 - c)^5, the angular part of Schlick's Fresnel approximation.
 template <class T> T schlick_weight(const T& cosTheta) { return pow5(clamp01(T(1) - cosTheta)); }
 
+/// 1 - (1 - c)^5 as a polynomial: no cancellation for small c.
+template <class T> T one_minus_schlick_weight(const T& c) {
+  return c * (T(5) - c * (T(10) - c * (T(10) - c * (T(5) - c))));
+}
+
 }  // namespace brdfc

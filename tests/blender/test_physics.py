@@ -90,6 +90,9 @@ SAMPLED = with_every_model(
     ("radziszewski_alda", {"n": 12.0, "tint": (1.0, 0.6, 0.2)}),
     ("radziszewski_alda", {"n": 4.0, "part": "latitudinal"}),
     ("radziszewski_alda", {"n": 4.0, "part": "longitudinal"}),
+    ("glossy_reflector", {"e": 5.0, "cr": (1.0, 0.6, 0.2)}),
+    ("glossy_reflector", {"e": 3.0, "below": "lose"}),
+    ("glossy_specular", {"e": 8.0, "normalisation": "conserving"}),
 )
 #: Facets: view cosines times azimuths, each seen by so many pixels that its noise can be measured.
 COSINES = (1.0, 0.8, 0.5, 0.25, 0.1)

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The lobe cos^e alpha about an axis, for exponents from 0 to 1e8.
+//
+// With q = |a - b|^2 / 2 = 1 - cos alpha of unit vectors the power is exp(e log1p(-q)): rounding moves q by its own
+// last digits, whereas a power of the dot product has lost all of them at e = 1e7. Near a right angle, where 1 - q
+// cancels and the dot product does not, the logarithm is taken of the latter. Sampling takes
+// 1 - cos alpha = -expm1(log1p(-u) / (e + 1)) for the same reason.
+#pragma once
+
+#include "model/model.h"
+
+namespace brdfc {
+
+/// cos^e alpha of the angle between unit vectors; 0 beyond a right angle.
+template <class T> T power_lobe(const T& e, const Vec3<T>& a, const Vec3<T>& b) {
+  const Vec3<T> d = a - b;
+  const T q = named("one_minus_cos", dot(d, d) / T(2));
+  const T cosAlpha = named("cosAlpha", dot(a, b));
+  const T near_axis = log1p(-minimum(q, T(0.5))), near_edge = log(maximum(cosAlpha, tiny<T>()));
+  const T log_cos = select(q < T(0.5), near_axis, near_edge);
+  return named("lobe", select(cosAlpha > T(0), exp(e * log_cos), T(0)));
+}
+
+/// Density of sample_power_lobe().
+template <class T> T power_lobe_pdf(const T& e, const Vec3<T>& axis, const Vec3<T>& w) {
+  return (e + T(1)) / (T(2) * pi<T>()) * power_lobe(e, axis, w);
+}
+
+/// Direction about the z axis with density proportional to cos^e alpha.
+template <class T> Vec3<T> sample_power_lobe(const T& e, const T& u1, const T& u2) {
+  const T one_minus_cos = named("one_minus_cosAlpha", -expm1(log1p(-u1) / (e + T(1))));
+  const T sinAlpha = named("sinAlpha", sqrt(one_minus_cos * (T(2) - one_minus_cos)));
+  const T phi = named("phi", T(2) * pi<T>() * u2);
+  return {sinAlpha * cos(phi), sinAlpha * sin(phi), T(1) - one_minus_cos};
+}
+
+/// s.x u + s.y v + s.z w in an orthonormal frame (u, v, w) that varies smoothly with w, for w.z >= 0.
+template <class T> Vec3<T> about_axis(const Vec3<T>& w, const Vec3<T>& s) {
+  const T a = T(1) / (T(1) + w.z), b = -w.x * w.y * a;
+  const Vec3<T> u = {T(1) - w.x * w.x * a, b, -w.x}, v = {b, T(1) - w.y * w.y * a, -w.y};
+  return u * s.x + v * s.y + w * s.z;
+}
+
+}  // namespace brdfc

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Suffern's glossy reflector: rays about the mirror direction, each worth what a perfect mirror's is.
+//
+// K. Suffern: Ray Tracing from the Ground Up, 2007, chapter 25. Equations below are the book's.
+// Estimator eq. 25.7 over directions of density (e + 1) / (2 pi) cos^e alpha about r (eqs. 25.1, 25.8). What it
+// estimates is f cos theta_i = k_r c_r (e + 1) / (2 pi) cos^e alpha: the cosine of eq. 25.3 has gone, because
+// eq. 25.6 divides by it, so f is not reciprocal and grows without bound towards the horizon.
+//
+// Rays below the surface: "lose" drops them (fig. 25.5, half as bright at the silhouette); "mirror" turns them about
+// r by half a circle, which puts them above it (figs. 25.6, 25.7). The density is then twice as large where the
+// partner, 2 (r.wi) r - wi, is below, and jumps there. Every ray counts, so the albedo is k_r c_r at every angle.
+//
+// Stable forms: see power_lobe.h.
+#include "model/power_lobe.h"
+#include "model/sampling.h"
+
+namespace brdfc {
+
+template <class T> struct GlossyReflector {
+  T kr, e;
+  Rgb<T> cr;
+  Choice below;
+
+  enum { Mirror, Lose };
+
+  static ModelInfo info() {
+    return {.name = "glossy_reflector",
+            .label = "Glossy Reflector",
+            .paper = "K. Suffern: Ray Tracing from the Ground Up, chapter 25, 2007",
+            .equations = "eqs. 25.1, 25.7, 25.8",
+            .doc = "Blurred mirror: rays spread about the mirror direction, all of the same weight.",
+            .properties = {.reciprocal = false, .positive = false, .smooth = false, .specular_limit = "e=1e7"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(kr, NumberSpec{"kr", "Reflection", 0.9, 0, 1, 0, 1, "Share of the light that is reflected, k_r"});
+    v(cr, ColorSpec{"cr", "Reflection Color", {1, 1, 1}, "Color of the reflection, c_r"});
+    v(e, NumberSpec{"e", "Exponent", 100, 1, 1e7, 1, 100000, "1 is matte about the mirror direction; larger sharper"});
+    v(below, ChoiceSpec{"below",
+                        "Rays Below",
+                        {"mirror", "lose"},
+                        "What becomes of rays below the surface. mirror: turned about the mirror direction; lose: "
+                        "dropped, as in the book's incorrect picture"});
+  }
+
+  /// Scattered density without k_r c_r; also that of sample().
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const Vec3<T> r = reflect(wo);
+    const T p = power_lobe_pdf(e, r, wi);
+    if (below == Lose) return select(above(wi, wo), p, T(0));
+    const T partner_z = named("partner_z", T(2) * dot(r, wi) * r.z - wi.z);
+    return select(above(wi, wo), p * select(partner_z <= T(0), T(2), T(1)), T(0));
+  }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return cr * (kr * pdf(wi, wo) / maximum(wi.z, tiny<T>())); }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> r = reflect(wo), s = sample_power_lobe(e, u.y, u.z);
+    Vec3<T> wi = about_axis(r, s);
+    if (below == Mirror) {
+      const Vec3<T> turned = about_axis(r, {-s.x, -s.y, s.z});
+      const auto flip = wi.z <= T(0);
+      wi = {select(flip, turned.x, wi.x), select(flip, turned.y, wi.y), select(flip, turned.z, wi.z)};
+    }
+    return sample_if(above(wi, wo), wi, cr * kr, pdf(wi, wo));
+  }
+};
+
+BRDFC_MODEL(GlossyReflector)
+
+}  // namespace brdfc

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the papers say of these models in words or pictures, as numbers: also the defects.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "analysis/albedo.h"
+
+namespace brdfc {
+namespace {
+
+BoundModel bound(const char* name, const std::vector<std::string>& assignments) {
+  const Model& m = find_model(name);
+  return bind_model(m, parse_values(m.info(), assignments));
+}
+
+double albedo_at(const BoundModel& b, double cosTheta) { return albedo(*b.brdf, cosTheta, 0.3, b.label).total().g; }
+
+void expect_albedo(const BoundModel& b, double cosTheta, double wanted) {
+  const Albedo a = albedo(*b.brdf, cosTheta, 0.3, b.label);
+  EXPECT_LT(a.error, 1e-4) << b.label;
+  EXPECT_NEAR(a.total().g, wanted, 1e-6 + 2 * a.error) << b.label << " cos_theta_o=" << cosTheta;
+}
+
+TEST(GlossyReflector, LostRaysHalveTheSilhouetteAndTurnedRaysDoNot) {
+  // Figs. 25.5 and 25.7. A cosine lobe (e = 1) about r keeps (1 + cos theta) / 2 of itself above the surface.
+  const BoundModel lose = bound("glossy_reflector", {"kr=0.8", "e=1", "below=lose"}),
+                   mirror = bound("glossy_reflector", {"kr=0.8", "e=1", "below=mirror"});
+  for (const double c : {1., 0.7, 0.4, 0.1, 0.01, 1e-3}) {
+    expect_albedo(lose, c, 0.8 * (1 + c) / 2);
+    expect_albedo(mirror, c, 0.8);
+  }
+  EXPECT_NEAR(albedo_at(lose, 1e-3) / albedo_at(lose, 1), 0.5, 1e-3);
+  // "Roughly 50 % at grazing incidence for all values of e."
+  for (const char* e : {"e=10", "e=1000"})
+    EXPECT_NEAR(albedo_at(bound("glossy_reflector", {"kr=1", "below=lose", e}), 1e-4), 0.5, 0.01) << e;
+}
+
+TEST(GlossyReflector, DensityDoublesExactlyWhereThePartnerIsBelow) {
+  const BoundModel lose = bound("glossy_reflector", {"e=3", "below=lose"}),
+                   mirror = bound("glossy_reflector", {"e=3", "below=mirror"});
+  const Vec3<double> wo = direction(0.4, 0.7), r{-wo.x, -wo.y, wo.z};
+  int doubled = 0, alike = 0, none = 0;
+  Sequence2 sequence(1);
+  for (int i = 0; i < 2000; ++i) {
+    const Point2 u = sequence.next();
+    const Vec3<double> wi = direction(1 - u.x, 2 * kPi * u.y), partner = r * (2 * dot(r, wi)) - wi;
+    const double once = lose.brdf->pdf(wi, wo), got = mirror.brdf->pdf(wi, wo);
+    EXPECT_EQ(got, partner.z <= 0 ? 2 * once : once);
+    EXPECT_EQ(dot(r, wi) <= 0, once == 0);
+    ++(once == 0 ? none : partner.z <= 0 ? doubled : alike);
+  }
+  EXPECT_GT(doubled, 100);
+  EXPECT_GT(alike, 100);
+  EXPECT_GT(none, 100);
+}
+
+TEST(GlossyReflector, IsAMirrorAtTheLargestExponent) {
+  const BoundModel b = bound("glossy_reflector", {"kr=0.9", "e=1e7"});
+  const Vec3<double> wo = direction(0.6, 1), r{-wo.x, -wo.y, wo.z};
+  Sequence3 sequence(1);
+  for (int i = 0; i < 1000; ++i) EXPECT_LT(length(b.brdf->sample(wo, sequence.next()).wi - r), 2e-3);
+}
+
+TEST(GlossySpecular, ScaleDecidesWhetherLightIsGained) {
+  // At normal incidence the albedo is 2 pi c / (e + 2).
+  for (const double e : {1., 25., 1000.}) {
+    const std::string exponent = fmt::format("e={}", e);
+    const auto at_normal = [&](const char* normalisation) {
+      return albedo_at(bound("glossy_specular", {"ks=1", exponent, normalisation}), 1);
+    };
+    EXPECT_NEAR(at_normal("normalisation=book"), 2 * kPi / (e + 2), 1e-6);
+    EXPECT_NEAR(at_normal("normalisation=estimator"), (e + 1) / (e + 2), 1e-6);
+    EXPECT_NEAR(at_normal("normalisation=conserving"), 1, 1e-6);
+    // Never more at other angles: the cosine that eq. 25.7 leaves out is still there.
+    const BoundModel b = bound("glossy_specular", {"ks=1", exponent, "normalisation=conserving"});
+    double before = 1 + 1e-6;
+    for (int i = 19; i >= 1; --i) {
+      const double a = albedo_at(b, i / 20.);
+      EXPECT_LT(a, before) << e << " " << i / 20.;
+      before = a;
+    }
+  }
+}
+
+TEST(MatteSpecular, ConstantSharesDoNotTradeWithTheAngle) {
+  const BoundModel b = bound("lambertian_specular", {"rd=0.8", "rs=0.05"});
+  for (const double c : {1., 0.5, 0.01}) {
+    EXPECT_EQ(b.brdf->mirror(direction(c, 0)).r, 0.05);
+    EXPECT_NEAR(albedo_at(b, c), 0.85, 1e-9);
+  }
+  EXPECT_NEAR(albedo_at(bound("lambertian_specular", {"rd=0.8", "rs=0.5"}), 0.3), 1.3, 1e-9) << "nothing stops it";
+}
+
+TEST(MatteSpecular, Shirley1991IsNotReciprocal) {
+  const BoundModel b = bound("shirley_1991", {"r0=0.05", "rd=1"});
+  const Vec3<double> high = direction(1, 0), low = direction(0.1, 2);
+  // f(low, high) / f(high, low) = (1 - R(0)) / (1 - R(84 deg)).
+  EXPECT_NEAR(b.brdf->eval(low, high).g / b.brdf->eval(high, low).g, 1 / (1 - std::pow(0.9, 5)), 1e-12);
+  EXPECT_GT(b.brdf->eval(low, high).g / b.brdf->eval(high, low).g, 2.4);
+  for (const double c : {1., 0.3, 0.01}) EXPECT_NEAR(albedo_at(b, c), 1, 1e-9);
+}
+
+TEST(MatteSpecular, SchlickDoubleGainsLightAtGrazingViews) {
+  const BoundModel b = bound("schlick_double", {"r0=0.05", "rd=1"});
+  EXPECT_NEAR(albedo_at(b, 1), 1, 1e-3);
+  double most = 0;
+  for (const double c : {1., 0.5, 0.2, 0.1, 0.05, 0.01, 1e-3}) most = std::max(most, albedo_at(b, c));
+  EXPECT_NEAR(most, 1.9186, 1e-4);
+  EXPECT_EQ(most, albedo_at(b, 1e-3)) << "more the nearer to the horizon";
+}
+
+}  // namespace
+}  // namespace brdfc
