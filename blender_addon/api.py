@@ -40,7 +40,9 @@ def models():
 def _checked(model_name, representation, given):
     given = dict(given)
     lobes = given.pop("lobes", None) if "lobes" not in pack.parameters(model_name) else None
-    values = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
+    fixed = pack.fixed(model_name)
+    checked = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
+    values = {name: v for name, v in checked.items() if name not in fixed}
     if lobes is not None:
         values[pack.LOBES] = pack.check_lobes(model_name, representation, lobes)
     return values

@@ -70,6 +70,12 @@ def parameters(model_name):
     return {p["name"]: p for p in model(model_name)["parameters"]}
 
 
+def fixed(model_name):
+    """Parameters that this pack was built without, and the values they have in it."""
+    found = model(model_name).get("fixed", {})
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
+
+
 def has_socket(parameter):
     """Whether a parameter is shown: a choice of one leaves nothing to choose."""
     return parameter["kind"] != "choice" or len(parameter["choices"]) > 1
@@ -108,6 +114,18 @@ def _checked_number(what, value, low, high):
     return value
 
 
+def _checked_fixed(model_name, name, value):
+    here = fixed(model_name)[name]
+    given = (value,) * 3 if isinstance(here, tuple) and _is_number(value) else value
+    given = tuple(given) if isinstance(given, list) else given
+    if given != here:
+        raise ValueError(
+            f"{model_name}.{name}: expected {here}, the only value in this extension, which was "
+            f"built for one scene; got {value!r}"
+        )
+    return here
+
+
 def check_value(model_name, name, value):
     """Returns the value in canonical form: float, (r, g, b) or the identifier of a choice.
 
@@ -115,6 +133,8 @@ def check_value(model_name, name, value):
     what was expected.
     """
     schema = parameters(model_name)
+    if name in fixed(model_name):
+        return _checked_fixed(model_name, name, value)
     if name not in schema:
         known = ", ".join(schema)
         raise ValueError(f"model {model_name!r} has no parameter {name!r}; expected one of {known}")

@@ -193,7 +193,9 @@ TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
 
 class PackFiles : public ::testing::Test {
  protected:
-  PackOptions options(const fs::path& out) const { return {out, BRDFC_SOURCE_DIR "/blender_addon", {"lambert"}, {}}; }
+  PackOptions options(const fs::path& out) const {
+    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan_models({"lambert"}), {}};
+  }
   TempFolder temp;
 };
 
@@ -241,7 +243,7 @@ TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   const PackResult pack = build_pack(options(temp.path()));
   const std::string before = read(pack.zip);
   PackOptions bad = options(temp.path());
-  bad.models = {"lambert", "no_such_model"};
+  bad.models[0].fixed["rho"] = 7.;  // refused when the shader is written, after the build has begun
   EXPECT_THROW(build_pack(bad), InputError);
   bad = options(temp.path());
   bad.addon = temp.path() / "nowhere";

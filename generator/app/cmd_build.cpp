@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <set>
+#include <nlohmann/json.hpp>
 
 #include "app/commands.h"
 #include "pack/pack.h"
@@ -14,7 +15,7 @@ namespace brdfc {
 namespace {
 
 struct Options {
-  bool all = false;
+  bool all = false, json = false;
   std::string scene, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
 };
@@ -29,24 +30,88 @@ void print_table(const PackResult& result) {
                l.table_floats, l.table_error, l.bytes);
 }
 
+/// How the scene uses its materials.
+std::vector<MaterialNeed> needs_of(const Scene& scene) {
+  std::vector<MaterialNeed> needs;
+  for (const Material& m : scene.materials) {
+    MaterialNeed need{m.id, m.model, m.values, {}, m.representation, kDefaultLobes};
+    for (const auto& [name, image] : m.textures) need.textured.insert(name);
+    const nlohmann::json& resolved = scene.resolved.at("materials").at(m.id);
+    need.lobes = resolved.value("lobes", kDefaultLobes);
+    needs.push_back(std::move(need));
+  }
+  return needs;
+}
+
+nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& result) {
+  const ModelInfo& info = plan.model->info();
+  nlohmann::ordered_json forms = nlohmann::ordered_json::array(), free = nlohmann::ordered_json::array();
+  for (const PackLine& l : result.lines)
+    if (l.model == info.name)
+      forms.push_back({{"form", l.representation},
+                       {"before",
+                        {{"bytes", l.whole_bytes},
+                         {"operations", l.whole_operations},
+                         {"closures", l.whole_closures},
+                         {"table_floats", l.whole_table_floats}}},
+                       {"after",
+                        {{"bytes", l.bytes},
+                         {"operations", l.operations},
+                         {"closures", l.closures},
+                         {"table_floats", l.table_floats}}}});
+  nlohmann::ordered_json fixed = nlohmann::ordered_json::object();
+  for (const ParamInfo& p : info.params) {
+    const auto it = plan.fixed.find(p.name);
+    if (it == plan.fixed.end())
+      free.push_back(p.name);
+    else
+      std::visit([&](const auto& v) { fixed[p.name] = v; }, it->second);
+  }
+  return {{"model", info.name}, {"materials", plan.materials}, {"forms", forms}, {"fixed", fixed},
+          {"free", free},       {"left_out", plan.reasons}};
+}
+
+/// Why each thing is left out, and what that saves.
+void explain(const Options& options, const std::vector<PlannedModel>& plan, const PackResult& result) {
+  std::vector<std::string> unused;
+  for (const auto& [name, model] : models())
+    if (std::none_of(plan.begin(), plan.end(), [&, &n = name](const auto& p) { return p.model->info().name == n; }))
+      unused.push_back(name);
+  if (options.json) {
+    nlohmann::ordered_json out{{"scene", options.scene}, {"models", nlohmann::ordered_json::array()}};
+    for (const PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
+    out["unused_models"] = unused;
+    fmt::print("{}\n", out.dump(2));
+    return;
+  }
+  for (const PlannedModel& p : plan) {
+    fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
+    for (const std::string& reason : p.reasons) fmt::print("  without {}\n", reason);
+    for (const PackLine& l : result.lines)
+      if (l.model == p.model->info().name)
+        fmt::print("  {}: {} -> {} bytes, {} -> {} operations, {} -> {} closures, {} -> {} floats of tables\n",
+                   l.representation, l.whole_bytes, l.bytes, l.whole_operations, l.operations, l.whole_closures,
+                   l.closures, l.whole_table_floats, l.table_floats);
+  }
+  if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
+}
+
 void run(const Options& options) {
   if (int(options.all) + int(!options.scene.empty()) + int(!options.models.empty()) != 1)
     input_error("build: expected one of --all, --scene FILE or --model NAME");
-  PackOptions pack{options.out, options.addon, options.models, {}};
-  if (!options.scene.empty()) {
-    // Only the models that the scene's materials name.
-    const Scene scene = load_scene(options.scene);
-    std::set<std::string> used;
-    for (const Material& m : scene.materials) used.insert(m.model->info().name);
-    pack.models.assign(used.begin(), used.end());
-  }
+  const std::vector<PlannedModel> plan =
+      options.scene.empty() ? plan_models(options.models) : plan_scene(needs_of(load_scene(options.scene)));
+  PackOptions pack{options.out, options.addon, plan, {}};
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     fmt::print(stderr, "brdfc build: {}/{} {:<20} {:6.1f} s\n", done, total, what, seconds);
   };
   const PackResult result = build_pack(pack);
-  print_table(result);
+  if (options.scene.empty())
+    print_table(result);
+  else
+    explain(options, plan, result);
   fmt::print(stderr, "brdfc build: wrote {} and {}\n", result.zip.string(), result.folder.string());
 }
 
@@ -56,7 +121,11 @@ void add_build_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* c = app.add_subcommand("build", "Write the Blender extension");
   c->add_flag("--all", options->all, "Every model");
-  c->add_option("--scene", options->scene, "Only the models of a scene file");
+  CLI::Option* scene = c->add_option(
+      "--scene", options->scene,
+      "Only what the materials of a scene file need: models, forms, lobes, and parameters that are not constant");
+  c->add_flag("--explain", options->json, "With --scene: what is left out, why and what that saves, as JSON")
+      ->needs(scene);
   c->add_option("--model", options->models, "Only these models (repeat for several)");
   c->add_option("--out", options->out, "Folder for the extension and its zip")->required();
   c->add_option("--addon", options->addon, "Folder with the add-on's Python");

@@ -110,7 +110,7 @@ std::vector<std::string> warnings(RepresentationKind kind) {
   return {};
 }
 
-Json table_json(const AlbedoTable& t, const std::string& file) {
+Json table_json(const AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
   Json grids = Json::array(), terms = Json::array();
   for (const AlbedoGrid& g : t.grids) {
     Json axes = Json::array();
@@ -118,16 +118,24 @@ Json table_json(const AlbedoTable& t, const std::string& file) {
       axes.push_back({{"name", a.name}, {"scale", name_of(a.scale)}, {"values", a.values}});
     grids.push_back({{"axes", axes}, {"channels", g.channels}, {"error", g.error}, {"values", g.values}});
   }
-  for (const auto& combination : t.terms) {
+  const std::vector<Choices> combinations = choice_combinations(model.info());
+  for (std::size_t i = 0; i < t.terms.size(); ++i) {
+    if (!admits(model.info(), combinations.at(i), fixed)) continue;
     Json list = Json::array();
-    for (const AlbedoTerm& term : combination)
+    for (const AlbedoTerm& term : t.terms[i])
       list.push_back({{"mirror", term.mirror}, {"colors", term.colors}, {"grid", term.grid}});
     terms.push_back(list);
   }
-  return {{"table", file},        {"doc", t.doc},
-          {"error", t.error},     {"anisotropy", t.anisotropy},
-          {"choices", t.choices}, {"choice_sizes", t.choice_sizes},
-          {"terms", terms},       {"grids", grids}};
+  Json choices = Json::array(), choice_sizes = Json::array();
+  for (std::size_t i = 0; i < t.choices.size(); ++i) {
+    if (fixed.count(t.choices[i])) continue;
+    choices.push_back(t.choices[i]);
+    choice_sizes.push_back(t.choice_sizes[i]);
+  }
+  return {{"table", file},      {"doc", t.doc},
+          {"error", t.error},   {"anisotropy", t.anisotropy},
+          {"choices", choices}, {"choice_sizes", choice_sizes},
+          {"terms", terms},     {"grids", grids}};
 }
 
 struct ArchiveDelete {
@@ -219,7 +227,12 @@ bool has_table(const Model& model) {
          std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;
 }
 
-BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& scratch) {
+Json value_json(const ParamValue& value) {
+  return std::visit([](const auto& v) { return Json(v); }, value);
+}
+
+BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::path& scratch) {
+  const Model& model = *plan.model;
   const ModelInfo& info = model.info();
   BuiltModel built;
   Json& j = built.manifest;
@@ -230,28 +243,33 @@ BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& s
        {"isotropic", info.properties.isotropic},
        {"scatter", model.has_scatter()}};
   j["parameters"] = Json::array();
-  for (const ParamInfo& p : info.params) j["parameters"].push_back(parameter_json(p));
+  for (const ParamInfo& p : info.params)
+    if (!plan.fixed.count(p.name)) j["parameters"].push_back(parameter_json(p));
+  j["fixed"] = Json::object();
+  for (const auto& [name, value] : plan.fixed) j["fixed"][name] = value_json(value);
 
-  AlbedoTable table;
+  AlbedoTable table, whole_table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
   if (has_table(model)) {
-    table = tabulate_albedo(model);
+    whole_table = tabulate_albedo(model);
+    table = fold(whole_table, model, plan.fixed);
     const fs::path exr = scratch / (info.name + ".exr");
     write_albedo_exr(table, exr.string());
     built.files[table_file] = read_text(exr);
     fs::remove(exr);
   }
 
-  const std::vector<RepresentationKind> kinds = representations(model);
-  j["auto"] = name_of(kinds.front());
-  for (RepresentationKind kind : kinds) {
-    const Shader shader = write_shader(model, kind, table);
+  j["auto"] = name_of(plan.forms.front());
+  for (RepresentationKind kind : plan.forms) {
+    const Shader shader = write_shader(model, kind, table, plan.fixed, plan.max_lobes);
+    const Shader whole = write_shader(model, kind, whole_table);
     const RepresentationError error = measure_error(model, kind);
     const auto cost = costs.find(info.name + "," + name_of(kind));
     const std::string file = "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
-                           table.size(), table.error, shader.source.size()});
+                           table.size(), table.error, shader.source.size(), whole.closures, whole.operations,
+                           whole_table.size(), whole.source.size()});
     j["representations"][name_of(kind)] = {
         {"shader", file},
         {"closures", shader.closures},
@@ -259,22 +277,18 @@ BuiltModel build_model(const Model& model, const Costs& costs, const fs::path& s
         {"statements", shader.operations},
         {"error", error_json(error)},
         {"cost", cost == costs.end() ? Json() : Json(cost->second)},
-        {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", kMaxLobes}} : Json()},
+        {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind)},
         {"sha256", sha256(shader.source)}};
   }
-  if (has_table(model)) j["albedo"] = table_json(table, table_file);
+  if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
   return built;
 }
 
 }  // namespace
 
 PackResult build_pack(const PackOptions& options) {
-  std::vector<const Model*> chosen;
-  if (options.models.empty())
-    for (const auto& [name, model] : models()) chosen.push_back(model.get());
-  else
-    for (const std::string& name : options.models) chosen.push_back(&find_model(name));
+  const std::vector<PlannedModel>& chosen = options.models;
   if (!fs::exists(options.addon / "blender_manifest.toml"))
     input_error("{}: expected the add-on's folder with blender_manifest.toml", options.addon.string());
   std::error_code error;
@@ -286,8 +300,8 @@ PackResult build_pack(const PackOptions& options) {
   const Staging staging(options.out);
   std::vector<BuiltModel> built(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (options.progress) options.progress(chosen[i]->info().name, int(i), int(chosen.size()));
-    built[i] = build_model(*chosen[i], costs, staging.path());
+    if (options.progress) options.progress(chosen[i].model->info().name, int(i), int(chosen.size()));
+    built[i] = build_model(chosen[i], costs, staging.path());
   }
 
   PackResult result;
@@ -295,7 +309,7 @@ PackResult build_pack(const PackOptions& options) {
   Json manifest = {
       {"format", 1}, {"generator", std::string("brdfc ") + BRDFC_VERSION}, {"hash", ""}, {"models", Json::object()}};
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    manifest["models"][chosen[i]->info().name] = built[i].manifest;
+    manifest["models"][chosen[i].model->info().name] = built[i].manifest;
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
   }

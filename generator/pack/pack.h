@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "represent/representation.h"
+#include "pack/plan.h"
 
 namespace brdfc {
 
 struct PackOptions {
-  std::filesystem::path out;        ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
-  std::filesystem::path addon;      ///< folder with the add-on's Python and blender_manifest.toml
-  std::vector<std::string> models;  ///< identifiers; empty: every model
+  std::filesystem::path out;         ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
+  std::filesystem::path addon;       ///< folder with the add-on's Python and blender_manifest.toml
+  std::vector<PlannedModel> models;  ///< what of each model
   std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty
 };
 
@@ -26,6 +26,9 @@ struct PackLine {
   std::size_t table_floats = 0;
   double table_error = 0;
   std::size_t bytes = 0;  ///< of the shader's text
+  /// The same with nothing left out; equal where nothing is.
+  int whole_closures = 0, whole_operations = 0;
+  std::size_t whole_table_floats = 0, whole_bytes = 0;
 };
 
 struct PackResult {

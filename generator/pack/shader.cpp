@@ -301,12 +301,13 @@ std::string balanced_sum(const std::vector<std::string>& terms) {
   return group(left, middle - terms.begin() > 1) + " + " + group(right, terms.end() - middle > 1);
 }
 
-Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& fixed) {
+Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& fixed,
+                    int max_lobes) {
   const ModelInfo& info = model.info();
   const bool sampled = kind == RepresentationKind::Sampled;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
-  shader.lobes = sampled;
+  shader.lobes = sampled && max_lobes > 1;
 
   std::vector<ClosureKind> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
@@ -343,19 +344,19 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   if (sampled) {
     body += fmt::format(
         "    color weight_0[{}] = {{ 0.0 }};\n    vector wi[{}] = {{ vector(0.0) }};\n"
-        "    int count = clamp(Lobes, 1, {});\n"
+        "    int count = {};\n"
         "    for (int lobe = 0; lobe < count; lobe++) {{\n"
         "        vector u_all = brdfc_random(lobe);\n"
         "        float u_0 = u_all[0];\n        float u_1 = u_all[1];\n        float u_2 = u_all[2];\n"
         "        float wi_x, wi_y, wi_z;\n        color weight;\n",
-        kMaxLobes, kMaxLobes, kMaxLobes);
+        max_lobes, max_lobes, shader.lobes ? fmt::format("clamp(Lobes, 1, {})", max_lobes) : std::string("1"));
     body += statements.print(8);
     body +=
         "        weight_0[lobe] = weight / float(count);\n"
         "        wi[lobe] = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n    }\n";
     if (model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
-    for (int i = 0; i < kMaxLobes; ++i) terms.push_back(fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
-    shader.slots = kMaxLobes * slots(ClosureKind::PhongRamp);
+    for (int i = 0; i < max_lobes; ++i) terms.push_back(fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
+    shader.slots = max_lobes * slots(ClosureKind::PhongRamp);
     if (model.has_mirror()) {
       terms.push_back("mirror_weight * reflection(frame_n)");
       shader.slots += slots(ClosureKind::Reflection);
@@ -396,11 +397,11 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
                   p.name);
     out += parameter(p);
   }
-  if (sampled)
+  if (shader.lobes)
     out += fmt::format(
         "    int Lobes = {} [[ string label = \"Lobes\", string help = \"Directions traced per shading "
         "point, 1 to {}\" ]],\n",
-        kDefaultLobes, kMaxLobes);
+        kDefaultLobes, max_lobes);
   out +=
       "    normal Normal = N,\n    vector Tangent = vector(0, 0, 0),\n"
       "    output closure color BSDF = 0,\n    output color Albedo = 0)\n{\n";

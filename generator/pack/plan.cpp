@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pack/plan.h"
+
+#include <algorithm>
+#include <map>
+
+namespace brdfc {
+namespace {
+
+std::string value_text(const ModelInfo& info, const std::string& name, const ParamValue& value) {
+  return format_values(info, {{name, value}});
+}
+
+RepresentationKind chosen_form(const MaterialNeed& need) {
+  const std::vector<RepresentationKind> known = representations(*need.model);
+  if (need.representation == "auto") return known.front();
+  const RepresentationKind kind = representation_named(need.representation);
+  if (std::find(known.begin(), known.end(), kind) == known.end())
+    input_error("material {}: {} has no form '{}'", need.id, need.model->info().name, need.representation);
+  return kind;
+}
+
+PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed*>& needs) {
+  const ModelInfo& info = model.info();
+  PlannedModel plan;
+  plan.model = &model;
+  plan.max_lobes = 1;
+  std::set<RepresentationKind> used;
+  for (const MaterialNeed* need : needs) {
+    plan.materials.push_back(need->id);
+    used.insert(chosen_form(*need));
+    plan.max_lobes = std::max(plan.max_lobes, std::min(need->lobes, kMaxLobes));
+  }
+  for (const RepresentationKind kind : representations(model)) {
+    if (used.count(kind))
+      plan.forms.push_back(kind);
+    else
+      plan.reasons.push_back(fmt::format("form {}: no material uses it", name_of(kind)));
+  }
+  if (used.count(RepresentationKind::Sampled) && plan.max_lobes < kMaxLobes)
+    plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
+  for (const ParamInfo& p : info.params) {
+    const ParamValue& first = needs.front()->values.at(p.name);
+    const bool textured = std::any_of(needs.begin(), needs.end(),
+                                      [&](const MaterialNeed* need) { return need->textured.count(p.name) > 0; });
+    const bool same = std::all_of(needs.begin(), needs.end(),
+                                  [&](const MaterialNeed* need) { return need->values.at(p.name) == first; });
+    if (textured || !same) continue;
+    plan.fixed[p.name] = first;
+    plan.reasons.push_back(fmt::format("parameter {}: constant, {}", p.name, value_text(info, p.name, first)));
+  }
+  return plan;
+}
+
+/// The grid at fixed coordinates: linear between two knots of the axis' scale, as lookup() does.
+AlbedoGrid sliced(const AlbedoGrid& grid, const ParamValues& fixed) {
+  AlbedoGrid out;
+  out.channels = grid.channels;
+  out.error = grid.error;
+  for (const TableAxis& axis : grid.axes)
+    if (!fixed.count(axis.name)) out.axes.push_back(axis);
+  std::vector<std::size_t> index(out.axes.size(), 0);
+  for (bool more = true; more;) {
+    std::vector<double> x;
+    std::size_t kept = 0;
+    for (const TableAxis& axis : grid.axes) {
+      const auto it = fixed.find(axis.name);
+      x.push_back(it == fixed.end() ? axis.values[index[kept]] : std::get<double>(it->second));
+      if (it == fixed.end()) ++kept;
+    }
+    const Rgb<double> v = lookup(grid, x);
+    out.values.push_back(float(v.r));
+    if (grid.channels == 3) {
+      out.values.push_back(float(v.g));
+      out.values.push_back(float(v.b));
+    }
+    more = false;
+    for (std::size_t a = out.axes.size(); a-- > 0 && !more;) {
+      more = ++index[a] < out.axes[a].values.size();
+      if (!more) index[a] = 0;
+    }
+  }
+  return out;
+}
+
+void multiply(AlbedoGrid& grid, const std::array<double, 3>& color) {
+  if (grid.channels == 1 && color[0] == color[1] && color[1] == color[2]) {
+    for (float& v : grid.values) v = float(v * color[0]);
+    return;
+  }
+  std::vector<float> values;
+  const std::size_t step = std::size_t(grid.channels);
+  for (std::size_t i = 0; i < grid.values.size(); i += step)
+    for (std::size_t c = 0; c < 3; ++c) values.push_back(float(grid.values[i + (step == 1 ? 0 : c)] * color[c]));
+  grid.channels = 3;
+  grid.values = std::move(values);
+}
+
+bool same_axes(const AlbedoGrid& a, const AlbedoGrid& b) {
+  return std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(),
+                    [](const TableAxis& p, const TableAxis& q) {
+                      return p.name == q.name && p.scale == q.scale && p.values == q.values;
+                    });
+}
+
+void add(AlbedoGrid& sum, AlbedoGrid other) {
+  if (sum.channels != other.channels) {
+    AlbedoGrid& grey = sum.channels == 1 ? sum : other;
+    std::vector<float> values;
+    for (const float v : grey.values) values.insert(values.end(), 3, v);
+    grey.channels = 3;
+    grey.values = std::move(values);
+  }
+  for (std::size_t i = 0; i < sum.values.size(); ++i) sum.values[i] += other.values[i];
+  sum.error += other.error;
+}
+
+}  // namespace
+
+bool admits(const ModelInfo& info, const Choices& choices, const ParamValues& fixed) {
+  const ParamValues values = with_choices(info, choices);
+  return std::all_of(values.begin(), values.end(), [&](const auto& item) {
+    const auto it = fixed.find(item.first);
+    return it == fixed.end() || it->second == item.second;
+  });
+}
+
+std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
+  std::vector<PlannedModel> plan;
+  const auto add_model = [&](const Model& m) {
+    PlannedModel p;
+    p.model = &m;
+    p.forms = representations(m);
+    plan.push_back(p);
+  };
+  if (names.empty())
+    for (const auto& [name, model] : models()) add_model(*model);
+  for (const std::string& name : names) add_model(find_model(name));
+  return plan;
+}
+
+std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>& needs) {
+  std::map<std::string, std::vector<const MaterialNeed*>> by_model;
+  for (const MaterialNeed& need : needs) by_model[need.model->info().name].push_back(&need);
+  std::vector<PlannedModel> plan;
+  for (const auto& [name, list] : by_model) plan.push_back(plan_model(*list.front()->model, list));
+  return plan;
+}
+
+AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues& fixed) {
+  if (fixed.empty()) return table;
+  AlbedoTable out = table;
+  out.grids.clear();
+  const std::vector<Choices> combinations = choice_combinations(model.info());
+  for (std::size_t i = 0; i < combinations.size(); ++i) {
+    std::vector<AlbedoTerm> terms;
+    if (admits(model.info(), combinations[i], fixed)) {
+      // Terms with the same free colours over the same axes are one.
+      std::vector<std::pair<AlbedoTerm, AlbedoGrid>> parts;
+      for (const AlbedoTerm& t : table.terms.at(i)) {
+        AlbedoTerm term = t;
+        AlbedoGrid grid = sliced(table.grids.at(std::size_t(t.grid)), fixed);
+        term.colors.clear();
+        for (const std::string& c : t.colors) {
+          const auto it = fixed.find(c);
+          if (it == fixed.end())
+            term.colors.push_back(c);
+          else
+            multiply(grid, std::get<std::array<double, 3>>(it->second));
+        }
+        const auto like = std::find_if(parts.begin(), parts.end(), [&](const auto& p) {
+          return p.first.colors == term.colors && p.first.mirror == term.mirror && same_axes(p.second, grid);
+        });
+        if (like == parts.end())
+          parts.emplace_back(term, std::move(grid));
+        else
+          add(like->second, std::move(grid));
+      }
+      for (auto& [term, grid] : parts) {
+        if (std::all_of(grid.values.begin(), grid.values.end(), [](float v) { return v == 0; })) continue;
+        const auto known = std::find_if(out.grids.begin(), out.grids.end(), [&, &g = grid](const AlbedoGrid& k) {
+          return k.channels == g.channels && k.values == g.values && same_axes(k, g);
+        });
+        term.grid = int(known - out.grids.begin());
+        if (known == out.grids.end()) out.grids.push_back(std::move(grid));
+        terms.push_back(term);
+      }
+    }
+    out.terms[i] = std::move(terms);
+  }
+  return out;
+}
+
+}  // namespace brdfc

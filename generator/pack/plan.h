@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What of each model a pack holds: everything, or only what the materials of a scene need.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "analysis/albedo_table.h"
+#include "represent/representation.h"
+
+namespace brdfc {
+
+/// A material as a scene uses it.
+struct MaterialNeed {
+  std::string id;
+  const Model* model = nullptr;
+  ParamValues values;              ///< complete
+  std::set<std::string> textured;  ///< parameters that vary over the surface
+  std::string representation = "auto";
+  int lobes = kDefaultLobes;  ///< directions a sampled form draws
+};
+
+/// What a pack holds of one model.
+struct PlannedModel {
+  const Model* model = nullptr;
+  std::vector<std::string> materials;     ///< that need it; none in a pack of everything
+  ParamValues fixed;                      ///< folded into shaders and tables: no sockets
+  std::vector<RepresentationKind> forms;  ///< preferred first
+  int max_lobes = kMaxLobes;              ///< of sampled forms
+  std::vector<std::string> reasons;       ///< why something is left out, a line each
+};
+
+/// Whole models in every form. Throws InputError for an unknown name; no names: every model.
+std::vector<PlannedModel> plan_models(const std::vector<std::string>& names);
+
+/// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same
+/// constant is fixed, a form that none uses is left out. Throws InputError naming the material for a representation
+/// that its model does not have.
+std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&);
+
+/// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and
+/// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out.
+AlbedoTable fold(const AlbedoTable&, const Model&, const ParamValues& fixed);
+
+/// Whether a combination of choices agrees with the fixed values.
+bool admits(const ModelInfo&, const Choices&, const ParamValues& fixed);
+
+}  // namespace brdfc

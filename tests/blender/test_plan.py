@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An extension cut to a scene renders the same picture, holds less, and says what it lacks."""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import read_picture
+
+ROOT = Path(__file__).parents[2]
+DRIVER = ROOT / "script" / "render_scene.py"
+#: Scenes with isotropic material of one model, and with four models.
+SCENES = ["gl-fig8-radziszewski_alda", pytest.param("small-lamp", marks=pytest.mark.full)]
+
+
+def shaders_and_tables(extension_zip):
+    """Bytes, uncompressed; the manifest holds the tables that the panel reads."""
+    with zipfile.ZipFile(extension_zip) as archive:
+        return sum(
+            i.file_size
+            for i in archive.infolist()
+            if i.filename.startswith(("shaders/", "tables/")) or i.filename == "manifest.json"
+        )
+
+
+def render(extension_zip, scene, out):
+    command = [sys.executable, DRIVER, "--extension", extension_zip, "--scene", scene, "--out", out]
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=os.environ)
+    return done
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_path, name):
+    content = json.loads((ROOT / "scenes" / f"{name}.json").read_text())
+    content["settings"] |= {"width": 48, "height": 48, "spp": 16}
+    source = tmp_path / f"{name}.json"
+    source.write_text(json.dumps(content))
+    why = json.loads(tool("build", "--scene", source, "--out", tmp_path / "cut", "--explain"))
+    cut = next((tmp_path / "cut").glob("*.zip"))
+    used = {m["model"] for m in content["materials"].values()}
+    assert {m["model"] for m in why["models"]} == used
+    assert used.isdisjoint(why["unused_models"])
+    for model in why["models"]:
+        assert set(model["fixed"]).isdisjoint(model["free"])
+        for form in model["forms"]:
+            assert form["after"]["operations"] <= form["before"]["operations"]
+            assert form["after"]["closures"] <= form["before"]["closures"]
+
+    tool("scene", source, "--out", tmp_path / "scene")
+    scene = tmp_path / "scene" / "scene.json"
+    pictures = []
+    for pack in (extension_zip, cut):
+        out = tmp_path / f"{len(pictures)}.exr"
+        done = render(pack, scene, out)
+        assert done.returncode == 0, done.stderr
+        pictures.append(read_picture(out)[..., :3])
+    whole, lean = pictures
+    assert whole.mean() > 0.01
+    # The same random numbers; folding rounds once where the shader rounded twice, and a sharp
+    # reflection at the edge of something bright may fall on its other side.
+    off = np.abs(whole - lean) > 1e-3 * (1 + whole)
+    assert off.any(axis=-1).mean() < 0.01
+    assert abs(lean.mean() / whole.mean() - 1) < 1e-3
+    if len(used) == 1:
+        assert shaders_and_tables(cut) <= shaders_and_tables(extension_zip) / 10
+
+
+def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):
+    source = tmp_path / "s.json"
+    content = json.loads((ROOT / "scenes" / "gl-fig8-radziszewski_alda.json").read_text())
+    source.write_text(json.dumps(content))
+    tool("build", "--scene", source, "--out", tmp_path / "cut", "--explain")
+    cut = next((tmp_path / "cut").glob("*.zip"))
+    for material in content["materials"].values():
+        material["parameters"] = material.get("parameters", {}) | {"n": 3}
+    source.write_text(json.dumps(content))
+    tool("scene", source, "--out", tmp_path / "scene")
+    done = render(cut, tmp_path / "scene" / "scene.json", tmp_path / "a.exr")
+    assert done.returncode == 2
+    assert "radziszewski_alda.n" in done.stderr and "built for one scene" in done.stderr
+    assert not (tmp_path / "a.exr").exists()

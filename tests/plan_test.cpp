@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A pack cut to a scene holds what its materials need, and computes the same.
+#include "pack/plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pack/shader.h"
+
+namespace brdfc {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+MaterialNeed need(const std::string& id, const std::string& model, const std::vector<std::string>& values,
+                  const std::string& representation = "auto") {
+  const Model& m = find_model(model);
+  return {id, &m, parse_values(m.info(), values), {}, representation, kDefaultLobes};
+}
+
+TEST(Plan, EverythingIsEveryModelInEveryForm) {
+  const auto plan = plan_models({});
+  EXPECT_EQ(plan.size(), models().size());
+  for (const PlannedModel& p : plan) {
+    EXPECT_EQ(p.forms, representations(*p.model));
+    EXPECT_TRUE(p.fixed.empty() && p.reasons.empty());
+    EXPECT_EQ(p.max_lobes, kMaxLobes);
+  }
+  EXPECT_THROW(plan_models({"nonesuch"}), InputError);
+}
+
+TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {
+  auto textured = need("c", "coupled", {"r0=0.1", "rm=0.5"});
+  textured.textured.insert("rm");
+  const auto plan = plan_scene({need("b", "coupled", {"r0=0.1", "rm=0.5"}), textured, need("a", "lambert", {"rho=1"})});
+  ASSERT_EQ(plan.size(), 2u);
+  EXPECT_EQ(plan[0].model->info().name, "coupled");
+  EXPECT_THAT(plan[0].materials, ElementsAre("b", "c"));
+  EXPECT_EQ(plan[0].fixed.count("r0"), 1u);
+  EXPECT_EQ(plan[0].fixed.count("rm"), 0u) << "it varies over a surface";
+  EXPECT_THAT(plan[0].forms, ElementsAre(RepresentationKind::Exact));
+  EXPECT_EQ(plan[1].fixed.count("rho"), 1u);
+
+  const auto two = plan_scene({need("a", "lambert", {"rho=1"}), need("b", "lambert", {"rho=0.5"}, "sampled")});
+  EXPECT_TRUE(two[0].fixed.empty()) << "two values";
+  EXPECT_THAT(two[0].forms, ElementsAre(RepresentationKind::Exact, RepresentationKind::Sampled));
+  EXPECT_EQ(two[0].max_lobes, 1);
+}
+
+TEST(Plan, NamesTheMaterialWhoseFormDoesNotExist) {
+  try {
+    plan_scene({need("shiny", "radziszewski_alda", {}, "exact")});
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("material shiny"));
+  }
+}
+
+TEST(Plan, FoldedTablesInterpolateToTheSame) {
+  const Model& m = find_model("coupled");
+  const AlbedoTable whole = tabulate_albedo(m);
+  for (const std::vector<std::string>& fixed_text :
+       {std::vector<std::string>{"r0=0.137"}, {"rm=0.9,0.5,0.1"}, {"r0=0.137", "rm=0.9,0.5,0.1"}}) {
+    const ParamValues all = parse_values(m.info(), {"r0=0.137", "rm=0.9,0.5,0.1"});
+    ParamValues fixed;
+    for (const std::string& t : fixed_text) fixed[t.substr(0, 2)] = all.at(t.substr(0, 2));
+    const AlbedoTable cut = fold(whole, m, fixed);
+    EXPECT_LE(cut.size(), 3 * whole.size());
+    for (const AlbedoGrid& g : cut.grids)
+      for (const TableAxis& a : g.axes) EXPECT_EQ(fixed.count(a.name), 0u);
+    for (const double c : {0.01, 0.3, 0.77, 1.0}) {
+      const Rgb<double> want = lookup(whole, m, all, c), got = lookup(cut, m, all, c);
+      EXPECT_NEAR(got.r, want.r, 1e-6) << fixed_text[0];
+      EXPECT_NEAR(got.g, want.g, 1e-6);
+      EXPECT_NEAR(got.b, want.b, 1e-6);
+    }
+  }
+}
+
+TEST(Plan, AShaderOfOneDirectionHasNoLobes) {
+  const Model& m = find_model("radziszewski_alda");
+  const AlbedoTable table = tabulate_albedo(m);
+  const Shader one = write_shader(m, RepresentationKind::Sampled, table, {}, 1),
+               all = write_shader(m, RepresentationKind::Sampled, table);
+  EXPECT_EQ(one.closures, 1);
+  EXPECT_FALSE(one.lobes);
+  EXPECT_THAT(one.source, Not(HasSubstr("Lobes")));
+  EXPECT_LT(one.source.size(), all.source.size());
+}
+
+}  // namespace
+}  // namespace brdfc
