@@ -243,7 +243,8 @@ TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   const PackResult pack = build_pack(options(temp.path()));
   const std::string before = read(pack.zip);
   PackOptions bad = options(temp.path());
-  bad.models[0].fixed["rho"] = 7.;  // refused when the shader is written, after the build has begun
+  bad.models[0].fixed["rho"] =
+      std::array<double, 3>{7, 7, 7};  // refused when the shader is written, after the build has begun
   EXPECT_THROW(build_pack(bad), InputError);
   bad = options(temp.path());
   bad.addon = temp.path() / "nowhere";
