@@ -311,6 +311,15 @@ TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
   EXPECT_THAT(load_error(), HasSubstr("convergence[0].form"));
 }
 
+TEST_F(ReportTest, EqualTimeTakesTheImagesThatFit) {
+  // The exact form costs 1.5 times as much: 4 / 1.5 = 2.7 images, of whose mean the noise is 4 / 3 that of all four.
+  const auto scenes = load();
+  const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
+  EXPECT_EQ(glossy.equal_time_images, 4);
+  EXPECT_EQ(exact.equal_time_images, 3);
+  EXPECT_NEAR(exact.equal_time.rel_mse / exact.difference.rel_mse, 4. / 3, 0.1);
+}
+
 TEST_F(ReportTest, ReadsFlipBesideTheRuns) {
   std::ofstream(folder_ / "ball/flip.json") << R"({"exact": 0.25})";
   const auto scenes = load();

@@ -98,7 +98,10 @@ Costs read_costs(const fs::path& path) {
 }
 
 Json error_json(const RepresentationError& e) {
-  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()}, {"albedo", e.albedo}, {"note", e.note}};
+  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
+          {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
+          {"albedo", e.albedo},
+          {"note", e.note}};
 }
 
 /// What a user must know of a form; the add-on turns each into words where it applies.

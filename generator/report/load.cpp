@@ -53,7 +53,13 @@ MaterialForm read_material(const JsonView& view) {
   return m;
 }
 
-FormReport read_form(const fs::path& folder, const JsonView& view, const SceneReport& scene) {
+/// A form and its images, which are needed until the costs are known.
+struct FormImages {
+  FormReport form;
+  std::vector<Rendering> pictures;
+};
+
+FormImages read_form(const fs::path& folder, const JsonView& view, const SceneReport& scene) {
   FormReport form;
   form.form = view.at("form").text();
   // It becomes part of file names.
@@ -80,7 +86,18 @@ FormReport read_form(const fs::path& folder, const JsonView& view, const SceneRe
                            (folder / scene.reference_image).string());
   form.difference = measure_difference(form.picture, scene.reference, (folder / form.images.front()).string(),
                                        (folder / scene.reference_image).string());
-  return form;
+  return {std::move(form), std::move(pictures)};
+}
+
+/// Of forms that cost more than the Glossy node fewer images fit into its time; cheaper ones have no more than were
+/// made.
+void set_equal_time(FormReport& form, const std::vector<Rendering>& pictures, const SceneReport& scene) {
+  if (!form.cost || !(*form.cost > 0)) return;
+  const double count = double(pictures.size());
+  form.equal_time_images = int(std::clamp(std::round(count / *form.cost), 1.0, count));
+  form.equal_time_picture = mean_of({pictures.data(), std::size_t(form.equal_time_images)});
+  form.equal_time =
+      measure_difference(form.equal_time_picture, scene.reference, form.images.front(), scene.reference_image);
 }
 
 /// Times are paired by index: what slows the machine for a while slows both of a pair.
@@ -186,12 +203,16 @@ SceneReport load_scene(const fs::path& folder) {
 
   std::set<std::string> seen;
   const JsonView runs = top.at("runs");
+  std::vector<std::vector<Rendering>> pictures;
   for (const JsonView& run : runs.elements()) {
-    scene.forms.push_back(read_form(folder, run, scene));
+    FormImages read = read_form(folder, run, scene);
+    scene.forms.push_back(std::move(read.form));
+    pictures.push_back(std::move(read.pictures));
     if (!seen.insert(scene.forms.back().form).second) run.at("form").fail("each form once");
   }
   if (scene.forms.empty()) runs.fail("at least one form");
   set_costs(scene.forms);
+  for (std::size_t i = 0; i < scene.forms.size(); ++i) set_equal_time(scene.forms[i], pictures[i], scene);
   if (const auto convergence = top.find("convergence")) {
     for (const JsonView& point : convergence->elements()) {
       const std::string name = point.at("form").text();

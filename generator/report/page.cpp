@@ -208,9 +208,12 @@ void put_scene(std::string& out, const SceneReport& s, const Previews& p) {
         picture, picture, escaped(label(f)), s.width, s.height, escaped(p.reference));
     put(out, "<a href=\"{}\"><img src=\"{}\" alt=\"{} minus reference\" width=\"{}\" height=\"{}\"></a>\n", difference,
         difference, escaped(label(f)), s.width, s.height);
-    put(out, "<figcaption><b>{}</b>{}{}<br>relMSE {} (noise {}), mean {}, CPU {}{}</figcaption></figure>\n",
+    put(out, "<figcaption><b>{}</b>{}{}<br>relMSE {} (noise {}), mean {}, CPU {}{}{}</figcaption></figure>\n",
         escaped(label(f)), f.materials.empty() ? "" : "<br>", escaped(models_of(f)), scientific(f.difference.rel_mse),
         scientific(f.difference.noise), bias(f.difference), or_dash(f.cost, cost(f) + "\xc3\x97"),
+        f.equal_time_images > 0 ? fmt::format("<br><a href=\"{}\">in the Glossy node's time</a>: relMSE {}",
+                                              escaped(p.forms[i].equal_time), scientific(f.equal_time.rel_mse))
+                                : std::string(),
         p.forms[i].p_values.empty() ? std::string()
                                     : fmt::format("<br><a href=\"{}\">p-values</a>: {} of the pixels",
                                                   escaped(p.forms[i].p_values), accepted(f)));
@@ -239,6 +242,8 @@ is agreement, dark patches are not.</dd>
 <dt>CPU time / Glossy node</dt><dd>A diamond marks the forms that no other beats in both error and time. Median over the seeds of the CPU time of rendering, divided by that of the same scene with
 Blender's own Glossy node on every material, rendered in turns in the same process.</dd>
 <dt>Closures</dt><dd>The most closures a point of any material gives to Cycles.</dd>
+<dt>In the Glossy node's time</dt><dd>The mean of as many of the form's pictures as fit into the CPU time of all pictures
+of the Glossy node: what one gets for the same wait.</dd>
 <dt>CPU time to equal error</dt><dd>Until the form's noise is as small as that of Blender's Glossy node with 16, 256 or 1024
 samples a pixel, in units of the time which that takes.</dd>
 <dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Sampled forms are exact in

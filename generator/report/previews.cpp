@@ -63,10 +63,13 @@ Previews write_previews(const fs::path& folder, const SceneReport& scene) {
   write_preview(folder / out.reference, reference, out.exposure);
   for (const FormReport& form : scene.forms) {
     const std::string stem = scene.scene + "/" + form.form;
-    out.forms.push_back({stem + ".png", stem + "-difference.png", form.test ? stem + "-p-values.png" : ""});
+    out.forms.push_back({stem + ".png", stem + "-difference.png", form.test ? stem + "-p-values.png" : "",
+                         form.equal_time_images > 0 ? stem + "-equal-time.png" : ""});
     write_preview(folder / out.forms.back().picture, form.picture.mean, out.exposure);
     write_display(folder / out.forms.back().difference,
                   difference_image(form.picture.mean, reference, out.difference_at / mean));
+    if (form.equal_time_images > 0)
+      write_preview(folder / out.forms.back().equal_time, form.equal_time_picture.mean, out.exposure);
     if (form.test) write_display(folder / out.forms.back().p_values, form.test->p);
   }
   return out;

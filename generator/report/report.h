@@ -79,6 +79,11 @@ struct FormReport {
   std::vector<ConvergencePoint> convergence;  ///< by increasing samples
   /// CPU time to the noise that Blender's Glossy node has with kEqualErrorAt samples, in units of the time that takes.
   std::vector<std::optional<double>> equal_error;
+  /// What the time that Blender's Glossy node takes for all its images is enough for: this many of them, their mean
+  /// and its difference from the reference. 0 if the cost is not known.
+  int equal_time_images = 0;
+  Rendering equal_time_picture;
+  Difference equal_time;
   std::optional<double> cost;  ///< CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered
   Rendering picture;           ///< mean of the images
 
@@ -107,7 +112,8 @@ std::vector<SceneReport> load_report(const std::filesystem::path& folder);
 struct Previews {
   struct Form {
     std::string picture, difference;
-    std::string p_values;  ///< empty if there was no test
+    std::string p_values;    ///< empty if there was no test
+    std::string equal_time;  ///< empty if that is not known
   };
   std::string reference;
   std::vector<Form> forms;   ///< in the order of the scene's forms

@@ -36,6 +36,9 @@ ordered_json form_json(const FormReport& f) {
           {"test", f.test ? to_json(*f.test) : ordered_json()},
           {"cost", or_null(f.cost)},
           {"equal_error_cost", equal_error},
+          {"equal_time", f.equal_time_images > 0
+                             ? ordered_json{{"images", f.equal_time_images}, {"rel_mse", f.equal_time.rel_mse}}
+                             : ordered_json()},
           {"convergence", convergence},
           {"spp", f.spp},
           {"closures", or_null(f.closures())},

@@ -160,7 +160,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);
-  double difference = 0, total = 0, albedo_error = 0;
+  double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;
   for (const Choices& choices : choice_combinations(model.info())) {
     // The recording does not depend on the values, so one serves all parameter sets.
     Recorder recorder;
@@ -208,6 +208,8 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
           const Rgb<double> d = evaluate(closures, wi, wo) - f_cos;
           difference += std::abs(d.r) + std::abs(d.g) + std::abs(d.b);
           total += f_cos.r + f_cos.g + f_cos.b;
+          squared_difference += sqr(d.r) + sqr(d.g) + sqr(d.b);
+          squared_total += sqr(f_cos.r) + sqr(f_cos.g) + sqr(f_cos.b);
           albedo_difference += d * (kPi / wi.z / kPoints);
         } else {
           // The same numbers drive both, so that what differs is the arithmetic and not the noise.
@@ -226,8 +228,9 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
     }
   }
   if (kind == RepresentationKind::Exact)
-    return {total > 0 ? difference / total : 0, albedo_error, "closures equal the model; what is left is rounding"};
-  return {std::nullopt, albedo_error, "equals the model in expectation, with the noise of sampling it"};
+    return {total > 0 ? difference / total : 0, squared_total > 0 ? std::sqrt(squared_difference / squared_total) : 0,
+            albedo_error, "closures equal the model; what is left is rounding"};
+  return {std::nullopt, std::nullopt, albedo_error, "equals the model in expectation, with the noise of sampling it"};
 }
 
 }  // namespace brdfc

@@ -51,6 +51,7 @@ Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
 /// The measured error of a form against the model.
 struct RepresentationError {
   std::optional<double> relative_l1;  ///< of f cos over directions and parameters; none if equal in expectation only
+  std::optional<double> relative_l2;  ///< the same, root of the sums of squares
   double albedo = 0;                  ///< largest |albedo - quadrature| as executed in single precision
   std::string note;
 };
