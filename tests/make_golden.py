@@ -3,7 +3,8 @@
 
 The formulas are typed in from the papers as printed (with their errata, see the models'
 headers) and evaluated with mpmath in as many digits as they need; albedos are integrated by
-mpmath. Run it after adding a model:  python3 tests/make_golden.py
+mpmath. Run it after adding a model:  python3 tests/make_golden.py [MODEL...]
+With models named, the rows of the others stay as they are.
 
 A row's tolerance is what the rounding of its inputs to double precision can cause (measured
 here, by moving each input by half a unit in the last place), times a small factor, plus a floor.
@@ -12,6 +13,7 @@ here, by moving each input by half a unit in the last place), times a small fact
 import csv
 import math
 import random
+import sys
 from pathlib import Path
 
 import mpmath as mp
@@ -325,6 +327,411 @@ def conductor_albedo(p, cos_o):
     return [fresnel(cos_o, mp.mpc(p[f"n_{c}"], p[f"k_{c}"])) for c in "rgb"]
 
 
+# ---- Lobes around the mirror direction: Phong, modified Phong, max-Phong ------------------------
+
+
+def mirror_cosine(wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    return max(ki[2] * ko[2] - ki[0] * ko[0] - ki[1] * ko[1], mp.mpf(0))
+
+
+def phong_lobe(p, wi, wo):
+    c = mirror_cosine(wi, wo)
+    return c ** p["e"] if c > 0 else mp.mpf(0)
+
+
+def phong_f(p, wi, wo):
+    return [k * phong_lobe(p, wi, wo) / vec(wi)[2] for k in p["ks"]]
+
+
+def modified_phong_f(p, wi, wo):
+    return [k * (mp.mpf(p["e"]) + 2) / (2 * mp.pi) * phong_lobe(p, wi, wo) for k in p["ks"]]
+
+
+def max_phong_f(p, wi, wo):
+    larger = max(vec(wi)[2], vec(wo)[2])
+    return [k * phong_pdf(p, wi, wo) / larger for k in p["ks"]]
+
+
+def phong_pdf(p, wi, wo):
+    return (mp.mpf(p["e"]) + 1) / (2 * mp.pi) * phong_lobe(p, wi, wo)
+
+
+def lobe_albedo(e, axis_cos, ring, breaks=()):
+    """Integral over directions above the horizon of cos^e alpha times a function of cos theta_i.
+
+    ring(up, side, a) is that function's integral over the circle at alpha, where
+    cos theta_i = up + side cos b, for |b| < a."""
+    c, s = mp.mpf(axis_cos), mp.sqrt(1 - mp.mpf(axis_cos) ** 2)
+
+    def circle(t):
+        up, side = mp.cos(t) * c, mp.sin(t) * s
+        if up >= side:
+            a = mp.pi
+        else:
+            a = mp.acos(-up / side)
+        return mp.sin(t) * mp.cos(t) ** e * ring(up, side, a)
+
+    width = 4 / mp.sqrt(e + 1)
+    cuts = {mp.mpf(0), mp.pi / 2, mp.asin(c), *breaks}
+    cuts |= {k * width for k in (0.25, 0.5, 1, 2)}
+    return mp.quad(circle, sorted(t for t in cuts if 0 <= t <= mp.pi / 2))
+
+
+def phong_albedo(p, cos_o):
+    a = lobe_albedo(p["e"], cos_o, lambda up, side, a: 2 * a)
+    return [k * a for k in p["ks"]]
+
+
+def modified_phong_albedo(p, cos_o):
+    def ring(up, side, a):
+        return 2 * (up * a + side * mp.sin(a))
+
+    e = p["e"]
+    a = (e + 2) / (2 * mp.pi) * lobe_albedo(e, cos_o, ring)
+    return [k * a for k in p["ks"]]
+
+
+def max_phong_albedo(p, cos_o):
+    """The integral of min(1, cos theta_i / cos theta_o)."""
+    o = mp.mpf(cos_o)
+
+    def ring(up, side, a):
+        if side == 0:
+            return 2 * a * min(mp.mpf(1), up / o)
+        b = mp.acos(min(max((o - up) / side, mp.mpf(-1)), mp.mpf(1)))
+        b = min(b, a)
+        return 2 * (b + (up * (a - b) + side * (mp.sin(a) - mp.sin(b))) / o)
+
+    e = p["e"]
+    double = 2 * mp.acos(o)
+    kink = [double] if double < mp.pi / 2 else []
+    a = (e + 1) / (2 * mp.pi) * lobe_albedo(e, cos_o, ring, kink)
+    return [k * a for k in p["ks"]]
+
+
+# ---- Blinn; Cook and Torrance ------------------------------------------------------------------
+
+
+def half(wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    h = unit([a + b for a, b in zip(ki, ko, strict=True)])
+    return ki, ko, h, dot(h, ko)
+
+
+def cavity(hn, oh, ni, no):
+    return min(1, 2 * hn * ni / oh, 2 * hn * no / oh)
+
+
+def blinn_d(p, hn):
+    e = mp.mpf(p["e"])
+    return (e + 2) / (2 * mp.pi) * hn**e
+
+
+# Mitsuba 3.9's Beckmann distribution agrees with beckmann_d, and stretched with ward_gaussian, to
+# single precision (1.5e-6).
+def beckmann_d(p, hn):
+    m2 = mp.mpf(p["m"]) ** 2
+    return mp.exp(-(1 - hn**2) / hn**2 / m2) / (mp.pi * m2 * hn**4)
+
+
+def facet_f(d, fresnel):
+    def f(p, wi, wo):
+        ki, ko, h, oh = half(wi, wo)
+        g = cavity(h[2], oh, ki[2], ko[2])
+        shape = d(p, h[2]) * g / (4 * ki[2] * ko[2])
+        return [c * shape for c in fresnel(p, oh)]
+
+    return f
+
+
+def facet_pdf(d):
+    """Facets drawn from D (n.h), reflected."""
+
+    def pdf(p, wi, wo):
+        _, _, h, oh = half(wi, wo)
+        return d(p, h[2]) * h[2] / (4 * oh)
+
+    return pdf
+
+
+def blinn_fresnel(p, oh):
+    return p["ks"]
+
+
+def schlick_fresnel(name):
+    return lambda p, oh: [r + (1 - r) * (1 - oh) ** 5 for r in p[name]]
+
+
+def half_albedo(density, width):
+    """Albedo over half vectors, by Gauss-Legendre panels that close in on the lobe and on kinks:
+    density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h."""
+
+    def albedo(p, cos_o):
+        sin_o = math.sqrt(1 - cos_o**2)
+        wide = width(p)
+
+        def ring(phi):
+            c = math.cos(phi)
+
+            def at(t):
+                hn, s = math.cos(t), math.sin(t)
+                oh = sin_o * s * c + cos_o * hn
+                return hn, oh, 2 * oh * hn - cos_o, s
+
+            def levels(t):
+                hn, oh, ni, _ = at(t)
+                return ni, ni - cos_o, 2 * hn * ni - oh, 2 * hn * cos_o - oh
+
+            # Roots of the conditions at which the integrand has a kink or ends.
+            grid = [k * math.pi / 2 / 256 for k in range(257)]
+            values = [levels(t) for t in grid]
+            cuts = {0.0, math.pi / 2, *(k * wide for k in (0.5, 1, 2, 4, 8))}
+            for j in range(4):
+                for a, b, va, vb in zip(grid, grid[1:], values, values[1:], strict=False):
+                    if va[j] * vb[j] < 0:
+                        for _ in range(48):
+                            m = (a + b) / 2
+                            if levels(m)[j] * va[j] > 0:
+                                a = m
+                            else:
+                                b = m
+                        cuts.add(a)
+                        # Towards the horizon there may be a root, of which all derivatives grow.
+                        cuts |= {a + d * 10.0**-k for k in (1, 2, 3, 4) for d in (-1, 1) if j == 0}
+            ends = sorted(t for t in cuts if 0 <= t <= math.pi / 2)
+            total = 0.0
+            for a, b in zip(ends, ends[1:], strict=False):
+                for x, w in GAUSS:
+                    t = a + (b - a) * x
+                    hn, oh, ni, s = at(t)
+                    if oh > 0 and ni > 0:
+                        total += w * (b - a) * s * density(p, hn, oh, ni, cos_o, phi)
+            return total
+
+        panels = 96
+        total = 0.0
+        for i in range(panels):
+            for x, w in GAUSS:
+                total += w * math.pi / panels * ring((i + x) * math.pi / panels)
+        return 2 * total
+
+    return albedo
+
+
+def gauss_legendre(n):
+    """Nodes and weights on [0, 1]."""
+    out = []
+    for k in range(n):
+        x = mp.cos(mp.pi * (k + 0.75) / (n + 0.5))
+        for _ in range(8):  # Newton
+            d = n * (x * mp.legendre(n, x) - mp.legendre(n - 1, x)) / (x * x - 1)
+            x -= mp.legendre(n, x) / d
+        out.append((float((1 + x) / 2), float(1 / ((1 - x * x) * d * d))))
+    return out
+
+
+GAUSS = gauss_legendre(12)
+
+
+def facet_albedo(d, fresnel, width):
+    def one(p, hn, oh, ni, no, phi):
+        return d(p, hn) * cavity(hn, oh, ni, no) * oh / no * fresnel(p, oh)[0]
+
+    return lambda p, c: [half_albedo(one, width)(p, c)] * 3
+
+
+def blinn_d_fp(p, hn):
+    return (p["e"] + 2) / (2 * math.pi) * hn ** p["e"]
+
+
+def beckmann_d_fp(p, hn):
+    m2 = p["m"] ** 2
+    return math.exp(-(1 - hn**2) / hn**2 / m2) / (math.pi * m2 * hn**4)
+
+
+# ---- Ward, in three normalisations -------------------------------------------------------------
+
+
+def ward_gaussian(p, h):
+    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    exponent = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
+    return mp.exp(-exponent) / (4 * mp.pi * ax * ay)
+
+
+def ward_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    norm = {
+        "bounded": oh**2 * h[2] ** 4,
+        "duer": ki[2] * ko[2],
+        "ward": mp.sqrt(ki[2] * ko[2]),
+    }[p["normalisation"]]
+    return [k * ward_gaussian(p, h) / norm for k in p["ks"]]
+
+
+def ward_pdf(p, wi, wo):
+    _, _, h, oh = half(wi, wo)
+    return ward_gaussian(p, h) / (oh * h[2] ** 3)
+
+
+def ward_albedo(p, cos_o):
+    """View in the x-z plane, over half vectors."""
+
+    def one(p, hn, oh, ni, no, phi):
+        s2 = (1 - hn**2) / hn**2
+        q = (math.cos(phi) / p["ax"]) ** 2 + (math.sin(phi) / p["ay"]) ** 2
+        g = math.exp(-s2 * q) / (math.pi * p["ax"] * p["ay"])
+        norm = {"bounded": oh**2 * hn**4, "duer": ni * no, "ward": math.sqrt(ni * no)}
+        return g / norm[p["normalisation"]] * ni * oh
+
+    a = half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)
+    return [k * a for k in p["ks"]]
+
+
+# ---- Schlick -----------------------------------------------------------------------------------
+
+
+def schlick_shares(p):
+    s = mp.mpf(p["rough"])
+    b = 4 * s * (1 - s)
+    return (0, b, 1 - b) if s < 0.5 else (1 - b, b, 0)
+
+
+def schlick_parts(p, h):
+    """Z(t) and A(w)."""
+    s, iso, t = mp.mpf(p["rough"]), mp.mpf(p["p"]), h[2]
+    z = s / (1 + s * t**2 - t**2) ** 2
+    w2 = h[0] ** 2 / (h[0] ** 2 + h[1] ** 2)
+    return z, mp.sqrt(iso / (iso**2 - iso**2 * w2 + w2))
+
+
+def schlick_g(p, v):
+    s = mp.mpf(p["rough"])
+    return v / (s - s * v + v)
+
+
+def schlick_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    a, b, _ = schlick_shares(p)
+    z, aw = schlick_parts(p, h)
+    g = schlick_g(p, ki[2]) * schlick_g(p, ko[2])
+    shape = a / mp.pi + b * g * z * aw / (4 * mp.pi * ki[2] * ko[2])
+    return [c * shape for c in schlick_fresnel("r")(p, oh)]
+
+
+def schlick_pdf(p, wi, wo):
+    """Of the glossy lobe, where it is alone: half vectors by Z, azimuths by the mean of a circle's
+    and of a squeezed circle's."""
+    a, _, _ = schlick_shares(p)
+    if a:
+        return None
+    _, _, h, oh = half(wi, wo)
+    z, _ = schlick_parts(p, h)
+    iso = mp.mpf(p["p"])
+    w2 = h[0] ** 2 / (h[0] ** 2 + h[1] ** 2)
+    squeezed = iso / (iso**2 * (1 - w2) + w2)
+    return z * h[2] / mp.pi * (1 + squeezed) / 2 / (4 * oh)
+
+
+def schlick_albedo(p, cos_o):
+    """View in the x-z plane."""
+    s, iso, r = p["rough"], p["p"], p["r"][0]
+    a, b, c = (float(x) for x in schlick_shares(p))
+
+    def one(p, hn, oh, ni, no, phi):
+        z = s / (1 + s * hn**2 - hn**2) ** 2
+        w2 = math.cos(phi) ** 2
+        aw = math.sqrt(iso / (iso**2 * (1 - w2) + w2))
+        g = 1 / (s - s * ni + ni) / (s - s * no + no)
+        fresnel = r + (1 - r) * (1 - oh) ** 5
+        return fresnel * (a / math.pi + b / (4 * math.pi) * g * z * aw) * ni * 4 * oh
+
+    mirror = c * (r + (1 - r) * (1 - cos_o) ** 5)
+    return [half_albedo(one, lambda p: math.sqrt(s))(p, cos_o) + mirror] * 3
+
+
+# ---- Oren and Nayar ----------------------------------------------------------------------------
+
+
+def oren_nayar_terms(p, ti, to, c, lib):
+    """What rho / pi and rho^2 / pi are multiplied with, as printed: a formula of angles."""
+    s2 = p["sigma"] * p["sigma"]
+    al, be = max(ti, to), min(ti, to)
+    c1 = 1 - 0.5 * s2 / (s2 + 0.33)
+    k = s2 / (s2 + 0.09)
+    if p["form"] == "qualitative":
+        return c1 + 0.45 * k * max(c, 0) * lib.sin(al) * lib.tan(be), 0 * c
+    c2 = 0.45 * k * (lib.sin(al) - (0 if c >= 0 else (2 * be / lib.pi) ** 3))
+    c3 = 0.125 * k * (4 * al * be / lib.pi**2) ** 2
+    l1 = c1 + c * c2 * lib.tan(be) + (1 - abs(c)) * c3 * lib.tan((al + be) / 2)
+    return l1, 0.17 * s2 / (s2 + 0.13) * (1 - c * (2 * be / lib.pi) ** 2)
+
+
+def oren_nayar_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    si, so = mp.hypot(ki[0], ki[1]), mp.hypot(ko[0], ko[1])
+    c = (ki[0] * ko[0] + ki[1] * ko[1]) / (si * so) if si * so > 0 else mp.mpf(1)
+    p = dict(p, sigma=mp.mpf(p["sigma"]))
+    l1, l2 = oren_nayar_terms(p, mp.atan2(si, ki[2]), mp.atan2(so, ko[2]), c, mp)
+    return [r * l1 / mp.pi + mp.mpf(r) ** 2 * l2 / mp.pi for r in p["rho"]]
+
+
+def oren_nayar_albedo(p, cos_o):
+    to = math.acos(cos_o)
+    direct = again = 0.0
+    cuts = [0.0, to / 2, to, (to + math.pi / 2) / 2, math.pi / 2]
+    for a, b in zip(cuts, cuts[1:], strict=False):
+        for x, w in GAUSS if b > a else ():
+            ti = a + (b - a) * x
+            for half_pi in (0, 1):  # the kink of |c| at a right angle
+                for y, v in GAUSS:
+                    phi = (half_pi + y) * math.pi / 2
+                    weight = w * (b - a) * v * math.pi * math.sin(ti) * math.cos(ti) / math.pi
+                    l1, l2 = oren_nayar_terms(p, ti, to, math.cos(phi), math)
+                    direct += weight * l1
+                    again += weight * l2
+    return [r * direct + r * r * again for r in p["rho"]]
+
+
+# ---- Lafortune ---------------------------------------------------------------------------------
+
+
+def lafortune_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    bracket = p["cxy"] * (ki[0] * ko[0] + ki[1] * ko[1]) + p["cz"] * ki[2] * ko[2]
+    e = mp.mpf(p["e"])
+    lobe = bracket**e if bracket > 0 else mp.mpf(0)
+    return [k * (e + 2) / (2 * mp.pi) * lobe for k in p["ks"]]
+
+
+def lafortune_axis(p, ko):
+    return [p["cxy"] * ko[0], p["cxy"] * ko[1], p["cz"] * ko[2]]
+
+
+def lafortune_pdf(p, wi, wo):
+    ki, axis = vec(wi), unit(lafortune_axis(p, vec(wo)))
+    e = mp.mpf(p["e"])
+    c = dot(ki, axis)
+    return (e + 1) / (2 * mp.pi) * (c**e if c > 0 else mp.mpf(0))
+
+
+def lafortune_albedo(p, cos_o):
+    """A modified Phong lobe about another axis, times |w|^e."""
+    w = lafortune_axis(p, [mp.sqrt(1 - mp.mpf(cos_o) ** 2), mp.mpf(0), mp.mpf(cos_o)])
+    size = mp.sqrt(dot(w, w))
+    a = modified_phong_albedo({"e": p["e"], "ks": (1, 1, 1)}, w[2] / size)[0]
+    return [k * a * size ** p["e"] for k in p["ks"]]
+
+
+PHONG_CASES = [
+    {"e": 0},
+    {"e": 1.5, "ks": (1, 1, 1)},
+    {"e": 20, "ks": (0.1, 0.5, 1)},
+    {"e": 300},
+    {"e": 10000},
+    {"e": 1e6},
+    {"e": 1e8},
+]
 MODELS = {
     "lambert": dict(
         f=lambert_f,
@@ -481,6 +888,122 @@ MODELS = {
         ],
         cosines=[1, 0.5, 0.1, 0.001],
     ),
+    "phong": dict(
+        f=phong_f,
+        pdf=phong_pdf,
+        albedo=phong_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 20},
+        cases=PHONG_CASES,
+        albedo_cases=PHONG_CASES[1:5],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "modified_phong": dict(
+        f=modified_phong_f,
+        pdf=phong_pdf,
+        albedo=modified_phong_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 20},
+        cases=PHONG_CASES,
+        albedo_cases=PHONG_CASES[1:5],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "max_phong": dict(
+        f=max_phong_f,
+        pdf=phong_pdf,
+        albedo=max_phong_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 20},
+        cases=PHONG_CASES,
+        albedo_cases=PHONG_CASES[1:5],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "blinn": dict(
+        f=facet_f(blinn_d, blinn_fresnel),
+        pdf=facet_pdf(blinn_d),
+        albedo=facet_albedo(blinn_d_fp, lambda p, oh: p["ks"], lambda p: 1 / math.sqrt(p["e"] + 2)),
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 50},
+        cases=PHONG_CASES,
+        albedo_cases=[{"e": 0}, {"e": 30, "ks": (1, 1, 1)}, {"e": 3000, "ks": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "cook_torrance": dict(
+        f=facet_f(beckmann_d, schlick_fresnel("f0")),
+        pdf=facet_pdf(beckmann_d),
+        albedo=facet_albedo(beckmann_d_fp, schlick_fresnel("f0"), lambda p: p["m"]),
+        defaults={"f0": (0.9, 0.6, 0.3), "m": 0.3},
+        cases=[{}, {"m": 1}, {"m": 0.05, "f0": (0, 0.04, 1)}, {"m": 1e-3}, {"m": 1e-4}],
+        albedo_cases=[
+            {"m": 1, "f0": (1, 1, 1)},
+            {"m": 0.3, "f0": (0.04, 0.04, 0.04)},
+            {"m": 0.05, "f0": (1, 1, 1)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "ward": dict(
+        f=ward_f,
+        pdf=ward_pdf,
+        albedo=ward_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "ax": 0.15, "ay": 0.15, "normalisation": "bounded"},
+        cases=[
+            {},
+            {"ax": 0.02, "ay": 0.5, "ks": (1, 0.5, 0.1)},
+            {"ax": 1, "ay": 1, "normalisation": "duer"},
+            {"ax": 0.3, "ay": 0.1, "normalisation": "ward"},
+            {"ax": 1e-4, "ay": 1e-4},
+            {"ax": 1e-4, "ay": 1, "normalisation": "duer"},
+        ],
+        albedo_cases=[
+            {"ks": (1, 1, 1)},
+            {"ax": 0.5, "ay": 0.5, "ks": (1, 1, 1), "normalisation": "ward"},
+            {"ax": 0.2, "ay": 0.4, "ks": (1, 1, 1), "normalisation": "duer"},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "schlick": dict(
+        f=schlick_f,
+        pdf=schlick_pdf,
+        albedo=schlick_albedo,
+        defaults={"r": (0.8, 0.8, 0.8), "p": 1, "rough": 0.2},
+        cases=[
+            {},
+            {"rough": 0.7, "p": 0.3, "r": (0, 0.5, 1)},
+            {"rough": 1},
+            {"rough": 0.01, "p": 0.1},
+            {"rough": 1e-8},
+        ],
+        albedo_cases=[
+            {"rough": 0.3, "r": (1, 1, 1)},
+            {"rough": 0.8, "p": 0.4, "r": (0.5, 0.5, 0.5)},
+            {"rough": 0.05, "r": (0, 0, 0)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "oren_nayar": dict(
+        f=oren_nayar_f,
+        pdf=lambda p, wi, wo: vec(wi)[2] / mp.pi,
+        albedo=oren_nayar_albedo,
+        defaults={"rho": (0.8, 0.8, 0.8), "sigma": 0.3, "form": "full"},
+        cases=[
+            {},
+            {"sigma": 0.66, "rho": (1, 0.5, 0.1)},
+            {"sigma": 1e-4},
+            {"form": "qualitative"},
+            {"form": "qualitative", "sigma": 0.6},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "lafortune": dict(
+        f=lafortune_f,
+        pdf=lafortune_pdf,
+        albedo=lafortune_albedo,
+        defaults={"cxy": -1, "cz": 0.8, "e": 10, "ks": (0.5, 0.5, 0.5)},
+        cases=[
+            {},
+            {"cxy": 1, "cz": 1, "e": 100, "ks": (1, 0.5, 0.1)},
+            {"cxy": -1, "cz": 1, "e": 300},
+            {"cxy": -0.7, "cz": 0.9, "e": 3},
+            {"cxy": 0, "cz": 1, "e": 1.5},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
 }
 
 
@@ -545,8 +1068,13 @@ def text(p):
 
 
 def main():
+    chosen = sys.argv[1:] or list(MODELS)
     rows = []
-    for name, m in MODELS.items():
+    if OUT.exists():
+        with OUT.open(newline="") as f:
+            rows = [row for row in list(csv.reader(f))[1:] if row[0] not in chosen]
+    for name in chosen:
+        m = MODELS[name]
         rng = random.Random(name)
         for case in m["cases"]:
             p = {**m["defaults"], **case}
@@ -577,6 +1105,7 @@ def main():
                     + ["1e-06"]
                 )
         print(name, len(rows))
+    rows.sort(key=lambda row: row[0])  # stable: the order within a model stays
     with OUT.open("w", newline="") as f:
         w = csv.writer(f, lineterminator="\n")
         w.writerow("model parameters kind wi_x wi_y wi_z wo_x wo_y wo_z r g b tolerance".split())

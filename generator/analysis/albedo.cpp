@@ -549,7 +549,8 @@ SampledAlbedo sampled_albedo(const Brdf<double>& brdf, double cos_theta_o, doubl
   }
   const double scale = 1. / (kReplicates * (kReplicates - 1));
   out.standard_error = std::sqrt(max_component(variance) * scale);
-  out.lost_error = std::sqrt(lost_variance * scale);
+  // At least a sample's worth: losses so rare that none came up would seem certain not to happen.
+  out.lost_error = std::max(std::sqrt(lost_variance * scale), 1. / count);
   return out;
 }
 

@@ -21,7 +21,7 @@ namespace {
 constexpr double kMinCos = 1e-3;
 // Interpolation is refined until its estimated error is below this, or the grid holds kMaxPoints.
 constexpr double kAimError = 3e-4;
-constexpr std::size_t kMaxPoints = 6000;
+constexpr std::size_t kMaxPoints = 6000, kMaxPoints4 = 14000;  // of up to three axes, of four
 // Two albedos that differ by less, and by less than seven times their own error, count as equal while axes are sought.
 constexpr double kSame = 1e-4;
 
@@ -67,7 +67,8 @@ Coordinate coordinate(const ParamInfo& p) {
   return c;
 }
 
-/// Coefficients of the polynomial in the colours: index = bits of the colours in the monomial.
+/// Coefficients of the polynomial in the colours, by monomial: index = powers of the colours as digits, the first
+/// colour's the lowest, each running to the colour's degree.
 struct Coefficients {
   std::vector<Rgb<double>> scattered, mirror;
   double error = 0;  // of each coefficient, one standard error
@@ -104,6 +105,7 @@ class Tabulator {
   }
 
   AlbedoTable run() {
+    study_degrees();
     study_azimuth();
     make_probes();
     for (const ParamValues& combination : combinations_) add_terms(combination);
@@ -130,27 +132,72 @@ class Tabulator {
     ParamValues values = values_at(combination, x);
     for (const std::string& c : colors_) values[c] = 0.5;
     const auto guide = model_.make_double(values);
-    const std::size_t corners = std::size_t(1) << colors_.size();
+    const std::size_t nodes = monomials();
     std::vector<std::unique_ptr<Brdf<double>>> models;
     std::vector<const Brdf<double>*> pointers;
-    for (std::size_t bits = 0; bits < corners; ++bits) {
-      for (std::size_t c = 0; c < colors_.size(); ++c) values[colors_[c]] = double(bits >> c & 1);
+    for (std::size_t k = 0; k < nodes; ++k) {
+      for (std::size_t c = 0; c < colors_.size(); ++c) values[colors_[c]] = double(power(k, c)) / degrees_[c];
       models.push_back(model_.make_double(values));
       pointers.push_back(models.back().get());
     }
     const std::string name = label(values_at(combination, x)) + " (colours 0, 0.5 or 1)";
     if (!depends_on_azimuth_ && !phi) phi = 0;
     const MeanAlbedo mean = mean_albedos(*guide, pointers, x[0], phi, name, samples, seed);
-    Coefficients out{mean.scattered, mean.mirror, mean.error * double(corners)};
-    // From values at the corners to coefficients of the monomials.
+    Coefficients out{mean.scattered, mean.mirror, mean.error * double(nodes)};
+    // From values at the colours 0, 1 or 0, 1/2, 1 to coefficients of the monomials.
     for (std::size_t c = 0; c < colors_.size(); ++c)
-      for (std::size_t k = 0; k < corners; ++k)
-        if (k >> c & 1) {
-          const std::size_t without = k & ~(std::size_t(1) << c);
-          out.scattered[k] = out.scattered[k] - out.scattered[without];
-          out.mirror[k] = out.mirror[k] - out.mirror[without];
+      for (std::size_t k = 0; k < nodes; ++k) {
+        if (power(k, c) != 0) continue;
+        for (std::vector<Rgb<double>>* v : {&out.scattered, &out.mirror}) {
+          const Rgb<double> f0 = (*v)[k], f1 = (*v)[k + stride(c)];
+          if (degrees_[c] == 1) {
+            (*v)[k + stride(c)] = f1 - f0;
+          } else {
+            const Rgb<double> f2 = (*v)[k + 2 * stride(c)];
+            (*v)[k + stride(c)] = f1 * 4. - f2 - f0 * 3.;
+            (*v)[k + 2 * stride(c)] = (f2 + f0 - f1 * 2.) * 2.;
+          }
         }
+      }
     return out;
+  }
+
+  /// How many powers the colours before c take up in an index of monomials.
+  std::size_t stride(std::size_t c) const {
+    std::size_t n = 1;
+    for (std::size_t i = 0; i < c; ++i) n *= std::size_t(degrees_[i] + 1);
+    return n;
+  }
+  std::size_t monomials() const { return stride(colors_.size()); }
+  int power(std::size_t monomial, std::size_t c) const {
+    return int(monomial / stride(c) % std::size_t(degrees_[c] + 1));
+  }
+
+  /// Colours whose half does not give the mean of 0 and 1 enter squared; prove() finds what is no polynomial at all.
+  void study_degrees() {
+    degrees_.assign(colors_.size(), 1);
+    std::mt19937_64 random(5);
+    for (const ParamValues& combination : combinations_)
+      for (int i = 0; i < 2; ++i) {
+        const Position x = random_position(random);
+        ParamValues values = values_at(combination, x);
+        for (const std::string& name : colors_) values[name] = 0.5;
+        const auto guide = model_.make_double(values);
+        for (std::size_t c = 0; c < colors_.size(); ++c) {
+          std::vector<std::unique_ptr<Brdf<double>>> models;
+          std::vector<const Brdf<double>*> pointers;
+          for (const double level : {0., 0.5, 1.}) {
+            ParamValues v = values;
+            v[colors_[c]] = level;
+            models.push_back(model_.make_double(v));
+            pointers.push_back(models.back().get());
+          }
+          const MeanAlbedo m = mean_albedos(*guide, pointers, x[0], 0, label(values), kGridSamples);
+          // The same samples for all three: what a straight line leaves is no noise.
+          for (const std::vector<Rgb<double>>& v : {m.scattered, m.mirror})
+            if (max_abs(v[0] + v[2] - v[1] * 2.) > 1e-9 * max_abs(v[0] + v[2])) degrees_[c] = 2;
+        }
+      }
   }
 
   static double distance(const Coefficients& a, const Coefficients& b) {
@@ -239,12 +286,15 @@ class Tabulator {
 
   struct NewTerm {
     bool mirror;
-    std::size_t bits;
+    std::size_t monomial;
     std::vector<std::size_t> axes;
   };
 
+  /// A mirror's weight is no mean of samples.
+  static double noise(const Coefficients& c, const NewTerm& t) { return t.mirror ? 0 : c.error; }
+
   Rgb<double> pick(const Coefficients& c, const NewTerm& t) const {
-    return t.mirror ? c.mirror[t.bits] : c.scattered[t.bits];
+    return t.mirror ? c.mirror[t.monomial] : c.scattered[t.monomial];
   }
 
   void add_terms(const ParamValues& combination) {
@@ -254,12 +304,11 @@ class Tabulator {
     for_all(places_.size(), [&](std::size_t i) { at_probe[i] = coefficients(combination, places_[i], kAllAzimuths); });
 
     std::vector<NewTerm> wanted;
-    const std::size_t corners = at_probe[0].scattered.size();
     for (int mirror = 0; mirror < 2; ++mirror)
-      for (std::size_t bits = 0; bits < corners; ++bits) wanted.push_back({mirror == 1, bits, {}});
+      for (std::size_t k = 0; k < monomials(); ++k) wanted.push_back({mirror == 1, k, {}});
     std::erase_if(wanted, [&](const NewTerm& t) {
       for (const Coefficients& c : at_probe)
-        if (max_abs(pick(c, t)) > 1e-9 + 7 * c.error) return false;
+        if (max_abs(pick(c, t)) > 1e-9 + 7 * noise(c, t)) return false;
       return true;
     });
 
@@ -268,7 +317,7 @@ class Tabulator {
     for (const NewTerm& t : wanted) {
       const int shared = find_shared(t, at_probe);
       if (shared >= 0)
-        terms.push_back({t.mirror, color_names(t.bits), shared});
+        terms.push_back({t.mirror, color_names(t.monomial), shared});
       else
         missing.push_back(t);
     }
@@ -284,7 +333,8 @@ class Tabulator {
         const Coefficients c = coefficients(combination, x, kAllAzimuths);
         const std::lock_guard lock(mutex);
         for (std::size_t t = 0; t < missing.size(); ++t)
-          if (max_abs(pick(c, missing[t]) - pick(at_probe[i], missing[t])) > kSame + 7 * (c.error + at_probe[i].error))
+          if (max_abs(pick(c, missing[t]) - pick(at_probe[i], missing[t])) >
+              kSame + 7 * (noise(c, missing[t]) + noise(at_probe[i], missing[t])))
             depends[t][p] = 1;
       });
       for (std::size_t t = 0; t < missing.size(); ++t)
@@ -295,17 +345,17 @@ class Tabulator {
         for (const NewTerm& t : missing) (t.axes == missing[0].axes ? group : rest).push_back(t);
         const std::vector<int> grids = tabulate(combination, group, at_probe);
         for (std::size_t i = 0; i < group.size(); ++i)
-          terms.push_back({group[i].mirror, color_names(group[i].bits), grids[i]});
+          terms.push_back({group[i].mirror, color_names(group[i].monomial), grids[i]});
         missing = std::move(rest);
       }
     }
     table_.terms.push_back(std::move(terms));
   }
 
-  std::vector<std::string> color_names(std::size_t bits) const {
+  std::vector<std::string> color_names(std::size_t monomial) const {
     std::vector<std::string> names;
     for (std::size_t c = 0; c < colors_.size(); ++c)
-      if (bits >> c & 1) names.push_back(colors_[c]);
+      for (int k = 0; k < power(monomial, c); ++k) names.push_back(colors_[c]);
     return names;
   }
 
@@ -314,7 +364,7 @@ class Tabulator {
     for (std::size_t g = 0; g < signatures_.size(); ++g) {
       bool same = true;
       for (std::size_t i = 0; i < at_probe.size(); ++i)
-        same = same && max_abs(pick(at_probe[i], t) - signatures_[g][i]) <= kSame + 14 * at_probe[i].error;
+        same = same && max_abs(pick(at_probe[i], t) - signatures_[g][i]) <= kSame + 14 * noise(at_probe[i], t);
       if (same) return int(g);
     }
     return -1;
@@ -415,7 +465,9 @@ class Tabulator {
         if (gain > best) best = gain, choice = a;
       }
       if (axes.empty() || error <= kAimError || best <= 0) break;
-      if (points / std::size_t(count[choice]) * std::size_t(count[choice] + 1) > kMaxPoints || count[choice] >= 128)
+      if (points / std::size_t(count[choice]) * std::size_t(count[choice] + 1) >
+              (axes.size() > 3 ? kMaxPoints4 : kMaxPoints) ||
+          count[choice] >= 128)
         break;
       ++count[choice];
     }
@@ -483,8 +535,9 @@ class Tabulator {
       const auto brdf = model_.make_double(values);
       const Coefficients all = coefficients(combination, p.x, kAllAzimuths, kProofSamples, 1);
       const Coefficients one = coefficients(combination, p.x, p.phi, kProofSamples, 2);
-      // Random colours, different in every channel: proves that channels are apart and the polynomial is one.
-      const MeanAlbedo direct = mean_albedos(*brdf, {brdf.get()}, p.x[0], p.phi, label(values), kProofSamples, 3);
+      // Random colours, different in every channel: proves that channels are apart and the polynomial is one. With the
+      // numbers that `one` used, so that noise hides nothing and looks like nothing.
+      const MeanAlbedo direct = mean_albedos(*brdf, {brdf.get()}, p.x[0], p.phi, label(values), kProofSamples, 2);
       const auto require_equal = [&](const Rgb<double>& wanted, double error, const char* what) {
         const Rgb<double> got = combine(one, p.colors);
         if (max_abs(wanted - got) <= kSame + error + 10 * one.error) return;
@@ -509,17 +562,17 @@ class Tabulator {
       if (depends_on_azimuth_) table_.anisotropy = std::max(table_.anisotropy, max_abs(combine(one, p.colors) - truth));
       for (const AlbedoTerm& t : table_.terms[p.combination]) {
         AlbedoGrid& g = table_.grids[std::size_t(t.grid)];
-        g.error =
-            std::max(g.error, max_abs(lookup(g, position_in(g, p.x)) - pick(all, {t.mirror, bits_of(t.colors), {}})));
+        g.error = std::max(g.error,
+                           max_abs(lookup(g, position_in(g, p.x)) - pick(all, {t.mirror, monomial_of(t.colors), {}})));
       }
     });
   }
 
-  std::size_t bits_of(const std::vector<std::string>& names) const {
-    std::size_t bits = 0;
+  std::size_t monomial_of(const std::vector<std::string>& names) const {
+    std::size_t monomial = 0;
     for (std::size_t c = 0; c < colors_.size(); ++c)
-      if (std::find(names.begin(), names.end(), colors_[c]) != names.end()) bits |= std::size_t(1) << c;
-    return bits;
+      monomial += stride(c) * std::size_t(std::count(names.begin(), names.end(), colors_[c]));
+    return monomial;
   }
 
   std::vector<double> position_in(const AlbedoGrid& g, const Position& x) const {
@@ -535,7 +588,8 @@ class Tabulator {
     for (std::size_t k = 0; k < c.scattered.size(); ++k) {
       Rgb<double> product(1);
       for (std::size_t i = 0; i < colors_.size(); ++i)
-        if (k >> i & 1) product = product * Rgb<double>(colors[3 * i], colors[3 * i + 1], colors[3 * i + 2]);
+        for (int j = 0; j < power(k, i); ++j)
+          product = product * Rgb<double>(colors[3 * i], colors[3 * i + 1], colors[3 * i + 2]);
       sum += product * (c.scattered[k] + c.mirror[k]);
     }
     return sum;
@@ -555,6 +609,7 @@ class Tabulator {
   const Model& model_;
   std::vector<Coordinate> coordinates_;  // the view cosine first
   std::vector<std::string> colors_;
+  std::vector<int> degrees_;  // of the polynomial in each colour
   std::vector<ParamValues> combinations_;
   bool depends_on_azimuth_ = false;
   std::vector<char> turns_;       // per coordinate: does nothing but turn the model; empty if nothing does

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Directional albedo of a model as tables over the view cosine and the parameters it depends on.
 //
-// Per channel the albedo is a polynomial in the colour parameters, of degree one in each, whose coefficients
+// Per channel the albedo is a polynomial in the colour parameters, of degree one or two in each, whose coefficients
 // are tabulated. With C the channel of the colours:
 //
 //   albedo_C = sum over terms of  grid(cos_theta_o, numbers)_C * product of the term's colours_C
@@ -44,7 +44,7 @@ struct AlbedoGrid {
 /// A coefficient of the polynomial in the colours.
 struct AlbedoTerm {
   bool mirror = false;              ///< weight of ideal reflection; otherwise scattered light
-  std::vector<std::string> colors;  ///< Color parameters multiplied with it; empty for a constant term
+  std::vector<std::string> colors;  ///< Color parameters multiplied with it, twice for a square; empty for a constant
   int grid = 0;                     ///< index into AlbedoTable::grids
 };
 

@@ -228,8 +228,8 @@ class AlbedoText {
       if (g.channels == 1) return number(g.values[0]);
       return fmt::format("color({}, {}, {})", number(g.values[0]), number(g.values[1]), number(g.values[2]));
     }
-    if (g.axes.size() > 3)
-      input_error("{}: the albedo table has {} axes, and OSL look-ups exist for 3", info_.name, g.axes.size());
+    if (g.axes.size() > 4)
+      input_error("{}: the albedo table has {} axes, and OSL look-ups exist for 4", info_.name, g.axes.size());
     if (g.values.size() > kMaxArray)
       input_error("{}: the albedo table has {} numbers, and an OSL array may have {}", info_.name, g.values.size(),
                   kMaxArray);
@@ -285,7 +285,7 @@ std::string closure_text(ClosureKind kind, std::size_t index) {
     case ClosureKind::Reflection:
       return fmt::format("weight_{} * reflection(frame_n)", index);
     case ClosureKind::PhongRamp:
-      break;
+      return fmt::format("weight_{} * phong_ramp(frame_n, exponent_{}, ramp_{})", index, index, index);
   }
   throw std::logic_error("no OSL for this closure");
 }
@@ -364,7 +364,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   } else {
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       body += fmt::format("    color weight_{};\n", c);
-      if (kinds[c] == ClosureKind::DiffuseRamp) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
+      if (has_ramp(kinds[c])) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
+      if (kinds[c] == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
       terms.push_back(closure_text(kinds[c], c));
       shader.slots += slots(kinds[c]);
     }

@@ -21,6 +21,7 @@ enum class ClosureKind {
 
 /// How many entries a ramp has.
 inline constexpr int kRampSize = 8;
+inline bool has_ramp(ClosureKind kind) { return kind == ClosureKind::DiffuseRamp || kind == ClosureKind::PhongRamp; }
 
 template <class T> struct Closure {
   ClosureKind kind;

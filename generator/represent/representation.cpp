@@ -30,8 +30,9 @@ void output_exact(const ClosureSum<Expr>& sum, Program& program, std::vector<Clo
   for (std::size_t c = 0; c < sum.size(); ++c) {
     kinds.push_back(sum[c].kind);
     program.output(fmt::format("weight_{}", c), sum[c].weight);
-    if (sum[c].kind == ClosureKind::DiffuseRamp)
+    if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
+    if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
   }
 }
 
@@ -188,8 +189,10 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
         const auto out = program.run<float>(inputs);
         for (std::size_t c = 0; c < kinds.size(); ++c) {
           Closure<double> closure(kinds[c], executed(out, fmt::format("weight_{}", c), false));
-          if (kinds[c] == ClosureKind::DiffuseRamp)
+          if (has_ramp(kinds[c]))
             for (std::size_t i = 0; i < kRampSize; ++i) closure.ramp[i] = executed(out, ramp_entry(c, i), true);
+          if (kinds[c] == ClosureKind::PhongRamp)
+            closure.exponent = executed(out, fmt::format("exponent_{}", c), false).r;
           closures.push_back(closure);
         }
       }

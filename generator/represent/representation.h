@@ -37,7 +37,7 @@ ParamValues with_choices(const ModelInfo&, const Choices&, ParamValues values = 
 /// sampled, u_0, u_1, u_2; and assign what `kind` says.
 struct Recording {
   std::string statements;
-  std::vector<ClosureKind> closures;  ///< Exact: closure i has weight_i, and ramp_i[8] if it is a ramp
+  std::vector<ClosureKind> closures;  ///< Exact: closure i has weight_i, ramp_i[8] if it is a ramp, and exponent_i
   int operations = 0;
   std::vector<std::string> inputs;
 };

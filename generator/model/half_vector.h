@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pieces of models that are formulas of the half vector.
+#pragma once
+
+#include "model/sampling.h"
+
+namespace brdfc {
+
+/// Unit half vector, and its cosine o.h = i.h = |wi + wo| / 2 to both directions.
+template <class T> struct HalfVector {
+  Vec3<T> h;
+  T oh;
+
+  HalfVector(const Vec3<T>& wi, const Vec3<T>& wo) {
+    const Vec3<T> sum = wi + wo;
+    const T len = maximum(length(sum), tiny<T>());
+    h = sum / len;
+    oh = named("oh", len / T(2));
+  }
+};
+
+/// Slopes of the facet whose normal is h: tan theta_h times cosine and sine of its azimuth. Facets steeper than 10^7
+/// count as that steep: Gaussian slopes have none, and fourth powers of the slope stay finite in single precision.
+template <class T> struct Slopes {
+  T x, y;
+
+  explicit Slopes(const Vec3<T>& h) {
+    const auto capped = [&](const T& s) { return minimum(maximum(s / maximum(h.z, tiny<T>()), T(-1e7)), T(1e7)); };
+    x = named("slope_x", capped(h.x));
+    y = named("slope_y", capped(h.y));
+  }
+  /// 1 / (n.h)^2.
+  T inverse_cos2() const { return T(1) + x * x + y * y; }
+};
+
+/// The normal of a facet with slopes drawn from the Gaussian exp(-(x/ax)^2 - (y/ay)^2) / (pi ax ay). u1 = 1 would be an
+/// infinite slope; 100 is beyond the logarithm of the smallest 1 - u1 there is.
+template <class T> Vec3<T> sample_gaussian_slopes(const T& ax, const T& ay, const T& u1, const T& u2) {
+  const T r = named("r", sqrt(minimum(-log1p(-u1), T(100))));
+  const T phi = named("phi", T(2) * pi<T>() * u2);
+  const T x = ax * r * cos(phi), y = ay * r * sin(phi);
+  const T cosTheta = named("cosTheta_h", T(1) / sqrt(T(1) + x * x + y * y));
+  return {x * cosTheta, y * cosTheta, cosTheta};
+}
+
+}  // namespace brdfc

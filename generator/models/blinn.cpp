@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Blinn's microfacet model with the cosine-power distribution of facets.
+//
+// J. Blinn: Models of Light Reflection for Computer Synthesized Pictures, SIGGRAPH 1977.
+// f = F D G / (4 (n.i)(n.o)), D = (e + 2) / (2 pi) (n.h)^e, G = min(1, 2 (n.h)(n.i) / (o.h), 2 (n.h)(n.o) / (o.h)).
+//
+// The paper leaves the constant of D open (its D is 1 at h = n) and folds the rest into k_s. Here D (n.h) integrates to
+// 1 and the factor 1/4 is that of the reflection's Jacobian, so that k_s = F is a reflectance, and k_s = 1 loses only
+// what the cavities block. (n.h)^e comes from 1 - (n.h)^2 = h_x^2 + h_y^2, which keeps its digits near the normal.
+#include "model/power_lobe.h"
+#include "model/v_cavity.h"
+
+namespace brdfc {
+
+template <class T> struct Blinn {
+  Rgb<T> ks;
+  T e;
+
+  static ModelInfo info() {
+    return {.name = "blinn",
+            .label = "Blinn",
+            .paper = "J. Blinn: Models of Light Reflection for Computer Synthesized Pictures, SIGGRAPH 1977",
+            .equations = "f = k_s D G / (4 (n.i)(n.o)), D = (e + 2) / (2 pi) (n.h)^e",
+            .doc = "Microfacets in V-shaped cavities with a cosine-power distribution of normals.",
+            .properties = {.smooth = false,  // min() in the geometry term
+                           .exact_sampling = false,
+                           .specular_limit = "e=1e8"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of a facet, k_s"});
+    v(e, NumberSpec{"e", "Exponent", 50, 0, 1e8, 0, 1000, "Exponent of the facets' distribution: larger is smoother"});
+  }
+
+  T D(const Vec3<T>& h) const {
+    const T s2 = named("sin2_h", sin2_theta(h));
+    const T near_pole = T(0.5) * log1p(-minimum(s2, T(0.75))), near_horizon = log(maximum(h.z, tiny<T>()));
+    return named("D", (e + T(2)) / (T(2) * pi<T>()) * exp(e * select(s2 < T(0.5), near_pole, near_horizon)));
+  }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return ks * select(above(wi, wo), D(k.h) / T(4) * v_cavity_shape(k, wi, wo), T(0));
+  }
+
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return select(above(wi, wo), v_cavity_pdf(k, D(k.h)), T(0));
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> h = sample_power_lobe(e + T(1), u.y, u.z);
+    const T oh = named("oh", dot(wo, h));
+    const Vec3<T> wi = h * (T(2) * oh) - wo;
+    return sample_if(above(wi, wo), wi, ks * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
+  }
+};
+
+BRDFC_MODEL(Blinn)
+
+}  // namespace brdfc

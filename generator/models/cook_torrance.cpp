@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Cook and Torrance's microfacet model with Beckmann's distribution of slopes.
+//
+// R. Cook, K. Torrance: A Reflectance Model for Computer Graphics, ACM Transactions on Graphics 1(1), 1982.
+// f = F D G / (4 (n.i)(n.o)), D = exp(-tan^2 theta_h / m^2) / (pi m^2 (n.h)^4),
+// G = min(1, 2 (n.h)(n.i) / (o.h), 2 (n.h)(n.o) / (o.h)).
+//
+// Erratum: the paper divides by pi (n.i)(n.o) and its D lacks the pi, together four times as much light as there is
+// (D (n.h) must integrate to 1, the reflection's Jacobian is 1/4). F is Schlick's approximation from the reflectance f0
+// at normal incidence, where the paper solves f0 for a refractive index and takes Fresnel's equations: linear in f0,
+// which the tables of the albedo need.
+#include "model/v_cavity.h"
+
+namespace brdfc {
+
+template <class T> struct CookTorrance {
+  Rgb<T> f0;
+  T m;
+
+  static ModelInfo info() {
+    return {.name = "cook_torrance",
+            .label = "Cook-Torrance",
+            .paper =
+                "R. Cook, K. Torrance: A Reflectance Model for Computer Graphics, ACM Transactions on Graphics 1(1), "
+                "1982",
+            .equations = "f = F D G / (4 (n.i)(n.o)), Beckmann's D; pi for 4 mended; Schlick's F",
+            .doc = "Microfacets in V-shaped cavities with Beckmann's distribution of slopes and Fresnel reflection.",
+            .properties = {.smooth = false,  // min() in the geometry term
+                           .exact_sampling = false,
+                           .specular_limit = "m=1e-4"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"});
+    v(m, NumberSpec{"m", "Slope", 0.3, 1e-4, 1, 0.05, 1, "Root mean square slope of the facets, m"});
+  }
+
+  T D(const Vec3<T>& h) const {
+    const Slopes<T> s(h);
+    const T m2 = m * m;
+    return named("D", exp(-(s.x * s.x + s.y * s.y) / m2) * sqr(s.inverse_cos2()) / (pi<T>() * m2));
+  }
+
+  Rgb<T> F(const T& oh) const { return named("F", f0 + (Rgb<T>(T(1)) - f0) * schlick_weight(oh)); }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return F(k.oh) * select(above(wi, wo), D(k.h) / T(4) * v_cavity_shape(k, wi, wo), T(0));
+  }
+
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return select(above(wi, wo), v_cavity_pdf(k, D(k.h)), T(0));
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> h = sample_gaussian_slopes(m, m, u.y, u.z);
+    const T oh = named("oh", dot(wo, h));
+    const Vec3<T> wi = h * (T(2) * oh) - wo;
+    return sample_if(above(wi, wo), wi, F(oh) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
+  }
+};
+
+BRDFC_MODEL(CookTorrance)
+
+}  // namespace brdfc

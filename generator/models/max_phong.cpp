@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Neumann's Phong lobe "pumped up" by the larger of both cosines, the start of Ashikhmin and Shirley's model.
+//
+// L. Neumann, A. Neumann, L. Szirmay-Kalos: Compact Metallic Reflectance Models, Computer Graphics Forum 18(3), 1999;
+// quoted as eq. 2 by Ashikhmin and Shirley. f = k_s c cos^e alpha / max(cos theta_i, cos theta_o), alpha between the
+// light and the mirrored viewer.
+//
+// c = (e + 1) / (2 pi): f cos theta_i is then at most a density over directions, so that the albedo stays below k_s and
+// reaches it for e -> infinity at every angle. The paper's Fresnel term is k_s here, constant.
+#include "model/power_lobe.h"
+#include "model/sampling.h"
+
+namespace brdfc {
+
+template <class T> struct MaxPhong {
+  Rgb<T> ks;
+  T e;
+
+  static ModelInfo info() {
+    return {.name = "max_phong",
+            .label = "Max-Phong",
+            .paper =
+                "L. Neumann, A. Neumann, L. Szirmay-Kalos: Compact Metallic Reflectance Models, Computer Graphics "
+                "Forum 18(3), 1999",
+            .equations = "f = k_s (e + 1) / (2 pi) cos^e alpha / max(cos theta_i, cos theta_o)",
+            .doc = "Metallic Phong lobe whose highlight is as bright at grazing angles as from above.",
+            .properties = {.positive = false,  // black beyond 90 degrees from the mirror direction
+                           .smooth = false,    // max(): an edge where both cosines are equal
+                           .exact_sampling = false,
+                           .specular_limit = "e=1e8"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of the mirror it tends to, k_s"});
+    v(e, NumberSpec{"e", "Exponent", 20, 0, 1e8, 1, 1000, "Phong exponent: larger is narrower"});
+  }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return ks *
+           select(above(wi, wo), power_lobe_pdf(e, wi, reflect(wo)) / maximum(maximum(wi.z, wo.z), tiny<T>()), T(0));
+  }
+
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return select(above(wi, wo), power_lobe_pdf(e, wi, reflect(wo)), T(0));
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> wi = about_axis(reflect(wo), sample_power_lobe(e, u.y, u.z));
+    const T ratio = wi.z / maximum(maximum(wi.z, wo.z), tiny<T>());
+    return sample_if(above(wi, wo), wi, ks * ratio, pdf(wi, wo));
+  }
+};
+
+BRDFC_MODEL(MaxPhong)
+
+}  // namespace brdfc

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Oren and Nayar's rough diffuse surface: Lambertian facets in V-shaped cavities.
+//
+// M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model, SIGGRAPH 1994. With alpha the larger and beta the
+// smaller of both polar angles, c the cosine of the difference of the azimuths, s = sigma^2:
+//   full:        f = rho / pi [C1 + c C2 tan beta + (1 - |c|) C3 tan((alpha + beta) / 2)]
+//                    + 0.17 rho^2 / pi s / (s + 0.13) [1 - c (2 beta / pi)^2],
+//                C1 = 1 - 0.5 s / (s + 0.33), C3 = 0.125 s / (s + 0.09) (4 alpha beta / pi^2)^2,
+//                C2 = 0.45 s / (s + 0.09) times sin alpha for c >= 0, sin alpha - (2 beta / pi)^3 below;
+//   qualitative: f = rho / pi [C1 + 0.45 s / (s + 0.09) max(c, 0) sin alpha tan beta].
+//
+// These are fits to an integral, with the fits' faults: the albedo with rho = 1 exceeds 1 at grazing angles (by up to
+// 1.5 % qualitative, 4.8 % full), f grows without limit where both directions graze, and beyond sigma = 0.664 (38
+// degrees) the full form is negative opposite to the light at grazing angles, so sigma ends before.
+//
+// Stable forms. sin alpha tan beta c = (the product of the horizontal parts) / max(cos); tan((alpha + beta) / 2) =
+// (sin alpha + sin beta) / (cos alpha + cos beta). Angles are 2 atan(sin / (1 + cos)).
+#include "model/sampling.h"
+
+namespace brdfc {
+
+template <class T> struct OrenNayar {
+  Rgb<T> rho;
+  T sigma;
+  Choice form;
+
+  enum { Full, Qualitative };
+
+  static ModelInfo info() {
+    return {.name = "oren_nayar",
+            .label = "Oren-Nayar",
+            .paper = "M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model, SIGGRAPH 1994",
+            .equations = "eqs. of section 4.3 (full) and 4.4 (qualitative)",
+            .doc = "Rough matte surface, as clay or the moon: flatter than Lambert's, bright towards the light.",
+            .properties = {.conserving = false,
+                           .smooth = false,  // kinks where the angles are equal and in |c| or max(c, 0)
+                           .exact_sampling = false,
+                           .diffuse_limit = "sigma=0"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(rho, ColorSpec{"rho", "Reflectance", {0.8, 0.8, 0.8}, "Albedo of the facets"});
+    v(sigma,
+      NumberSpec{"sigma", "Roughness", 0.3, 0, 0.66, 0, 0.66, "Standard deviation of the facets' slope angle", "rad"});
+    v(form, ChoiceSpec{
+                "form", "Form", {"full", "qualitative"}, "full: with interreflection; qualitative: the short formula"});
+  }
+
+  /// s / (s + k).
+  T share(double k) const { return sigma * sigma / (sigma * sigma + T(k)); }
+  T C1() const { return T(1) - T(0.5) * share(0.33); }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return select(above(wi, wo), form == Full ? full(wi, wo) : qualitative(wi, wo), Rgb<T>(T(0)));
+  }
+
+  Rgb<T> qualitative(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const T side = wi.x * wo.x + wi.y * wo.y;
+    const T B = T(0.45) * share(0.09);
+    return rho * ((C1() + B * maximum(side, T(0)) / maximum(maximum(wi.z, wo.z), tiny<T>())) / pi<T>());
+  }
+
+  Rgb<T> full(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const T si = named("si", sqrt(sin2_theta(wi))), so = named("so", sqrt(sin2_theta(wo)));
+    const auto wi_lower = wi.z < wo.z;
+    const T sin_a = named("sin_alpha", select(wi_lower, si, so)), sin_b = named("sin_beta", select(wi_lower, so, si));
+    const T cos_a = minimum(wi.z, wo.z), cos_b = named("cos_beta", maximum(maximum(wi.z, wo.z), tiny<T>()));
+    // Angles over a right angle.
+    const auto over_right = [](const T& s, const T& c) { return T(4) / pi<T>() * atan(s / (T(1) + maximum(c, T(0)))); };
+    const T alpha = named("alpha", over_right(sin_a, cos_a)), beta = named("beta", over_right(sin_b, cos_b));
+    const T side = named("side", wi.x * wo.x + wi.y * wo.y);
+    const T c = named("c", side / maximum(si * so, tiny<T>()));
+    const T back = named("back", minimum(side, T(0)) / maximum(sin_a, tiny<T>()));
+    const T direct = C1() + T(0.45) * share(0.09) * (side - beta * beta * beta * back) / cos_b +
+                     T(0.125) * share(0.09) * sqr(alpha * beta) * maximum(T(1) - abs(c), T(0)) * (sin_a + sin_b) /
+                         maximum(cos_a + cos_b, tiny<T>());
+    const T again = T(0.17) * share(0.13) * (T(1) - c * beta * beta);
+    return rho * (named("direct", direct) / pi<T>()) + rho * rho * (named("again", again) / pi<T>());
+  }
+
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), cosine_pdf(wi), T(0)); }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> wi = sample_cosine(u.y, u.z);
+    return sample_if(above(wi, wo), wi, eval(wi, wo) * pi<T>(), cosine_pdf(wi));
+  }
+};
+
+BRDFC_MODEL(OrenNayar)
+
+}  // namespace brdfc

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Schlick's rational model: from a Lambertian over a glossy to a mirror-like surface by one roughness.
+//
+// C. Schlick: An Inexpensive BRDF Model for Physically-based Rendering, Computer Graphics Forum 13(3), 1994 (a first
+// form in A Customizable Reflectance Model for Everyday Rendering, EG Workshop on Rendering 1993).
+// With t = n.h, u = o.h, v = n.o, v' = n.i, and w the cosine of the azimuth of h from the tangent,
+//   f = S(u) (a / pi + b / (4 pi v v') G(v) G(v') Z(t) A(w)) + S(v) c delta,   S(u) = r + (1 - r) (1 - u)^5,
+//   Z(t) = s / (1 + s t^2 - t^2)^2,   A(w) = sqrt(p / (p^2 - p^2 w^2 + w^2)),   G(v) = v / (s - s v + v),
+//   b = 4 s (1 - s), the rest a for s >= 1/2, c for s < 1/2,   s the roughness, p the isotropy.
+//
+// The light that G blocks is lost here; the paper also offers to give it back as (1 - G G') / (4 pi v v'), whose albedo
+// grows without limit towards grazing angles. Z (n.h) A integrates to pi for p = 1 only: the mean of A over azimuths is
+// (2 / pi) sqrt(p) K(sqrt(1 - p^2)) (K: complete elliptic integral), so that anisotropy costs light.
+//
+// There are no edges, but with p < 1 one point at h = n where f depends on the way that one comes from: so A is made.
+//
+// Stable forms. 1 + s t^2 - t^2 = sin^2 theta_h + s t^2; G(v) / v = 1 / (s (1 - v) + v). sqrt(p) A has no elementary
+// inverse of its integral; A / (2 pi) is the geometric mean of the uniform density and of
+// q = p / (2 pi (p^2 sin^2 + cos^2)), hence at most their arithmetic mean, which is sampled: weights stay below S.
+#include "model/half_vector.h"
+
+namespace brdfc {
+
+template <class T> struct Schlick {
+  Rgb<T> r;
+  T p, rough;
+
+  static ModelInfo info() {
+    return {.name = "schlick",
+            .label = "Schlick",
+            .paper =
+                "C. Schlick: An Inexpensive BRDF Model for Physically-based Rendering, Computer Graphics Forum 13(3), "
+                "1994",
+            .equations = "f = S (a / pi + b G G' Z A / (4 pi v v') + c delta)",
+            .doc = "Rational approximation of a microfacet model: Lambertian, glossy and mirror-like by one roughness.",
+            .properties = {.isotropic = false,
+                           .exact_sampling = false,
+                           .diffuse_limit = "r=1 rough=1",
+                           .specular_limit = "rough=0"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(r, ColorSpec{"r", "Reflectance", {0.8, 0.8, 0.8}, "Reflectance at normal incidence, r"});
+    v(p, NumberSpec{"p", "Isotropy", 1, 0.01, 1, 0.05, 1,
+                    "1 is isotropic; smaller stretches the highlight across the tangent"});
+    v(rough,
+      NumberSpec{"rough", "Roughness", 0.2, 0, 1, 0.01, 1, "0 is a mirror, 1 Lambertian but for the Fresnel term"});
+  }
+
+  Rgb<T> S(const T& u) const { return named("S", r + (Rgb<T>(T(1)) - r) * schlick_weight(u)); }
+
+  T b() const { return named("b", T(4) * rough * (T(1) - rough)); }
+  T a() const { return named("a", select(rough < T(0.5), T(0), sqr(T(2) * rough - T(1)))); }
+  T c() const { return named("c", select(rough < T(0.5), sqr(T(1) - T(2) * rough), T(0))); }
+
+  Rgb<T> mirror(const Vec3<T>& wo) const { return S(wo.z) * c(); }
+
+  /// Z(t) / pi.
+  T Z(const Vec3<T>& h, const T& sin2) const {
+    const T d = maximum(sin2 + rough * (h.z * h.z), tiny<T>());
+    return named("Z", rough / d / d / pi<T>());
+  }
+  /// A(w)^2 / p.
+  T A2(const Vec3<T>& h, const T& sin2) const {
+    const T s2 = maximum(sin2, tiny<T>());
+    const T squared = (p * p * (h.y * h.y) + h.x * h.x) / s2;
+    return named("A2", select(sin2 < tiny<T>(), T(1) / p, T(1) / maximum(squared, p * p)));
+  }
+  /// G(v) / v.
+  T G(const T& v) const { return T(1) / maximum(rough * (T(1) - v) + v, tiny<T>()); }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    const T sin2 = named("sin2_h", sin2_theta(k.h));
+    const T glossy = b() / T(4) * Z(k.h, sin2) * sqrt(p * A2(k.h, sin2)) * G(wi.z) * G(wo.z);
+    return S(k.oh) * select(above(wi, wo), a() / pi<T>() + glossy, T(0));
+  }
+
+  /// Half vectors with density Z(t) t and, in azimuth, the mean of both densities.
+  T glossy_pdf(const HalfVector<T>& k) const {
+    const T sin2 = named("sin2_h", sin2_theta(k.h));
+    return Z(k.h, sin2) * k.h.z * (T(1) + p * A2(k.h, sin2)) / (T(8) * k.oh);
+  }
+
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const T share = a();
+    return select(above(wi, wo), share * cosine_pdf(wi) + (T(1) - share) * glossy_pdf(HalfVector<T>(wi, wo)), T(0));
+  }
+
+  Vec3<T> sample_glossy(const Vec3<T>& wo, const T& which, const T& u1, const T& u2) const {
+    // t^2 = u / (s (1 - u) + u), sin^2 = s (1 - u) / (s (1 - u) + u), with u1 for 1 - u.
+    const T v = T(1) - u1;
+    const T norm = maximum(rough * u1 + v, tiny<T>());
+    const T sinTheta = named("sinTheta_h", sqrt(rough * u1 / norm)), cosTheta = named("cosTheta_h", sqrt(v / norm));
+    const T phi = named("phi", T(2) * pi<T>() * u2);
+    // q: the azimuth of a circle's point after the circle has been squeezed across the tangent by p.
+    const T x = cos(phi) * select(which < T(0.5), p, T(1)), y = sin(phi);
+    const T len = sqrt(x * x + y * y);
+    const Vec3<T> h = {sinTheta * x / len, sinTheta * y / len, cosTheta};
+    return h * (T(2) * dot(wo, h)) - wo;
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const T share = a();
+    const auto matte_lobe = u.x < share;
+    const T rest = (u.x - share) / maximum(T(1) - share, T(1e-6));
+    const Vec3<T> matte = sample_cosine(u.y, u.z), glossy = sample_glossy(wo, rest, u.y, u.z);
+    const Vec3<T> wi = {select(matte_lobe, matte.x, glossy.x), select(matte_lobe, matte.y, glossy.y),
+                        select(matte_lobe, matte.z, glossy.z)};
+    const T density = pdf(wi, wo);
+    return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
+  }
+};
+
+BRDFC_MODEL(Schlick)
+
+}  // namespace brdfc
