@@ -93,6 +93,9 @@ SAMPLED = with_every_model(
     ("glossy_reflector", {"e": 5.0, "cr": (1.0, 0.6, 0.2)}),
     ("glossy_reflector", {"e": 3.0, "below": "lose"}),
     ("glossy_specular", {"e": 8.0, "normalisation": "conserving"}),
+    ("ward", {"ax": 0.3, "ay": 0.6, "ks": (1.0, 0.5, 0.2)}),
+    ("schlick", {}),
+    ("schlick", {"rough": 0.7, "p": 0.4, "r": (0.9, 0.5, 0.1)}),
 )
 #: Facets: view cosines times azimuths, each seen by so many pixels that its noise can be measured.
 COSINES = (1.0, 0.8, 0.5, 0.25, 0.1)
