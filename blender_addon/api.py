@@ -38,14 +38,16 @@ def models():
 
 
 def _checked(model_name, representation, given):
+    """The form to use, and the values in canonical form."""
     given = dict(given)
     lobes = given.pop("lobes", None) if "lobes" not in pack.parameters(model_name) else None
     fixed = pack.fixed(model_name)
     checked = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
     values = {name: v for name, v in checked.items() if name not in fixed}
+    representation = pack.resolve(model_name, representation, values)
     if lobes is not None:
         values[pack.LOBES] = pack.check_lobes(model_name, representation, lobes)
-    return values
+    return representation, values
 
 
 def prepare_material(material):
@@ -66,8 +68,7 @@ def new_material(model, representation="auto", **parameters):
     Raises ValueError for an unknown model, representation or parameter, or a value that is out of
     range; CompileError when Cycles can't compile the shader. Nothing is left in the file then.
     """
-    representation = pack.resolve(model, representation)
-    values = _checked(model, representation, parameters)
+    representation, values = _checked(model, representation, parameters)
     nodes.ensure_group(model, representation)
     material = bpy.data.materials.new(pack.model(model)["label"])
     try:
@@ -103,7 +104,7 @@ def set_parameters(material, **parameters):
     Raises ValueError as new_material does, and for a parameter that a link controls.
     """
     node = _the_node(material)
-    values = _checked(*nodes.identity(node), parameters)
+    _, values = _checked(*nodes.identity(node), parameters)
     present = nodes.sockets(node)
     for name in values:
         if name in present and present[name].is_linked:
@@ -132,7 +133,7 @@ def albedo(model, cos_theta_o, **parameters):
 
     if not 0 < cos_theta_o <= 1:
         raise ValueError(f"cos_theta_o: expected a number in (0, 1], got {cos_theta_o!r}")
-    return energy.albedo(model, _checked(model, "auto", parameters), cos_theta_o)
+    return energy.albedo(model, _checked(model, "auto", parameters)[1], cos_theta_o)
 
 
 def scene_warnings(scene):

@@ -75,8 +75,7 @@ def expected_inputs(model_name, representation):
     """Identifiers of the script node's inputs and the types of their sockets."""
     inputs = {
         p["name"]: _SOCKET_TYPES[p["kind"]]
-        for p in pack.parameters(model_name).values()
-        if pack.has_socket(p)
+        for p in pack.socket_parameters(model_name, representation).values()
     }
     inputs |= {pack.NORMAL: "VECTOR", pack.TANGENT: "VECTOR"}
     if pack.representation(model_name, representation).get("lobes"):
@@ -239,9 +238,7 @@ def _fill_group(group, model_name, representation, text):
 
     inputs = {s.identifier: s for s in script.inputs}
     sockets = {}
-    for name, parameter in pack.parameters(model_name).items():
-        if not pack.has_socket(parameter):
-            continue
+    for name, parameter in pack.socket_parameters(model_name, representation).items():
         sockets[name] = _add_parameter(group, group_input, inputs[name], parameter)
     if lobes := entry.get("lobes"):
         sockets[pack.LOBES] = _socket(
@@ -307,13 +304,7 @@ def ensure_group(model_name, representation="auto"):
             "model": model_name,
             "representation": representation,
             "digest": pack.digest(model_name, representation),
-            "choices": json.dumps(
-                {
-                    p["name"]: p["choices"]
-                    for p in pack.parameters(model_name).values()
-                    if p["kind"] == "choice"
-                }
-            ),
+            "choices": json.dumps(pack.form_choices(model_name, representation)),
         }
         _fill_group(group, model_name, representation, text)
     except BaseException:
@@ -416,11 +407,12 @@ def switch(node, representation):
     Raises ValueError, CompileError; the node is then as it was.
     """
     model_name, _ = identity(node)
-    group = ensure_group(model_name, representation)
+    tree = node.id_data
+    choices = json.loads(node.node_tree[TAG]["choices"])
+    values = {name: get_value(node, name) for name in (*choices, *sockets(node))}
+    group = ensure_group(model_name, pack.resolve(model_name, representation, values))
     if group == node.node_tree:
         return
-    tree = node.id_data
-    values = {name: get_value(node, name) for name in sockets(node)}
     incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
     outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
     for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:

@@ -47,16 +47,39 @@ def model(name):
     return models[name]
 
 
-def resolve(model_name, representation):
-    """Name of the representation, "auto" replaced by the model's preference. Raises ValueError."""
-    entry = model(model_name)
-    name = entry["auto"] if representation == "auto" else representation
+def refusal(model_name, name, values):
+    """Why these values exclude a form, which may exist for some choices only; None if not."""
+    choices = model(model_name)["representations"][name]["choices"]
+    for key, only in choices.items():
+        if values.get(key, only) != only:
+            got = "a linked value" if values[key] is None else repr(values[key])
+            return (
+                f"model {model_name!r} has the representation {name!r} only for {key}={only!r}, "
+                f"not for {got}"
+            )
+    return None
+
+
+def resolve(model_name, representation, values=None):
+    """Name of the representation. Raises ValueError.
+
+    "auto" becomes the model's preference, or another form where `values` have a choice that the
+    preferred one lacks.
+    """
+    entry, values = model(model_name), values or {}
+    name = representation
+    if name == "auto":
+        others = sorted(set(entry["representations"]) - {entry["auto"]})
+        fitting = [n for n in (entry["auto"], *others) if refusal(model_name, n, values) is None]
+        name = fitting[0] if fitting else entry["auto"]
     if name not in entry["representations"]:
         known = ", ".join(["auto", *sorted(entry["representations"])])
         raise ValueError(
             f"model {model_name!r} has no representation {representation!r}; "
             f"expected one of {known}"
         )
+    if problem := refusal(model_name, name, values):
+        raise ValueError(problem)
     return name
 
 
@@ -76,9 +99,20 @@ def fixed(model_name):
     return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
 
 
-def has_socket(parameter):
-    """Whether a parameter is shown: a choice of one leaves nothing to choose."""
-    return parameter["kind"] != "choice" or len(parameter["choices"]) > 1
+def form_choices(model_name, name):
+    """Identifiers of every choice as a form has them: one where the form exists for that alone."""
+    only = representation(model_name, name)["choices"]
+    return {
+        key: [only[key]] if key in only else p["choices"]
+        for key, p in parameters(model_name).items()
+        if p["kind"] == "choice"
+    }
+
+
+def socket_parameters(model_name, name):
+    """The parameters that a form shows: a choice of one leaves nothing to choose."""
+    choices = form_choices(model_name, name)
+    return {key: p for key, p in parameters(model_name).items() if len(choices.get(key, "any")) > 1}
 
 
 def _file(relative):

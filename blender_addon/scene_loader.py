@@ -331,9 +331,10 @@ def _material(name, view, representation):
         colors = [k for k, p in pack.parameters(model).items() if p["kind"] == "color"]
         targets = {colors[0]: node.inputs["Color"]} if colors else {}
     else:
-        if view.has("lobes") and pack.representation(model, representation).get("lobes"):
-            values["lobes"] = view.get("lobes").value
         try:
+            form = pack.resolve(model, representation, values)
+            if view.has("lobes") and pack.representation(model, form).get("lobes"):
+                values["lobes"] = view.get("lobes").value
             material = api.new_material(model, representation, **values)
         except ValueError as error:
             raise ValueError(f"{view.file}: {view.path}: {error}") from error

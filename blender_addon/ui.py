@@ -99,13 +99,22 @@ def _draw_form(layout, node, editable):
     entry = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = editable
+    values = {
+        key: nodes.get_value(node, key) for key in pack.form_choices(model_name, representation)
+    }
+    refusals = []
     for name in entry["representations"]:
+        if refusal := pack.refusal(model_name, name, values):
+            refusals.append(refusal)
+            continue
         button = row.operator(
             "brdfc.switch", text=name.capitalize(), depress=name == representation
         )
         button.node, button.representation = node.name, name
     form = entry["representations"][representation]
     column = layout.column(align=True)
+    for refusal in refusals:
+        _wrapped(column, refusal[0].upper() + refusal[1:])
     _wrapped(column, f"Error: {error_text(form)}")
     _wrapped(column, f"Cost: {cost_text(form)}")
     if form.get("closures"):

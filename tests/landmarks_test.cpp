@@ -110,5 +110,41 @@ TEST(MatteSpecular, SchlickDoubleGainsLightAtGrazingViews) {
   EXPECT_EQ(most, albedo_at(b, 1e-3)) << "more the nearer to the horizon";
 }
 
+TEST(CoupledDielectric, LosesNothingAndHasWalshsConstant) {
+  // J. W. T. Walsh's closed form of the cosine-weighted mean of Fresnel's reflectance.
+  const auto mean_reflectance = [](double n) {
+    const double n2 = n * n, n4 = n2 * n2, a = n2 - 1, b = n2 + 1;
+    return 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) * (n + 1)) +
+           n2 * a * a / (b * b * b) * std::log((n - 1) / (n + 1)) - 2 * n * n2 * (n2 + 2 * n - 1) / (b * (n4 - 1)) +
+           8 * n4 * (n4 + 1) / (b * (n4 - 1) * (n4 - 1)) * std::log(n);
+  };
+  EXPECT_NEAR(mean_reflectance(1.5), 0.0918, 1e-4);
+  double table = 0;
+  for (const double n : {1.1, 1.33, 1.5, 1.8, 2.4, 4., 10., 40.}) {
+    const double r0 = sqr((n - 1) / (n + 1));
+    const BoundModel b = bound("coupled", {"fresnel=dielectric", "rm=1", fmt::format("r0={}", r0)});
+    for (const double c : {1., 0.4, 0.05, 1e-3}) expect_albedo(b, c, 1);
+    const Vec3<double> normal{0, 0, 1};
+    const double wanted = sqr(1 - r0) / (kPi * (1 - mean_reflectance(n)));
+    table = std::max(table, std::abs(b.brdf->eval(normal, normal).g / wanted - 1));
+  }
+  EXPECT_LT(table, 4e-7) << "of linear interpolation in the table of the constant";
+  EXPECT_GT(table, 1e-12) << "the table is not in use";
+}
+
+TEST(Coupled, Eq6IsInvertedToMachinePrecision) {
+  const BoundModel b = bound("coupled", {});
+  double worst = 0;
+  for (int i = 0; i < 4000; ++i) {
+    // Up to 1 and down to where the shape is 7/2 c^3.
+    const double xi = i % 2 ? (i + 0.5) / 4000 : std::exp2(-i / 8.);
+    const long double c = b.brdf->sample({0.6, 0, 0.8}, {0.5, xi, 0.25}).wi.z;
+    const long double F = c * c * c * (3.5L - c * (5.25L - c * (4.2L - c * (1.75L - 0.3L * c))));
+    const long double slope = 2.1L * c * c * (5 - c * (10 - c * (10 - c * (5 - c))));
+    worst = std::max(worst, double(std::abs((F - xi) / (slope * c))));  // relative error of c
+  }
+  EXPECT_LT(worst, 4 * 0x1p-52);
+}
+
 }  // namespace
 }  // namespace brdfc

@@ -11,6 +11,7 @@ here, by moving each input by half a unit in the last place), times a small fact
 """
 
 import csv
+import functools
 import math
 import random
 import sys
@@ -149,6 +150,42 @@ def coupled_pdf(p, wi, wo):
 def coupled_albedo(p, cos_o):
     rf = p["r0"] + (1 - p["r0"]) * (1 - mp.mpf(cos_o)) ** 5
     return [rf + rm * (1 - rf) for rm in p["rm"]]
+
+
+def full_fresnel(r0, c):
+    """Unpolarised reflectance by Snell's law and Fresnel's equations; the index is that of R_0."""
+    s = mp.sqrt(mp.mpf(r0))
+    eta = (1 + s) / (1 - s)
+    cos_t = mp.sqrt(1 - (1 - c * c) / eta**2)
+    rs = (c - eta * cos_t) / (c + eta * cos_t)
+    rp = (eta * c - cos_t) / (eta * c + cos_t)
+    return (rs**2 + rp**2) / 2
+
+
+@functools.cache
+def mean_transmission(r0):
+    """2 integral of (1 - R_f) c dc."""
+    with mp.workdps(30):
+        ends = [0, mp.mpf("1e-4"), mp.mpf("1e-2"), mp.mpf("0.1"), mp.mpf("0.5"), 1]
+        return mp.quad(lambda c: 2 * (1 - full_fresnel(r0, c)) * c, ends)
+
+
+def coupled_full_f(p, wi, wo):
+    if isinstance(p["r0"], mp.mpf):
+        mean = mean_transmission(float(p["r0"]))  # as smooth as R_0 itself: not what rounding moves
+    else:
+        mean = mean_transmission(p["r0"])
+    through = [1 - full_fresnel(p["r0"], vec(w)[2]) for w in (wi, wo)]
+    return [rm * through[0] * through[1] / (mp.pi * mean) for rm in p["rm"]]
+
+
+def coupled_full_albedo(p, cos_o):
+    rf = full_fresnel(p["r0"], mp.mpf(cos_o))
+    return [rf + rm * (1 - rf) for rm in p["rm"]]
+
+
+def by_fresnel(schlick_, full):
+    return lambda p, *w: (full if p.get("fresnel") == "dielectric" else schlick_)(p, *w)
 
 
 # ---- Suffern, eqs. 25.1, 25.2 and 25.7 ---------------------------------------------------------
@@ -772,11 +809,20 @@ MODELS = {
         cosines=[1, 0.5, math.cos(math.radians(80)), 0.09],
     ),
     "coupled": dict(
-        f=coupled_f,
+        f=by_fresnel(coupled_f, coupled_full_f),
         pdf=coupled_pdf,
-        albedo=coupled_albedo,
+        albedo=by_fresnel(coupled_albedo, coupled_full_albedo),
         defaults={"r0": 0.05, "rm": (0.8, 0.8, 0.8)},
-        cases=[{}, {"r0": 0.5, "rm": (1, 0.5, 0.1)}, {"r0": 0, "rm": (1, 1, 1)}],
+        cases=[
+            {},
+            {"r0": 0.5, "rm": (1, 0.5, 0.1)},
+            {"r0": 0, "rm": (1, 1, 1)},
+            {"fresnel": "dielectric"},
+            {"fresnel": "dielectric", "r0": 0.3, "rm": (1, 0.5, 0.1)},
+            {"fresnel": "dielectric", "r0": 0.99},
+        ],
+        # Interpolation in the model's table of the constant.
+        floor=lambda p: 4e-7 if p.get("fresnel") == "dielectric" else 0,
         cosines=[1, 0.5, 0.1, 0.01],
     ),
     "glossy_reflector": dict(
@@ -1086,6 +1132,8 @@ def main():
                     if v is None or max(v) < mp.mpf("1e-290"):
                         continue
                     t = tolerance(m[kind], p, wi, wo, v)
+                    if kind == "f" and "floor" in m:
+                        t += m["floor"](p)
                     if t > 1e-3:
                         continue  # says nothing: the inputs' own rounding decides the value
                     rows.append(

@@ -191,6 +191,23 @@ TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
   EXPECT_THROW(measure_error(broken, RepresentationKind::Sampled), ValueError);
 }
 
+TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
+  const Model& m = find_model("coupled");
+  const ParamValues only = form_choices(m, RepresentationKind::Exact);
+  ASSERT_EQ(only.size(), 1u);
+  EXPECT_EQ(std::get<std::string>(only.at("fresnel")), "schlick");
+  EXPECT_TRUE(form_choices(m, RepresentationKind::Sampled).empty());
+  const AlbedoTable t = empty_table(m);
+  EXPECT_THAT(write_shader(m, RepresentationKind::Exact, t).source, Not(HasSubstr("int fresnel")));
+  EXPECT_THAT(write_shader(m, RepresentationKind::Sampled, t).source, HasSubstr("int fresnel"));
+  try {
+    write_shader(m, RepresentationKind::Exact, t, {{"fresnel", std::string("dielectric")}});
+    FAIL() << "expected a refusal";
+  } catch (const InputError& e) {
+    EXPECT_STREQ(e.what(), "coupled: the exact form exists only for fresnel=schlick");
+  }
+}
+
 class PackFiles : public ::testing::Test {
  protected:
   PackOptions options(const fs::path& out) const {

@@ -5,6 +5,7 @@
 #include "app/commands.h"
 #include "core/error.h"
 #include "model/model.h"
+#include "represent/representation.h"
 
 namespace brdfc {
 namespace {
@@ -15,10 +16,10 @@ const char* kind_name(ParamKind k) {
   return k == ParamKind::Number ? "number" : k == ParamKind::Color ? "color" : "choice";
 }
 
-std::vector<std::string> representations(const Model& m) {
-  if (!m.has_scatter()) return {"exact"};
-  if (m.has_exact()) return {"exact", "sampled"};
-  return {"sampled"};
+std::vector<std::string> names_of_forms(const Model& m) {
+  std::vector<std::string> names;
+  for (RepresentationKind kind : representations(m)) names.push_back(name_of(kind));
+  return names;
 }
 
 Json describe(const Model& m) {
@@ -60,7 +61,7 @@ Json describe(const Model& m) {
             {"specular_limit", q.specular_limit}}},
           {"scatter", m.has_scatter()},
           {"mirror", m.has_mirror()},
-          {"representations", representations(m)},
+          {"representations", names_of_forms(m)},
           {"parameters", std::move(params)}};
 }
 
@@ -68,7 +69,11 @@ void print_text(const Model& m) {
   const ModelInfo& info = m.info();
   fmt::print("{}  {}\n  {} ({})\n  {}\n", info.name, info.label, info.paper, info.equations, info.doc);
   std::string forms;
-  for (const std::string& r : representations(m)) forms += (forms.empty() ? "" : ", ") + r;
+  for (RepresentationKind kind : representations(m)) {
+    forms += (forms.empty() ? "" : ", ") + std::string(name_of(kind));
+    for (const auto& [name, value] : form_choices(m, kind))
+      forms += fmt::format(" (only {}={})", name, std::get<std::string>(value));
+  }
   fmt::print("  representations: {}\n", forms);
   for (const ParamInfo& p : info.params) {
     std::string range, value;

@@ -8,16 +8,77 @@
 // Erratum: k = 21 / (20 pi (1 - R_0)) of eq. 4 belongs with [1 - R_f(theta)][1 - R_f(theta')]; with eq. 5 as
 // printed, which has no (1 - R_0) factors, k is 21 (1 - R_0) / (20 pi). Then R_m = 1 loses nothing at any angle.
 //
+// fresnel = dielectric inserts the full Fresnel equations and solves for k, as the paper suggests: f = k R_m T T' with
+// T = 1 - R_f and 1/k = 2 pi integral of T(c) c dc. The index of the coat is that whose reflectance at normal incidence
+// is R_0; with nu = 1 / index = (1 - sqrt R_0) / (1 + sqrt R_0) and g = index cos theta_t = sqrt(1 - nu^2 + nu^2 c^2),
+//   r_s = (1 - nu^2) / (nu c + g)^2,  r_p = (1 - nu^2) (c^2 (1 + nu^2) - nu^2) / (c + nu g)^2,
+//   T = nu That,  That = 2 c g [1 / (nu c + g)^2 + 1 / (c + nu g)^2],
+// without differences of like numbers from R_0 = 0 to 1. The constant comes from a table of S(nu) = 2 integral of That
+// c dc, made from That itself on first use: interpolation is off by at most 4e-7 of it, so is the albedo. S has the
+// slope of nu log nu at 0, hence knots at squares.
+//
 // Sampling eq. 6. The printed rational guess is good to 1.2 % absolutely but not relatively, and Newton from it
 // stalls near 0; below xi = 0.02 the start is c = t (1 + t/2), t = cbrt(2 xi / 7), from the leading terms of eq. 6.
+#include <boost/math/quadrature/gauss.hpp>
+
+#include "core/table.h"
 #include "model/sampling.h"
 
 namespace brdfc {
+
+/// S over sqrt(nu).
+const std::shared_ptr<const Table>& table_of_S();
+
+/// The coat by Fresnel's equations.
+template <class T> struct FullCoat {
+  T nu, w;  ///< w = 1 - nu^2
+
+  explicit FullCoat(const T& r0) {
+    const T s = named("sqrt_R0", sqrt(r0));
+    nu = named("nu", (T(1) - s) / (T(1) + s));
+    w = named("w", T(4) * s / sqr(T(1) + s));
+  }
+  /// Cosines from here on; at 0 the formulas are 0/0 where nothing is reflected.
+  static T guarded(const T& c) { return maximum(c, T(1e-15)); }
+  T g(const T& c) const { return named("g", sqrt(w + sqr(nu * c))); }
+
+  T R(const T& cosTheta) const {
+    const T c = guarded(cosTheta), gc = g(c);
+    const T rs = w / sqr(nu * c + gc), rp = w * (c * c * (T(1) + nu * nu) - nu * nu) / sqr(c + nu * gc);
+    return named("R_f", (rs * rs + rp * rp) / T(2));
+  }
+  /// T / nu
+  T That(const T& cosTheta) const {
+    const T c = guarded(cosTheta), gc = g(c);
+    return named("That", T(2) * c * gc * (T(1) / sqr(nu * c + gc) + T(1) / sqr(c + nu * gc)));
+  }
+  /// 2 integral of That c dc
+  T S() const { return named("S", lookup(table_of_S(), std::array<T, 1>{sqrt(nu)})); }
+};
+
+const std::shared_ptr<const Table>& table_of_S() {
+  static const std::shared_ptr<const Table> table = [] {
+    constexpr int kKnots = 4097;
+    std::vector<double> values;
+    for (int i = 0; i < kKnots; ++i) {
+      FullCoat<double> coat(0);
+      coat.nu = sqr(double(i) / (kKnots - 1));
+      coat.w = (1 - coat.nu) * (1 + coat.nu);
+      // c = t^3 takes the root at the horizon away.
+      values.push_back(boost::math::quadrature::gauss<double, 30>::integrate(
+          [&](double t) { return 6 * coat.That(t * t * t) * t * t * t * t * t; }, 0., 1.));
+    }
+    return make_table("coupled_S", {kKnots}, values);
+  }();
+  return table;
+}
 
 template <class T> struct Coupled {
   T r0;
   Rgb<T> rm;
   Choice fresnel;
+
+  enum { Schlick, Dielectric };
 
   static ModelInfo info() {
     return {.name = "coupled",
@@ -25,9 +86,11 @@ template <class T> struct Coupled {
             .paper =
                 "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
                 "Models, Pacific Graphics 1997",
-            .equations = "eqs. 1, 5, 6; k of eq. 4 mended",
+            .equations = "eqs. 1, 5, 6; k of eq. 4 mended; or the full Fresnel equations in eq. 3",
             .doc = "Polished surface: a mirror-like coat over a matte base, whose shares trade off with the angle.",
-            .properties = {.lossless = true, .specular_limit = "r0=1"},
+            .properties = {.lossless = true,
+                           .exact_sampling = false,  // for schlick it is exact
+                           .specular_limit = "r0=1"},
             .params = {}};
   }
 
@@ -35,26 +98,36 @@ template <class T> struct Coupled {
     v(r0,
       NumberSpec{"r0", "Normal Reflectance", 0.05, 0, 1, 0, 0.2, "Reflectance of the coat at normal incidence, R_0"});
     v(rm, ColorSpec{"rm", "Matte Reflectance", {0.8, 0.8, 0.8}, "Reflectance of the matte base, R_m"});
-    v(fresnel, ChoiceSpec{"fresnel", "Fresnel", {"schlick"}, "schlick: eq. 1"});
+    v(fresnel, ChoiceSpec{"fresnel",
+                          "Fresnel",
+                          {"schlick", "dielectric"},
+                          "Reflectance of the coat. schlick: approximation, eq. 1; dielectric: Fresnel's equations"});
   }
 
-  /// R_f(theta), eq. 1.
-  T R_f(const T& cosTheta) const { return r0 + (T(1) - r0) * schlick_weight(cosTheta); }
+  /// R_f(theta), eq. 1 or in full.
+  T R_f(const T& cosTheta) const {
+    if (fresnel == Dielectric) return FullCoat<T>(r0).R(cosTheta);
+    return r0 + (T(1) - r0) * schlick_weight(cosTheta);
+  }
 
   /// Weight of the mirror term of eq. 5.
   Rgb<T> mirror(const Vec3<T>& wo) const { return Rgb<T>(R_f(wo.z)); }
 
-  /// 1 - (1 - c)^5 as a polynomial: no cancellation for small c.
-  static T f(const T& c) { return c * (T(5) - c * (T(10) - c * (T(10) - c * (T(5) - c)))); }
+  static T f(const T& c) { return one_minus_schlick_weight(c); }
 
   T k() const { return T(21) * (T(1) - r0) / (T(20) * pi<T>()); }
 
   /// Matte term of eq. 5.
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    if (fresnel == Dielectric) {
+      const FullCoat<T> coat(r0);
+      const T k = named("k", coat.nu / (pi<T>() * coat.S()));
+      return select(above(wi, wo), rm * (k * coat.That(wi.z) * coat.That(wo.z)), Rgb<T>(T(0)));
+    }
     return select(above(wi, wo), rm * (k() * f(wi.z) * f(wo.z)), Rgb<T>(T(0)));
   }
 
-  /// The matte term's shape in wi, normalised.
+  /// The matte term's shape in wi, normalised; with the full equations nearly so.
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     return select(above(wi, wo), T(21) / (T(20) * pi<T>()) * f(wi.z) * wi.z, T(0));
   }
@@ -80,21 +153,27 @@ template <class T> struct Coupled {
     const T sinTheta = sqrt((T(1) - c) * (T(1) + c));
     const T phi = T(2) * pi<T>() * u.z;
     const Vec3<T> wi = {sinTheta * cos(phi), sinTheta * sin(phi), c};
+    if (fresnel == Dielectric) {
+      const FullCoat<T> coat(r0);
+      const T shape = coat.That(c) / maximum(T(1.05) * coat.S() * f(c), tiny<T>());
+      return sample_if(above(wi, wo), wi, rm * (coat.nu * coat.That(wo.z) * shape), pdf(wi, wo));
+    }
     // f cos / pdf = R_m (1 - R_f(theta_o)): the shape in wi cancels.
     return sample_if(above(wi, wo), wi, rm * ((T(1) - r0) * f(wo.z)), pdf(wi, wo));
   }
 
-  /// With s = (1 - c)^5: (1 - s) c = 2 (1 - s/2) c - c. Burley's closure at roughness 0 gives the first term and
-  /// a ramp, which may be negative, the second. The ramp is linear in c, hence exact. Its magnitude sits in its
-  /// colours, so that its weight adds nothing to what the passes take for albedo.
-  ClosureSum<T> exact(const Vec3<T>& wo) const {
+  /// None with the full equations. With s = (1 - c)^5: (1 - s) c = 2 (1 - s/2) c - c. Burley's closure at roughness 0
+  /// gives the first term and a ramp, which may be negative, the second. The ramp is linear in c, hence exact. Its
+  /// magnitude sits in its colours, so that its weight adds nothing to what the passes take for albedo.
+  std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const {
+    if (fresnel == Dielectric) return std::nullopt;
     const Rgb<T> W = named("W", rm * (T(1.05) * (T(1) - r0) * f(wo.z)));
     const T so = named("s_o", schlick_weight(wo.z));
     Closure<T> burley(ClosureKind::Burley, W * (T(2) / (T(1) - so / T(2))));
     const T small = T(kRampWeight);
     Closure<T> ramp(ClosureKind::DiffuseRamp, Rgb<T>(small));
     for (int i = 0; i < kRampSize; ++i) ramp.ramp[std::size_t(i)] = W * (T(-i) / (T(kRampSize - 1) * small));
-    return {burley, ramp, Closure<T>(ClosureKind::Reflection, mirror(wo))};
+    return ClosureSum<T>{burley, ramp, Closure<T>(ClosureKind::Reflection, mirror(wo))};
   }
 
   /// Large enough that Cycles does not drop the closure (it does at 1e-5), small beside any albedo that matters.

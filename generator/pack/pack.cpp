@@ -104,6 +104,12 @@ Json error_json(const RepresentationError& e) {
           {"note", e.note}};
 }
 
+Json choices_json(const ParamValues& choices) {
+  Json j = Json::object();
+  for (const auto& [name, value] : choices) j[name] = std::get<std::string>(value);
+  return j;
+}
+
 /// What a user must know of a form; the add-on turns each into words where it applies.
 std::vector<std::string> warnings(RepresentationKind kind) {
   // Measured in Cycles: bump-map correction bends lobes that are tilted from the shading normal, and a clamp on
@@ -275,6 +281,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
                            whole_table.size(), whole.source.size()});
     j["representations"][name_of(kind)] = {
         {"shader", file},
+        {"choices", choices_json(form_choices(model, kind))},
         {"closures", shader.closures},
         {"slots", shader.slots},
         {"statements", shader.operations},

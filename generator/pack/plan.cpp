@@ -13,10 +13,21 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
 
 RepresentationKind chosen_form(const MaterialNeed& need) {
   const std::vector<RepresentationKind> known = representations(*need.model);
-  if (need.representation == "auto") return known.front();
+  // A form may exist for some choices only.
+  const auto lacking = [&](RepresentationKind kind) {
+    for (const auto& [name, value] : form_choices(*need.model, kind))
+      if (need.values.at(name) != value) return fmt::format("{}={}", name, std::get<std::string>(value));
+    return std::string();
+  };
+  if (need.representation == "auto")
+    for (RepresentationKind kind : known)
+      if (lacking(kind).empty()) return kind;
   const RepresentationKind kind = representation_named(need.representation);
   if (std::find(known.begin(), known.end(), kind) == known.end())
     input_error("material {}: {} has no form '{}'", need.id, need.model->info().name, need.representation);
+  if (const std::string choice = lacking(kind); !choice.empty())
+    input_error("material {}: {} has the form '{}' only for {}", need.id, need.model->info().name, need.representation,
+                choice);
   return kind;
 }
 

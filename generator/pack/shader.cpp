@@ -301,9 +301,14 @@ std::string balanced_sum(const std::vector<std::string>& terms) {
   return group(left, middle - terms.begin() > 1) + " + " + group(right, terms.end() - middle > 1);
 }
 
-Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& fixed,
+Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
                     int max_lobes) {
   const ModelInfo& info = model.info();
+  ParamValues fixed = given;
+  for (const auto& [name, value] : form_choices(model, kind))
+    if (fixed.emplace(name, value).first->second != value)
+      input_error("{}: the {} form exists only for {}={}", info.name, name_of(kind), name,
+                  std::get<std::string>(value));
   const bool sampled = kind == RepresentationKind::Sampled;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));

@@ -19,10 +19,10 @@ struct Shader {
   bool lobes = false;  ///< has the Lobes parameter
 };
 
-/// Parameters in `fixed` are folded into the text and are no parameters of the shader. `table` gives the Albedo
+/// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
 /// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. Throws
 /// InputError if the closures would exceed what Cycles keeps or the table what an array holds.
-Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& fixed = {},
+Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
                     int max_lobes = kMaxLobes);
 
 /// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <set>
 
 #include "analysis/albedo.h"
 #include "model/horizon.h"
@@ -129,6 +130,29 @@ ParamValues with_choices(const ModelInfo& info, const Choices& choices, ParamVal
   return values;
 }
 
+ParamValues form_choices(const Model& model, RepresentationKind kind) {
+  if (kind != RepresentationKind::Exact) return {};
+  const ModelInfo& info = model.info();
+  std::vector<Choices> known;
+  for (const Choices& c : choice_combinations(info))
+    if (model.make_double(with_choices(info, c))->exact({0, 0, 1})) known.push_back(c);
+  ParamValues fixed;
+  std::size_t k = 0, combinations = 1;
+  for (const ParamInfo& p : info.params) {
+    if (p.kind != ParamKind::Choice) continue;
+    std::set<int> used;
+    for (const Choices& c : known) used.insert(c[k]);
+    if (used.size() == 1 && p.choices.size() > 1)
+      fixed[p.name] = p.choices[std::size_t(*used.begin())];
+    else
+      combinations *= p.choices.size();
+    ++k;
+  }
+  if (known.size() != combinations)
+    throw std::logic_error(info.name + ": exact() must be decided by choices that each have one value for it");
+  return fixed;
+}
+
 Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent) {
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
@@ -162,7 +186,12 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);
   double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;
+  const ParamValues confined = form_choices(model, kind);
   for (const Choices& choices : choice_combinations(model.info())) {
+    const ParamValues combination = with_choices(model.info(), choices);
+    if (!std::all_of(confined.begin(), confined.end(),
+                     [&](const auto& c) { return combination.at(c.first) == c.second; }))
+      continue;
     // The recording does not depend on the values, so one serves all parameter sets.
     Recorder recorder;
     const std::unique_ptr<Brdf<Expr>> recorded = model.record(with_choices(model.info(), choices));

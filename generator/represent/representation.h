@@ -33,6 +33,9 @@ std::vector<Choices> choice_combinations(const ModelInfo&);
 /// Adds the combination to the fixed values.
 ParamValues with_choices(const ModelInfo&, const Choices&, ParamValues values = {});
 
+/// The choices that a form is confined to, because the closures of an exact one are known for some choices only.
+ParamValues form_choices(const Model&, RepresentationKind);
+
 /// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
 /// sampled, u_0, u_1, u_2; and assign what `kind` says.
 struct Recording {

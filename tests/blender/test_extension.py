@@ -92,8 +92,8 @@ def test_every_choice_reaches_the_shader(extension, empty, subtests):
     extension.api.enable_osl(scene)
     tested = 0
     for model, representation in forms(extension):
-        for parameter in extension.pack.parameters(model).values():
-            if parameter["kind"] != "choice" or len(parameter["choices"]) < 2:
+        for parameter in extension.pack.socket_parameters(model, representation).values():
+            if parameter["kind"] != "choice":
                 continue
             for index, choice in enumerate(parameter["choices"]):
                 with subtests.test(model=model, representation=representation, choice=choice):
@@ -128,7 +128,7 @@ def test_sockets_equal_the_manifest(extension, empty, subtests):
         for parameter in manifest["models"][model]["parameters"]:
             name = parameter["name"]
             with subtests.test(model=model, representation=representation, parameter=name):
-                if parameter["kind"] == "choice" and len(parameter["choices"]) == 1:
+                if name not in extension.pack.socket_parameters(model, representation):
                     assert name not in sockets
                     continue
                 socket = sockets[name]
@@ -608,11 +608,35 @@ def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
             assert ("Albedo: 0\u00b0" in text) == bool(entry.get("albedo"))
             for form in entry["representations"]:
                 assert f"operator brdfc.switch {form.capitalize()}" in text
-            for parameter in entry["parameters"]:
-                if extension.pack.has_socket(parameter):
-                    assert f"value {parameter['label']}:" in text
+            shown = extension.nodes.identity(extension.nodes.group_nodes(material)[0])
+            for parameter in extension.pack.socket_parameters(*shown).values():
+                assert f"value {parameter['label']}:" in text
             assert "Open Shading Language is off" in text
             assert "operator brdfc.enable_osl" in text
+
+
+def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension, empty):
+    api, pack, nodes = extension.api, extension.pack, extension.nodes
+    only = "'exact' only for fresnel='schlick', not for 'dielectric'"
+    with pytest.raises(ValueError, match=only):
+        api.new_material("coupled", "exact", fresnel="dielectric")
+    material = api.new_material("coupled", fresnel="dielectric", r0=0.1)
+    assert nodes.identity(nodes.group_nodes(material)[0]) == ("coupled", "sampled")
+    with pytest.raises(ValueError, match=only):
+        api.switch_representation(material, "exact")
+    assert api.get_parameters(material)["fresnel"] == "dielectric"
+    layout = Layout()
+    extension.ui.draw_material(layout, material, empty)
+    text = "\n".join(layout.log)
+    assert "operator brdfc.switch Exact" not in text
+    assert "operator brdfc.switch Sampled" in text
+    api.set_parameters(material, fresnel="schlick")
+    api.switch_representation(material, "auto")
+    assert nodes.identity(nodes.group_nodes(material)[0]) == ("coupled", "exact")
+    assert api.get_parameters(material)["fresnel"] == "schlick"
+    with pytest.raises(ValueError, match=only):
+        api.set_parameters(material, fresnel="dielectric")
+    assert pack.resolve("coupled", "auto", {"fresnel": "dielectric"}) == "sampled"
 
 
 def test_panel_says_why_there_is_no_albedo(extension, empty):

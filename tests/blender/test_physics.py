@@ -83,6 +83,7 @@ SAMPLED = with_every_model(
     "sampled",
     ("lambert", {"rho": (0.9, 0.5, 0.1)}),
     ("coupled", {"r0": 0.1, "rm": (1.0, 0.5, 0.1)}),
+    ("coupled", {"r0": 0.1, "rm": (1.0, 0.5, 0.1), "fresnel": "dielectric"}),
     ("ashikhmin_shirley", {"nu": 20.0, "nv": 20.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.5, 0.2)}),
     ("ashikhmin_shirley", {"nu": 5.0, "nv": 100.0, "rotation": 0.5, "part": "specular"}),
     ("ashikhmin_shirley", {"part": "diffuse", "rd": 1.0}),
