@@ -32,7 +32,7 @@ enum Defect {
   kUnstable,
   kGain,
   kTurn,
-  kColorSquared,
+  kColorCubed,
   kClosure,
   kDark,
   kEdge,
@@ -74,7 +74,7 @@ template <Defect D> struct Faulty {
       if (D == kUnstable) f = f * (T(1) + (T(1e6) + wi.z * wi.z) - (T(1e6) + wi.z * wi.z * T(0.999)));
       if (D == kGain) f = f * T(1.01);
       if (D == kTurn) f = f * (T(1) + T(0.01) * wi.x * wo.x);
-      if (D == kColorSquared) f = f * rho;
+      if (D == kColorCubed) f = f * rho * rho;
       if (D == kDark) f = f * sqr(maximum(wi.x * wo.x + wi.y * wo.y + T(0.5), T(0)));
       if (D == kEdge) f = f * (T(1) - T(0.05) * abs(wi.x + wo.x));
       // Fades so quickly that it underflows, and smoothly.
@@ -339,9 +339,19 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
   EXPECT_LT(worst, t.error + 1e-3);
 }
 
-TEST(AlbedoTableOf, AModelNotLinearInItsColoursIsRefused) {
-  const detail::ModelOf<Faulty<kColorSquared>::Type> model;
-  EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("linear in each"));
+TEST(AlbedoTableOf, OrenNayarsColourEntersSquared) {
+  const Model& m = find_model("oren_nayar");
+  const AlbedoTable t = tabulate_albedo(m);
+  const auto& full = t.terms_for(m, parse_values(m.info(), {"form=full"}));
+  ASSERT_EQ(full.size(), 2u);
+  EXPECT_THAT(full[0].colors, testing::ElementsAre("rho"));
+  EXPECT_THAT(full[1].colors, testing::ElementsAre("rho", "rho"));
+  EXPECT_EQ(t.terms_for(m, parse_values(m.info(), {"form=qualitative"})).size(), 1u);
+}
+
+TEST(AlbedoTableOf, AModelOfThirdDegreeInItsColoursIsRefused) {
+  const detail::ModelOf<Faulty<kColorCubed>::Type> model;
+  EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("of degree two at most in each"));
 }
 
 TEST(AlbedoTableOf, APdfThatIsNotTheSamplersIsRefused) {

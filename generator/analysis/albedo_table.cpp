@@ -548,7 +548,7 @@ class Tabulator {
                         kSame + error + 10 * one.error));
       };
       require_equal(direct.scattered[0] + direct.mirror[0], 10 * direct.error,
-                    "the albedo at the colours themselves, linear in each and channel by channel,");
+                    "the albedo at the colours themselves, of degree two at most in each and channel by channel,");
       double error = all.error;
       if (p.quadrature) {
         const Albedo a = albedo(*brdf, p.x[0], p.phi, label(values), kProofOptions);
