@@ -54,15 +54,15 @@ TEST(Fresnel, DielectricEqualsTheConductorWithoutAbsorptionAndLosesNothing) {
     for (int i = 1; i <= 50; ++i) {
       const double c = i / 50., s2 = (1 - c) * (1 + c);
       const Dielectric<double> f = fresnel_dielectric(c, s2, eta);
-      EXPECT_NEAR(f.R, textbook_conductor(c, eta, 0), 1e-12) << c << " " << eta;
-      EXPECT_NEAR(f.R + f.T_, 1, 1e-14) << c << " " << eta;
+      EXPECT_NEAR(f.reflected, textbook_conductor(c, eta, 0), 1e-12) << c << " " << eta;
+      EXPECT_NEAR(f.reflected + f.refracted, 1, 1e-14) << c << " " << eta;
     }
-  EXPECT_NEAR(fresnel_dielectric(1., 0., 1.5).R, 0.04, 1e-16);
+  EXPECT_NEAR(fresnel_dielectric(1., 0., 1.5).reflected, 0.04, 1e-16);
   const double brewster = std::atan(1.5);
-  EXPECT_NEAR(fresnel_dielectric(std::cos(brewster), sqr(std::sin(brewster)), 1.5).R,
+  EXPECT_NEAR(fresnel_dielectric(std::cos(brewster), sqr(std::sin(brewster)), 1.5).reflected,
               0.5 * sqr(std::sin(std::atan(1.5) - std::atan(1 / 1.5))), 1e-15);
-  EXPECT_EQ(fresnel_dielectric(0.6, 0.64, 1 / 1.5).R, 1);  // beyond the critical angle
-  EXPECT_EQ(fresnel_dielectric(0.6, 0.64, 1 / 1.5).T_, 0);
+  EXPECT_EQ(fresnel_dielectric(0.6, 0.64, 1 / 1.5).reflected, 1);  // beyond the critical angle
+  EXPECT_EQ(fresnel_dielectric(0.6, 0.64, 1 / 1.5).refracted, 0);
 }
 
 TEST(Metals, ReflectWhatIsPublishedAtTheirMeasuredWavelengths) {
@@ -130,7 +130,7 @@ TEST(Metals, SchlicksErrorForDielectricsIsAsTheyReport) {
     double worst = 0;
     for (int j = 1; j <= 1000; ++j) {
       const double c = j / 1000., s2 = (1 - c) * (1 + c);
-      worst = std::max(worst, std::abs(r0 + (1 - r0) * std::pow(1 - c, 5) - fresnel_dielectric(c, s2, eta).R));
+      worst = std::max(worst, std::abs(r0 + (1 - r0) * std::pow(1 - c, 5) - fresnel_dielectric(c, s2, eta).reflected));
     }
     return worst;
   };

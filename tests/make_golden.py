@@ -310,7 +310,22 @@ def ra_f(p, wi, wo):
     mp.mp.dps = ra_digits(n)
     n = mp.mpf(n)
     ki, ko = vec(wi), vec(wo)
-    kr = [-ko[0], -ko[1], ko[2]]
+    factor = mp.mpf(1)
+    if p["around"] == "refraction":
+        # Snell's law carries what is inside (z < 0) to the thin side.
+        if ki[2] * ko[2] >= 0:
+            return [mp.mpf(0)] * 3  # pairs beyond the critical angle are not among these tests
+        if ki[2] < 0:
+            factor = mp.mpf(p["ior"]) ** 2
+        carried = []
+        for k in (ki, ko):
+            scale = mp.mpf(p["ior"]) if k[2] < 0 else mp.mpf(1)
+            x, y = scale * k[0], scale * k[1]
+            if x * x + y * y >= 1:
+                return [mp.mpf(0)] * 3
+            carried.append([x, y, mp.sqrt(1 - x * x - y * y)])
+        ki, ko = carried
+    kr = ko if p["around"] == "retro" else [-ko[0], -ko[1], ko[2]]
     si, sr = mp.sqrt(ki[0] ** 2 + ki[1] ** 2), mp.sqrt(kr[0] ** 2 + kr[1] ** 2)
     x, y = ki[2] ** 2, kr[2] ** 2
     n_theta = p["n_theta"] if p["proportion"] == "custom" else n
@@ -340,13 +355,13 @@ def ra_f(p, wi, wo):
         f = 2 * f_phi
     else:
         f = f_theta * f_phi
-    return [f * c for c in p["tint"]]
+    return [factor * f * c for c in p["tint"]]
 
 
 def ra_pdf(p, wi, wo):
     """The cosine-weighted lobe."""
     white = dict(p, tint=(1, 1, 1))
-    return ra_f(white, wi, wo)[0] * vec(wi)[2]
+    return ra_f(white, wi, wo)[0] * abs(vec(wi)[2])
 
 
 # ---- Fresnel's equations by complex numbers ------------------------------------------------------
@@ -358,6 +373,11 @@ def fresnel(c, eta):
     root = mp.sqrt(eta**2 - 1 + c**2)
     rs, rp = (c - root) / (c + root), (eta**2 * c - root) / (eta**2 * c + root)
     return (abs(rs) ** 2 + abs(rp) ** 2) / 2
+
+
+def dielectric_albedo(p, cos_o):
+    """A boundary keeps nothing: what is not reflected goes through."""
+    return [mp.mpf(1)] * 3
 
 
 def conductor_albedo(p, cos_o):
@@ -901,6 +921,8 @@ MODELS = {
             "n_phi": 4,
             "proportion": "paper",
             "part": "product",
+            "around": "reflection",
+            "ior": 1.5,
             "tint": (1, 1, 1),
         },
         cases=[
@@ -910,9 +932,27 @@ MODELS = {
             {"n_theta": 0, "n_phi": 100, "proportion": "custom"},
             {"n": 3, "part": "latitudinal"},
             {"n": 30, "part": "longitudinal"},
+            {"n": 4, "around": "retro"},
+            {"n": 1e4, "around": "retro"},
+            {"n": 4, "around": "refraction"},
+            {"n": 40, "around": "refraction", "ior": 1.1},
+            {"n": 2, "around": "refraction", "ior": 2.4, "proportion": "equal"},
         ],
-        albedo_cases=[{"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)],
+        albedo_cases=[{"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)]
+        + [{"n": 4, "around": a} for a in ("retro", "refraction")],
         cosines=[1, 0.5, 0.05],
+    ),
+    "fresnel_dielectric": dict(
+        albedo=dielectric_albedo,
+        defaults={"ior": 1.5},
+        cases=[{}, {"ior": 2.4}, {"ior": 0.75}],
+        cosines=[1, 0.5, 0.1, 0.001],
+    ),
+    "glass": dict(
+        albedo=dielectric_albedo,
+        defaults={"ior": 1.5, "attenuation": (0.5, 0.9, 0.7), "density": 1},
+        cases=[{}, {"attenuation": (0, 0, 1), "density": 100}],
+        cosines=[1, 0.1],
     ),
     "fresnel_conductor": dict(
         albedo=conductor_albedo,
@@ -1089,7 +1129,8 @@ def tolerance(function, p, wi, wo, base):
     ulp = mp.mpf(2) ** -53
     total = mp.mpf(0)
     moves = [("wi", i) for i in range(3)] + [("wo", i) for i in range(3)]
-    moves += [(k, None) for k, v in p.items() if isinstance(v, (int, float))]
+    unused = {"ior"} if p.get("around") in ("reflection", "retro") else set()
+    moves += [(k, None) for k, v in p.items() if isinstance(v, (int, float)) and k not in unused]
     for what, i in moves:
         q, a, b = dict(p), [mp.mpf(c) for c in wi], [mp.mpf(c) for c in wo]
         if what == "wi":
@@ -1126,6 +1167,13 @@ def main():
             p = {**m["defaults"], **case}
             # A model without f has delta terms alone.
             for wi, wo in pairs(rng) if "f" in m else []:
+                if p.get("around") == "refraction":
+                    wi = (wi[0] / p["ior"], wi[1] / p["ior"])
+                    wi = (*wi, -math.sqrt(1 - wi[0] ** 2 - wi[1] ** 2))
+                    if rng.random() < 0.5:
+                        wi, wo = wo, wi
+                elif p.get("around") == "retro":
+                    wo = (-wo[0], -wo[1], wo[2])
                 for kind in ("f", "pdf"):
                     v = values(m[kind], p, wi, wo)
                     # Below the normal numbers of double precision there is nothing to compare.

@@ -146,6 +146,7 @@ Point2 Sequence2::next() {
 Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) {
   sin_o_ = std::hypot(wo.x, wo.y);
   theta_o_ = std::atan2(sin_o_, wo.z);
+  through_ = brdf.scatters_through();
   cos_phi_ = sin_o_ > 0 ? wo.x / sin_o_ : 1;
   sin_phi_ = sin_o_ > 0 ? wo.y / sin_o_ : 0;
   std::vector<double> borders = lobe_borders(brdf, wo);
@@ -197,9 +198,11 @@ Vec3<double> Guides::direction_at(double theta, double phi) const {
 std::vector<Rect> Guides::cells(std::size_t most) const {
   // Cut at the mirror direction, where a lobe's peak or a kink of max(cos_i, cos_o) lies.
   std::vector<Rect> out;
+  std::vector<double> cuts{0, std::min(theta_o_, kPi / 2), std::max(theta_o_, kPi / 2)};
+  if (through_) cuts.push_back(kPi);
   for (const double phi : {0., kPi})
-    for (const Rect& r : {Rect{0, theta_o_, phi, phi + kPi}, Rect{theta_o_, kPi / 2, phi, phi + kPi}})
-      if (r.x1 > r.x0) {
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i)
+      if (const Rect r{cuts[i], cuts[i + 1], phi, phi + kPi}; r.x1 > r.x0) {
         const std::vector<Rect> parts = cells(r, most);
         out.insert(out.end(), parts.begin(), parts.end());
       }
@@ -244,9 +247,10 @@ class AlbedoIntegrator {
     for (const Brdf<double>* m : models_) {
       const Rgb<double> f = m->eval(wi, wo_);
       require_value(f, "f", label_, wi, wo_);
-      *out++ = f.r * wi.z;
-      *out++ = f.g * wi.z;
-      *out++ = f.b * wi.z;
+      const double cosTheta = std::abs(wi.z);
+      *out++ = f.r * cosTheta;
+      *out++ = f.g * cosTheta;
+      *out++ = f.b * cosTheta;
     }
   }
 
@@ -459,8 +463,10 @@ Albedo albedo(const Brdf<double>& brdf, double cos_theta_o, double phi_o, const 
   Albedo out;
   out.scattered = {e.value[0], e.value[1], e.value[2]};
   out.mirror = brdf.mirror(wo);
+  out.transmit = brdf.transmit(wo);
   out.error = e.error;
   require_value(out.mirror, "mirror", label, {-wo.x, -wo.y, wo.z}, wo);
+  require_value(out.transmit, "transmit", label, {-wo.x, -wo.y, -wo.z}, wo);
   return out;
 }
 
@@ -488,7 +494,7 @@ MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<
         const AlbedoIntegrator integrator(guide, models, wo, label);
         integrator.evaluate_sample({borders[lobe] + choice * width, tent(p.x), tent(p.y)}, scratch.data());
         for (std::size_t m = 0; m < models.size(); ++m) {
-          const Rgb<double> mirror = models[m]->mirror(wo);
+          const Rgb<double> mirror = models[m]->mirror(wo) + models[m]->transmit(wo);
           require_value(mirror, "mirror", label, {-wo.x, -wo.y, wo.z}, wo);
           double* out = &scratch[3 * (models.size() + m)];
           out[0] = mirror.r;

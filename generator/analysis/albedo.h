@@ -26,7 +26,7 @@ struct BoundModel {
 /// Throws InputError for inadmissible values.
 BoundModel bind_model(const Model&, const ParamValues&);
 
-/// Unit vector with z = cos_theta (0 < cos_theta <= 1) and azimuth phi from the tangent.
+/// Unit vector with z = cos_theta (0 < |cos_theta| <= 1) and azimuth phi from the tangent.
 Vec3<double> direction(double cos_theta, double phi);
 
 /// Throws ValueError unless every component is finite and >= 0. `what` is "f", "pdf", ...
@@ -65,19 +65,21 @@ class Guides {
   /// theta in [0, pi], phi in [0, 2 pi) from the azimuth of wo; the mirror direction has phi = pi.
   Point2 angles(const Vec3<double>& wi) const;
   Vec3<double> direction_at(double theta, double phi) const;
-  /// Cells that cover the hemisphere: cut at the mirror direction, small where samples crowd.
+  /// Cells that cover the hemisphere, or the sphere if the model scatters through: cut at the mirror direction, small
+  /// where samples crowd.
   std::vector<Rect> cells(std::size_t most) const;
   /// Cells that cover a rectangle that holds many samples.
   std::vector<Rect> cells(const Rect&, std::size_t most) const;
 
  private:
   double sin_o_, theta_o_, cos_phi_, sin_phi_;
+  bool through_;
   std::vector<std::vector<Point2>> lobes_;
 };
 
-/// Integral over wi in the upper hemisphere, in solid angle. `guide` says by its samples where to look first, so that
-/// a peak is found though it be far narrower than the distance of the rule's nodes. `integrand` writes `components`
-/// numbers.
+/// Integral over wi in the upper hemisphere, in solid angle; over the sphere for a guide that scatters through. `guide`
+/// says by its samples where to look first, so that a peak is found though it be far narrower than the distance of the
+/// rule's nodes. `integrand` writes `components` numbers.
 CubatureResult integrate_hemisphere(const Brdf<double>& guide, const Vec3<double>& wo, std::size_t components,
                                     const std::function<void(const Vec3<double>& wi, double*)>& integrand,
                                     const CubatureOptions&, int guides = 512);
@@ -91,18 +93,20 @@ struct AlbedoOptions {
 struct Albedo {
   Rgb<double> scattered;  ///< integral of f cos(theta_i) over wi
   Rgb<double> mirror;     ///< weight of ideal reflection
+  Rgb<double> transmit;   ///< weight of ideal refraction
   double error = 0;       ///< of `scattered`: estimate, largest component
-  Rgb<double> total() const { return scattered + mirror; }
+  Rgb<double> total() const { return scattered + mirror + transmit; }
 };
-/// Albedo for a view direction with 0 < cos_theta_o <= 1. Two cubatures that fail in different places are compared:
-/// one over directions (poor at ridges that are thin and curved), one over the random numbers of sample() (poor at a
-/// narrow lobe seen through the samples of a wide one). Where they differ they are refined, and finally judged by
-/// sampled_albedo(); what then remains between them is the error reported.
+/// Albedo for a view direction with 0 < |cos_theta_o| <= 1, negative for the inside of a model of two sides. Two
+/// cubatures that fail in different places are compared: one over directions (poor at ridges that are thin and curved),
+/// one over the random numbers of sample() (poor at a narrow lobe seen through the samples of a wide one). Where they
+/// differ they are refined, and finally judged by sampled_albedo(); what then remains between them is the error
+/// reported.
 Albedo albedo(const Brdf<double>&, double cos_theta_o, double phi_o = 0, const std::string& label = "",
               const AlbedoOptions& = {});
 
 struct MeanAlbedo {
-  std::vector<Rgb<double>> scattered, mirror;  ///< of each model
+  std::vector<Rgb<double>> scattered, mirror;  ///< of each model; `mirror` holds both delta terms
   double error = 0;                            ///< standard error, largest component
 };
 /// Albedos of several models, averaged over the azimuth of the view direction if `phi_o` is not given, by a

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "analysis/properties.h"
+#include "model/sampling.h"
 
 namespace brdfc {
 namespace {
@@ -97,9 +98,14 @@ double relative(const Rgb<Wide>& a, const Rgb<Wide>& b) {
 template <class T> Rgb<double> to_double(const Rgb<T>& c) { return {double(c.r), double(c.g), double(c.b)}; }
 template <class T> Vec3<double> to_double(const Vec3<T>& v) { return {double(v.x), double(v.y), double(v.z)}; }
 
-/// What rounding and symmetries are judged by: f, or the mirror's weight where there are delta terms alone.
+/// Are views from inside meant?
+bool two_sided(const Model& model, const Brdf<double>& brdf) { return model.has_transmit() || brdf.scatters_through(); }
+
+/// What rounding and symmetries are judged by: f, or the weight of the term on wi's side where there are delta
+/// terms alone.
 template <class T> Rgb<T> value_of(const Model& model, const Brdf<T>& brdf, const Vec3<T>& wi, const Vec3<T>& wo) {
-  return model.has_scatter() ? brdf.eval(wi, wo) : brdf.mirror(wo);
+  if (model.has_scatter()) return brdf.eval(wi, wo);
+  return (wi.z > T(0)) == (wo.z > T(0)) ? brdf.mirror(wo) : brdf.transmit(wo);
 }
 
 template <class Narrow> std::unique_ptr<Brdf<Narrow>> make(const Model& m, const ParamValues& v) {
@@ -138,7 +144,7 @@ Stability stability(const Model& model, ParamValues values, int points, std::uin
   }
   const auto guide = model.make_double(values);
   Stability out;
-  for (const auto& pair : direction_pairs(*guide, points, random)) {
+  for (const auto& pair : direction_pairs(*guide, points, random, two_sided(model, *guide))) {
     const Vec3<Narrow> wi = Vec3<Narrow>::from(pair[0]), wo = Vec3<Narrow>::from(pair[1]);
     const Vec3<Better> better_wi = Vec3<Better>::from(wi), better_wo = Vec3<Better>::from(wo);
     const Rgb<Better> truth = value_of(model, *better, better_wi, better_wo);
@@ -195,7 +201,7 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
     Rect rect;
     std::vector<Point2> pilots;
   };
-  std::vector<Cell> cells{{{0, kPi / 2, 0, 2 * kPi}, pilots}};
+  std::vector<Cell> cells{{{0, brdf.scatters_through() ? kPi : kPi / 2, 0, 2 * kPi}, pilots}};
   for (int depth = 0; depth < kDepth; ++depth) {
     std::vector<Cell> halves;
     for (Cell& c : cells) {
@@ -323,7 +329,7 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
   Worst weights(model, "sample weight", "weight pdf = f cos, sample's pdf = pdf()");
   Worst mean(model, "sampled albedo", "mean weight = albedo by quadrature");
   Worst histogram(model, "chi-square", "p > 0.01 over all cases (Sidak)");
-  Worst exact(model, "exact closures", "relative L1 of f cos, and the mirror's weight");
+  Worst exact(model, "exact closures", "relative L1 of f cos, and the weights of delta terms");
   Worst single(model, "float rounding", "error of f / error its inputs' rounding causes");
   Worst twice(model, "double rounding", "error of f / error its inputs' rounding causes");
 
@@ -344,7 +350,7 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
 
     {  // values
       Random random = random_of(i, 1);
-      for (const auto& [wi, wo] : direction_pairs(f, scaled(256), random)) {
+      for (const auto& [wi, wo] : direction_pairs(f, scaled(256), random, two_sided(model, f))) {
         require_value(f.eval(wi, wo), "f", b.label, wi, wo);
         require_value(f.pdf(wi, wo), "pdf", b.label, wi, wo);
         const Vec3<float> fi = Vec3<float>::from(wi), fo = Vec3<float>::from(wo);
@@ -362,6 +368,14 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
         }
         require_value(f.mirror(wo), "mirror", b.label, wi, wo);
         require_value(to_double(single_precision->mirror(fo)), "mirror in float", b.label, wi, wo);
+        require_value(f.transmit(wo), "transmit", b.label, wi, wo);
+        require_value(to_double(single_precision->transmit(fo)), "transmit in float", b.label, wi, wo);
+        const double far = std::pow(10, 12 * uniform(random) - 6);
+        for (const double distance : {0., uniform(random), far}) {
+          require_value(f.transmittance(distance), "transmittance", b.label, wi, wo);
+          require_value(to_double(single_precision->transmittance(float(distance))), "transmittance in float", b.label,
+                        wi, wo);
+        }
         values.add(0, 0, b.label);
       }
     }
@@ -373,14 +387,16 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
       Random random = random_of(i, 2);
       const auto total = [&](const BoundModel& m, double cos_o, double phi) {
         return sampled_albedo(*m.brdf, cos_o, phi, m.label, scaled(2048)).scattered +
-               m.brdf->mirror(direction(cos_o, phi));
+               m.brdf->mirror(direction(cos_o, phi)) + m.brdf->transmit(direction(cos_o, phi));
       };
       const auto precise = [&](const BoundModel& m, double cos_o, double phi) {
         return albedo(*m.brdf, cos_o, phi, m.label, kAlbedoOptions);
       };
       double highest = 0, highest_cos = 1, lowest = 2, lowest_cos = 1;
       const double phi = 2 * kPi * uniform(random);
-      for (const double cos_o : {1., 0.2 + 0.7 * uniform(random), 0.05}) {
+      std::vector<double> cosines{1., 0.2 + 0.7 * uniform(random), 0.05};
+      if (two_sided(model, f)) cosines.insert(cosines.end(), {-1., -0.2 - 0.7 * uniform(random)});
+      for (const double cos_o : cosines) {
         const Rgb<double> t = total(white_bound, cos_o, phi);
         const double top = max_component(t), bottom = std::min({t.r, t.g, t.b});
         if (top > highest) highest = top, highest_cos = cos_o;
@@ -441,19 +457,29 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
     }
     {  // symmetries
       Random random = random_of(i, 3);
-      for (const auto& [either, wo] : direction_pairs(f, scaled(128), random)) {
-        const Vec3<double> wi = scatters ? either : Vec3<double>{-wo.x, -wo.y, wo.z};
-        double d = relative(value_of(model, f, wi, wo), value_of(model, f, wo, wi));
-        // High powers amplify the rounding of a half vector: then the formulas themselves are compared.
-        if (d > kReciprocity) {
-          const Vec3<Wide> a = Vec3<Wide>::from(wi), c = Vec3<Wide>::from(wo);
-          d = relative(value_of(model, *wide, a, c), value_of(model, *wide, c, a));
+      for (const auto& [wi, wo] : direction_pairs(f, scaled(128), random, two_sided(model, f))) {
+        double d = 0;
+        if (scatters) {
+          // Up to the squared index, where light goes through.
+          const double n2i = wi.z > 0 ? 1 : sqr(f.ior()), n2o = wo.z > 0 ? 1 : sqr(f.ior());
+          d = relative(f.eval(wi, wo) * n2o, f.eval(wo, wi) * n2i);
+          // High powers amplify the rounding of a half vector: then the formulas themselves are compared.
+          if (d > kReciprocity) {
+            const Vec3<Wide> a = Vec3<Wide>::from(wi), c = Vec3<Wide>::from(wo);
+            d = relative(wide->eval(a, c) * Wide(n2o), wide->eval(c, a) * Wide(n2i));
+          }
+        } else {
+          const Vec3<Wide> to = normalize(Vec3<Wide>::from(wo));
+          Vec3<Wide> from{-to.x, -to.y, to.z};
+          if ((wi.z > 0) != (wo.z > 0)) from = refract(to, wide->ior());
+          if (from.z == 0) continue;  // beyond the critical angle
+          d = relative(value_of(model, *wide, from, to), value_of(model, *wide, to, from));
         }
         reciprocal.add(d, kReciprocity, fmt::format("{} wi={} wo={}", b.label, text(wi), text(wo)));
         const std::lock_guard lock(mutex);
         largest_swap = std::max(largest_swap, d);
       }
-      for (const auto& [wi, wo] : direction_pairs(f, 16, random)) {
+      for (const auto& [wi, wo] : direction_pairs(f, 16, random, two_sided(model, f))) {
         const Wide angle(2 * kPi * uniform(random)), c = cos(angle), s = sin(angle);
         const Vec3<Wide> i0 = Vec3<Wide>::from(wi), o0 = Vec3<Wide>::from(wo);
         const Rgb<Wide> before = value_of(model, *wide, i0, o0);
@@ -464,8 +490,9 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
         largest_turn = std::max(largest_turn, d);
       }
     }
-    if (scatters) {  // shape: where sliders lead, colours neither black nor full; a declared failure may also show at a
-                     // slider's end
+    if (scatters && !f.scatters_through()) {  // shape above the surface: where sliders lead, colours neither black nor
+                                              // full; a declared failure may also show at a
+                                              // slider's end
       Random random = random_of(i, 10);
       ParamValues inner = cases[i];
       for (const ParamInfo& p : info.params)
@@ -506,18 +533,21 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
     if (scatters) {  // weights
       Random random = random_of(i, 4);
       for (int k = 0; k < scaled(24); ++k) {
-        const Vec3<double> wo = uniform_direction(random), u = uniform_cube(random);
+        Vec3<double> wo = uniform_direction(random);
+        const Vec3<double> u = uniform_cube(random);
+        if (two_sided(model, f) && k % 2 == 1) wo.z = -wo.z;
         const Vec3<Wide> wide_wo = Vec3<Wide>::from(wo);
         const Sample<Wide> s = wide->sample(wide_wo, Vec3<Wide>::from(u));
         if (!(s.pdf > Wide(0))) continue;
         const std::string where = fmt::format("{} wo={} u={}", b.label, text(wo), text(u));
-        const Rgb<Wide> value = wide->eval(s.wi, wide_wo) * s.wi.z, by_weight = s.weight * s.pdf;
+        const Rgb<Wide> value = wide->eval(s.wi, wide_wo) * Wide(abs(s.wi.z)), by_weight = s.weight * s.pdf;
         weights.add(std::max(relative(value, by_weight), relative(s.pdf, wide->pdf(s.wi, wide_wo))), kIdentity, where);
       }
     }
     if (thorough && scatters) {  // histogram
       Random random = random_of(i, 5);
-      const double cos_o = i % 4 == 0 ? 1 : 0.15 + 0.8 * uniform(random);
+      double cos_o = i % 4 == 0 ? 1 : 0.15 + 0.8 * uniform(random);
+      if (two_sided(model, f) && i % 4 > 1) cos_o = -cos_o;
       const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
       const ChiSquare c = chi_square(b, wo, std::max(10000, scaled(30000)), random());
       if (c.converged) {
@@ -532,7 +562,8 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
     if (f.exact({0, 0, 1})) {
       Random random = random_of(i, 6);
       for (int k = 0; k < 4; ++k) {
-        const Vec3<double> wo = k == 0 ? direction(0.01, 1) : uniform_direction(random);
+        Vec3<double> wo = k == 0 ? direction(0.01, 1) : uniform_direction(random);
+        if (two_sided(model, f) && k % 2 == 1) wo.z = -wo.z;
         const auto sum = f.exact(wo);
         if (!sum) throw ValueError(fmt::format("{}: expected closures for every view direction", b.label));
         double apart = 0, all = 0;
@@ -542,11 +573,14 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
           apart += std::abs(d.r) + std::abs(d.g) + std::abs(d.b);
           all += want.r + want.g + want.b;
         }
-        Rgb<double> mirror(0);
-        for (const Closure<double>& c : *sum)
+        Rgb<double> mirror(0), transmit(0);
+        for (const Closure<double>& c : *sum) {
           if (c.kind == ClosureKind::Reflection) mirror += c.weight;
-        exact.add(std::max(all > 0 ? apart / all : apart, relative(mirror, f.mirror(wo))), kExact,
-                  fmt::format("{} wo={}", b.label, text(wo)));
+          if (c.kind == ClosureKind::Refraction) transmit += c.weight;
+        }
+        exact.add(std::max({all > 0 ? apart / all : apart, relative(mirror, f.mirror(wo)),
+                            relative(transmit, f.transmit(wo))}),
+                  kExact, fmt::format("{} wo={}", b.label, text(wo)));
       }
     }
     {

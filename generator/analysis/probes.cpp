@@ -7,6 +7,8 @@
 #include <cmath>
 #include <set>
 
+#include "model/sampling.h"
+
 namespace brdfc {
 namespace {
 
@@ -54,7 +56,8 @@ Vec3<double> uniform_cube(Random& random) {
 
 std::string text(const Vec3<double>& w) { return fmt::format("({:.9g}, {:.9g}, {:.9g})", w.x, w.y, w.z); }
 
-std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brdf, int count, Random& random) {
+std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brdf, int count, Random& random,
+                                                         bool two_sided) {
   std::vector<std::array<Vec3<double>, 2>> out;
   const Vec3<double> normal{0, 0, 1};
   const auto grazing = [&] {
@@ -65,12 +68,15 @@ std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brd
     Vec3<double> wo = uniform_direction(random), wi = uniform_direction(random);
     if (i % 8 == 5) wo = grazing();
     if (i % 16 == 7) wo = normal;
+    if (two_sided && random() & 1) wo.z = -wo.z;
+    if (two_sided && random() & 1) wi.z = -wi.z;
     const Sample<double> s = brdf.sample(wo, uniform_cube(random));
-    if (i % 2 == 0 && s.pdf > 0 && s.wi.z > 0) wi = s.wi;
+    if (i % 2 == 0 && s.pdf > 0 && (two_sided || s.wi.z > 0)) wi = s.wi;
     if (i % 16 == 3) wi = {-wo.x, -wo.y, wo.z};
     if (i % 16 == 9) wi = wo;
     if (i % 16 == 11) wi = grazing();
-    if (wi.z > 0 && wo.z > 0) out.push_back({wi, wo});
+    if (two_sided && i % 16 == 13) wi = refract(wo, brdf.ior());
+    if (two_sided ? wi.z != 0 && wo.z != 0 : wi.z > 0 && wo.z > 0) out.push_back({wi, wo});
   }
   return out;
 }

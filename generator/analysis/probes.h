@@ -22,7 +22,8 @@ std::string text(const Vec3<double>&);
 
 /// Pairs of directions (wi, wo): anywhere, where the model scatters to, and where formulas break: the normal, grazing,
 /// mirror and backscattering directions.
-std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>&, int count, Random&);
+std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>&, int count, Random&,
+                                                         bool two_sided = false);
 
 /// For every combination of choices the defaults and `random` draws (log-uniform where a range spans decades) within
 /// the sliders' ranges.

@@ -21,10 +21,12 @@ void add_albedo_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "albedo",
-      "Directional albedo by quadrature: integral of f cos over the light directions plus the mirror weight.\n"
-      "stdin:  CSV with header cos_theta_o (0 < cos <= 1); without input, 64 cosines from 0.01 to 1\n"
+      "Directional albedo by quadrature: integral of f cos over the light directions plus the weights of ideal\n"
+      "reflection and refraction.\n"
+      "stdin:  CSV with header cos_theta_o (0 < cos <= 1, and negative inside of what lets light through);\n"
+      "        without input, 64 cosines from 0.01 to 1\n"
       "stdout: CSV with header cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate\n"
-      "        (the albedo includes the mirror)");
+      "        (the albedo includes the mirror and what is refracted)");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
   cmd->add_option("--count", o->count, "So many cosines from 0.01 to 1; stdin is not read")
@@ -47,7 +49,8 @@ void add_albedo_command(CLI::App& app) {
     } else {
       std::vector<double> row;
       while (in->next(row)) {
-        if (!(row[0] > 0 && row[0] <= 1))
+        const bool inside = (model.has_transmit() || bound.brdf->scatters_through()) && row[0] < 0 && row[0] >= -1;
+        if (!inside && !(row[0] > 0 && row[0] <= 1))
           input_error("{}: cos_theta_o: expected a number in (0, 1], got {}", in->where(), row[0]);
         write(row[0]);
       }

@@ -26,7 +26,7 @@ template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T
 }
 
 /// What a smooth boundary of two dielectrics reflects and lets through; R + T = 1.
-template <class T> struct Dielectric { T R, T_; };
+template <class T> struct Dielectric { T reflected, refracted; };
 
 /// `eta`: index of the far side over that of the side of the light. With g^2 = eta^2 - sin^2,
 ///   r_s = (1 - eta^2) / (c + g)^2,  r_p = (eta^2 - 1) (eta^2 c^2 - s^2) / (eta^2 c + g)^2,

@@ -9,6 +9,14 @@
 //
 // A model has eval(), pdf() and sample(), or none of them: then it has delta terms alone, f and pdf are 0 and every
 // sample is lost.
+//
+// Transmission. A model that lets light through separates two media, and z is the normal that leaves the object: a
+// direction with z < 0 lies inside. Then wo may be on either side; mirror(wo) reflects on its side, transmit(wo) is the
+// weight of the delta term in the direction of ideal refraction, ior() the index inside over the one outside. One whose
+// scatters_through() holds has f, pdf and samples for wi on either side as well, cosines are absolute, and the albedo
+// integrates over the sphere. Weights and f count energy: a lossless boundary has albedo 1 from both sides, and f is
+// reciprocal up to the squared index, f(wi, wo) n(wo)^2 = f(wo, wi) n(wi)^2. Radiance is not scaled by it, as in
+// Cycles.
 #pragma once
 
 #include <array>
@@ -93,6 +101,14 @@ template <class T> class Brdf {
   virtual Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const = 0;
   /// Weight of ideal reflection; 0 for a model without a mirror term.
   virtual Rgb<T> mirror(const Vec3<T>& wo) const = 0;
+  /// Weight of ideal refraction; 0 for a model without that term and beyond the critical angle.
+  virtual Rgb<T> transmit(const Vec3<T>& wo) const = 0;
+  /// Refractive index inside over the one outside; 1 where nothing is let through.
+  virtual T ior() const = 0;
+  /// Share of the light left after a distance inside.
+  virtual Rgb<T> transmittance(const T& distance) const = 0;
+  /// Does f join directions on different sides, with the choices bound?
+  virtual bool scatters_through() const = 0;
   /// The closures that equal the model, or nothing if no such sum is known. Delta terms alone are always known.
   virtual std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const = 0;
 };
@@ -106,6 +122,13 @@ class Model {
   virtual bool has_scatter() const = 0;
   virtual bool has_mirror() const = 0;
   virtual bool has_exact() const = 0;
+  virtual bool has_transmit() const { return false; }
+  /// Does the inside absorb?
+  virtual bool has_medium() const { return false; }
+  /// Does f join directions on different sides for some choice?
+  virtual bool has_through() const { return false; }
+  /// Views from inside (wo.z < 0) are meant as well.
+  bool two_sided() const { return has_transmit() || has_through(); }
   /// Throws InputError naming model, parameter and what was expected.
   virtual std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const = 0;
   virtual std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const = 0;
@@ -228,13 +251,28 @@ concept HasMirror = requires(const M& m, const Vec3<double>& w) {
   m.mirror(w);
 };
 template <class M>
+concept HasTransmit = requires(const M& m, const Vec3<double>& w) {
+  m.transmit(w);
+  m.ior();
+};
+template <class M>
+concept HasMedium = requires(const M& m, double distance) {
+  m.transmittance(distance);
+};
+template <class M>
+concept HasThrough = requires(const M& m) {
+  m.scatters_through();
+  m.ior();
+};
+template <class M>
 concept HasExact = requires(const M& m, const Vec3<double>& w) {
   m.exact(w);
 };
 
 template <template <class> class M, class T> class BrdfOf final : public Brdf<T> {
   static constexpr bool kScatters = HasScatter<M<double>>;
-  static_assert(kScatters || HasMirror<M<double>>, "a model needs eval, pdf and sample, or a delta term");
+  static constexpr bool kTransmits = HasTransmit<M<double>>;
+  static_assert(kScatters || HasMirror<M<double>> || kTransmits, "a model needs eval, pdf and sample, or a delta term");
 
  public:
   explicit BrdfOf(M<T> m) : m_(std::move(m)) {}
@@ -262,16 +300,50 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
     else
       return Rgb<T>(T(0));
   }
+  Rgb<T> transmit(const Vec3<T>& wo) const override {
+    if constexpr (kTransmits)
+      return m_.transmit(wo);
+    else
+      return Rgb<T>(T(0));
+  }
+  T ior() const override {
+    if constexpr (kTransmits || HasThrough<M<double>>)
+      return m_.ior();
+    else
+      return T(1);
+  }
+  Rgb<T> transmittance(const T& distance) const override {
+    if constexpr (HasMedium<M<double>>)
+      return m_.transmittance(distance);
+    else
+      return Rgb<T>(T(1));
+  }
+  bool scatters_through() const override {
+    if constexpr (HasThrough<M<double>>)
+      return m_.scatters_through();
+    else
+      return false;
+  }
   std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const override {
     if constexpr (HasExact<M<double>>)
       return m_.exact(wo);
     else if constexpr (!kScatters)
-      return ClosureSum<T>{Closure<T>(ClosureKind::Reflection, mirror(wo))};
+      return delta_terms(wo);
     else
       return std::nullopt;
   }
 
  private:
+  ClosureSum<T> delta_terms(const Vec3<T>& wo) const {
+    ClosureSum<T> sum;
+    if constexpr (HasMirror<M<double>>) sum.emplace_back(ClosureKind::Reflection, mirror(wo));
+    if constexpr (kTransmits) {
+      sum.emplace_back(ClosureKind::Refraction, transmit(wo));
+      sum.back().ior = select(wo.z > T(0), m_.ior(), T(1) / m_.ior());
+    }
+    return sum;
+  }
+
   M<T> m_;
 };
 
@@ -285,6 +357,9 @@ template <template <class> class M> class ModelOf final : public Model {
   bool has_scatter() const override { return HasScatter<M<double>>; }
   bool has_mirror() const override { return HasMirror<M<double>>; }
   bool has_exact() const override { return HasExact<M<double>> || !has_scatter(); }
+  bool has_transmit() const override { return HasTransmit<M<double>>; }
+  bool has_medium() const override { return HasMedium<M<double>>; }
+  bool has_through() const override { return HasThrough<M<double>>; }
   std::unique_ptr<Brdf<double>> make_double(const ParamValues& v) const override { return make<double>(v); }
   std::unique_ptr<Brdf<float>> make_float(const ParamValues& v) const override { return make<float>(v); }
   std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues& v) const override { return make<Wide>(v); }

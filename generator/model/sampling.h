@@ -12,6 +12,16 @@ template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.
 /// Ideal reflection of wo about the normal.
 template <class T> Vec3<T> reflect(const Vec3<T>& wo) { return {-wo.x, -wo.y, wo.z}; }
 
+/// Ideal refraction of wo to the other side of the surface; `ior` is the index inside (z < 0) over the one outside.
+/// What lies beyond the critical angle comes out level with the surface.
+template <class T> Vec3<T> refract(const Vec3<T>& wo, const T& ior) {
+  const auto outside = wo.z > T(0);
+  const T scale = select(outside, T(1) / ior, ior);
+  const T x = -scale * wo.x, y = -scale * wo.y;
+  const T cosTheta = sqrt(maximum(T(1) - x * x - y * y, T(0)));
+  return {x, y, select(outside, -cosTheta, cosTheta)};
+}
+
 /// cos(theta) / pi for a direction above the surface.
 template <class T> T cosine_pdf(const Vec3<T>& wi) { return select(wi.z > T(0), wi.z / pi<T>(), T(0)); }
 

@@ -14,6 +14,14 @@
 // eq. 17 with its denominator written as a sum of non-negative terms, scaled so that nothing over- or underflows
 // from n = 0 to 1e8 (the printed form breaks at n = 25).
 // f_phi: with k = 2 nbar + 1, q = 1/k, P_5(nbar) / k^5 = a^5 + 5 a^3 b^2 + (15/8) a b^4, a = (1+q)/2, b = (1-q)/2.
+// omega_r: the direction of ideal reflection, of ideal refraction, or back to wo. Refraction: simply evaluating the
+// lobe around the refracted direction would lose nothing seen from one side, but is neither reciprocal nor lossless
+// from the other. Instead both directions are carried to the thin side (outside, for the index is at least 1) by
+// Snell's law and the lobe is evaluated there, times the squared index where the light is on the dense side, whose
+// solid angles are so much smaller. Beyond the critical angle nothing comes from outside: there the reflection lobe,
+// its heights stretched, x = cos^2 theta / X with X = 1 - 1/ior^2, shares the light among these directions alone. So
+// all is lossless seen from both sides, and reciprocal up to the squared index.
+//
 // Sampling phi: tan psi = sqrt(k) tan(dphi/2) turns the density into (cos^2 psi + q sin^2 psi)^5 / (pi P_5/k^5),
 // bounded for every k; its CDF is a trigonometric polynomial, inverted by safeguarded Newton steps.
 #include "model/sampling.h"
@@ -23,17 +31,19 @@ namespace brdfc {
 template <class T> struct RadziszewskiAlda {
   T n, n_theta, n_phi;
   Choice proportion, part, around;
+  T index;
   Rgb<T> tint;
 
   enum { Product, Latitudinal, Longitudinal };
   enum { Paper, Equal, Custom };
+  enum { Reflection, Refraction, Retro };
 
   static ModelInfo info() {
     return {.name = "radziszewski_alda",
             .label = "Radziszewski-Alda",
             .paper = "M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008",
             .equations = "eqs. 17-19; factor 2 and nbar mended",
-            .doc = "Glossy reflection that loses no light at any angle, from matte (0) to mirror.",
+            .doc = "Glossy reflection or transmission that loses no light at any angle, from matte (0) to mirror.",
             .properties = {.lossless = true, .diffuse_limit = "n=0", .specular_limit = "n=1e8"},
             .params = {}};
   }
@@ -48,7 +58,12 @@ template <class T> struct RadziszewskiAlda {
                              {"paper", "equal", "custom"},
                              "paper: n_theta = n, n_phi = 0.75 n sqrt(n sin theta_i sin theta_r); equal: both n"});
     v(part, ChoiceSpec{"part", "Part", {"product", "latitudinal", "longitudinal"}, "Which lobes to multiply, eq. 4"});
-    v(around, ChoiceSpec{"around", "Around", {"reflection"}, "Direction the lobe is centred on"});
+    v(around,
+      ChoiceSpec{"around",
+                 "Around",
+                 {"reflection", "refraction", "retro"},
+                 "Direction the lobe is centred on: of ideal reflection, ideal refraction, or back to the viewer"});
+    v(index, NumberSpec{"ior", "IOR", 1.5, 1, 10, 1, 2.5, "Refractive index inside over outside, for refraction"});
     v(tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
   }
 
@@ -90,6 +105,9 @@ template <class T> struct RadziszewskiAlda {
     return named("tanh2_over_m", select(n < T(1e-4), T(1) - n * n / T(2), tanh * tanh / maximum(m, T(1e-9))));
   }
 
+  T ior() const { return index; }
+  bool scatters_through() const { return around == Refraction; }
+
   /// Latitudinal lobe, eq. 17; 1/2 its integral over x is 1.
   T f_theta(const Vec3<T>& wi, const Vec3<T>& wr) const {
     const T nt = latitudinal_n();
@@ -125,23 +143,70 @@ template <class T> struct RadziszewskiAlda {
     return named("f_phi", sqrt(k) / (T(2) * pi<T>() * p5_over_k5(T(1) / k)) / base3 / base3);
   }
 
-  /// eq. 19 without tint, where both directions are above the surface.
-  T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const Vec3<T> wr = reflect(wo);
+  /// A direction of either side as the lobe of refraction takes it.
+  struct Carried {
+    Vec3<T> w;       ///< on the thin side, or stretched beyond the critical angle
+    Vec3<T> turned;  ///< the one whose sine counts for the azimuth: where it is stretched, the direction itself
+    T beyond;        ///< (ior sin)^2 - 1 inside, -1 outside: positive beyond the critical angle
+  };
+  Carried carry(const Vec3<T>& w) const {
+    const auto inside = w.z < T(0);
+    const T scale = named("scale", select(inside, index, T(1)));
+    const T x = scale * w.x, y = scale * w.y;
+    const T sine = named("sin_thin", sqrt(x * x + y * y));
+    const T cos2 = named("cos2_thin", (T(1) - sine) * (T(1) + sine));
+    // With equal indices no angle is critical, and rounding must not make one.
+    const T beyond = named("beyond", select(inside && index > T(1), -cos2, T(-1)));
+    const auto total = beyond > T(0);
+    // Stretched: sin^2 = ((ior sin)^2 - 1) / (ior^2 - 1), cos^2 = cos^2 ior^2 / (ior^2 - 1).
+    const T room = maximum((index - T(1)) * (index + T(1)), tiny<T>());
+    const T stretch = sqrt(maximum(-cos2, T(0)) / room) / maximum(sine, tiny<T>());
+    const T size = named("size", select(total, stretch, T(1)));
+    const T height = named("height", select(total, abs(w.z) * index / sqrt(room), sqrt(maximum(cos2, T(0)))));
+    return {{x * size, y * size, select(inside, height, abs(w.z))},
+            {select(total, w.x, x), select(total, w.y, y), height},
+            beyond};
+  }
+
+  /// Is light carried between the two, through the surface or inside beyond the critical angle? Then the factor on the
+  /// lobe, else 0.
+  T passage(const Vec3<T>& wi, const Carried& i, const Vec3<T>& wo, const Carried& o) const {
+    const T through = select(wi.z < T(0), index * index, T(1));
+    const T total = index * index / maximum((index - T(1)) * (index + T(1)), tiny<T>());
+    const auto crosses = wi.z * wo.z < T(0) && i.beyond < T(0) && o.beyond < T(0);
+    const auto stays = i.beyond > T(0) && o.beyond > T(0);
+    return named("passage", select(crosses, through, select(stays, total, T(0))));
+  }
+
+  /// Eq. 19 around a direction on the upper side, without tint. The last two say what counts for the azimuth.
+  T product(const Vec3<T>& wi, const Vec3<T>& wr, const Vec3<T>& ti, const Vec3<T>& tr) const {
     switch (part) {
       case Latitudinal:
         return f_theta(wi, wr) / (T(2) * pi<T>());
       case Longitudinal:
-        return T(2) * f_phi(wi, wr);
+        return T(2) * f_phi(ti, tr);
       default:
-        return f_theta(wi, wr) * f_phi(wi, wr);
+        return f_theta(wi, wr) * f_phi(ti, tr);
     }
   }
 
-  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return tint * select(above(wi, wo), lobe(wi, wo), T(0)); }
+  /// Eq. 19 without tint; 0 where no light is carried.
+  T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    if (around == Refraction) {
+      const Carried i = carry(wi), o = carry(wo);
+      return passage(wi, i, wo, o) * product(i.w, reflect(o.w), i.turned, reflect(o.turned));
+    }
+    const Vec3<T> wr = centre(wo);
+    return select(above(wi, wo), product(wi, wr, wi, wr), T(0));
+  }
+
+  /// Of the lobe, for reflection and back.
+  Vec3<T> centre(const Vec3<T>& wo) const { return around == Retro ? wo : reflect(wo); }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return tint * lobe(wi, wo); }
 
   /// The cosine-weighted lobe is itself a density.
-  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), lobe(wi, wo) * wi.z, T(0)); }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return lobe(wi, wo) * abs(wi.z); }
 
   /// cos^2 theta_i with density f_theta / 2 given y, for u in [0, 1).
   static T sample_cos2(const T& m, const T& y, const T& u) {
@@ -207,23 +272,43 @@ template <class T> struct RadziszewskiAlda {
   }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Vec3<T> wr = reflect(wo);
-    const T sr2 = sin2_theta(wr), sr = sqrt(sr2);
+    const bool refracts = around == Refraction;
+    const Carried o = refracts ? carry(wo) : Carried{wo, wo, T(-1)};
+    const Vec3<T> wr = refracts ? reflect(o.w) : centre(wo);
+    const T sr2 = sin2_theta(wr);
     std::array<T, 2> x = {T(1) - u.y, u.y};
     if (part != Longitudinal) x = sample_x(latitudinal_n(), wr.z * wr.z, sr2, u.y);
-    const T cosTheta = named("cosTheta_i", sqrt(x[0])), sinTheta = named("sinTheta_i", sqrt(x[1]));
+    T cosTheta = named("cosTheta_i", sqrt(x[0])), sinTheta = named("sinTheta_i", sqrt(x[1]));
+    T sr = sqrt(sr2), sine = sinTheta;  // what count for the azimuth
+    if (refracts) {
+      // Back from where the lobe was evaluated: see carry().
+      const auto total = o.beyond > T(0);
+      const T room = named("room", (index - T(1)) * (index + T(1)));
+      const T beyond_sin = named("beyond_sin", sqrt(x[1] * room + T(1)) / index);
+      const T beyond_cos = sqrt(x[0] * maximum(room, T(0))) / index;
+      const T inner = sinTheta / index;
+      const T inner_cos = sqrt((T(1) - inner) * (T(1) + inner));
+      const auto outside = wo.z > T(0);
+      sr = sqrt(sin2_theta(o.turned));
+      sine = select(total, beyond_sin, sinTheta);
+      sinTheta = named("sin_i", select(total, beyond_sin, select(outside, inner, sinTheta)));
+      cosTheta = named("cos_i", select(total, -beyond_cos, select(outside, -inner_cos, cosTheta)));
+    }
     std::array<T, 2> dphi;
     if (part == Latitudinal) {
       const T angle = T(2) * pi<T>() * u.z;
       dphi = {cos(angle), sin(angle)};
     } else {
-      dphi = sample_phi(named("k", T(2) * nbar(sinTheta * sr) + T(1)), u.z);
+      dphi = sample_phi(named("k", T(2) * nbar(sine * sr) + T(1)), u.z);
     }
-    // Azimuth of the reflected direction; any will do at normal incidence, where the lobe is round.
-    const auto defined = sr > T(1e-20);
-    const T rx = select(defined, wr.x / maximum(sr, T(1e-20)), T(1));
-    const T ry = select(defined, wr.y / maximum(sr, T(1e-20)), T(0));
+    // Azimuth of the lobe's centre; any will do at normal incidence, where the lobe is round.
+    const T so = sqrt(sin2_theta(wo));
+    const auto defined = so > T(1e-20);
+    const T turn = around == Retro ? T(1) : T(-1);
+    const T rx = select(defined, turn * wo.x / maximum(so, T(1e-20)), T(1));
+    const T ry = select(defined, turn * wo.y / maximum(so, T(1e-20)), T(0));
     const Vec3<T> wi = {sinTheta * (rx * dphi[0] - ry * dphi[1]), sinTheta * (ry * dphi[0] + rx * dphi[1]), cosTheta};
+    if (refracts) return sample_if(abs(wi.z) > T(0), wi, tint, pdf(wi, wo));
     return sample_if(above(wi, wo), wi, tint, pdf(wi, wo));
   }
 };

@@ -11,12 +11,49 @@ namespace {
 
 /// Words a parameter may not be called in OSL: globals, keywords and the names of this generator.
 const std::set<std::string>& reserved_words() {
-  static const std::set<std::string> words = {
-      "and",      "break",   "closure",     "color",      "continue",     "do",     "else",   "emit", "float",
-      "for",      "if",      "illuminance", "illuminate", "int",          "matrix", "normal", "not",  "or",
-      "output",   "point",   "public",      "return",     "string",       "struct", "vector", "void", "while",
-      "u",        "v",       "time",        "dtime",      "wi",           "wo",     "weight", "lobe", "sum",
-      "position", "frame_n", "frame_t",     "frame_b",    "mirror_weight"};
+  static const std::set<std::string> words = {"and",
+                                              "break",
+                                              "closure",
+                                              "color",
+                                              "continue",
+                                              "do",
+                                              "else",
+                                              "emit",
+                                              "float",
+                                              "for",
+                                              "if",
+                                              "illuminance",
+                                              "illuminate",
+                                              "int",
+                                              "matrix",
+                                              "normal",
+                                              "not",
+                                              "or",
+                                              "output",
+                                              "point",
+                                              "public",
+                                              "return",
+                                              "string",
+                                              "struct",
+                                              "vector",
+                                              "void",
+                                              "while",
+                                              "u",
+                                              "v",
+                                              "time",
+                                              "dtime",
+                                              "wi",
+                                              "wo",
+                                              "weight",
+                                              "lobe",
+                                              "sum",
+                                              "position",
+                                              "frame_n",
+                                              "frame_t",
+                                              "frame_b",
+                                              "mirror_weight",
+                                              "side",
+                                              "path_length"};
   return words;
 }
 
@@ -284,6 +321,8 @@ std::string closure_text(ClosureKind kind, std::size_t index) {
       return fmt::format("weight_{} * diffuse_ramp(frame_n, ramp_{})", index, index);
     case ClosureKind::Reflection:
       return fmt::format("weight_{} * reflection(frame_n)", index);
+    case ClosureKind::Refraction:
+      return fmt::format("weight_{} * refraction(frame_n, ior_{})", index, index);
     case ClosureKind::PhongRamp:
       return fmt::format("weight_{} * phong_ramp(frame_n, exponent_{}, ramp_{})", index, index, index);
   }
@@ -345,6 +384,11 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       "    brdfc_frame(frame_n, Tangent, frame_t, frame_b);\n"
       "    // Towards the viewer: I in Cycles points away from the surface.\n"
       "    float wo_x = dot(I, frame_t);\n    float wo_y = dot(I, frame_b);\n    float wo_z = dot(I, frame_n);\n\n";
+  if (model.two_sided())
+    body +=
+        "    // frame_n is on the viewer's side; the model's z leaves the object.\n"
+        "    float side = backfacing() ? -1.0 : 1.0;\n";
+  if (model.has_medium()) body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
   std::vector<std::string> terms;
   if (sampled) {
     body += fmt::format(
@@ -360,7 +404,9 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         "        weight_0[lobe] = weight / float(count);\n"
         "        wi[lobe] = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n    }\n";
     if (model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
-    for (int i = 0; i < max_lobes; ++i) terms.push_back(fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
+    for (int i = 0; i < max_lobes; ++i)
+      terms.push_back(model.has_through() ? fmt::format("weight_0[{}] * brdfc_ray_anywhere(wi[{}], I, frame_n)", i, i)
+                                          : fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
     shader.slots = max_lobes * slots(ClosureKind::PhongRamp);
     if (model.has_mirror()) {
       terms.push_back("mirror_weight * reflection(frame_n)");
@@ -371,6 +417,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       body += fmt::format("    color weight_{};\n", c);
       if (has_ramp(kinds[c])) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
       if (kinds[c] == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
+      if (kinds[c] == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
       terms.push_back(closure_text(kinds[c], c));
       shader.slots += slots(kinds[c]);
     }

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "model/horizon.h"
+#include "model/sampling.h"
 #include "reference/lights.h"
 #include "reference/random.h"
 #include "reference/tracer.h"
@@ -33,7 +34,9 @@ class Surface {
       : material_(material),
         brdf_(material.model->make_double(material.values)),
         has_scatter_(material.model->has_scatter()),
-        has_mirror_(material.model->has_mirror()) {
+        has_mirror_(material.model->has_mirror()),
+        has_transmit_(material.model->has_transmit()),
+        has_medium_(material.model->has_medium()) {
     if (!has_scatter_) return;
     Random random(0, 0, 0);
     for (int i = 0; i < kCosines; ++i) {
@@ -50,14 +53,17 @@ class Surface {
 
   bool has_scatter() const { return has_scatter_; }
   bool has_mirror() const { return has_mirror_; }
+  bool has_transmit() const { return has_transmit_; }
+  bool has_medium() const { return has_medium_; }
 
-  /// Chance to follow the mirror rather than to sample the rest. Any number strictly between 0 and 1 is unbiased
-  /// where both exist; the estimate of the rest's albedo only keeps the weights even.
-  double mirror_chance(const Color& mirror, double cosine) const {
-    const double m = luminance(mirror);
+  /// Chance to follow one of the delta terms, whose weights add up to `delta`, rather than to sample the rest. Any
+  /// number strictly between 0 and 1 is unbiased where both exist; the estimate of the rest's albedo only keeps the
+  /// weights even.
+  double delta_chance(const Color& delta, double cosine) const {
+    const double m = luminance(delta);
     if (!has_scatter_) return 1;
     if (!(m > 0)) return 0;
-    const double rest = albedo_[std::min(int(cosine * kCosines), kCosines - 1)];
+    const double rest = albedo_[std::min(int(std::abs(cosine) * kCosines), kCosines - 1)];
     return std::min(std::max(m / (m + rest), 0.05), 0.95);
   }
 
@@ -93,7 +99,7 @@ class Surface {
   static constexpr int kCosines = 32, kSamples = 128;
   const Material& material_;
   std::unique_ptr<Brdf<double>> brdf_;
-  const bool has_scatter_, has_mirror_;
+  const bool has_scatter_, has_mirror_, has_transmit_, has_medium_;
   std::array<double, kCosines> albedo_{};
 };
 
@@ -109,8 +115,11 @@ class PathTracer {
     for (const Material& m : scene.materials) surfaces_.emplace_back(m);
   }
 
-  /// One path through a pixel. `chance` is scratch memory of the thread.
-  Color path(int x, int y, int sample, std::vector<double>& chance) const {
+  /// Chances of the lights on the viewer's side of a surface and on the other.
+  using Chances = std::array<std::vector<double>, 2>;
+
+  /// One path through a pixel. `chances` is scratch memory of the thread.
+  Color path(int x, int y, int sample, Chances& chances) const {
     Random random(std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, std::uint64_t(sample));
     Vector origin, direction;
     const double film_x = x + random.uniform(), film_y = y + random.uniform();
@@ -118,14 +127,14 @@ class PathTracer {
 
     Color light(0), throughput(1, 1, 1);
     Hit hit;
-    Vector normal;             // at the last scattering
-    double scattered_pdf = 0;  // of the direction, if another strategy could have found it
-    bool sampled = false;      // it could
+    Vector normal;                                 // at the last scattering, on the side of the ray
+    double scattered_pdf = 0;                      // of the direction, if another strategy could have found it
+    const std::vector<double>* sampled = nullptr;  // the chances with which it could
     for (int bounce = 0;; ++bounce) {
       const bool from_camera = bounce == 0;
       const bool found = tracer_.intersect(origin, direction, from_camera, hit);
-      lights_.meet(origin, direction, found ? hit.distance : kInfinity, normal, sampled ? &chance : nullptr,
-                   from_camera, [&](const Color& radiance, double light_pdf) {
+      lights_.meet(origin, direction, found ? hit.distance : kInfinity, normal, sampled, from_camera,
+                   [&](const Color& radiance, double light_pdf) {
                      if (!sampled || light_pdf == 0)
                        light += throughput * radiance;
                      else if (strategy_ != Strategy::Light)
@@ -136,31 +145,59 @@ class PathTracer {
       const Surface& surface = surfaces_[hit.material];
       std::unique_ptr<Brdf<double>> bound;
       const Brdf<double>& brdf = surface.at(hit.u, hit.v, bound);
+      if (hit.inside && surface.has_medium()) {
+        const Color left = brdf.transmittance(hit.distance);
+        surface.check("transmittance", direction, -direction, left);
+        throughput = throughput * left;
+      }
+      // The frame of a model of two sides has its z outside.
+      const double side = hit.inside && (surface.has_transmit() || brdf.scatters_through()) ? -1 : 1;
       const Vector bitangent = cross(hit.normal, hit.tangent);
       const auto to_local = [&](const Vector& w) {
-        return Vector{dot(w, hit.tangent), dot(w, bitangent), dot(w, hit.normal)};
+        return Vector{dot(w, hit.tangent), dot(w, bitangent), side * dot(w, hit.normal)};
       };
-      const Vector wo = raise_to_horizon(to_local(-direction));
-      normal = hit.geometric;
-      Color mirror(0);
-      double mirror_chance = 0;
+      Vector wo = raise_to_horizon(
+          Vector{-dot(direction, hit.tangent), -dot(direction, bitangent), -dot(direction, hit.normal)});
+      wo.z *= side;
+      Color mirror(0), transmit(0);
       if (surface.has_mirror()) {
         mirror = brdf.mirror(wo);
         surface.check("mirror", {-wo.x, -wo.y, wo.z}, wo, mirror);
-        mirror_chance = surface.mirror_chance(mirror, wo.z);
       }
+      if (surface.has_transmit()) {
+        transmit = brdf.transmit(wo);
+        surface.check("transmit", refract(wo, brdf.ior()), wo, transmit);
+      }
+      const double delta_chance =
+          surface.has_mirror() || surface.has_transmit() ? surface.delta_chance(mirror + transmit, wo.z) : 0;
+      // What crossing does to radiance.
+      const double squared_index = settings_.scale_radiance ? sqr(brdf.ior()) : 1;
+      const double crossing = wo.z > 0 ? 1 / squared_index : squared_index;
 
-      const bool lit = surface.has_scatter() && !lights_.empty() && lights_.chances(hit.p, normal, chance);
-      if (lit) light += throughput * direct(hit, surface, brdf, to_local, wo, 1 - mirror_chance, chance, random);
+      std::array<bool, 2> lit{};
+      if (surface.has_scatter() && !lights_.empty())
+        for (int far = 0; far <= int(brdf.scatters_through()); ++far) {
+          const Vector facing = far ? -hit.geometric : hit.geometric;
+          lit[far] = lights_.chances(hit.p, facing, chances[far]);
+          if (lit[far])
+            light += throughput * (far ? crossing : 1) *
+                     direct(hit, facing, surface, brdf, to_local, wo, far, 1 - delta_chance, chances[far], random);
+        }
 
       // Drawn in any case, so that a stream's place does not depend on the material.
       const double choose = random.uniform();
       const Vector u = random.uniform3();
       Vector wi;
-      if (choose < mirror_chance) {
-        wi = {-wo.x, -wo.y, wo.z};
-        throughput = throughput * mirror / mirror_chance;
-        sampled = false;
+      sampled = nullptr;
+      if (choose < delta_chance) {
+        const double share = luminance(mirror) / luminance(mirror + transmit);
+        if (choose < delta_chance * share) {
+          wi = {-wo.x, -wo.y, wo.z};
+          throughput = throughput * mirror / (delta_chance * share);
+        } else {
+          wi = refract(wo, brdf.ior());
+          throughput = throughput * transmit / (delta_chance * (1 - share));
+        }
       } else {
         const Sample<double> s = brdf.sample(wo, u);
         surface.check("sample weight", s.wi, wo, s.weight);
@@ -169,11 +206,15 @@ class PathTracer {
           surface.bad_value("sample pdf", s.wi, wo, Color(s.pdf));
         }
         wi = s.wi;
-        throughput = throughput * s.weight / (1 - mirror_chance);
-        scattered_pdf = s.pdf * (1 - mirror_chance);
-        sampled = lit;
+        throughput = throughput * s.weight / (1 - delta_chance);
+        scattered_pdf = s.pdf * (1 - delta_chance);
+        const bool far = wi.z * wo.z < 0;
+        if (lit[far]) sampled = &chances[far];
       }
-      direction = normalize(hit.tangent * wi.x + bitangent * wi.y + hit.normal * wi.z);
+      const bool crosses = wi.z * wo.z < 0;
+      if (crosses) throughput = throughput * crossing;
+      normal = crosses ? -hit.geometric : hit.geometric;
+      direction = normalize(hit.tangent * wi.x + bitangent * wi.y + hit.normal * (side * wi.z));
       if (!(dot(direction, normal) > 0)) break;
       const double brightest = max_component(throughput);
       if (!(brightest > 0)) break;
@@ -202,20 +243,21 @@ class PathTracer {
     return 1 / (1 + ratio * ratio);
   }
 
-  /// Light from one sampled direction, without the path's throughput.
-  template <class ToLocal> Color direct(const Hit& hit, const Surface& surface, const Brdf<double>& brdf,
-                                        const ToLocal& to_local, const Vector& wo, double rest_chance,
-                                        const std::vector<double>& chance, Random& random) const {
+  /// Light from one sampled direction on the side that `facing` points to, without the path's throughput. `far`: not
+  /// the viewer's side.
+  template <class ToLocal> Color direct(const Hit& hit, const Vector& facing, const Surface& surface,
+                                        const Brdf<double>& brdf, const ToLocal& to_local, const Vector& wo, bool far,
+                                        double rest_chance, const std::vector<double>& chance, Random& random) const {
     const double choice = random.uniform();
     const Vector u = random.uniform3();
-    const LightSample s = lights_.sample(hit.p, hit.geometric, chance, choice, u.x, u.y, u.z);
-    if (!(s.pdf > 0) || !(dot(s.wi, hit.geometric) > 0)) return Color(0);
+    const LightSample s = lights_.sample(hit.p, facing, chance, choice, u.x, u.y, u.z);
+    if (!(s.pdf > 0) || !(dot(s.wi, facing) > 0)) return Color(0);
     if (strategy_ == Strategy::Brdf && !s.delta) return Color(0);
     const Vector wi = to_local(s.wi);
-    if (!(wi.z > 0)) return Color(0);
+    if (far ? !(wi.z * wo.z < 0) : !(wi.z * wo.z > 0)) return Color(0);
     const Color f = brdf.eval(wi, wo);
     surface.check("f", wi, wo, f);
-    const Color value = f * s.radiance * wi.z;
+    const Color value = f * s.radiance * std::abs(wi.z);
     if (!(max_component(value) > 0)) return Color(0);
     double weight = 1;
     if (!s.delta && strategy_ == Strategy::Mis) weight = power_heuristic(s.pdf, brdf.pdf(wi, wo) * rest_chance);
@@ -286,7 +328,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
     tbb::parallel_for(
         tbb::blocked_range<int>(0, tiles, 1),
         [&](const tbb::blocked_range<int>& range) {
-          std::vector<double> chance;
+          PathTracer::Chances chances;
           for (int tile = range.begin(); tile < range.end(); ++tile) {
             const int x0 = tile % columns * kTile, y0 = tile / columns * kTile;
             std::uint64_t done = 0;
@@ -294,7 +336,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
               for (int x = x0; x < std::min(x0 + kTile, settings.width); ++x) {
                 if (stoppable ? stop() : options.cancel && options.cancel->load(std::memory_order_relaxed)) return;
                 Pixel& pixel = pixels[std::size_t(y) * settings.width + x];
-                for (int s = from; s < to; ++s) pixel.add(tracer.path(x, y, s, chance));
+                for (int s = from; s < to; ++s) pixel.add(tracer.path(x, y, s, chances));
                 done += std::uint64_t(to - from);
               }
             paths += done;

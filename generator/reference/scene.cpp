@@ -88,7 +88,8 @@ class Loader {
     if (const auto settings = root.find("settings")) read_settings(*settings);
     const RenderSettings& s = scene_.settings;
     scene_.resolved["settings"] = {
-        {"width", s.width}, {"height", s.height}, {"spp", s.spp}, {"seed", s.seed}, {"max_bounces", s.max_bounces}};
+        {"width", s.width}, {"height", s.height},           {"spp", s.spp},
+        {"seed", s.seed},   {"max_bounces", s.max_bounces}, {"scale_radiance", s.scale_radiance}};
     return std::move(scene_);
   }
 
@@ -109,13 +110,14 @@ class Loader {
   }
 
   void read_settings(const JsonView& j) {
-    j.only({"width", "height", "spp", "seed", "max_bounces"});
+    j.only({"width", "height", "spp", "seed", "max_bounces", "scale_radiance"});
     RenderSettings& s = scene_.settings;
     if (const auto v = j.find("width")) s.width = v->integer(1, 16384);
     if (const auto v = j.find("height")) s.height = v->integer(1, 16384);
     if (const auto v = j.find("spp")) s.spp = v->integer(1, 10000000);
     if (const auto v = j.find("seed")) s.seed = v->integer(0, 2147483647);
     if (const auto v = j.find("max_bounces")) s.max_bounces = v->integer(0, 1024);
+    if (const auto v = j.find("scale_radiance")) s.scale_radiance = v->boolean();
   }
 
   void read_camera(const JsonView& j) {

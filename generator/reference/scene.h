@@ -29,6 +29,8 @@ struct RenderSettings {
   int seed = 0;
   /// Scatterings after the first: 0 is direct light alone, as in Cycles.
   int max_bounces = 8;
+  /// Radiance changes with the squared index where it is refracted, as in nature; Cycles leaves it as it is.
+  bool scale_radiance = false;
 };
 
 struct Camera {

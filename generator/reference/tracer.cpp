@@ -113,7 +113,8 @@ bool Tracer::intersect(const Vector& p, const Vector& direction, bool from_camer
   } else {
     hit.u = hit.v = 0;
   }
-  if (dot(hit.geometric, direction) > 0) {
+  hit.inside = dot(hit.geometric, direction) > 0;
+  if (hit.inside) {
     hit.geometric = -hit.geometric;
     hit.normal = -hit.normal;
   }

@@ -16,6 +16,7 @@ struct Hit {
   double u = 0, v = 0;  ///< texture coordinates
   double distance = kInfinity;
   int material = 0;
+  bool inside = false;  ///< seen from behind: the object's own normal points away from the viewer
 };
 
 class Tracer {

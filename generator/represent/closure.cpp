@@ -37,6 +37,7 @@ Rgb<double> evaluate(const Closure<double>& c, const Vec3<double>& wi, const Vec
       return c.weight * ramp_at(c.ramp, lobe) * (cosTheta_i * (c.exponent + 2) * kInvPi / 2 * lobe);
     }
     case ClosureKind::Reflection:
+    case ClosureKind::Refraction:
       return Rgb<double>(0.0);
   }
   throw InputError("closure of unknown kind");

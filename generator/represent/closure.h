@@ -17,6 +17,7 @@ enum class ClosureKind {
   DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, no cosine
   PhongRamp,    ///< phong_ramp(N, e, colours): ramp8(cos^e a) (N.wi) (e+2)/(2 pi) cos^e a
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
+  Refraction,   ///< refraction(N, ior): delta in the direction of ideal refraction, none beyond the critical angle
 };
 
 /// How many entries a ramp has.
@@ -29,9 +30,10 @@ template <class T> struct Closure {
   Vec3<T> normal;
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
   T exponent;                          ///< PhongRamp
+  T ior;                               ///< Refraction: index of the far side over that of the viewer's
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
-      : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0) {}
+      : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0), ior(1) {}
 };
 
 template <class T> using ClosureSum = std::vector<Closure<T>>;

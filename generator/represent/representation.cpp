@@ -15,14 +15,32 @@ namespace {
 
 /// Names the statements around a recording use; a recording may not declare them.
 std::vector<std::string> frame_names() {
-  std::vector<std::string> names = {"Normal",  "Tangent", "Lobes", "BSDF",    "Albedo",        "frame_n",
-                                    "frame_t", "frame_b", "wi",    "weight",  "mirror_weight", "lobe",
-                                    "u",       "wo",      "sum",   "position"};
+  std::vector<std::string> names = {"Normal",  "Tangent",     "Lobes", "BSDF",   "Albedo",        "frame_n",
+                                    "frame_t", "frame_b",     "wi",    "weight", "mirror_weight", "lobe",
+                                    "side",    "path_length", "u",     "wo",     "sum",           "position"};
   return names;
 }
 
-Vec3<Expr> recorded_wo() {
-  return raise_to_horizon(Vec3<Expr>{Expr::input("wo_x"), Expr::input("wo_y"), Expr::input("wo_z")});
+/// The shader's frame has its normal on the viewer's side. For a model of two sides z is turned outwards by `side`.
+Vec3<Expr> recorded_wo(const Model& model, const Brdf<Expr>& brdf) {
+  Vec3<Expr> wo = raise_to_horizon(Vec3<Expr>{Expr::input("wo_x"), Expr::input("wo_y"), Expr::input("wo_z")});
+  if (model.has_transmit() || brdf.scatters_through()) wo.z = wo.z * Expr::input("side");
+  return wo;
+}
+
+/// What the medium has left of the light that comes from this hit; `distance` is that to the hit before.
+template <class T> Rgb<T> medium(const Brdf<T>& brdf, const T& side, const T& distance) {
+  return select(side < T(0), brdf.transmittance(distance), Rgb<T>(T(1)));
+}
+
+/// The closures, as the shader has to weigh them.
+std::optional<ClosureSum<Expr>> recorded_exact(const Model& model, const Brdf<Expr>& brdf) {
+  auto sum = brdf.exact(recorded_wo(model, brdf));
+  if (sum && model.has_medium()) {
+    const Rgb<Expr> left = named("medium", medium(brdf, Expr::input("side"), Expr::input("path_length")));
+    for (Closure<Expr>& c : *sum) c.weight = c.weight * left;
+  }
+  return sum;
 }
 
 std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
@@ -34,14 +52,16 @@ void output_exact(const ClosureSum<Expr>& sum, Program& program, std::vector<Clo
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
+    if (sum[c].kind == ClosureKind::Refraction) program.output(fmt::format("ior_{}", c), sum[c].ior);
   }
 }
 
-void output_sampled(const Brdf<Expr>& brdf, const Vec3<Expr>& wo, Program& program) {
+void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program) {
+  const Vec3<Expr> wo = recorded_wo(model, brdf);
   const Sample<Expr> s = brdf.sample(wo, {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
   program.output("wi_x", s.wi.x);
   program.output("wi_y", s.wi.y);
-  program.output("wi_z", s.wi.z);
+  program.output("wi_z", brdf.scatters_through() ? s.wi.z * Expr::input("side") : s.wi.z);
   program.output("weight", s.weight);
 }
 
@@ -64,7 +84,8 @@ FloatInputs float_inputs(const ParamValues& values, const Vec3<double>& wo) {
   }
   set_input(inputs, "wo_x", wo.x);
   set_input(inputs, "wo_y", wo.y);
-  set_input(inputs, "wo_z", wo.z);
+  set_input(inputs, "wo_z", std::abs(wo.z));
+  set_input(inputs, "side", wo.z > 0 ? 1 : -1);
   return inputs;
 }
 
@@ -156,15 +177,14 @@ ParamValues form_choices(const Model& model, RepresentationKind kind) {
 Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent) {
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
-  const Vec3<Expr> wo = recorded_wo();
   Program program;
   std::vector<ClosureKind> kinds;
   if (kind == RepresentationKind::Exact) {
-    const auto sum = brdf->exact(wo);
+    const auto sum = recorded_exact(model, *brdf);
     if (!sum) input_error("{}: has no exact representation", model.info().name);
     output_exact(*sum, program, kinds);
   } else {
-    output_sampled(*brdf, wo, program);
+    output_sampled(model, *brdf, program);
   }
   int used = 0;
   for (ClosureKind k : kinds) used += slots(k);
@@ -177,7 +197,8 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
 Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
   Recorder recorder;
   Program program;
-  program.output("mirror_weight", model.record(fixed)->mirror(recorded_wo()));
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
   return finish(program, indent, {ClosureKind::Reflection});
 }
 
@@ -198,15 +219,18 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
     Program program;
     std::vector<ClosureKind> kinds;
     if (kind == RepresentationKind::Exact)
-      output_exact(*recorded->exact(recorded_wo()), program, kinds);
+      output_exact(*recorded_exact(model, *recorded), program, kinds);
     else
-      output_sampled(*recorded, recorded_wo(), program);
+      output_sampled(model, *recorded, program);
 
     for (int view = 0; view < kParameterSets * kViews; ++view) {
       const ParamValues values = random_values(model.info(), choices, rng);
       const BoundModel truth = bind_model(model, values);
-      const Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
+      Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
+      if ((model.has_transmit() || truth.brdf->scatters_through()) && view % 2 == 1) wo.z = -wo.z;
       FloatInputs inputs = float_inputs(values, wo);
+      const double distance = model.has_medium() ? 3 * uniform(rng) : 0;
+      set_input(inputs, "path_length", distance);
       const auto executed = [&](const std::map<std::string, std::array<float, 3>>& out, const std::string& name,
                                 bool may_be_negative) {
         const auto& v = out.at(name);
@@ -228,8 +252,9 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
       Rgb<double> albedo_difference(0.0);
       if (kind == RepresentationKind::Exact) {
         for (const Closure<double>& c : closures)
-          if (c.kind == ClosureKind::Reflection) albedo_difference += c.weight;
-        albedo_difference = albedo_difference - truth.brdf->mirror(wo);
+          if (c.kind == ClosureKind::Reflection || c.kind == ClosureKind::Refraction) albedo_difference += c.weight;
+        albedo_difference = albedo_difference -
+                            (truth.brdf->mirror(wo) + truth.brdf->transmit(wo)) * medium(*truth.brdf, wo.z, distance);
       }
       Sequence3 points(std::uint64_t(view) + 1);
       for (int i = 0; i < kPoints; ++i) {

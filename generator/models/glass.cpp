@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Thick coloured glass: a smooth dielectric boundary around a medium that absorbs, exp(-a t) over a distance t.
+//
+// P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
+// Graphics 1997, section 2. Stable form of the Fresnel equations: model/fresnel.h.
+//
+// a is given as what is left of white light after one unit of length, attenuation = exp(-a / density).
+#include "model/fresnel.h"
+#include "model/sampling.h"
+
+namespace brdfc {
+
+template <class T> struct Glass {
+  T index, density;
+  Rgb<T> attenuation;
+
+  static ModelInfo info() {
+    return {.name = "glass",
+            .label = "Glass",
+            .paper =
+                "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
+                "Models, Pacific Graphics 1997",
+            .equations = "Fresnel's equations, unpolarised; exp(-a t)",
+            .doc = "Clear or coloured glass: reflects, refracts, and absorbs along the way inside.",
+            .properties = {.lossless = true, .positive = false, .smooth = false},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"});
+    v(attenuation, ColorSpec{"attenuation",
+                             "Attenuation",
+                             {0.5, 0.9, 0.7},
+                             "Share of the light that is left after one unit of length inside, at density 1"});
+    v(density, NumberSpec{"density", "Density", 1, 0, 1e6, 0, 10, "Multiplies the absorption per length"});
+  }
+
+  T ior() const { return index; }
+
+  Dielectric<T> shares(const Vec3<T>& wo) const {
+    return fresnel_dielectric(abs(wo.z), named("sin2", sin2_theta(wo)),
+                              named("eta", select(wo.z > T(0), index, T(1) / index)));
+  }
+
+  Rgb<T> mirror(const Vec3<T>& wo) const { return Rgb<T>(shares(wo).reflected); }
+  Rgb<T> transmit(const Vec3<T>& wo) const { return Rgb<T>(shares(wo).refracted); }
+
+  Rgb<T> transmittance(const T& distance) const {
+    const T d = named("depth", density * distance);
+    // 0 to the power of 0 is 1: what absorbs all absorbs nothing over no distance.
+    const auto left = [&](const T& c) {
+      return select(c > T(0), exp(d * log(maximum(c, tiny<T>()))), select(d > T(0), T(0), T(1)));
+    };
+    // A recorded colour has no components; the largest of one that is black in two channels is the third.
+    const auto channel = [&](const Rgb<T>& one) { return left(max_component(attenuation * one)); };
+    return {channel({T(1), T(0), T(0)}), channel({T(0), T(1), T(0)}), channel({T(0), T(0), T(1)})};
+  }
+};
+
+BRDFC_MODEL(Glass)
+
+}  // namespace brdfc

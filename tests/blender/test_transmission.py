@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light that goes through: glass against closed forms, sampled refraction against the model."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from helpers import add_camera, add_world, arguments, read_csv, render, sphere_scene
+
+
+def test_dielectric_sphere_is_invisible_in_a_furnace(extension, empty):
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=64)
+    material = extension.api.new_material("fresnel_dielectric", ior=1.5)
+    sphere_scene(scene, material, size=12, samples=128)
+    pixels = render(scene)[..., :3]
+    # What 64 bounces leave inside by total reflection at facets is all that may be missing.
+    print(f"furnace of a glass sphere: {pixels.min():.4f} to {pixels.max():.4f}")
+    assert pixels.mean() == pytest.approx(1, abs=1e-3)
+    assert pixels.max() < 1 + 1e-4
+
+
+@pytest.mark.parametrize("thickness", [0.5, 2.0])
+def test_slab_absorbs_along_the_way(extension, empty, thickness):
+    """A slab seen squarely: all orders of inner reflection add up to a closed form."""
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, samples=2048, max_bounces=32)
+    attenuation, density, ior = (0.2, 0.5, 0.9), 0.7, 1.5
+    material = extension.api.new_material(
+        "glass", ior=ior, attenuation=attenuation, density=density
+    )
+    mesh = bpy.data.meshes.new("slab")
+    half = thickness / 2
+    corners = [(x, y, z) for z in (-half, half) for y in (-50, 50) for x in (-50, 50)]
+    sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    mesh.from_pydata(corners, [], sides)
+    mesh.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("slab", mesh))
+    add_camera(scene, (0, 0, 10), (0, 0, 0), orthographic=0.1)
+    add_world(scene)
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    measured = render(scene)[..., :3].mean((0, 1))
+    a = np.array(attenuation) ** (density * thickness)
+    r = ((ior - 1) / (ior + 1)) ** 2
+    expected = (
+        (1 - r) ** 2 * a / (1 - (r * a) ** 2) + r + (1 - r) ** 2 * r * a**2 / (1 - (r * a) ** 2)
+    )
+    print(f"slab of {thickness}: {measured}, closed form {expected}")
+    assert measured == pytest.approx(expected, abs=3e-3)
+
+
+VIEWS = [(1, 0.9), (1, 0.25), (-1, 0.9), (-1, 0.4)]  # side and cosine; the last is beyond the angle
+
+
+@pytest.mark.parametrize(("n", "ior"), [(0.0, 1.5), (20.0, 1.3)])
+def test_sampled_refraction_in_a_world(extension, empty, tool, n, ior):
+    """A quad seen from both sides in a world whose colour tells the direction."""
+    values = {"n": n, "around": "refraction", "ior": ior}
+    for side, cosine in VIEWS:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.scene_loader.apply_clean_settings(scene, samples=256, max_bounces=1)
+        mesh = bpy.data.meshes.new("quad")
+        mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
+        mesh.materials.append(extension.api.new_material("radziszewski_alda", **values))
+        scene.collection.objects.link(bpy.data.objects.new("quad", mesh))
+        # A frame that is not the world's would be seen as a turn of the colours.
+        angle = math.acos(cosine) if side > 0 else math.pi - math.acos(cosine)
+        camera = (0, -20 * math.sin(angle), 20 * math.cos(angle))
+        add_camera(scene, camera, (angle, 0, 0)).angle = 0.01
+        tree, background = add_world(scene)
+        where = tree.nodes.new("ShaderNodeTexCoord")
+        scale = tree.nodes.new("ShaderNodeVectorMath")
+        scale.operation = "MULTIPLY_ADD"
+        for i in (1, 2):
+            scale.inputs[i].default_value = (0.5, 0.5, 0.5)
+        tree.links.new(where.outputs["Generated"], scale.inputs[0])
+        tree.links.new(scale.outputs[0], background.inputs["Color"])
+        scene.world.cycles.sampling_method = "NONE"
+        scene.render.resolution_x = scene.render.resolution_y = 16
+        measured = render(scene)[..., :3].reshape(-1, 3)
+        # x is the object's x axis laid into the quad: the world's.
+        wo = (0.0, -math.sin(angle), math.cos(angle))
+        text = tool(
+            "sample", "radziszewski_alda", *arguments(values), "--count", "100000",
+            "--wo", ",".join(map(repr, wo)),
+        )  # fmt: skip
+        rows = read_csv(text)[1]
+        # Rays that are not of the quad's sides see the world along them; light is 0.5 + d / 2.
+        light = (0.5 + 0.5 * rows[:, :3]) * rows[:, 3:6]
+        expected, spread = light.mean(0), light.std(0)
+        error = spread * math.sqrt(1 / len(rows) + 1 / (256 * len(measured))) + 2e-4
+        z = (measured.mean(0) - expected) / error
+        print(f"n={n} view {side * cosine}: {measured.mean(0)} {expected} z={np.round(z, 1)}")
+        assert np.abs(z).max() < 4.5
