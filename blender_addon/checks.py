@@ -16,6 +16,8 @@ FAR_PIXEL = 1e-5
 #: Lamps below this size (metres, or radians for a sun) are hit by chance too rarely.
 SMALL_LIGHT = 0.01
 SMALL_SUN = 0.02
+#: Below this, a clamp on indirect light shows in mirrors of ordinary lights.
+LOW_CLAMP = 10
 
 
 @dataclass(frozen=True)
@@ -81,8 +83,8 @@ def _bump_correction(material, scene):
     if material.cycles.use_bump_map_correction:
         return (
             "ERROR",
-            "Bump Map Correction is on in the material's settings: it bends tilted closures and "
-            "falsifies the model",
+            "Bump Map Correction is on in the material's settings: where a normal is bent it dims "
+            "this form or turns its mirror",
         )
 
 
@@ -97,6 +99,15 @@ def _clamp_indirect(material, scene):
         return (
             "WARNING",
             f"Clamp Indirect is {clamp:g}: it darkens bright reflections of this form; 0 is exact",
+        )
+
+
+def _clamp_low(material, scene):
+    clamp = scene.cycles.sample_clamp_indirect
+    if 0 < clamp < LOW_CLAMP:
+        return (
+            "WARNING",
+            f"Clamp Indirect is {clamp:g}: it darkens lights in this mirror; 0 is exact",
         )
 
 
@@ -142,6 +153,33 @@ def _filter_glossy(material, scene):
         )
 
 
+def _albedo_passes(material, scene):
+    cycles = scene.cycles
+    uses = []
+    if cycles.use_denoising and cycles.denoising_input_passes != "RGB":
+        uses.append("the denoiser")
+    layers = scene.view_layers
+    if any(v.use_pass_diffuse_color or v.cycles.denoising_store_passes for v in layers):
+        uses.append("a colour or denoising pass")
+    if uses:
+        return (
+            "WARNING",
+            f"{' and '.join(uses).capitalize()} sees too high an albedo of this form: details may "
+            "blur; the picture itself is right",
+        )
+
+
+def _normal_pass(material, scene):
+    cycles = scene.cycles
+    denoised = cycles.use_denoising and cycles.denoising_input_passes == "RGB_ALBEDO_NORMAL"
+    if denoised or any(v.cycles.denoising_store_passes for v in scene.view_layers):
+        return (
+            "WARNING",
+            "The denoiser's normals of this form are noisy, as its directions are: details may "
+            "blur; let the denoiser use Albedo alone",
+        )
+
+
 #: What a representation may declare itself sensitive to in the manifest. A rule returns
 #: (severity, message), or None where nothing is wrong.
 DECLARED = {
@@ -153,6 +191,9 @@ DECLARED = {
     "orthographic_far": _far_camera,
     "caustics": _caustics,
     "filter_glossy": _filter_glossy,
+    "albedo_passes": _albedo_passes,
+    "clamp_low": _clamp_low,
+    "normal_pass": _normal_pass,
 }
 
 

@@ -101,6 +101,28 @@ def test_eval_normalises_what_is_nearly_a_unit_vector():
     assert row["f_g"] == pytest.approx(exact, rel=1e-14)
 
 
+def test_closure_is_f_cos_with_its_weight():
+    text = f"{EVAL_HEADER}\n0.6,0,0.8,0,0,1\n"
+    (row,) = rows(run("closure", "diffuse", "weight=1,0.5,0.25", stdin=text))
+    assert row["f_cos_g"] == pytest.approx(0.4 / math.pi, rel=1e-15)
+    # Ashikhmin and Shirley's lobe with n = 0: (n + 1) / (8 pi) over (h.k) max(cos).
+    (row,) = rows(run("closure", "ashikhmin_shirley", "alpha_x=1", "alpha_y=1", stdin=text))
+    assert row["f_cos_r"] == pytest.approx(0.8 / (8 * math.pi * math.sqrt(0.9)), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["blinn"], ["'blinn'", "diffuse", "glossy_toon"]),
+        (["ggx", "alpha=1"], ["closure ggx", "'alpha'", "alpha_x"]),
+        (["ggx", "alpha_x=2"], ["closure ggx", "alpha_x", "[0.0001, 1]", "2"]),
+        (["diffuse", "normal=0"], ["closure diffuse", "normal", "not 0"]),
+    ],
+)
+def test_closure_says_what_is_wrong_with_its_arguments(arguments, words):
+    refused(run("closure", *arguments, stdin=f"{EVAL_HEADER}\n0,0,1,0,0,1\n"), *words)
+
+
 @pytest.mark.parametrize(
     ("stdin", "words"),
     [

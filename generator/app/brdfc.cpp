@@ -16,6 +16,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   brdfc::add_list_command(app);
   brdfc::add_eval_command(app);
+  brdfc::add_closure_command(app);
+  brdfc::add_probe_command(app);
   brdfc::add_sample_command(app);
   brdfc::add_albedo_command(app);
   brdfc::add_check_command(app);

@@ -15,6 +15,8 @@ struct CheckFailed : std::runtime_error {
 
 void add_list_command(CLI::App&);
 void add_eval_command(CLI::App&);
+void add_closure_command(CLI::App&);
+void add_probe_command(CLI::App&);
 void add_sample_command(CLI::App&);
 void add_albedo_command(CLI::App&);
 void add_check_command(CLI::App&);

@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/osl_arithmetic.h"
 #include "core/table.h"
 
 namespace brdfc {
@@ -73,6 +74,42 @@ template <class T> T apply(Op op, const T* a) {
     default:
       throw ExprError("operation without a value");
   }
+}
+
+/// The same as OSL computes it.
+float apply_osl(Op op, const float* a) {
+  switch (op) {
+    case Op::Div:
+      return osl::divide(a[0], a[1]);
+    case Op::Sqrt:
+      return osl::sqrt(a[0]);
+    case Op::Cbrt:
+      return osl::cbrt(a[0]);
+    case Op::Exp:
+      return osl::exp(a[0]);
+    case Op::Log:
+      return osl::log(a[0]);
+    case Op::Log1p:
+      return osl::log1p(a[0]);
+    case Op::Expm1:
+      return osl::expm1(a[0]);
+    case Op::Sin:
+      return osl::sin(a[0]);
+    case Op::Cos:
+      return osl::cos(a[0]);
+    case Op::Atan:
+      return osl::atan(a[0]);
+    case Op::Pow:
+      return osl::pow(a[0], a[1]);
+    default:
+      return apply(op, a);
+  }
+}
+
+template <class T> T execute(Op op, const T* a) {
+  if constexpr (std::is_same_v<T, float>)
+    if (OslArithmetic::active()) return apply_osl(op, a);
+  return apply(op, a);
 }
 
 const char* op_name(Op op) {
@@ -483,7 +520,7 @@ std::map<std::string, std::array<T, 3>> Program::run(const std::map<std::string,
         for (std::size_t c = 0; c < 3; ++c) {
           T a[3] = {};
           for (std::size_t i = 0; i < n.args.size(); ++i) a[i] = arg(i)[c];
-          out[c] = apply(n.op, a);
+          out[c] = execute(n.op, a);
         }
     }
   };

@@ -111,12 +111,20 @@ Json choices_json(const ParamValues& choices) {
 }
 
 /// What a user must know of a form; the add-on turns each into words where it applies.
-std::vector<std::string> warnings(RepresentationKind kind) {
-  // Measured in Cycles: bump-map correction bends lobes that are tilted from the shading normal, and a clamp on
-  // indirect light, path guiding or a lamp of no size meets a sampled lobe differently from Blender's own closures.
+std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Shader& shader) {
+  // Measured in Cycles (script/conditions): bump-map correction dims closures whose normal is not the surface's and
+  // turns their mirrors; a clamp on indirect light, path guiding or a lamp of no size meets a sampled lobe differently
+  // from Blender's own closures; its lobes' normals are not the surface's; Filter Glossy blurs a mirror.
+  std::vector<std::string> codes = {"bump_correction"};
   if (kind == RepresentationKind::Sampled)
-    return {"bump_correction", "clamp_indirect", "zero_size_lights", "orthographic_far"};
-  return {};
+    codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
+  else if (mirror)
+    codes.push_back("clamp_low");
+  if (mirror) codes.push_back("filter_glossy");
+  // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
+  // do not see.
+  if (kind == RepresentationKind::Exact && shader.slots > shader.closures) codes.push_back("albedo_passes");
+  return codes;
 }
 
 Json table_json(const AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
@@ -288,7 +296,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"error", error_json(error)},
         {"cost", cost == costs.end() ? Json() : Json(cost->second)},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
-        {"warnings", warnings(kind)},
+        {"warnings", warnings(kind, model.has_mirror(), shader)},
         {"sha256", sha256(shader.source)}};
   }
   if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);

@@ -65,6 +65,13 @@ def extension(extension_zip):
     )
 
 
+@pytest.fixture(scope="session")
+def batch():
+    from helpers import Batch
+
+    return Batch()
+
+
 @pytest.fixture
 def empty(extension):
     """An empty factory file with Cycles. Preferences, and with them the extension, stay."""

@@ -53,11 +53,16 @@ class Goniometer:
     """`normals` (n, 3): one facet each, as seen by a camera that looks along -z.
 
     Facets are strewn over the pixels, so that what differs over the picture averages out over
-    facets of the same kind.
+    facets of the same kind. `materials`: one, or several of which `which`, (n,), tells each
+    facet's, so that one render measures many. `attributes`: arrays (n,) or (n, 3) that shaders
+    can read.
     """
 
-    def __init__(self, scene, material, normals, samples, perspective=False):
+    def __init__(
+        self, scene, materials, normals, samples, perspective=False, which=None, attributes=None
+    ):
         normals = unit(normals)
+        materials = materials if isinstance(materials, list) else [materials]
         self.count, self.scene = len(normals), scene
         self.side = int(np.ceil(np.sqrt(self.count)))
         grid = np.random.default_rng(0).permutation(self.count)
@@ -67,11 +72,16 @@ class Goniometer:
             [self.columns - centre, self.rows - centre, np.zeros(self.count)], -1
         ).astype(np.float64)
         height = DISTANCE * self.side
-        self._build(material, positions, normals)
+        eye = np.array([0.0, 0.0, height]) - positions
+        #: Towards the camera from the middle of each facet, in world coordinates.
+        self.views = unit(eye) if perspective else np.broadcast_to([0.0, 0.0, 1.0], eye.shape)
+        self._build(materials, positions, normals, which)
+        for name, values in (attributes or {}).items():
+            self._add_attribute(name, np.asarray(values, np.float32))
         self._camera(perspective, height)
         self._settings(samples, perspective)
 
-    def _build(self, material, positions, normals):
+    def _build(self, materials, positions, normals, which):
         t, b = frame(normals)
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         corners = [positions + HALF * (i * t + j * b) for i, j in signs]
@@ -82,11 +92,21 @@ class Goniometer:
         mesh = bpy.data.meshes.new("facets")
         faces = np.arange(4 * self.count).reshape(-1, 4)
         mesh.from_pydata(vertices.reshape(-1, 3).tolist(), [], faces.tolist())
-        mesh.materials.append(material)
+        for material in materials:
+            mesh.materials.append(material)
+        if which is not None:
+            mesh.polygons.foreach_set("material_index", np.ascontiguousarray(which, np.int32))
+            mesh.update()
+        self.mesh = mesh
         facets = bpy.data.objects.new("facets", mesh)
         for ray in ("diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
             setattr(facets, f"visible_{ray}", False)
         self.scene.collection.objects.link(facets)
+
+    def _add_attribute(self, name, values):
+        kind, field = ("FLOAT", "value") if values.ndim == 1 else ("FLOAT_VECTOR", "vector")
+        attribute = self.mesh.attributes.new(name, kind, "FACE")
+        attribute.data.foreach_set(field, np.ascontiguousarray(values).ravel())
 
     def _camera(self, perspective, height):
         camera = add_camera(
@@ -107,6 +127,10 @@ class Goniometer:
         cycles.pixel_filter_type = "BOX" if perspective else "BLACKMAN_HARRIS"
         if not perspective:
             cycles.filter_width = 0.01
+
+    def own_wo(self):
+        """Each facet's own view direction in its frame, (n, 3)."""
+        return self.local(self.views)
 
     def local(self, directions):
         """Directions (n, 3) or (3,) of the world in the frames of the facets, (n, 3)."""

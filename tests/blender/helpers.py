@@ -29,6 +29,50 @@ def with_every_model(form, *cases):
     return present + [(model, {}) for model in have_form if model not in covered]
 
 
+class Batch:
+    """Measures all cases of a test in one render, when the first of them asks.
+
+    Only the cases that this run of pytest selected are measured. A case that raises while its
+    material is made fails alone.
+    """
+
+    def __init__(self):
+        self.results = {}
+
+    def result(self, request, measure):
+        """What `measure(cases)` returned for the case of the running test; its parameters other
+        than the case tell one batch from another."""
+
+        def key(item):
+            others = {k: v for k, v in item.callspec.params.items() if k not in ("model", "values")}
+            return item.originalname, tuple(sorted((k, repr(v)) for k, v in others.items()))
+
+        def case(item):
+            return item.callspec.params["model"], item.callspec.params["values"]
+
+        mine = key(request.node)
+        if mine not in self.results:
+            items = [i for i in request.session.items if hasattr(i, "callspec")]
+            cases = [case(i) for i in items if key(i) == mine]
+            self.results[mine] = list(zip(cases, measure(cases), strict=True))
+        wanted = case(request.node)
+        result = next(r for c, r in self.results[mine] if c == wanted)
+        if isinstance(result, Exception):
+            raise result
+        return result
+
+
+def materials_of(extension, form, cases):
+    """A material for each case, or the exception that making it raised."""
+    made = []
+    for model, values in cases:
+        try:
+            made.append(extension.api.new_material(model, form, **values))
+        except Exception as error:  # it belongs to this case alone
+            made.append(error)
+    return made
+
+
 def render(scene):
     """Renders the scene; (height, width, 4) float64, row 0 at the bottom."""
     settings = scene.render.image_settings
@@ -39,6 +83,41 @@ def render(scene):
         scene.render.filepath = str(path)
         bpy.ops.render.render(write_still=True, scene=scene.name)
         return read_picture(path)
+
+
+def render_passes(scene):
+    """Renders the scene; every pass by name, (height, width, channels), row 0 at the bottom.
+
+    Blender does not hand out the pixels of a multilayer file; the OpenImageIO that it brings does.
+    """
+    import sys
+
+    root = Path(bpy.utils.resource_path("LOCAL"))
+    sys.path += [str(p) for p in root.glob("python/lib/python3.*/site-packages")]
+    import OpenImageIO
+
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # from 5.0
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth, settings.exr_codec = "32", "NONE"
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.exr"
+        scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        image = OpenImageIO.ImageBuf(str(path))
+        passes = {}
+        for part in range(image.nsubimages):
+            image = OpenImageIO.ImageBuf(str(path), part, 0)
+            pixels = image.get_pixels(OpenImageIO.FLOAT)[::-1].astype(np.float64)
+            for index, channel in enumerate(image.spec().channelnames):
+                *_, name, letter = channel.split(".")
+                passes.setdefault(name, {})[letter] = pixels[..., index]
+        order = "RXUGYVBZA"
+        return {
+            name: np.stack([c[k] for k in sorted(c, key=lambda k: order.find(k))], -1)
+            for name, c in passes.items()
+        }
 
 
 def read_picture(path):
@@ -104,6 +183,24 @@ def sphere_scene(scene, material, size=16, samples=16):
     scene.cycles.samples = samples
 
 
+def script_material(extension, name, source, surface="BSDF"):
+    """A material of an OSL source whose output `surface` is what is seen."""
+    text = bpy.data.texts.new(f"{name}.osl")
+    text.write(source)
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    script = tree.nodes.new("ShaderNodeScript")
+    script.mode = "INTERNAL"
+    extension.nodes._compile(script, text, name)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(script.outputs[surface], output.inputs["Surface"])
+    material.cycles.use_bump_map_correction = False
+    return material
+
+
 def read_csv(text):
     """Columns of a CSV with a header line: (names, array of shape (rows, columns))."""
     names = next(csv.reader(io.StringIO(text)))
@@ -136,3 +233,14 @@ def albedo(tool, model, values, cosines, phi=0.0):
     stdin = to_csv(("cos_theta_o",), np.reshape(cosines, (-1, 1)))
     text = tool("albedo", model, *arguments(values), "--phi", repr(float(phi)), stdin=stdin)
     return read_csv(text)[1][:, 1:4]
+
+
+def draw(tool, model, values, wo, count):
+    """Directions drawn from the model in double precision, and each one's share of f cos dw."""
+    # Additive recurrence on the plastic number's relative: evenly spread in three dimensions.
+    root = 1.2207440846057596
+    u = (0.5 + np.outer(np.arange(count), [1 / root, 1 / root**2, 1 / root**3])) % 1.0
+    header = ("wo_x", "wo_y", "wo_z", "u1", "u2", "u3")
+    stdin = to_csv(header, np.hstack([np.broadcast_to(wo, (count, 3)), u]))
+    rows = read_csv(tool("sample", model, *arguments(values), stdin=stdin))[1]
+    return rows[:, :3], rows[:, 3:6] / count

@@ -307,7 +307,7 @@ def test_group_of_another_version_is_offered_for_update(extension, empty, monkey
     material = extension.api.new_material("coupled", r0=0.3)
     node = extension.nodes.group_nodes(material)[0]
     node.node_tree[extension.nodes.TAG]["digest"] = "of an older version"
-    extension.api.enable_osl(empty)
+    extension.scene_loader.apply_clean_settings(empty)
     assert [w.code for w in extension.api.warnings(material, empty)] == ["outdated"]
     old = node.node_tree
     extension.api.switch_representation(material, "exact")
@@ -324,6 +324,7 @@ def clean(extension, scene, model="lambert", form="exact"):
     material = extension.api.new_material(model, form)
     extension.api.enable_osl(scene)
     scene.cycles.sample_clamp_indirect = scene.cycles.sample_clamp_direct = 0
+    scene.cycles.blur_glossy, scene.cycles.use_denoising = 0, False
     assert extension.api.warnings(material, scene) == []
     return material
 
@@ -458,6 +459,37 @@ def test_warnings_a_form_may_declare(extension, empty, monkeypatch, code, spoil)
     for name, value in spoil.items():
         setattr(empty.cycles, name, value)
     assert codes(extension, material, empty) == [code]
+
+
+def test_warning_clamp_that_shows_in_mirrors(extension, empty):
+    material = clean(extension, empty, "coupled", "exact")
+    empty.cycles.sample_clamp_indirect = 10
+    assert codes(extension, material, empty) == []
+    empty.cycles.sample_clamp_indirect = 1
+    assert codes(extension, material, empty) == ["clamp_low"]
+
+
+def test_warning_normal_pass(extension, empty):
+    """A drawn lobe has a normal of its own, and the denoiser sees it."""
+    material = clean(extension, empty, *sampled_forms(extension)[0])
+    empty.cycles.use_denoising = True
+    empty.cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+    assert codes(extension, material, empty) == ["normal_pass"]
+    empty.cycles.denoising_input_passes = "RGB_ALBEDO"
+    assert codes(extension, material, empty) == []
+
+
+def test_warning_albedo_passes(extension, empty):
+    """The signed sum of an exact form has closures that weigh more than it reflects."""
+    form = extension.pack.representation("coupled", "exact")
+    assert "albedo_passes" in form["warnings"]
+    material = clean(extension, empty, "coupled", "exact")
+    empty.cycles.use_denoising = True
+    assert codes(extension, material, empty) == ["albedo_passes"]
+    empty.cycles.denoising_input_passes = "RGB"
+    assert codes(extension, material, empty) == []
+    empty.view_layers[0].use_pass_diffuse_color = True
+    assert codes(extension, material, empty) == ["albedo_passes"]
 
 
 def test_warning_script_failed(extension, empty):

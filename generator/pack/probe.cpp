@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pack/probe.h"
+
+#include "core/osl_arithmetic.h"
+#include "pack/osl_library.h"
+
+namespace brdfc {
+namespace {
+
+Vec3<Expr> input3(const std::string& name) {
+  return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
+}
+
+struct Recorded {
+  Program eval, sample;
+};
+
+/// The current recorder receives both; names of the outputs are those of the shader's variables.
+Recorded record_both(const Model& model, const ParamValues& choices) {
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(choices);
+  const Vec3<Expr> wo = input3("wo");
+  Recorded r;
+  const Vec3<Expr> wi = input3("wi");
+  r.eval.output("shown_f", brdf->eval(wi, wo));
+  r.eval.output("shown_pdf", brdf->pdf(wi, wo));
+  const Sample<Expr> s = brdf->sample(wo, {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
+  r.sample.output("shown_x", s.wi.x);
+  r.sample.output("shown_y", s.wi.y);
+  r.sample.output("shown_z", s.wi.z);
+  r.sample.output("shown_pdf", s.pdf);
+  r.sample.output("shown_weight", s.weight);
+  return r;
+}
+
+template <class T> ProbeValues direct(const Brdf<T>& brdf, const ProbePoint& p) {
+  const auto wi = Vec3<T>::from(p.wi), wo = Vec3<T>::from(p.wo), u = Vec3<T>::from(p.u);
+  const Rgb<T> f = brdf.eval(wi, wo);
+  const Sample<T> s = brdf.sample(wo, u);
+  return {double(f.r),        double(f.g),        double(f.b),    double(brdf.pdf(wi, wo)),
+          double(s.wi.x),     double(s.wi.y),     double(s.wi.z), double(s.weight.r),
+          double(s.weight.g), double(s.weight.b), double(s.pdf)};
+}
+
+ProbeValues executed(const Recorded& r, const ProbePoint& p) {
+  std::map<std::string, std::array<float, 3>> in;
+  const auto set = [&](const std::string& name, double v) { in[name] = {float(v), float(v), float(v)}; };
+  for (const auto& [name, value] : p.values) {
+    if (const double* v = std::get_if<double>(&value)) set(name, *v);
+    if (const auto* c = std::get_if<std::array<double, 3>>(&value))
+      in[name] = {float((*c)[0]), float((*c)[1]), float((*c)[2])};
+  }
+  const char* const axes[] = {"_x", "_y", "_z"};
+  const double wi[] = {p.wi.x, p.wi.y, p.wi.z}, wo[] = {p.wo.x, p.wo.y, p.wo.z}, u[] = {p.u.x, p.u.y, p.u.z};
+  for (int i = 0; i < 3; ++i) {
+    set(std::string("wi") + axes[i], wi[i]);
+    set(std::string("wo") + axes[i], wo[i]);
+    set(fmt::format("u_{}", i), u[i]);
+  }
+  const auto f = r.eval.run<float>(in), s = r.sample.run<float>(in);
+  const auto& rgb = f.at("shown_f");
+  const auto& weight = s.at("shown_weight");
+  return {
+      rgb[0],    rgb[1],    rgb[2],    f.at("shown_pdf")[0], s.at("shown_x")[0], s.at("shown_y")[0], s.at("shown_z")[0],
+      weight[0], weight[1], weight[2], s.at("shown_pdf")[0]};
+}
+
+}  // namespace
+
+const char* name_of(ProbeRun run) {
+  switch (run) {
+    case ProbeRun::Double:
+      return "double";
+    case ProbeRun::Float:
+      return "float";
+    case ProbeRun::Recorded:
+      return "recorded";
+    default:
+      return "osl";
+  }
+}
+
+std::string probe_source(const Model& model, const ParamValues& choices) {
+  if (!model.has_scatter()) input_error("{}: has delta terms alone, there is nothing to probe", model.info().name);
+  Recorder recorder;
+  const Recorded r = record_both(model, choices);
+  const std::vector<std::string> taken = {"shown_f", "shown_pdf", "shown_x", "shown_y", "shown_z", "shown_weight",
+                                          "show",    "first",     "last",    "BSDF",    "Shown"};
+  // Inputs of the node, because Cycles passes on only attributes that nodes ask for.
+  std::string parameters = "    float show = 0,\n    vector wi = 0,\n    vector wo = 0,\n    vector numbers = 0,\n";
+  std::string body;
+  for (const char* name : {"wi", "wo"})
+    for (int i = 0; i < 3; ++i) body += fmt::format("    float {}_{} = {}[{}];\n", name, "xyz"[i], name, i);
+  for (int i = 0; i < 3; ++i) body += fmt::format("    float u_{} = numbers[{}];\n", i, i);
+  for (const ParamInfo& p : model.info().params) {
+    if (p.kind == ParamKind::Choice) continue;
+    const bool color = p.kind == ParamKind::Color;
+    parameters += fmt::format("    {} p_{} = 0,\n", color ? "color" : "float", p.name);
+    body += fmt::format("    {} {} = p_{};\n", color ? "color" : "float", p.name, p.name);
+  }
+  body +=
+      "    color first = 0;\n    if (show < 0.5 || show > 2.5) {\n        color shown_f;\n        float shown_pdf;\n" +
+      r.eval.print_osl(8, taken) +
+      "        first = show > 2.5 ? color(shown_pdf) : shown_f;\n    } else {\n"
+      "        float shown_x, shown_y, shown_z, shown_pdf;\n        color shown_weight;\n" +
+      r.sample.print_osl(8, taken) +
+      "        first = show < 1.25 ? color(shown_x, shown_y, shown_z) : show < 1.75 ? color(shown_pdf) : "
+      "shown_weight;\n"
+      "    }\n"
+      "    for (int i = 0; i < 3; i++)\n"
+      "        if (!isfinite(first[i]))\n            first[i] = -31337.0;\n"
+      "    BSDF = first * emission();\n";
+  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + library_for(body) + "\nshader brdfc_probe(\n" + parameters +
+         "    output closure color BSDF = 0)\n{\n" + body + "}\n";
+}
+
+std::vector<std::array<ProbeValues, 4>> run_probe(const Model& model, const ParamValues& choices,
+                                                  const std::vector<ProbePoint>& points) {
+  Recorder recorder;
+  const Recorded r = record_both(model, choices);
+  std::vector<std::array<ProbeValues, 4>> all;
+  for (const ProbePoint& p : points) {
+    std::array<ProbeValues, 4> runs;
+    runs[0] = direct(*model.make_double(p.values), p);
+    runs[1] = direct(*model.make_float(p.values), p);
+    runs[2] = executed(r, p);
+    const OslArithmetic arithmetic;
+    runs[3] = executed(r, p);
+    all.push_back(runs);
+  }
+  return all;
+}
+
+}  // namespace brdfc

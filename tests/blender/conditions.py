@@ -1,0 +1,484 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the settings and scenes of users do to each form, measured against clean ones.
+
+Grooves: each cell of a grid is a V of two quads, closed at its ends, so that light bounces inside
+it and none reaches other cells. One render shows every form in many cells: both walls of the form,
+or one of them white, so that caustics show. A condition is what it changes in that scene; its bias
+is what that does to the mean radiance of a form's cells.
+"""
+
+import dataclasses
+import math
+
+import bpy
+import numpy as np
+from goniometer import DISTANCE, Goniometer, tilted, unit
+from helpers import add_camera, albedo, render, render_passes
+from worlds import gradient
+
+#: Cells of a form and of each kind.
+REPLICAS = 40
+SAMPLES = 512
+#: Distance of cells, and so the size of a pixel; a groove is 1 wide and 1/2 deep.
+PITCH = 2.0
+#: A bias counts from this share on, and only beyond so many standard errors.
+BIASED, SIGNIFICANT = 0.02, 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Form:
+    model: str
+    form: str
+
+    def __str__(self):
+        return f"{self.model} ({self.form})"
+
+
+#: Blender's own nodes, for comparison.
+NATIVE = (Form("Diffuse", "node"), Form("Glossy", "node"))
+
+
+def representatives(extension, listed):
+    """Forms that stand for all, by what they are made of; `listed` is `brdfc list --json`."""
+    models = {m["name"]: m for m in listed}
+    forms = {}
+
+    def pick(name, form, key):
+        fitting = [
+            m
+            for m, e in extension.api.models().items()
+            if form in e["representations"] and m in models and key(models[m], e)
+        ]
+        if fitting:
+            forms[name] = Form(sorted(fitting)[0], form)
+
+    pick("closures and a mirror", "exact", lambda m, e: m["mirror"] and e["auto"] == "exact")
+    pick("closures alone", "exact", lambda m, e: not m["mirror"])
+    pick("drawn, with a mirror", "sampled", lambda m, e: m["mirror"])
+    pick("drawn, anisotropic", "sampled", lambda m, e: not e["isotropic"])
+    pick(
+        "drawn alone",
+        "sampled",
+        lambda m, e: not m["mirror"] and len(e["representations"]) == 1 and e["isotropic"],
+    )
+    return list(dict.fromkeys(forms.values()))
+
+
+def material_of(extension, form, index=0):
+    if form in NATIVE:
+        material = bpy.data.materials.new(form.model)
+        if material.node_tree is None:
+            material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        kind = "Glossy" if form.model == "Glossy" else form.model
+        node = tree.nodes.new(f"ShaderNodeBsdf{'Anisotropic' if kind == 'Glossy' else kind}")
+        node.inputs["Color"].default_value = (0.8, 0.8, 0.8, 1)
+        if kind == "Glossy":
+            node.inputs["Roughness"].default_value = 0.3
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(node.outputs[0], output.inputs["Surface"])
+        return material
+    return extension.api.new_material(form.model, form.form)
+
+
+def _plain(name, color):
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.inputs["Color"].default_value = (*color, 1)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material
+
+
+class Grooves:
+    """The scene. `copies`: materials of each form; `flip`: faces point away from the viewer;
+    `inset`: how far the walls are moved against their normals."""
+
+    def __init__(self, extension, forms, copies=1, flip=False, inset=0.0, offset=(0.0, 0.0, 0.0)):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        self.scene, self.forms = bpy.context.scene, forms
+        extension.scene_loader.apply_clean_settings(self.scene, samples=SAMPLES, max_bounces=4)
+        self.materials = [[material_of(extension, f) for _ in range(copies)] for f in forms]
+        flat = [m for group in self.materials for m in group]
+        count = len(forms) * 2 * REPLICAS
+        self.side = math.ceil(math.sqrt(count))
+        cells = np.random.default_rng(3).permutation(self.side**2)[:count]
+        self.columns, self.rows = cells % self.side, cells // self.side
+        centre = (self.side - 1) / 2
+        vertices, faces, slots = [], [], []
+        white, black = len(flat), len(flat) + 1
+        s = inset * math.sqrt(0.5)
+        # Walls whose normals look up and at each other; then the ends.
+        quads = [
+            [(-0.5, -0.5, 0.5), (0, -0.5, 0), (0, 0.5, 0), (-0.5, 0.5, 0.5)],
+            [(0, -0.5, 0), (0.5, -0.5, 0.5), (0.5, 0.5, 0.5), (0, 0.5, 0)],
+        ]
+        shifts = [(-s, 0, -s), (s, 0, -s)]
+        ends = [
+            [(-0.6, y, 0.6), (0, y, -0.1), (0.6, y, 0.6)][:: 1 if y > 0 else -1]
+            for y in (-0.5, 0.5)
+        ]
+        for k in range(count):
+            form, kind = divmod(k // REPLICAS, 2)
+            at = np.array([(self.columns[k] - centre), (self.rows[k] - centre), 0]) * PITCH
+            mine = form * copies + k % copies
+            other = mine if kind == 0 else white
+            for quad, shift, slot in zip(quads, shifts, (mine, other), strict=True):
+                moved = np.array(shift) if slot == mine else np.zeros(3)
+                corners = [np.add(c, moved) + at for c in quad]
+                faces.append([len(vertices) + i for i in range(4)][:: -1 if flip else 1])
+                vertices += corners
+                slots.append(slot)
+            for end in ends:
+                faces.append([len(vertices) + i for i in range(3)])
+                vertices += [np.array(c) + at for c in end]
+                slots.append(black)
+        mesh = bpy.data.meshes.new("grooves")
+        mesh.from_pydata([tuple(v) for v in vertices], [], faces)
+        for material in (*flat, _plain("white", (0.8,) * 3), _plain("black", (0.0,) * 3)):
+            mesh.materials.append(material)
+        mesh.polygons.foreach_set("material_index", np.array(slots, np.int32))
+        mesh.update()
+        self.object = bpy.data.objects.new("grooves", mesh)
+        self.object.location = offset
+        self.scene.collection.objects.link(self.object)
+        self._view(np.array(offset))
+        self._lights()
+
+    def _view(self, offset):
+        size = PITCH * self.side
+        height = DISTANCE * size
+        camera = add_camera(self.scene, tuple(offset + (0, 0, height)), (0, 0, 0))
+        camera.sensor_fit = "VERTICAL"
+        camera.angle = 2 * math.atan(0.5 / DISTANCE)
+        camera.clip_start, camera.clip_end = 0.01, 10 * height
+        self.scene.render.resolution_x = self.scene.render.resolution_y = self.side
+        self.scene.render.film_transparent = True
+
+    def _lights(self):
+        from helpers import add_world
+        from mathutils import Vector
+
+        tree, background = add_world(self.scene)
+        gradient(tree, background)
+        data = bpy.data.lights.new("Sun", "SUN")
+        data.energy, data.angle = 3.0, 0.7
+        self.sun = bpy.data.objects.new("Sun", data)
+        self.sun.rotation_mode = "QUATERNION"
+        self.sun.rotation_quaternion = Vector((0.3, -0.25, 0.9)).to_track_quat("Z", "Y")
+        self.scene.collection.objects.link(self.sun)
+
+    def measure(self):
+        """Radiance of each form's cells, (forms, 2, replicas)."""
+        picture = render(self.scene)[self.rows, self.columns]
+        colour = picture[:, :3].mean(-1) / np.maximum(picture[:, 3], 1e-6)
+        return colour.reshape(len(self.forms), 2, REPLICAS)
+
+
+# ---- the conditions ---------------------------------------------------------------------------
+
+
+def _cycles(**settings):
+    def change(grooves):
+        for name, value in settings.items():
+            setattr(grooves.scene.cycles, name, value)
+
+    return change
+
+
+#: What Blender starts with, where a clean scene differs.
+FACTORY = {
+    "use_adaptive_sampling": True,
+    "adaptive_threshold": 0.01,
+    "blur_glossy": 1.0,
+    "sample_clamp_indirect": 10.0,
+    "light_sampling_threshold": 0.01,
+    "caustics_reflective": True,
+    "use_guiding": False,
+}
+
+
+def _bump(grooves):
+    for group in grooves.materials:
+        for material in group:
+            material.cycles.use_bump_map_correction = True
+
+
+def _instance(grooves):
+    """The grooves are seen through an instance of a collection that lies elsewhere."""
+    collection = bpy.data.collections.new("source")
+    collection.objects.link(grooves.object)
+    grooves.scene.collection.objects.unlink(grooves.object)
+    empty = bpy.data.objects.new("instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    collection.instance_offset = (5.0, 3.0, 1.0)
+    empty.location = (5.0, 3.0, 1.0)
+    grooves.scene.collection.objects.link(empty)
+
+
+def _moving(grooves):
+    grooves.scene.render.use_motion_blur = True
+    grooves.scene.frame_set(1)
+    for frame, x in ((0, -0.4), (2, 0.4)):
+        grooves.object.location.x = x
+        grooves.object.keyframe_insert("location", frame=frame)
+
+
+def _deforming(grooves):
+    grooves.scene.render.use_motion_blur = True
+    grooves.scene.frame_set(1)
+    grooves.object.shape_key_add(name="rest")
+    key = grooves.object.shape_key_add(name="moved")
+    for point in key.data:
+        point.co.x += 0.8
+    for frame, value in ((0, 0.0), (2, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    # Its middle lies where the still one is.
+    grooves.object.location.x -= 0.4
+
+
+INSET = 0.05
+
+
+def _displaced(grooves):
+    for group in grooves.materials:
+        for material in group:
+            tree = material.node_tree
+            output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+            node = tree.nodes.new("ShaderNodeDisplacement")
+            node.inputs["Height"].default_value = INSET
+            node.inputs["Midlevel"].default_value = 0.0
+            node.inputs["Scale"].default_value = 1.0
+            tree.links.new(node.outputs[0], output.inputs["Displacement"])
+            material.displacement_method = "DISPLACEMENT"
+
+
+def _no_size(grooves):
+    grooves.sun.data.angle = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Condition:
+    """`change` alters clean grooves, built with `build`. `code`: how the panel's codes begin where
+    a form suffers."""
+
+    name: str
+    change: object = None
+    build: tuple = ()
+    code: str = ""
+    quick: bool = False
+
+
+CONDITIONS = [
+    Condition("default settings", _cycles(**FACTORY), code="clamp_indirect", quick=True),
+    Condition("clamp indirect 10", _cycles(sample_clamp_indirect=10.0), code="clamp_indirect"),
+    Condition("clamp indirect 1", _cycles(sample_clamp_indirect=1.0), code="clamp"),
+    Condition("filter glossy 1", _cycles(blur_glossy=1.0), code="filter_glossy", quick=True),
+    Condition("path guiding", _cycles(use_guiding=True), code="path_guiding"),
+    Condition("caustics off", _cycles(caustics_reflective=False), code="caustics", quick=True),
+    Condition("bump correction", _bump, code="bump_correction", quick=True),
+    Condition("sun without size", _no_size, code="zero_size_lights", quick=True),
+    Condition("backfaces", build=(("flip", True),), quick=True),
+    Condition("instance", _instance),
+    Condition("object motion", _moving),
+    Condition("deformation motion", _deforming),
+    Condition("true displacement", _displaced, build=(("inset", INSET),)),
+    Condition("10 km from the origin", build=(("offset", (1e4, 1e4, 0.0)),)),
+    Condition("40 materials", build=(("copies", 8),)),
+]
+
+
+def is_warned(row):
+    return bool(row["code"]) and any(w.startswith(row["code"]) for w in row["warned"])
+
+
+def panel_warns(extension, grooves):
+    """Codes of the panel's findings for each form."""
+    return [
+        {f.code for f in extension.api.warnings(group[0], grooves.scene)}
+        for group in grooves.materials
+    ]
+
+
+def measure(extension, forms, names=None):
+    """Rows: condition, form, bias as a share of the clean radiance, its standard error, what the
+    panel says."""
+    rows = []
+    clean = Grooves(extension, forms)
+    before = clean.measure()
+    for condition in CONDITIONS:
+        if names is not None and condition.name not in names:
+            continue
+        grooves = Grooves(extension, forms, **dict(condition.build))
+        if condition.change:
+            condition.change(grooves)
+        after = grooves.measure()
+        warned = panel_warns(extension, grooves)
+        for i, form in enumerate(forms):
+            # The same cells: where random numbers stay, so does the noise.
+            mean = before[i].mean()
+            off = after[i] - before[i]
+            bias = off.mean() / mean
+            error = np.sqrt(off.var(1, ddof=1).sum() / REPLICAS) / (2 * mean)
+            biased = abs(bias) > BIASED and abs(bias) > SIGNIFICANT * error
+            rows.append(
+                {
+                    "condition": condition.name,
+                    "form": str(form),
+                    "bias": float(bias),
+                    "error": float(error),
+                    "biased": bool(biased),
+                    "code": condition.code,
+                    "warned": sorted(warned[i]),
+                }
+            )
+    return rows
+
+
+# ---- passes -----------------------------------------------------------------------------------
+
+
+def passes(extension, tool, forms):
+    """What the passes that denoisers and compositors use say of each form, in a white world:
+    differences from the model's albedo, the normal and the picture."""
+    rows = []
+    cosines = np.tile((0.2, 0.5, 0.8, 1.0), 64)
+    normals = tilted(cosines, np.linspace(0, 6, len(cosines)))
+    for form in forms:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.scene_loader.apply_clean_settings(scene, max_bounces=1)
+        material = material_of(extension, form)
+        meter = Goniometer(scene, material, normals, samples=64, perspective=True)
+        meter.add_world()
+        scene.world.lightgroup = "sky"
+        layer = scene.view_layers[0]
+        layer.lightgroups.add(name="sky")
+        layer.cycles.denoising_store_passes = True
+        layer.use_pass_diffuse_color = layer.use_pass_glossy_color = True
+        layer.use_pass_transmission_color = True
+        found = render_passes(scene)
+        at = (meter.rows, meter.columns)
+        alpha = np.maximum(found["Combined"][at][:, 3:], 1e-6)
+
+        def value(name, found=found, at=at, alpha=alpha):
+            return found[name][at][:, :3] / alpha
+
+        wo = meter.wo()
+        if form in NATIVE:
+            expected = scattered = np.full_like(wo, 0.8)
+        else:
+            first = np.array([albedo(tool, form.model, {}, [c])[0] for c in wo[:4, 2]])
+            expected = np.tile(first, (64, 1))
+            # Denoisers look through mirrors: their weight is not in this pass.
+            mirrors = np.array([albedo_parts(tool, form.model, c) for c in wo[:4, 2]])
+            scattered = np.tile(first - mirrors, (64, 1))
+        colours = value("DiffCol") + value("GlossCol") + value("TransCol")
+        # In the camera's frame, which looks along its z axis.
+        normal = unit(value("Denoising Normal")) * (1, 1, -1)
+        angle = np.degrees(np.arccos(np.clip((normal * meter.normals).sum(-1), -1, 1)))
+        warned = {f.code for f in extension.api.warnings(material, scene)}
+        combined = value("Combined")
+        sky = value("Combined_sky")
+        for name, bias, biased in (
+            ("denoising albedo", (value("Denoising Albedo") - scattered).mean(), None),
+            ("colour passes", (colours - expected).mean(), None),
+            ("denoising normal, degrees", np.median(angle), np.median(angle) > 5),
+            ("light group", np.abs(sky - combined).max(), None),
+        ):
+            rows.append(
+                {
+                    "condition": name,
+                    "form": str(form),
+                    "bias": float(bias),
+                    "error": 0.0,
+                    "biased": bool(abs(bias) > BIASED if biased is None else biased),
+                    "code": "normal_pass" if "normal" in name else "albedo_passes",
+                    "warned": sorted(warned),
+                }
+            )
+    return rows
+
+
+# ---- tilted normals ---------------------------------------------------------------------------
+
+TILT = 0.3
+
+
+def normals(extension, tool, forms, smooth):
+    """A normal that differs from the surface's: rays below the true surface are lost, and nothing
+    else may change. `smooth`: by the mesh's own normals, else by the Normal input. In a white world
+    against the model's own samples in double precision."""
+    from helpers import draw
+
+    rows = []
+    cosines = np.array((0.4, 0.7, 0.95))
+    replicas = 64
+    flat = tilted(np.repeat(cosines, replicas), 0.5)
+    for form in forms:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.scene_loader.apply_clean_settings(scene, max_bounces=1)
+        material = material_of(extension, form)
+        meter = Goniometer(scene, material, flat, samples=128, perspective=True)
+        meter.add_world()
+        axis = unit((0.4, -0.9, 0.2))
+        bent = unit(meter.normals + math.tan(TILT) * unit(np.cross(meter.normals, axis)))
+        if smooth:
+            mesh = meter.mesh
+            mesh.polygons.foreach_set("use_smooth", np.ones(len(bent), bool))
+            attribute = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
+            attribute.data.foreach_set("vector", np.repeat(bent, 4, 0).astype(np.float32).ravel())
+            mesh.update()
+        else:
+            meter._add_attribute("bent", bent.astype(np.float32))
+            tree = material.node_tree
+            read = tree.nodes.new("ShaderNodeAttribute")
+            read.attribute_name = "bent"
+            shader = next(n for n in tree.nodes if "Normal" in n.inputs)
+            tree.links.new(read.outputs["Vector"], shader.inputs["Normal"])
+        found = meter.measure().mean(-1).reshape(len(cosines), replicas)
+        if form in NATIVE:
+            continue
+        from goniometer import frame
+
+        expected = []
+        for k in range(len(cosines)):
+            n = bent[k * replicas]
+            axes = np.stack([*(a[0] for a in frame(n[None])), n])
+            wi, weight = draw(tool, form.model, {}, axes @ (0.0, 0.0, 1.0), 1 << 13)
+            above = (wi @ axes) @ meter.normals[k * replicas] > 0
+            mirror = albedo_parts(tool, form.model, axes[2, 2])
+            reflected = 2 * axes[2, 2] * n - np.array([0.0, 0.0, 1.0])
+            kept = reflected @ meter.normals[k * replicas] > 0
+            expected.append((weight[above].sum(0) + mirror * kept).mean())
+        expected = np.array(expected)
+        error = found.std(1, ddof=1) / math.sqrt(replicas)
+        bias = (found.mean(1) - expected) / expected
+        k = np.abs(bias).argmax()
+        rows.append(
+            {
+                "condition": "smooth normals" if smooth else "Normal input",
+                "form": str(form),
+                "bias": float(bias[k]),
+                "error": float(error[k] / expected[k]),
+                "biased": bool(abs(bias[k]) > max(BIASED, SIGNIFICANT * error[k] / expected[k])),
+                "code": "",
+                "warned": [],
+            }
+        )
+    return rows
+
+
+def albedo_parts(tool, model, cosine):
+    """Weight of the model's mirror term."""
+    from helpers import read_csv, to_csv
+
+    names, rows = read_csv(tool("albedo", model, stdin=to_csv(("cos_theta_o",), [[cosine]])))
+    return np.array([rows[0, names.index(f"mirror_{c}")] for c in "rgb"])

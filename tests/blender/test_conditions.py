@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The conditions that users live in: see conditions.py.
+
+Where a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all every condition is
+measured, with BRDFC_CONDITIONS=quick a few. The rows go to conditions/<version>.json beside the
+tool; script/conditions makes the table of them.
+"""
+
+import json
+import os
+from pathlib import Path
+
+import bpy
+import conditions
+import pytest
+
+VERSION = ".".join(map(str, bpy.app.version[:2]))
+ALL = os.environ.get("BRDFC_CONDITIONS") == "all"
+
+pytestmark = pytest.mark.skipif(
+    "BRDFC_CONDITIONS" not in os.environ, reason="script/conditions measures them"
+)
+
+
+@pytest.fixture(scope="module")
+def forms(extension, tool):
+    return conditions.representatives(extension, json.loads(tool("list", "--json")))
+
+
+@pytest.fixture(scope="module")
+def rows(extension, tool, forms):
+    names = None if ALL else [c.name for c in conditions.CONDITIONS if c.quick]
+    every = [*forms, *conditions.NATIVE]
+    found = conditions.measure(extension, every, names)
+    found += conditions.passes(extension, tool, every)
+    for smooth in (True, False):
+        found += conditions.normals(extension, tool, forms, smooth)
+    folder = Path(os.environ["BRDFC_TOOL"]).resolve().parent / "conditions"
+    folder.mkdir(exist_ok=True)
+    record = {"blender": bpy.app.version_string, "all": ALL, "rows": found}
+    (folder / f"{VERSION}.json").write_text(json.dumps(record, indent=1) + "\n")
+    for r in found:
+        print(
+            f"{r['condition']:28} {r['form']:32} {r['bias']:+9.4f} +- {r['error']:.4f} "
+            f"{'BIASED' if r['biased'] else '':6} {','.join(r['warned'])}"
+        )
+    return found
+
+
+def test_the_panel_warns_where_a_form_is_biased(rows):
+    native = {str(form) for form in conditions.NATIVE}
+    silent = [
+        f"{r['condition']}: {r['form']} is off by {r['bias']:+.1%} and the panel is silent"
+        for r in rows
+        if r["biased"] and r["form"] not in native and not conditions.is_warned(r)
+    ]
+    assert not silent, "\n".join(silent)
+
+
+def test_the_panel_is_silent_under_clean_settings(extension, forms):
+    grooves = conditions.Grooves(extension, forms)
+    assert conditions.panel_warns(extension, grooves) == [set() for _ in forms]
+
+
+def test_conditions_can_tell(rows):
+    """A sun without size, which drawn rays never meet, must show as a bias of sampled forms."""
+    found = [r for r in rows if r["condition"] == "sun without size" and "sampled" in r["form"]]
+    assert found and all(r["biased"] for r in found)

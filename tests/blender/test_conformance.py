@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the closures of this Blender do what the forms rely on; see conformance.py.
+
+The table goes to conformance/<version>.json and .csv beside the tool, for the report.
+"""
+
+import csv
+import json
+import os
+import re
+from pathlib import Path
+
+import bpy
+import conformance
+import pytest
+
+VERSION = ".".join(map(str, bpy.app.version[:2]))
+
+
+@pytest.fixture(scope="module")
+def rows(extension, tool):
+    """The table of all closures, measured once."""
+    evaluated = conformance.evaluation(extension, tool)
+    found = conformance.table(evaluated, conformance.sampling(extension, tool))
+    folder = Path(os.environ["BRDFC_TOOL"]).resolve().parent / "conformance"
+    folder.mkdir(exist_ok=True)
+    text = json.dumps({"blender": bpy.app.version_string, "closures": found}, indent=1)
+    (folder / f"{VERSION}.json").write_text(text + "\n")
+    with (folder / f"{VERSION}.csv").open("w", newline="") as file:
+        names = list(dict.fromkeys(name for row in found for name in row))
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(found)
+    for row in found:
+        print(
+            f"{row['closure']:30} {row['verdict']:6} "
+            f"evaluation {row.get('evaluation_l1', -1):8.1e} "
+            f"resolution {row['sampling_resolution']:.1%} {row['fault']}"
+        )
+    return {row["closure"]: row for row in found}
+
+
+@pytest.mark.parametrize("case", conformance.CASES, ids=lambda c: c.name)
+def test_closure_samples_what_it_evaluates_and_evaluates_what_we_define(rows, case):
+    row = rows[case.name]
+    why, last = conformance.FAULTS.get(case.name, (None, (0, 0)))
+    version = bpy.app.version[:2]
+    if version > conformance.LOOKED_AT and why and row["verdict"] == "mended":
+        pytest.xfail(f"mended in Blender {VERSION}: forms may use it from there on ({why})")
+    if version > last:
+        assert row["verdict"] in ("ok", "mended"), row["fault"]
+        return
+    assert row["verdict"] == "fault", f"a known fault was not found: {why}"
+    assert "sampling" in row["fault"]
+
+
+def test_the_fault_of_ashikhmin_shirley_is_large(rows):
+    """The reason why no form uses the closure that would suit the model best."""
+    assert rows["ashikhmin_shirley 0.4 0.4"]["sampling_share"] > 0.3
+
+
+def test_forms_use_only_closures_that_conform(rows, extension):
+    """Every closure that the pack's shaders call has a row, and that row has no fault."""
+    sound = {}
+    for case in conformance.CASES:
+        name = re.match(r"\w+\([^,)]*", case.osl)[0]
+        function, first = name.split("(")
+        key = (function, first if first.startswith('"') else "")
+        if "tilted" not in case.name:
+            sound[key] = sound.get(key, True) and rows[case.name]["verdict"] != "fault"
+    called = set()
+    for model, entry in extension.api.models().items():
+        for form in entry["representations"]:
+            _, source = extension.pack.source(model, form)
+            for function, first in re.findall(r"\b(\w+)\((\"\w+\")?", source):
+                if function in {f for f, _ in sound} or function.endswith("_bsdf"):
+                    called.add((model, form, (function, first)))
+    assert called
+    bad = [c for c in called if not sound.get(c[2])]
+    assert not bad, f"no sound row in the conformance table: {bad}"
+
+
+def test_weights_and_limits(extension, empty, subtests):
+    shown = conformance.limits(extension)
+    for (name, _, expected), value in zip(conformance.LIMITS, shown, strict=True):
+        with subtests.test(name):
+            print(f"{name}: {value:.6g}")
+            assert value == pytest.approx(expected, rel=1e-5, abs=1e-9)

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Cycles makes of the generated code, step by step from the model.
+
+`brdfc probe` prints a shader that shows f, pdf, and a sample's wi, weight and pdf for given wi, wo,
+u and parameters, which come from attributes: one render executes thousands of points. The tool
+executes the same points itself: the model in double and in float, the recording in float, and the
+recording with OSL's arithmetic. So each step has its own error:
+
+    double -> float      rounding, and how the formula passes it on
+    float -> osl         OSL's fast functions
+    osl -> Cycles        what the printed text says other than the recording: an emission bug
+"""
+
+import csv
+import json
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from goniometer import Goniometer
+from helpers import arguments, read_csv, script_material, to_csv
+
+VERSION = ".".join(map(str, bpy.app.version[:2]))
+#: Points of a group: one parameter at one value, the others at their defaults.
+POINTS = 24
+#: Attribute `show` and the columns that it shows.
+SHOWN = {
+    0.0: ("f_r", "f_g", "f_b"),
+    1.0: ("wi_x", "wi_y", "wi_z"),
+    1.5: ("sample_pdf",) * 3,
+    2.0: ("weight_r", "weight_g", "weight_b"),
+    3.0: ("pdf",) * 3,
+}
+NOT_FINITE = -31337.0
+#: Relative L1 that f, pdf and weight may be off in Cycles, by the largest parameter: single
+#: precision can't hold more where an exponent multiplies it.
+LIMITS = ((1e5, 1e-3), (1e6, 1e-2))
+#: What the last step may add: OSL's compiler may contract and reorder nothing, but shares constants
+#: that were rounded in other places.
+EMISSION = 2e-5
+
+
+def groups(parameters):
+    """(name, value) for each decade of each wide number and a few values of each other one."""
+    chosen = [("", None)]
+    for p in parameters:
+        if p["kind"] != "number":
+            continue
+        low, high = p["min"], p["max"]
+        if high >= 1000:
+            start = -2 if low <= 0 else int(np.ceil(np.log10(low)))
+            values = [10.0**k for k in range(start, int(np.floor(np.log10(high))) + 1)]
+        else:
+            values = np.linspace(p["soft_min"], p["soft_max"], 4)[:-1]
+        chosen += [(p["name"], float(v)) for v in values if low <= v <= high]
+    return chosen
+
+
+def variants(parameters):
+    """Assignments of choices: the defaults, and each other choice by itself."""
+    choices = [p for p in parameters if p["kind"] == "choice"]
+    found = [{}]
+    for p in choices:
+        found += [{p["name"]: c} for c in p["choices"] if c != p["default"]]
+    return found
+
+
+def points_of(tool, model, choices, parameters, rng):
+    """Points of all groups as columns by name, and the group of each. Other choices than the
+    defaults are tried at the defaults of the numbers alone."""
+    numbers = [p for p in parameters if p["kind"] != "choice"]
+    columns, group = {}, []
+    for index, (name, value) in enumerate(groups(parameters)[: 1 if choices else None]):
+        count = POINTS
+        values = {p["name"]: p["default"] for p in numbers}
+        if name:
+            values[name] = value
+        cosine, azimuth = rng.uniform(0.05, 1, count), rng.uniform(0, 2 * np.pi, count)
+        sine = np.sqrt(1 - cosine**2)
+        wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
+        wo, u = wo.astype(np.float32), rng.random((count, 3)).astype(np.float32)
+        u = np.minimum(u, np.float32(1 - 2**-24))
+        # wi from the model, by other random numbers: nothing else meets a narrow lobe.
+        header = ("wo_x", "wo_y", "wo_z", "u1", "u2", "u3")
+        unit_wo = wo.astype(np.float64)
+        unit_wo /= np.linalg.norm(unit_wo, axis=-1, keepdims=True)
+        stdin = to_csv(header, np.hstack([unit_wo, rng.random((count, 3))]))
+        drawn = read_csv(tool("sample", model, *arguments(values | choices), stdin=stdin))[1]
+        kept = drawn[:, 6] > 0
+        wi = np.where(kept[:, None], drawn[:, :3], unit_wo).astype(np.float32)
+        rows = {
+            f"{v}_{a}": w[:, i] for v, w in (("wi", wi), ("wo", wo)) for i, a in enumerate("xyz")
+        }
+        rows |= {f"u{i + 1}": u[:, i] for i in range(3)}
+        for p in numbers:
+            v = np.float32(values[p["name"]])
+            if p["kind"] == "color":
+                rows |= {f"{p['name']}_{c}": np.full(count, v[i]) for i, c in enumerate("rgb")}
+            else:
+                rows[p["name"]] = np.full(count, v)
+        for key, column in rows.items():
+            columns.setdefault(key, []).append(column.astype(np.float64))
+        group += [index] * count
+    return {key: np.concatenate(parts) for key, parts in columns.items()}, np.array(group)
+
+
+def probe_material(extension, name, source):
+    """Each input of the probe reads the attribute of its name."""
+    material = script_material(extension, name, source)
+    tree = material.node_tree
+    script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
+    for socket in script.inputs:
+        read = tree.nodes.new("ShaderNodeAttribute")
+        read.attribute_name = socket.identifier
+        output = {"VALUE": "Fac", "VECTOR": "Vector", "RGBA": "Color"}[socket.type]
+        tree.links.new(read.outputs[output], socket)
+    return material
+
+
+@pytest.fixture(scope="module")
+def measured(extension, tool):
+    """By (model, choices): groups, group of each point, runs by column, and Cycles' values."""
+    rng = np.random.default_rng(7)
+    scattering = {m["name"] for m in json.loads(tool("list", "--json")) if m.get("scatter", True)}
+    jobs = []
+    for model, entry in extension.api.models().items():
+        if model not in scattering:
+            continue
+        for choices in variants(entry["parameters"]):
+            source = tool("probe", model, *arguments(choices))
+            columns, group = points_of(tool, model, choices, entry["parameters"], rng)
+            names = list(columns)
+            stdin = to_csv(names, np.stack(list(columns.values()), -1))
+            header, rows = read_csv(tool("probe", model, *arguments(choices), "--run", stdin=stdin))
+            runs = {name: rows[:, i] for i, name in enumerate(header)}
+            jobs.append((model, choices, source, columns, group, runs, entry["parameters"]))
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    materials = [probe_material(extension, f"probe {i}", j[2]) for i, j in enumerate(jobs)]
+    sizes = [len(j[4]) for j in jobs]
+    attributes, which, show = {}, [], []
+    total = sum(sizes) * len(SHOWN)
+    start = 0
+    for i, (_, _, _, columns, group, _, parameters) in enumerate(jobs):
+        for s in SHOWN:
+            part = slice(start, start + len(group))
+            for v, keys in (
+                ("wi", ("wi_x", "wi_y", "wi_z")),
+                ("wo", ("wo_x", "wo_y", "wo_z")),
+                ("numbers", ("u1", "u2", "u3")),
+            ):
+                at = attributes.setdefault(v, np.zeros((total, 3)))
+                at[part] = np.stack([columns[k] for k in keys], -1)
+            for p in parameters:
+                name = f"p_{p['name']}"
+                # A name may be a number in one model and a colour in another: one attribute each.
+                if p["kind"] == "number":
+                    at = attributes.setdefault(name, np.zeros(total))
+                    if at.ndim == 2:
+                        at[part] = columns[p["name"]][:, None]
+                    else:
+                        at[part] = columns[p["name"]]
+                elif p["kind"] == "color":
+                    if name not in attributes or attributes[name].ndim == 1:
+                        old = attributes.get(name, np.zeros(total))
+                        attributes[name] = np.repeat(old[:, None], 3, 1)
+                    colour = [columns[f"{p['name']}_{c}"] for c in "rgb"]
+                    attributes[name][part] = np.stack(colour, -1)
+            which += [i] * len(group)
+            show += [s] * len(group)
+            start += len(group)
+    attributes["show"] = np.array(show)
+    up = np.tile([0.0, 0.0, 1.0], (total, 1))
+    meter = Goniometer(scene, materials, up, 1, which=np.array(which), attributes=attributes)
+    picture = meter.measure()
+    result, start = {}, 0
+    for (model, choices, _, _, group, runs, parameters), size in zip(jobs, sizes, strict=True):
+        values = {}
+        for names in SHOWN.values():
+            for c, name in enumerate(names):
+                values[name] = picture[start : start + size, c]
+            start += size
+        key = (model, " ".join(arguments(choices)))
+        result[key] = (groups(parameters)[: group.max() + 1], group, runs, values)
+    return result
+
+
+def _l1(a, b):
+    scale = np.abs(b).sum()
+    return float(np.abs(a - b).sum() / scale) if scale else float(np.abs(a).sum() > 0)
+
+
+@pytest.fixture(scope="module")
+def rows(measured):
+    """A row for each group and quantity: the error of each step."""
+    found = []
+    for (model, choices), (names, group, runs, cycles) in measured.items():
+        for index, (name, value) in enumerate(names):
+            mine = group == index
+            for quantity, columns in (
+                ("f", ("f_r", "f_g", "f_b")),
+                ("pdf", ("pdf",)),
+                ("wi", ("wi_x", "wi_y", "wi_z")),
+                ("weight", ("weight_r", "weight_g", "weight_b")),
+                ("sample_pdf", ("sample_pdf",)),
+            ):
+                step = {
+                    run: np.stack([runs[f"{run}_{c}"][mine] for c in columns])
+                    for run in ("double", "float", "recorded", "osl")
+                }
+                step["cycles"] = np.stack([cycles[c][mine] for c in columns])
+                # A lost sample has any direction.
+                if quantity == "wi":
+                    alive = (runs["double_sample_pdf"][mine] > 0) & (cycles["sample_pdf"][mine] > 0)
+                    step = {run: v[:, alive] for run, v in step.items()}
+                bad = sum(int((v == NOT_FINITE).sum()) for v in step.values())
+                found.append(
+                    {
+                        "model": model,
+                        "choices": choices,
+                        "parameter": name,
+                        "value": value,
+                        "quantity": quantity,
+                        "rounding": _l1(step["float"], step["double"]),
+                        "recording": _l1(step["recorded"], step["float"]),
+                        "osl_arithmetic": _l1(step["osl"], step["recorded"]),
+                        "emission": _l1(step["cycles"], step["osl"]),
+                        "total": _l1(step["cycles"], step["double"]),
+                        "not_finite": bad,
+                    }
+                )
+    folder = Path(os.environ["BRDFC_TOOL"]).resolve().parent / "generated_code"
+    folder.mkdir(exist_ok=True)
+    with (folder / f"{VERSION}.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(found[0]))
+        writer.writeheader()
+        writer.writerows(found)
+    return found
+
+
+def _says(row):
+    at = f" at {row['parameter']} = {row['value']:g}" if row["parameter"] else ""
+    steps = ("rounding", "recording", "osl_arithmetic", "emission", "total")
+    errors = ", ".join(f"{s} {row[s]:.1e}" for s in steps)
+    return f"{row['model']} {row['choices']}: {row['quantity']}{at}: {errors}"
+
+
+def test_text_says_what_was_recorded(rows):
+    """Cycles against the recording with OSL's arithmetic. Where a formula amplifies rounding, the
+    last bit of a constant counts too: as much as it costs between float and double."""
+    bad = [r for r in rows if r["emission"] > EMISSION + r["rounding"] + r["osl_arithmetic"]]
+    assert not bad, "\n".join(map(_says, bad))
+
+
+def test_everything_is_finite(rows):
+    bad = [r for r in rows if r["not_finite"]]
+    assert not bad, "\n".join(map(_says, bad))
+
+
+def test_accuracy_in_cycles_by_decade(rows):
+    worst = {}
+    for r in rows:
+        limit = next((e for top, e in LIMITS if (r["value"] or 0) <= top), None)
+        if limit is None:
+            continue
+        key = (r["model"], r["choices"], r["quantity"])
+        if key not in worst or r["total"] / limit > worst[key][0]:
+            worst[key] = (r["total"] / limit, r)
+    for share, row in sorted(worst.values(), key=lambda w: -w[0])[:12]:
+        print(f"{share:.2f} of the limit: {_says(row)}")
+    bad = [row for share, row in worst.values() if share > 1]
+    assert not bad, "\n".join(map(_says, bad))
