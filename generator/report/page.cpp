@@ -84,9 +84,9 @@ std::string label(const FormReport& f) { return f.form == kNativeForm ? "Blender
 
 std::string accepted(const FormReport& f) {
   if (!f.test) return kDash;
-  return fmt::format("{:.2f} %{}", 100 * f.test->accepted(),
-                     f.test->rejected_tiles ? fmt::format(", {} of {} tiles not", f.test->rejected_tiles, f.test->tiles)
-                                            : std::string());
+  const std::string tiles =
+      f.test->rejected_tiles ? fmt::format(", {}/{} tiles off", f.test->rejected_tiles, f.test->tiles) : std::string();
+  return fmt::format("{:.2f} %{}", 100 * f.test->accepted(), tiles);
 }
 
 std::string equal_error(const FormReport& f) {
