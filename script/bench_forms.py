@@ -49,7 +49,7 @@ def main():
     )
     parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
     parser.add_argument("--extension", required=True, type=Path, help="brdfc_shaders-<version>.zip")
-    parser.add_argument("--size", type=int, default=256, help="pixels along each side (256)")
+    parser.add_argument("--size", type=int, default=128, help="pixels along each side (128)")
     parser.add_argument("--spp", type=int, default=64, help="samples a pixel (64)")
     parser.add_argument("--repeat", type=int, default=3, help="renders a form (3)")
     options = parser.parse_args()
