@@ -146,7 +146,8 @@ Point2 Sequence2::next() {
 Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) {
   sin_o_ = std::hypot(wo.x, wo.y);
   theta_o_ = std::atan2(sin_o_, wo.z);
-  through_ = brdf.scatters_through();
+  // Beyond the critical angle nothing comes through: f jumps there.
+  if (brdf.scatters_through()) edge_ = kPi - std::asin(std::min(1 / brdf.ior(), 1.));
   cos_phi_ = sin_o_ > 0 ? wo.x / sin_o_ : 1;
   sin_phi_ = sin_o_ > 0 ? wo.y / sin_o_ : 0;
   std::vector<double> borders = lobe_borders(brdf, wo);
@@ -199,7 +200,7 @@ std::vector<Rect> Guides::cells(std::size_t most) const {
   // Cut at the mirror direction, where a lobe's peak or a kink of max(cos_i, cos_o) lies.
   std::vector<Rect> out;
   std::vector<double> cuts{0, std::min(theta_o_, kPi / 2), std::max(theta_o_, kPi / 2)};
-  if (through_) cuts.push_back(kPi);
+  if (edge_ > 0) cuts.push_back(kPi);
   for (const double phi : {0., kPi})
     for (std::size_t i = 0; i + 1 < cuts.size(); ++i)
       if (const Rect r{cuts[i], cuts[i + 1], phi, phi + kPi}; r.x1 > r.x0) {
@@ -211,6 +212,8 @@ std::vector<Rect> Guides::cells(std::size_t most) const {
 
 std::vector<Rect> Guides::cells(const Rect& whole, std::size_t most) const {
   std::vector<Rect> parts{whole};
+  if (edge_ > whole.x0 && edge_ < whole.x1)
+    parts = {{whole.x0, edge_, whole.y0, whole.y1}, {edge_, whole.x1, whole.y0, whole.y1}};
   // Each lobe for itself: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
   for (const std::vector<Point2>& points : lobes_) {
     std::vector<Rect> finer;

@@ -73,7 +73,7 @@ class Guides {
 
  private:
   double sin_o_, theta_o_, cos_phi_, sin_phi_;
-  bool through_;
+  double edge_ = 0;  // angle at which what is let through ends, if the model scatters through; else 0
   std::vector<std::vector<Point2>> lobes_;
 };
 
