@@ -380,7 +380,8 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
         "diffuse_bounces": max_bounces,
         "glossy_bounces": max_bounces,
         "transmission_bounces": max_bounces,
-        "transparent_max_bounces": max_bounces,
+        # Cycles counts a lamp that a ray passes as a transparent surface; beyond the limit it is lost.
+        "transparent_max_bounces": 1024,
         "min_light_bounces": 0,
         "min_transparent_bounces": 0,
         "film_exposure": 1.0,

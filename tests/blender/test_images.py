@@ -138,8 +138,8 @@ def test_a_bias_of_one_percent_or_one_in_a_thousand_is_found(
 ):
     """The power of the test: as rendered it accepts, brightened it rejects."""
     materials = {"lambert": {"model": "lambert", "representation": "exact"}}
-    # With no bounce at all Cycles ends a path that meets a lamp, and loses the sky behind it.
-    content = scene(materials, max_bounces=1, spp=8192)
+    # No bounce, so that a sky lost behind the lamp, which is a transparent bounce to Cycles, shows.
+    content = scene(materials, max_bounces=0, spp=8192)
     content["camera"]["height"] = 1.2  # nothing but the sphere
     content["environment"] = {"color": [0.5, 0.6, 0.7]}
     content["lights"] = [
