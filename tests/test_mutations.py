@@ -85,7 +85,7 @@ PACK_FAULTS = {
         f"{ALBEDO} and coupled",
     ),
 }
-#: A furnace sees weights alone and is blind to a wrong distribution: hence the worlds with structure.
+#: A furnace sees weights alone: hence the worlds with structure.
 BLIND = {"a distribution": f"{WHITE} and lambert"}
 
 
