@@ -72,10 +72,7 @@ def new_material(model, representation="auto", **parameters):
     nodes.ensure_group(model, representation)
     material = bpy.data.materials.new(pack.model(model)["label"])
     try:
-        if material.node_tree is None:  # before 5.0 a material starts without nodes
-            material.use_nodes = True
-        tree = material.node_tree
-        tree.nodes.clear()
+        tree = nodes.empty_tree(material)
         node = nodes.add_group_node(tree, model, representation)
         for name, value in values.items():
             nodes.set_value(node, name, value)

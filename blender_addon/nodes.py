@@ -26,6 +26,14 @@ class CompileError(RuntimeError):
     """Cycles could not compile a shader, or compiled it to something else than expected."""
 
 
+def empty_tree(owner):
+    """The node tree of a new material or world, without a node."""
+    if owner.node_tree is None:  # before 5.0 it starts without nodes
+        owner.use_nodes = True
+    owner.node_tree.nodes.clear()
+    return owner.node_tree
+
+
 def _find_oslquery():
     """Makes the `oslquery` module importable, which Cycles needs to find a script's sockets.
 

@@ -230,10 +230,7 @@ def _image_node(tree, image):
 def _environment(scene, view):
     world = bpy.data.worlds.new("World")
     scene.world = world
-    if world.node_tree is None:
-        world.use_nodes = True
-    tree = world.node_tree
-    tree.nodes.clear()
+    tree = nodes.empty_tree(world)
     background = tree.nodes.new("ShaderNodeBackground")
     output = tree.nodes.new("ShaderNodeOutputWorld")
     tree.links.new(background.outputs[0], output.inputs["Surface"])
@@ -270,10 +267,7 @@ def glossy_material(name, values):
     Exponents n become the roughness of Ashikhmin and Shirley's distribution, (2 / (n + 2))^(1/4).
     """
     material = bpy.data.materials.new(f"{name} (Glossy)")
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
+    tree = nodes.empty_tree(material)
     node = tree.nodes.new("ShaderNodeBsdfAnisotropic")
     node.distribution = "ASHIKHMIN_SHIRLEY"
     color = next((v for v in values.values() if isinstance(v, tuple)), (0.8, 0.8, 0.8))
@@ -380,7 +374,7 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
         "diffuse_bounces": max_bounces,
         "glossy_bounces": max_bounces,
         "transmission_bounces": max_bounces,
-        # Cycles counts a lamp that a ray passes as a transparent surface; beyond the limit it is lost.
+        # To Cycles a lamp that a ray passes is a transparent surface; beyond the limit it is lost.
         "transparent_max_bounces": 1024,
         "min_light_bounces": 0,
         "min_transparent_bounces": 0,

@@ -5,18 +5,15 @@ fuzzed by script/fuzz.
 """
 
 import json
-import os
 import resource
 import signal
 import struct
 import subprocess
 import time
-from pathlib import Path
 
 import pytest
+from support import TOOL, scene
 
-ROOT = Path(__file__).resolve().parent.parent
-TOOL = os.environ.get("BRDFC_TOOL", str(ROOT / "build" / "brdfc"))
 #: Seconds for a refusal; the aim is one, the rest allows for a busy machine.
 QUICK = 5
 
@@ -44,24 +41,6 @@ def refused(done, *words):
         assert str(word) in errors[0], errors[0]
 
 
-def scene(**changes):
-    return {
-        "name": "s",
-        "description": "a sphere",
-        "settings": {"width": 64, "height": 64, "spp": 1, "seed": 1, "max_bounces": 1},
-        "camera": {
-            "type": "perspective",
-            "position": [0, -4, 0],
-            "look_at": [0, 0, 0],
-            "up": [0, 0, 1],
-            "fov_y_degrees": 60,
-        },
-        "materials": {"m": {"model": "lambert"}},
-        "objects": [{"name": "o", "shape": {"type": "sphere"}, "material": "m"}],
-        "environment": {"color": [1, 1, 1]},
-    } | changes
-
-
 def in_time(*arguments, **options):
     start = time.perf_counter()
     done = run(*arguments, **options)
@@ -81,14 +60,14 @@ def in_time(*arguments, **options):
         ("{" * 3, "JSON"),
         (json.dumps(scene())[:-20], "JSON"),
         ('{"name": "a", "name": "b"}', "twice"),
-        (json.dumps(scene()).replace('"spp": 1', '"spp": 1e999'), "1e999"),
-        (json.dumps(scene()).replace('"spp": 1', '"spp": -1'), "settings.spp"),
-        (json.dumps(scene()).replace('"spp": 1', '"spp": 1' + "0" * 400), ""),
-        (json.dumps(scene()).replace('"spp": 1', '"spp": "1"'), "settings.spp"),
-        (json.dumps(scene()).replace('"width": 64', '"width": 1000000000'), "settings.width"),
+        (json.dumps(scene()).replace('"spp": 4', '"spp": 1e999'), "1e999"),
+        (json.dumps(scene()).replace('"spp": 4', '"spp": -1'), "settings.spp"),
+        (json.dumps(scene()).replace('"spp": 4', '"spp": 4' + "0" * 400), ""),
+        (json.dumps(scene()).replace('"spp": 4', '"spp": "1"'), "settings.spp"),
+        (json.dumps(scene()).replace('"width": 8', '"width": 1000000000'), "settings.width"),
         (json.dumps(scene(objects={})), "objects"),
         (json.dumps(scene(materials=[])), "materials"),
-        (json.dumps(scene(name=None)), "name"),
+        (json.dumps(scene() | {"name": None}), "name"),
         ("\x00\x01\x02", "JSON"),
         ('"\ud800"', "JSON"),
     ],

@@ -7,19 +7,12 @@ tests/cli_test.py has list, eval, sample, albedo and check.
 import csv
 import io
 import json
-import os
 import subprocess
 import time
-from pathlib import Path
 
 import pytest
+from support import MODELS, TOOL, scene
 
-ROOT = Path(__file__).resolve().parent.parent
-TOOL = Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc"))
-MODELS = [
-    m["name"]
-    for m in json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
-]
 DIRECTIONS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0.6,0.8\n0.6,0,0.8,0,0,1\n"
 
 
@@ -33,26 +26,6 @@ def table(*arguments, text=""):
     done = brdfc(*arguments, text=text)
     assert done.returncode == 0, done.stderr
     return list(csv.DictReader(io.StringIO(done.stdout)))
-
-
-def scene(**changes):
-    """A scene of one sphere; a change of None removes the key."""
-    content = {
-        "name": "s",
-        "description": "a sphere",
-        "settings": {"width": 8, "height": 8, "spp": 4, "seed": 1, "max_bounces": 1},
-        "camera": {
-            "type": "perspective",
-            "position": [0, -4, 0],
-            "look_at": [0, 0, 0],
-            "up": [0, 0, 1],
-            "fov_y_degrees": 25,
-        },
-        "materials": {"m": {"model": "lambert", "parameters": {"rho": [0.5, 0.5, 0.5]}}},
-        "objects": [{"name": "o", "shape": {"type": "sphere"}, "material": "m"}],
-        "environment": {"color": [1, 1, 1]},
-    } | changes
-    return {k: v for k, v in content.items() if v is not None}
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -8,18 +8,11 @@ import csv
 import io
 import json
 import math
-import os
 import subprocess
-from pathlib import Path
 
 import pytest
+from support import MODELS, ROOT, TOOL
 
-ROOT = Path(__file__).resolve().parent.parent
-TOOL = os.environ.get("BRDFC_TOOL", str(ROOT / "build" / "brdfc"))
-MODELS = [
-    m["name"]
-    for m in json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
-]
 EVAL_HEADER = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
 SAMPLE_HEADER = "wo_x,wo_y,wo_z,u1,u2,u3"
 

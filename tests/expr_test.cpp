@@ -140,21 +140,6 @@ TEST(Expr, ColoursAreOneNode) {
   EXPECT_THAT(program.print_osl(0, {}), HasSubstr("z = c + (1.0 - c) * f;"));
 }
 
-TEST(Model, TwoModelsOfOneNameAreRefused) {
-  struct Twin : Model {
-    ModelInfo info_ = find_model("lambert").info();
-    const ModelInfo& info() const override { return info_; }
-    bool has_scatter() const override { return true; }
-    bool has_mirror() const override { return false; }
-    bool has_exact() const override { return false; }
-    std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override { return nullptr; }
-    std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override { return nullptr; }
-    std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override { return nullptr; }
-    std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { return nullptr; }
-  };
-  EXPECT_THROW(register_model(std::make_unique<Twin>()), std::logic_error);
-}
-
 /// Every model's recorded eval, pdf and sample, executed in float, against its float instantiation: the same bits,
 /// but for constants, which the recording folds in double and rounds once.
 class RecordedFormula : public ::testing::TestWithParam<std::string> {};

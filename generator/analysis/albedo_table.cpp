@@ -13,6 +13,7 @@
 #include <random>
 
 #include "analysis/albedo.h"
+#include "model/choices.h"
 
 namespace brdfc {
 namespace {
@@ -80,28 +81,18 @@ class Tabulator {
  public:
   explicit Tabulator(const Model& model) : model_(model) {
     coordinates_.push_back({"cos_theta_o", AxisScale::Linear, kMinCos, 1});
-    std::vector<const ParamInfo*> choices;
     for (const ParamInfo& p : model.info().params) {
       if (p.kind == ParamKind::Number) coordinates_.push_back(coordinate(p));
       if (p.kind == ParamKind::Color) colors_.push_back(p.name);
-      if (p.kind == ParamKind::Choice) choices.push_back(&p);
+      if (p.kind != ParamKind::Choice) continue;
+      table_.choices.push_back(p.name);
+      table_.choice_sizes.push_back(int(p.choices.size()));
     }
     if (colors_.size() > 5)
       throw ValueError(
           fmt::format("{}: expected at most 5 colours in an albedo table, got {}", model.info().name, colors_.size()));
     table_.model = model.info().name;
-    combinations_.push_back({});
-    for (const ParamInfo* p : choices) {
-      table_.choices.push_back(p->name);
-      table_.choice_sizes.push_back(int(p->choices.size()));
-      std::vector<ParamValues> longer;
-      for (const ParamValues& c : combinations_)
-        for (const std::string& text : p->choices) {
-          longer.push_back(c);
-          longer.back()[p->name] = text;
-        }
-      combinations_ = std::move(longer);
-    }
+    for (const Choices& c : choice_combinations(model.info())) combinations_.push_back(with_choices(model.info(), c));
   }
 
   AlbedoTable run() {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "model/choices.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -23,21 +24,6 @@ double random_number(const ParamInfo& p, Random& random) {
   else
     v = p.soft_min + u * (p.soft_max - p.soft_min);
   return std::clamp(v, p.soft_min, p.soft_max);
-}
-
-std::vector<ParamValues> choice_values(const ModelInfo& info) {
-  std::vector<ParamValues> out{{}};
-  for (const ParamInfo& p : info.params) {
-    if (p.kind != ParamKind::Choice) continue;
-    std::vector<ParamValues> longer;
-    for (const ParamValues& v : out)
-      for (const std::string& c : p.choices) {
-        longer.push_back(v);
-        longer.back()[p.name] = c;
-      }
-    out = std::move(longer);
-  }
-  return out;
 }
 
 }  // namespace
@@ -84,7 +70,8 @@ std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brd
 std::vector<ParamValues> slider_cases(const ModelInfo& info, int draws, std::uint64_t seed) {
   Random random(seed);
   std::vector<ParamValues> out;
-  for (const ParamValues& choices : choice_values(info)) {
+  for (const Choices& c : choice_combinations(info)) {
+    const ParamValues choices = with_choices(info, c);
     out.push_back(complete(info, choices));
     for (int i = 0; i < draws; ++i) {
       ParamValues v = choices;

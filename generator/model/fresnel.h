@@ -46,4 +46,10 @@ template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& 
   return {named("R_f", select(total, T(1), (rs * rs + rp * rp) / T(2))), named("T_f", select(total, T(0), through))};
 }
 
+/// The same for a direction on either side of the surface; `ior` is the index inside (z < 0) over the one outside.
+template <class T> Dielectric<T> fresnel_dielectric(const Vec3<T>& wo, const T& ior) {
+  return fresnel_dielectric(abs(wo.z), named("sin2", sin2_theta(wo)),
+                            named("eta", select(wo.z > T(0), ior, T(1) / ior)));
+}
+
 }  // namespace brdfc

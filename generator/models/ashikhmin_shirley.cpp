@@ -142,8 +142,7 @@ template <class T> struct AshikhminShirley {
     }
     const auto specular_lobe = u.x < specular_share();
     const Vec3<T> glossy = sample_specular(wo, u.y, u.z), matte = sample_cosine(u.y, u.z);
-    const Vec3<T> wi = {select(specular_lobe, glossy.x, matte.x), select(specular_lobe, glossy.y, matte.y),
-                        select(specular_lobe, glossy.z, matte.z)};
+    const Vec3<T> wi = select(specular_lobe, glossy, matte);
     const T p = pdf(wi, wo);
     return sample_if(p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }

@@ -29,13 +29,8 @@ template <class T> struct FresnelDielectric {
 
   T ior() const { return index; }
 
-  Dielectric<T> shares(const Vec3<T>& wo) const {
-    return fresnel_dielectric(abs(wo.z), named("sin2", sin2_theta(wo)),
-                              named("eta", select(wo.z > T(0), index, T(1) / index)));
-  }
-
-  Rgb<T> mirror(const Vec3<T>& wo) const { return Rgb<T>(shares(wo).reflected); }
-  Rgb<T> transmit(const Vec3<T>& wo) const { return Rgb<T>(shares(wo).refracted); }
+  Rgb<T> mirror(const Vec3<T>& wo) const { return Rgb<T>(fresnel_dielectric(wo, index).reflected); }
+  Rgb<T> transmit(const Vec3<T>& wo) const { return Rgb<T>(fresnel_dielectric(wo, index).refracted); }
 };
 
 BRDFC_MODEL(FresnelDielectric)

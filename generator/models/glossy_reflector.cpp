@@ -61,7 +61,7 @@ template <class T> struct GlossyReflector {
     if (below == Mirror) {
       const Vec3<T> turned = about_axis(r, {-s.x, -s.y, s.z});
       const auto flip = wi.z <= T(0);
-      wi = {select(flip, turned.x, wi.x), select(flip, turned.y, wi.y), select(flip, turned.z, wi.z)};
+      wi = select(flip, turned, wi);
     }
     return sample_if(above(wi, wo), wi, cr * kr, pdf(wi, wo));
   }

@@ -106,8 +106,7 @@ template <class T> struct Schlick {
     const auto matte_lobe = u.x < share;
     const T rest = (u.x - share) / maximum(T(1) - share, T(1e-6));
     const Vec3<T> matte = sample_cosine(u.y, u.z), glossy = sample_glossy(wo, rest, u.y, u.z);
-    const Vec3<T> wi = {select(matte_lobe, matte.x, glossy.x), select(matte_lobe, matte.y, glossy.y),
-                        select(matte_lobe, matte.z, glossy.z)};
+    const Vec3<T> wi = select(matte_lobe, matte, glossy);
     const T density = pdf(wi, wo);
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
   }

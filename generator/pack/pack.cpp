@@ -279,7 +279,9 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   j["auto"] = name_of(plan.forms.front());
   for (RepresentationKind kind : plan.forms) {
     const Shader shader = write_shader(model, kind, table, plan.fixed, plan.max_lobes);
-    const Shader whole = write_shader(model, kind, whole_table);
+    // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
+    const bool cut = !plan.fixed.empty() || plan.max_lobes < kMaxLobes;
+    const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
     const RepresentationError error = measure_error(model, kind);
     const auto cost = costs.find(info.name + "," + name_of(kind));
     const std::string file = "shaders/" + shader.name + ".osl";

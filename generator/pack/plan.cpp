@@ -128,14 +128,6 @@ void add(AlbedoGrid& sum, AlbedoGrid other) {
 
 }  // namespace
 
-bool admits(const ModelInfo& info, const Choices& choices, const ParamValues& fixed) {
-  const ParamValues values = with_choices(info, choices);
-  return std::all_of(values.begin(), values.end(), [&](const auto& item) {
-    const auto it = fixed.find(item.first);
-    return it == fixed.end() || it->second == item.second;
-  });
-}
-
 std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
   std::vector<PlannedModel> plan;
   const auto add_model = [&](const Model& m) {

@@ -43,7 +43,4 @@ std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&);
 /// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out.
 AlbedoTable fold(const AlbedoTable&, const Model&, const ParamValues& fixed);
 
-/// Whether a combination of choices agrees with the fixed values.
-bool admits(const ModelInfo&, const Choices&, const ParamValues& fixed);
-
 }  // namespace brdfc

@@ -208,7 +208,7 @@ class AlbedoText {
     ChoiceSwitch by_choice(info_, fixed_);
     const std::vector<Choices> combinations = choice_combinations(info_);
     for (std::size_t i = 0; i < combinations.size(); ++i)
-      if (matches(combinations[i])) by_choice.add(combinations[i], terms(table_.terms.at(i)));
+      if (admits(info_, combinations[i], fixed_)) by_choice.add(combinations[i], terms(table_.terms.at(i)));
     const std::string body = by_choice.print(4);
     std::string out;
     for (std::size_t g = 0; g < table_.grids.size(); ++g)
@@ -217,17 +217,6 @@ class AlbedoText {
   }
 
  private:
-  bool matches(const Choices& c) const {
-    std::size_t k = 0;
-    for (const ParamInfo& p : info_.params) {
-      if (p.kind != ParamKind::Choice) continue;
-      const auto it = fixed_.find(p.name);
-      if (it != fixed_.end() && std::get<std::string>(it->second) != p.choices[std::size_t(c[k])]) return false;
-      ++k;
-    }
-    return true;
-  }
-
   std::string terms(const std::vector<AlbedoTerm>& list) {
     std::string out = "    Albedo = 0.0;\n";
     for (const AlbedoTerm& t : list) {
@@ -359,10 +348,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   int operations = 0, mirror_operations = 0;
   const int indent = sampled ? 8 : 4;
   for (const Choices& choices : choice_combinations(info)) {
+    if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    bool admitted = true;
-    for (const auto& [name, value] : fixed) admitted = admitted && values.at(name) == value;
-    if (!admitted) continue;
     const Recording r = record(model, kind, values, indent);
     operations = std::max(operations, r.operations);
     statements.add(choices, r.statements);

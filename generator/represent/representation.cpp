@@ -129,28 +129,6 @@ std::vector<RepresentationKind> representations(const Model& model) {
   return {RepresentationKind::Sampled};
 }
 
-std::vector<Choices> choice_combinations(const ModelInfo& info) {
-  std::vector<Choices> all = {{}};
-  for (const ParamInfo& p : info.params) {
-    if (p.kind != ParamKind::Choice) continue;
-    std::vector<Choices> longer;
-    for (const Choices& c : all)
-      for (int i = 0; i < int(p.choices.size()); ++i) {
-        longer.push_back(c);
-        longer.back().push_back(i);
-      }
-    all = std::move(longer);
-  }
-  return all;
-}
-
-ParamValues with_choices(const ModelInfo& info, const Choices& choices, ParamValues values) {
-  std::size_t k = 0;
-  for (const ParamInfo& p : info.params)
-    if (p.kind == ParamKind::Choice) values[p.name] = p.choices[std::size_t(choices.at(k++))];
-  return values;
-}
-
 ParamValues form_choices(const Model& model, RepresentationKind kind) {
   if (kind != RepresentationKind::Exact) return {};
   const ModelInfo& info = model.info();
@@ -209,10 +187,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
   double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;
   const ParamValues confined = form_choices(model, kind);
   for (const Choices& choices : choice_combinations(model.info())) {
-    const ParamValues combination = with_choices(model.info(), choices);
-    if (!std::all_of(confined.begin(), confined.end(),
-                     [&](const auto& c) { return combination.at(c.first) == c.second; }))
-      continue;
+    if (!admits(model.info(), choices, confined)) continue;
     // The recording does not depend on the values, so one serves all parameter sets.
     Recorder recorder;
     const std::unique_ptr<Brdf<Expr>> recorded = model.record(with_choices(model.info(), choices));

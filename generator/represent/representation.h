@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "model/model.h"
+#include "model/choices.h"
 
 namespace brdfc {
 
@@ -25,13 +25,6 @@ std::vector<RepresentationKind> representations(const Model&);
 /// How many lobes a sampled shader may trace per shading point.
 inline constexpr int kMaxLobes = 8;
 inline constexpr int kDefaultLobes = 1;
-
-/// One combination of the model's choices.
-using Choices = std::vector<int>;
-/// Every combination, in the order of an odometer whose last wheel turns fastest.
-std::vector<Choices> choice_combinations(const ModelInfo&);
-/// Adds the combination to the fixed values.
-ParamValues with_choices(const ModelInfo&, const Choices&, ParamValues values = {});
 
 /// The choices that a form is confined to, because the closures of an exact one are known for some choices only.
 ParamValues form_choices(const Model&, RepresentationKind);

@@ -15,7 +15,7 @@ import math
 import bpy
 import numpy as np
 from goniometer import Goniometer, frame, tilted, unit
-from helpers import read_csv, script_material, to_csv
+from helpers import empty_tree, read_csv, script_material, to_csv
 from worlds import gradient, spot, white
 
 #: Coloured. diffuse_ramp is drawn in proportion to the cosine, which it does not contain: where its
@@ -285,10 +285,7 @@ def _emitter():
     if found := bpy.data.materials.get("emitter"):
         return found
     material = bpy.data.materials.new("emitter")
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
+    tree = empty_tree(material)
     emission = tree.nodes.new("ShaderNodeEmission")
     emission.inputs["Color"].default_value = (1, 1, 1, 1)
     output = tree.nodes.new("ShaderNodeOutputMaterial")

@@ -132,14 +132,19 @@ def read_picture(path):
         bpy.data.images.remove(image)
 
 
+def empty_tree(owner):
+    """The node tree of a new material or world, without a node."""
+    if owner.node_tree is None:
+        owner.use_nodes = True  # deprecated in 5.0, where the tree exists from the start
+    owner.node_tree.nodes.clear()
+    return owner.node_tree
+
+
 def add_world(scene, strength=1.0):
     """A white world; returns its node tree and the Background node."""
     world = bpy.data.worlds.new("World")
     scene.world = world
-    if world.node_tree is None:
-        world.use_nodes = True
-    tree = world.node_tree
-    tree.nodes.clear()
+    tree = empty_tree(world)
     background = tree.nodes.new("ShaderNodeBackground")
     background.inputs["Color"].default_value = (1, 1, 1, 1)
     background.inputs["Strength"].default_value = strength
@@ -188,10 +193,7 @@ def script_material(extension, name, source, surface="BSDF"):
     text = bpy.data.texts.new(f"{name}.osl")
     text.write(source)
     material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
+    tree = empty_tree(material)
     script = tree.nodes.new("ShaderNodeScript")
     script.mode = "INTERNAL"
     extension.nodes._compile(script, text, name)
