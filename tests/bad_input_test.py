@@ -143,6 +143,29 @@ def test_a_header_that_promises_too_much(picture, width, height, tmp_path):
     refused(in_time("compare", bad, picture), "bad.exr")
 
 
+def test_an_attribute_that_promises_too_much(picture, tmp_path):
+    """OpenEXR would reserve 2 GiB for it."""
+    bad = tmp_path / "bad.exr"
+    bad.write_bytes(picture.read_bytes().replace(b"chlist\0", b"chlist\0" + b"\xff\xff\xff\x7f"))
+    refused(in_time("compare", bad, picture), "bad.exr", "header")
+
+
+def test_a_damaged_picture_of_bytes(tmp_path):
+    """The reader of PNG has two things to say, on two lines."""
+    bad = tmp_path / "bad.png"
+    bad.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+    done = in_time("compare", bad, bad)
+    # libpng writes a line of its own.
+    done.stderr = done.stderr.split("\n", 1)[1] if done.stderr.startswith("libpng") else done.stderr
+    refused(done, "bad.png", "Read error")
+
+
+def test_a_picture_of_no_known_kind(tmp_path):
+    bad = tmp_path / "bad.mp4"
+    bad.write_bytes(b"not read")
+    refused(in_time("compare", bad, bad), "bad.mp4", ".exr")
+
+
 def test_a_picture_with_nan(tmp_path, picture):
     header = exr_header(2, 1)
     offset = len(header) + 8
@@ -154,6 +177,21 @@ def test_a_picture_with_nan(tmp_path, picture):
 
 # ---- meshes -------------------------------------------------------------------------------------
 
+PLY = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+3 0 1 2
+"""
+
 
 @pytest.mark.parametrize(
     ("name", "text", "accepted"),
@@ -164,6 +202,11 @@ def test_a_picture_with_nan(tmp_path, picture):
         ("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", False),
         ("other.blend", "BLENDER", False),
         ("binary.ply", "\x00\x01\x02", False),
+        # The importer would look for the end of these for ever.
+        ("list.ply", PLY.replace("list uchar int vertex_indices", "list 0"), False),
+        ("many.ply", PLY.replace("vertex 3", "vertex 2000000000"), False),
+        ("faceless.ply", PLY.replace("0 1 0\n", "0 1 0*"), False),
+        ("good.ply", PLY, True),
         # No area: nothing to see, and nothing to divide by.
         ("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\nv 0 1 0\nf 1 2 4\n", True),
         # Three faces on one edge, and one turned over.

@@ -6,8 +6,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <fstream>
 #include <functional>
+#include <set>
 
 #include "core/error.h"
 
@@ -62,12 +66,42 @@ struct File {
   }
 };
 
+/// What OpenImageIO says, on one line.
+std::string reason(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+/// Refuses an EXR file in whose first header something claims to be longer than the file: OpenEXR would reserve up to
+/// 2 GiB for it before it looks.
+void check_exr_header(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const auto size = std::int64_t(fs::file_size(path));
+  in.seekg(8);  // magic number and version
+  for (std::string name, type; std::getline(in, name, '\0') && !name.empty();) {
+    std::array<unsigned char, 4> bytes{};
+    std::getline(in, type, '\0');
+    in.read(reinterpret_cast<char*>(bytes.data()), bytes.size());
+    const std::int64_t length = bytes[0] | bytes[1] << 8 | bytes[2] << 16 | std::int64_t(bytes[3]) << 24;
+    if (!in || in.tellg() + length > size) input_error("{}: damaged image (its header does not end)", path.string());
+    in.seekg(length, std::ios::cur);
+  }
+}
+
 File read_file(const fs::path& path) {
   if (!fs::exists(path)) input_error("{}: no such image file", path.string());
-  const auto in = OIIO::ImageInput::open(path.string());
-  if (!in) input_error("{}: not an image that OpenImageIO can read ({})", path.string(), OIIO::geterror());
+  static const std::set<std::string> types{".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff"};
+  std::string type = path.extension().string();
+  std::transform(type.begin(), type.end(), type.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  if (!types.count(type))
+    input_error("{}: expected an image file that ends in one of {}", path.string(), fmt::join(types, ", "));
+  if (type == ".exr") check_exr_header(path);
+  // The reader for that ending and no other: else each of some thirty tries its luck with a damaged file.
+  const auto in = OIIO::ImageInput::create(type.substr(1));
   File file;
-  file.spec = in->spec();
+  if (!in || !in->open(path.string(), file.spec))
+    input_error("{}: not an image that OpenImageIO can read ({})", path.string(),
+                reason(in ? in->geterror() : OIIO::geterror()));
   const auto& s = file.spec;
   if (s.width < 1 || s.height < 1 || s.width > kMaxSide || s.height > kMaxSide || s.depth > 1 || s.nchannels < 1 ||
       s.nchannels > 1024 || std::size_t(s.width) * s.height * s.nchannels > kMaxPixels)
@@ -81,16 +115,16 @@ File read_file(const fs::path& path) {
                 s.height, s.nchannels, fs::file_size(path));
   file.data.resize(values);
   if (!in->read_image(0, 0, 0, s.nchannels, OIIO::TypeDesc::FLOAT, file.data.data()))
-    input_error("{}: damaged image ({})", path.string(), in->geterror());
+    input_error("{}: damaged image ({})", path.string(), reason(in->geterror()));
   return file;
 }
 
 void write_file(const fs::path& path, const OIIO::ImageSpec& spec, const std::vector<float>& data) {
   write_beside(path, [&](const fs::path& temporary) {
     const auto out = OIIO::ImageOutput::create(temporary.string());
-    if (!out) input_error("{}: can't write this image format ({})", path.string(), OIIO::geterror());
+    if (!out) input_error("{}: can't write this image format ({})", path.string(), reason(OIIO::geterror()));
     if (!out->open(temporary.string(), spec) || !out->write_image(OIIO::TypeDesc::FLOAT, data.data()) || !out->close())
-      input_error("{}: can't write ({})", path.string(), out->geterror());
+      input_error("{}: can't write ({})", path.string(), reason(out->geterror()));
     // OpenEXR hands the end of a small file to the system when it closes it, and does not tell if that fails.
     const auto back = OIIO::ImageInput::open(temporary.string());
     std::vector<float> same(data.size());
