@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built tool's commands list, eval, sample, albedo and check: output, exit status, messages.
+"""The tool's commands list, eval, sample, albedo, check, stability: output, exit status, messages.
 
 The tool is the program in the environment variable BRDFC_TOOL, build/brdfc if that is not set.
 """
@@ -289,3 +289,17 @@ def test_check_scales_with_the_effort_asked_for():
     few, many = cases("0.1"), cases("1")
     assert few.keys() == many.keys()
     assert few["values"] < many["values"] / 4
+
+
+# ---- stability --------------------------------------------------------------------------------
+
+
+def test_stability_reports_the_worst_place_and_fails_beyond_the_limit():
+    few = ("stability", "blinn", "--points", "500", "--calls", "5000")
+    result = run(*few)
+    assert result.returncode == 0, result.stdout + result.stderr
+    for words in ("units at blinn ks=", "no bad value", "numbers from 1e"):
+        assert words in result.stdout
+    strict = run(*few, "--limit", "0.1")
+    assert strict.returncode == 1
+    assert "FAILED: expected at most 0.1 units" in strict.stdout

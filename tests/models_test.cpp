@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "analysis/checks.h"
+#include "analysis/stability.h"
 
 namespace brdfc {
 namespace {

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "analysis/properties.h"
+#include "analysis/stability.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -97,79 +98,6 @@ double relative(const Rgb<Wide>& a, const Rgb<Wide>& b) {
 
 template <class T> Rgb<double> to_double(const Rgb<T>& c) { return {double(c.r), double(c.g), double(c.b)}; }
 template <class T> Vec3<double> to_double(const Vec3<T>& v) { return {double(v.x), double(v.y), double(v.z)}; }
-
-/// Are views from inside meant?
-bool two_sided(const Model& model, const Brdf<double>& brdf) { return model.has_transmit() || brdf.scatters_through(); }
-
-/// What rounding and symmetries are judged by: f, or the weight of the term on wi's side where there are delta
-/// terms alone.
-template <class T> Rgb<T> value_of(const Model& model, const Brdf<T>& brdf, const Vec3<T>& wi, const Vec3<T>& wo) {
-  if (model.has_scatter()) return brdf.eval(wi, wo);
-  return (wi.z > T(0)) == (wo.z > T(0)) ? brdf.mirror(wo) : brdf.transmit(wo);
-}
-
-template <class Narrow> std::unique_ptr<Brdf<Narrow>> make(const Model& m, const ParamValues& v) {
-  if constexpr (std::same_as<Narrow, float>)
-    return m.make_float(v);
-  else if constexpr (std::same_as<Narrow, double>)
-    return m.make_double(v);
-  else
-    return m.make_wide(v);
-}
-
-/// Narrow against Better. The parameters, too, are rounded to Narrow first, so that both see the same numbers.
-template <class Narrow, class Better>
-Stability stability(const Model& model, ParamValues values, int points, std::uint64_t seed) {
-  Random random(seed);
-  const double eps = double(std::numeric_limits<Narrow>::epsilon());
-  for (const ParamInfo& p : model.info().params) {
-    ParamValue& v = values[p.name];
-    if (p.kind == ParamKind::Number) v = std::clamp(double(Narrow(std::get<double>(v))), p.min, p.max);
-    if (p.kind == ParamKind::Color)
-      for (double& c : std::get<std::array<double, 3>>(v)) c = double(Narrow(c));
-  }
-  const std::string label = model.info().name + " " + format_values(model.info(), values);
-  const auto narrow = make<Narrow>(model, values);
-  const auto better = make<Better>(model, values);
-  // The same model with every number moved by a unit in the last place or so.
-  constexpr int kNudges = 6;
-  std::vector<std::unique_ptr<Brdf<Better>>> nudged;
-  for (int k = 0; k < kNudges; ++k) {
-    ParamValues moved = values;
-    for (const ParamInfo& p : model.info().params)
-      if (p.kind == ParamKind::Number)
-        moved[p.name] =
-            std::clamp(std::get<double>(values[p.name]) * (1 + eps * (random() & 1 ? 1 : -1)), p.min, p.max);
-    nudged.push_back(make<Better>(model, moved));
-  }
-  const auto guide = model.make_double(values);
-  Stability out;
-  for (const auto& pair : direction_pairs(*guide, points, random, two_sided(model, *guide))) {
-    const Vec3<Narrow> wi = Vec3<Narrow>::from(pair[0]), wo = Vec3<Narrow>::from(pair[1]);
-    const Vec3<Better> better_wi = Vec3<Better>::from(wi), better_wo = Vec3<Better>::from(wo);
-    const Rgb<Better> truth = value_of(model, *better, better_wi, better_wo);
-    const Rgb<double> got = to_double(value_of(model, *narrow, wi, wo));
-    const std::string where = fmt::format("{} wi={} wo={}", label, text(to_double(wi)), text(to_double(wo)));
-    require_value(got, std::same_as<Narrow, float> ? "f in float" : "f", label, to_double(wi), to_double(wo));
-    const double error = relative(Rgb<Better>{Better(got.r), Better(got.g), Better(got.b)}, truth);
-    double condition = 0;
-    for (int k = 0; k < kNudges; ++k) {
-      const auto nudge = [&](const Vec3<Better>& v) {
-        const auto factor = [&] { return Better(1 + eps * (2 * uniform(random) - 1)); };
-        return Vec3<Better>{v.x * factor(), v.y * factor(), v.z * factor()};
-      };
-      const Rgb<Better> moved = value_of(model, *nudged[std::size_t(k)], nudge(better_wi), nudge(better_wo));
-      condition = std::max(condition, relative(moved, truth));
-    }
-    // Values that underflow to 0 in the narrow type carry no light.
-    const bool vanishes = max_component(to_double(truth)) < double(std::numeric_limits<Narrow>::min()) / eps;
-    if (vanishes) continue;
-    const double amplified = error / (condition + eps);
-    if (error > out.relative) out.relative = error, out.where = where;
-    if (amplified > out.amplified) out.amplified = amplified, out.amplified_where = where;
-  }
-  return out;
-}
 
 /// "n=0 m=1" as values.
 ParamValues parse_limit(const ModelInfo& info, const std::string& text) {
@@ -280,13 +208,6 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
   result.degrees = std::max(1, kept - 1);
   result.p = boost::math::cdf(boost::math::complement(boost::math::chi_squared(result.degrees), result.statistic));
   return result;
-}
-
-Stability float_stability(const Model& m, const ParamValues& v, int points, std::uint64_t seed) {
-  return stability<float, double>(m, complete(m.info(), v), points, seed);
-}
-Stability double_stability(const Model& m, const ParamValues& v, int points, std::uint64_t seed) {
-  return stability<double, Wide>(m, complete(m.info(), v), points, seed);
 }
 
 std::vector<CheckRow> check_model(const Model& model, const CheckOptions& options) {

@@ -34,19 +34,6 @@ struct ChiSquare {
 /// than 5 expected samples are pooled. Same seed, same result.
 ChiSquare chi_square(const BoundModel&, const Vec3<double>& wo, int samples, std::uint64_t seed);
 
-/// How far a scalar type strays from a better one: the largest relative error of eval(), and the same in units of what
-/// rounding the inputs (directions, numbers) of that type alone can cause.
-struct Stability {
-  double relative = 0;
-  double amplified = 0;
-  std::string where;
-  std::string amplified_where;
-};
-/// float against double.
-Stability float_stability(const Model&, const ParamValues&, int points, std::uint64_t seed);
-/// double against Wide.
-Stability double_stability(const Model&, const ParamValues&, int points, std::uint64_t seed);
-
 struct CheckOptions {
   std::uint64_t seed = 1;
   double effort = 1;  ///< scales the numbers of cases, directions and samples

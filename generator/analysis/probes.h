@@ -17,6 +17,16 @@ double uniform(Random&);                  ///< in [0, 1)
 Vec3<double> uniform_direction(Random&);  ///< above the surface, uniform in solid angle
 Vec3<double> uniform_cube(Random&);       ///< three numbers for sample()
 
+/// Are views from inside meant?
+bool two_sided(const Model&, const Brdf<double>&);
+
+/// What rounding and symmetries are judged by: f, or the weight of the term on wi's side where there are delta
+/// terms alone.
+template <class T> Rgb<T> value_of(const Model& model, const Brdf<T>& brdf, const Vec3<T>& wi, const Vec3<T>& wo) {
+  if (model.has_scatter()) return brdf.eval(wi, wo);
+  return (wi.z > T(0)) == (wo.z > T(0)) ? brdf.mirror(wo) : brdf.transmit(wo);
+}
+
 /// "(x, y, z)" for messages.
 std::string text(const Vec3<double>&);
 

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   brdfc::add_sample_command(app);
   brdfc::add_albedo_command(app);
   brdfc::add_check_command(app);
+  brdfc::add_stability_command(app);
   brdfc::add_build_command(app);
   brdfc::add_render_command(app);
   brdfc::add_scene_command(app);

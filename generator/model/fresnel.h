@@ -32,13 +32,13 @@ template <class T> struct Dielectric { T reflected, refracted; };
 ///   r_s = (1 - eta^2) / (c + g)^2,  r_p = (eta^2 - 1) (eta^2 c^2 - s^2) / (eta^2 c + g)^2,
 /// differences of like numbers multiplied out, and T from its own formula instead of from 1 - R.
 template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& sin2, const T& eta) {
-  const T sine = sqrt(sin2);
-  const T g2 = named("g2", (eta - sine) * (eta + sine));
+  const T sine = sqrt(sin2), c2 = cosTheta * cosTheta, step = (eta - T(1)) * (eta + T(1));
+  // eta^2 - sin^2: near the horizon from the cosine.
+  const T g2 = named("g2", select(c2 < T(0.5), c2 + step, (eta - sine) * (eta + sine)));
   const auto total = g2 <= T(0);  // total internal reflection
   const T g = named("g", sqrt(maximum(g2, T(0))));
   const T eta2 = eta * eta;
   const T ds = named("d_s", sqr(cosTheta + g)), dp = named("d_p", sqr(eta2 * cosTheta + g));
-  const T step = (eta - T(1)) * (eta + T(1));
   const T rs = named("r_s", step / ds);
   const T ec = eta * cosTheta;
   const T rp = named("r_p", step * ((ec - sine) * (ec + sine)) / dp);

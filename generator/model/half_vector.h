@@ -6,16 +6,18 @@
 
 namespace brdfc {
 
-/// Unit half vector, and its cosine o.h = i.h = |wi + wo| / 2 to both directions.
+/// Unit half vector, its cosine o.h = i.h = |wi + wo| / 2 to both directions, and 1 - o.h from
+/// |wi - wo|^2 = 4 (1 - (o.h)^2).
 template <class T> struct HalfVector {
   Vec3<T> h;
-  T oh;
+  T oh, one_minus_oh;
 
   HalfVector(const Vec3<T>& wi, const Vec3<T>& wo) {
-    const Vec3<T> sum = wi + wo;
+    const Vec3<T> sum = sum_of_units(wi, wo), apart = difference_of_units(wi, wo);
     const T len = maximum(length(sum), tiny<T>());
     h = sum / len;
     oh = named("oh", len / T(2));
+    one_minus_oh = named("one_minus_oh", dot(apart, apart) / (T(4) * (T(1) + oh)));
   }
 };
 

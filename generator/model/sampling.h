@@ -17,6 +17,19 @@ template <class Flag, class T> Vec3<T> select(const Flag& first, const Vec3<T>& 
 /// Ideal reflection of wo about the normal.
 template <class T> Vec3<T> reflect(const Vec3<T>& wo) { return {-wo.x, -wo.y, wo.z}; }
 
+/// a + b for unit vectors, a multiple of their half vector. Where they are opposite the plain sum keeps only the error
+/// of their lengths. It is orthogonal to a - b, so what lies along a - b is that error, and is taken off.
+template <class T> Vec3<T> sum_of_units(const Vec3<T>& a, const Vec3<T>& b) {
+  const Vec3<T> s = a + b, d = a - b;
+  return s - d * (dot(s, d) / maximum(dot(d, d), T(1)));
+}
+
+/// a - b for unit vectors, likewise. Near the normal this gives it the height that the rounded cosines have lost.
+template <class T> Vec3<T> difference_of_units(const Vec3<T>& a, const Vec3<T>& b) {
+  const Vec3<T> s = a + b, d = a - b;
+  return d - s * (dot(s, d) / maximum(dot(s, s), T(1)));
+}
+
 /// Ideal refraction of wo to the other side of the surface; `ior` is the index inside (z < 0) over the one outside.
 /// What lies beyond the critical angle comes out level with the surface.
 template <class T> Vec3<T> refract(const Vec3<T>& wo, const T& ior) {
@@ -46,9 +59,10 @@ Sample<T> sample_if(const Flag& exists, const Vec3<T>& wi, const Rgb<T>& weight,
 /// (1 - c)^5, the angular part of Schlick's Fresnel approximation.
 template <class T> T schlick_weight(const T& cosTheta) { return pow5(clamp01(T(1) - cosTheta)); }
 
-/// 1 - (1 - c)^5 as a polynomial: no cancellation for small c.
+/// 1 - (1 - c)^5: for small c as a polynomial, which does not cancel there but does near 1.
 template <class T> T one_minus_schlick_weight(const T& c) {
-  return c * (T(5) - c * (T(10) - c * (T(10) - c * (T(5) - c))));
+  const T polynomial = c * (T(5) - c * (T(10) - c * (T(10) - c * (T(5) - c))));
+  return select(c < T(0.25), polynomial, T(1) - pow5(T(1) - c));
 }
 
 }  // namespace brdfc

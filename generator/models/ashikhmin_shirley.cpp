@@ -47,15 +47,17 @@ template <class T> struct AshikhminShirley {
     v(diffuse, ChoiceSpec{"diffuse", "Diffuse Term", {"paper"}, "paper: eq. 14"});
   }
 
-  /// The half vector with |wi + wo| / 2 = k.h, in the turned frame.
+  /// The half vector in the turned frame, |wi + wo| / 2 = k.h, and 1 - k.h from |wi - wo|^2 = 4 (1 - (k.h)^2).
   struct Half {
     Vec3<T> h;
-    T kh;
+    T kh, one_minus_kh;
   };
   Half half(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const Vec3<T> sum = wi + wo;
+    const Vec3<T> sum = sum_of_units(wi, wo);
     const T len = maximum(length(sum), tiny<T>());
-    return {rotate_z(sum / len, cos(rotation), sin(rotation)), len / T(2)};
+    const Vec3<T> apart = difference_of_units(wi, wo);
+    const T kh = len / T(2);
+    return {rotate_z(sum / len, cos(rotation), sin(rotation)), kh, dot(apart, apart) / (T(4) * (T(1) + kh))};
   }
 
   /// p_h(h), eq. 5.
@@ -70,14 +72,14 @@ template <class T> struct AshikhminShirley {
   }
 
   /// F(k.h), eq. 11.
-  Rgb<T> fresnel(const T& kh) const {
-    return named("F", rs + (Rgb<T>(T(1)) - rs) * named("one_minus_kh5", schlick_weight(kh)));
+  Rgb<T> fresnel(const Half& k) const {
+    return named("F", rs + (Rgb<T>(T(1)) - rs) * named("one_minus_kh5", pow5(k.one_minus_kh)));
   }
 
   /// Specular term, eq. 16.
   Rgb<T> specular(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const Half k = half(wi, wo);
-    return fresnel(k.kh) * (p_h(k.h) / (T(4) * k.kh * maximum(wi.z, wo.z)));
+    return fresnel(k) * (p_h(k.h) / (T(4) * k.kh * maximum(wi.z, wo.z)));
   }
 
   T specular_pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -138,7 +140,7 @@ template <class T> struct AshikhminShirley {
       const Vec3<T> wi = sample_specular(wo, u.y, u.z);
       const Half k = half(wi, wo);
       const T ratio = wi.z / maximum(maximum(wi.z, wo.z), tiny<T>());
-      return sample_if(above(wi, wo), wi, fresnel(k.kh) * ratio, p_h(k.h) / (T(4) * k.kh));
+      return sample_if(above(wi, wo), wi, fresnel(k) * ratio, p_h(k.h) / (T(4) * k.kh));
     }
     const auto specular_lobe = u.x < specular_share();
     const Vec3<T> glossy = sample_specular(wo, u.y, u.z), matte = sample_cosine(u.y, u.z);

@@ -42,11 +42,11 @@ template <class T> struct CookTorrance {
     return named("D", exp(-(s.x * s.x + s.y * s.y) / m2) * sqr(s.inverse_cos2()) / (pi<T>() * m2));
   }
 
-  Rgb<T> F(const T& oh) const { return named("F", f0 + (Rgb<T>(T(1)) - f0) * schlick_weight(oh)); }
+  Rgb<T> F(const T& one_minus_oh) const { return named("F", f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)); }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return F(k.oh) * select(above(wi, wo), D(k.h) / T(4) * v_cavity_shape(k, wi, wo), T(0));
+    return F(k.one_minus_oh) * select(above(wi, wo), D(k.h) / T(4) * v_cavity_shape(k, wi, wo), T(0));
   }
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -58,7 +58,7 @@ template <class T> struct CookTorrance {
     const Vec3<T> h = sample_gaussian_slopes(m, m, u.y, u.z);
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
-    return sample_if(above(wi, wo), wi, F(oh) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
+    return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
   }
 };
 

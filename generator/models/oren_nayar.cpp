@@ -14,7 +14,9 @@
 // degrees) the full form is negative opposite to the light at grazing angles, so sigma ends before.
 //
 // Stable forms. sin alpha tan beta c = (the product of the horizontal parts) / max(cos); tan((alpha + beta) / 2) =
-// (sin alpha + sin beta) / (cos alpha + cos beta). Angles are 2 atan(sin / (1 + cos)).
+// (sin alpha + sin beta) / (cos alpha + cos beta). Angles are 2 atan(sin / (1 + cos)), 1 - 2 beta / pi the same of the
+// complement. 1 - |c| is half the squared distance of the unit vectors at both azimuths (of one and the other's
+// opposite for c < 0). Opposite, sin alpha - (2 beta / pi)^3 is taken from 1 - 2 beta / pi and 1 - sin alpha.
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -69,13 +71,23 @@ template <class T> struct OrenNayar {
     // Angles over a right angle.
     const auto over_right = [](const T& s, const T& c) { return T(4) / pi<T>() * atan(s / (T(1) + maximum(c, T(0)))); };
     const T alpha = named("alpha", over_right(sin_a, cos_a)), beta = named("beta", over_right(sin_b, cos_b));
+    const T one_minus_beta = named("one_minus_beta", over_right(cos_b, sin_b));
     const T side = named("side", wi.x * wo.x + wi.y * wo.y);
     const T c = named("c", side / maximum(si * so, tiny<T>()));
-    const T back = named("back", minimum(side, T(0)) / maximum(sin_a, tiny<T>()));
-    const T direct = C1() + T(0.45) * share(0.09) * (side - beta * beta * beta * back) / cos_b +
-                     T(0.125) * share(0.09) * sqr(alpha * beta) * maximum(T(1) - abs(c), T(0)) * (sin_a + sin_b) /
-                         maximum(cos_a + cos_b, tiny<T>());
-    const T again = T(0.17) * share(0.13) * (T(1) - c * beta * beta);
+    // 1 - |c|, 1 at the normal where there is no azimuth.
+    const T ui = T(1) / maximum(si, tiny<T>()), uo = select(side < T(0), T(1), T(-1)) / maximum(so, tiny<T>());
+    const T apart2 = sqr(wi.x * ui + wo.x * uo) + sqr(wi.y * ui + wo.y * uo);
+    const T one_minus_c = named("one_minus_abs_c", select(si * so > T(0), minimum(apart2 / T(2), T(1)), T(1)));
+    // sin alpha - beta^3
+    const T fall = select(cos_b < T(0.5), one_minus_beta * (T(1) + beta + beta * beta) - cos_a * cos_a / (T(1) + sin_a),
+                          sin_a - beta * beta * beta);
+    const T slanted = named("slanted", side * select(side < T(0), fall / maximum(sin_a, tiny<T>()), T(1)));
+    const T direct =
+        C1() + T(0.45) * share(0.09) * slanted / cos_b +
+        T(0.125) * share(0.09) * sqr(alpha * beta) * one_minus_c * (sin_a + sin_b) / maximum(cos_a + cos_b, tiny<T>());
+    // 1 - c beta^2
+    const T shade = one_minus_c + abs(c) * one_minus_beta * (T(1) + beta);
+    const T again = T(0.17) * share(0.13) * select(side < T(0), T(1) - c * beta * beta, shade);
     return rho * (named("direct", direct) / pi<T>()) + rho * rho * (named("again", again) / pi<T>());
   }
 

@@ -87,22 +87,26 @@ template <class T> struct RadziszewskiAlda {
     return select(z < T(1e-6), T(1) - z / T(2) * (T(1) - z / T(3)), -expm1(-guarded) / guarded);
   }
 
-  /// m = 2 ln cosh n: log1p(sinh^2 n) for small n, where the other form loses everything.
-  static T log_cosh2(const T& n) {
-    const T small = minimum(n, T(1));
-    const T half = expm1(small) / T(2);
+  /// sinh^2 n for n <= 1, of 1 for larger n.
+  static T sinh2(const T& n) {
+    const T half = expm1(minimum(n, T(1))) / T(2);
     const T sinh = half + half / (T(2) * half + T(1));
-    const T large = maximum(n, T(1));
-    return named("m", select(n < T(1), log1p(sinh * sinh),
-                             T(2) * (large + log1p(exp(T(-2) * large)) - T(0.69314718055994530942))));
+    return named("sinh2", sinh * sinh);
   }
 
-  /// tanh^2 n / m, 1 at n = 0.
+  /// m = 2 ln cosh n: log1p(sinh^2 n) for small n, where the other form loses everything.
+  static T log_cosh2(const T& n) {
+    const T large = maximum(n, T(1));
+    return named(
+        "m", select(n < T(1), log1p(sinh2(n)), T(2) * (large + log1p(exp(T(-2) * large)) - T(0.69314718055994530942))));
+  }
+
+  /// tanh^2 n / m, 1 at n = 0. For small n as s / (log1p(s) (1 + s)), s = sinh^2 n, where the errors of s cancel.
   static T tanh2_over_m(const T& n, const T& m) {
-    const T guarded = maximum(n, T(1e-4));
-    const T e = expm1(T(-2) * guarded);
+    const T s = maximum(sinh2(n), tiny<T>());
+    const T e = expm1(T(-2) * maximum(n, T(1)));
     const T tanh = -e / (T(2) + e);
-    return named("tanh2_over_m", select(n < T(1e-4), T(1) - n * n / T(2), tanh * tanh / maximum(m, T(1e-9))));
+    return named("tanh2_over_m", select(n < T(1), s / (log1p(s) * (T(1) + s)), tanh * tanh / maximum(m, T(0.5))));
   }
 
   T ior() const { return index; }
@@ -112,9 +116,12 @@ template <class T> struct RadziszewskiAlda {
   T f_theta(const Vec3<T>& wi, const Vec3<T>& wr) const {
     const T nt = latitudinal_n();
     const T m = log_cosh2(nt);
-    const T x_minus_y = (wi.z - wr.z) * (wi.z + wr.z);
-    const T s = named("s", (wi.z * wi.z + wr.z * wr.z) / T(2));        // (x + y) / 2
-    const T t = named("t", (sin2_theta(wi) + sin2_theta(wr)) / T(2));  // (2 - x - y) / 2
+    // (x + y) / 2 and (2 - x - y) / 2, whose sum is 1 whatever rounding does to the directions' lengths.
+    const T z2 = wi.z * wi.z + wr.z * wr.z, r2 = sin2_theta(wi) + sin2_theta(wr);
+    const T s = named("s", z2 / (z2 + r2)), t = named("t", r2 / (z2 + r2));
+    // From the cosines near the horizon and from the sines near the normal: what is small keeps its digits.
+    const T x_minus_y =
+        select(s < t, (wi.z - wr.z) * (wi.z + wr.z), (wr.x - wi.x) * (wr.x + wi.x) + (wr.y - wi.y) * (wr.y + wi.y));
     const T d = named("d", m * abs(x_minus_y) / T(2));
     const T decay = named("decay", exp(-d));
     const T E = named("E", m * sqr(x_minus_y * phi1(d)) / T(4) + decay * (s * phi1(m * s) + t * phi1(m * t)));

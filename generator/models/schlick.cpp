@@ -48,13 +48,13 @@ template <class T> struct Schlick {
       NumberSpec{"rough", "Roughness", 0.2, 0, 1, 0.01, 1, "0 is a mirror, 1 Lambertian but for the Fresnel term"});
   }
 
-  Rgb<T> S(const T& u) const { return named("S", r + (Rgb<T>(T(1)) - r) * schlick_weight(u)); }
+  Rgb<T> S(const T& one_minus_u) const { return named("S", r + (Rgb<T>(T(1)) - r) * pow5(one_minus_u)); }
 
   T b() const { return named("b", T(4) * rough * (T(1) - rough)); }
   T a() const { return named("a", select(rough < T(0.5), T(0), sqr(T(2) * rough - T(1)))); }
   T c() const { return named("c", select(rough < T(0.5), sqr(T(1) - T(2) * rough), T(0))); }
 
-  Rgb<T> mirror(const Vec3<T>& wo) const { return S(wo.z) * c(); }
+  Rgb<T> mirror(const Vec3<T>& wo) const { return S(clamp01(T(1) - wo.z)) * c(); }
 
   /// Z(t) / pi.
   T Z(const Vec3<T>& h, const T& sin2) const {
@@ -74,7 +74,7 @@ template <class T> struct Schlick {
     const HalfVector<T> k(wi, wo);
     const T sin2 = named("sin2_h", sin2_theta(k.h));
     const T glossy = b() / T(4) * Z(k.h, sin2) * sqrt(p * A2(k.h, sin2)) * G(wi.z) * G(wo.z);
-    return S(k.oh) * select(above(wi, wo), a() / pi<T>() + glossy, T(0));
+    return S(k.one_minus_oh) * select(above(wi, wo), a() / pi<T>() + glossy, T(0));
   }
 
   /// Half vectors with density Z(t) t and, in azimuth, the mean of both densities.

@@ -38,7 +38,7 @@ template <class T> struct SchlickDouble {
 
   /// R_d (1 - R_f(alpha))
   Rgb<T> matte(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const T cosAlpha = named("cosAlpha", length(wi + wo) / T(2));
+    const T cosAlpha = named("cosAlpha", length(sum_of_units(wi, wo)) / T(2));
     return rd * ((T(1) - r0) * one_minus_schlick_weight(cosAlpha));
   }
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc stability: rounding, bad values and sampling, as long as asked.
+#include <algorithm>
+#include <chrono>
+
+#include "analysis/checks.h"
+#include "analysis/stability.h"
+#include "app/commands.h"
+
+namespace brdfc {
+
+void add_stability_command(CLI::App& app) {
+  struct Options {
+    std::string model;
+    Hunt hunt;
+    long calls = 1000000;
+    double limit = 32;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "stability",
+      "Rounding of double precision against 113 bits over everything a model accepts, float and recorded program\n"
+      "against double, bad values (NaN, infinite, negative). Exit status 1 if one fails.");
+  cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
+  cmd->add_option("--points", o->hunt.points, "Places a model at which double is compared with 113 bits")
+      ->check(CLI::PositiveNumber);
+  cmd->add_option("--calls", o->calls, "Evaluations and samples over all models that look for bad values")
+      ->check(CLI::NonNegativeNumber);
+  cmd->add_option("--limit", o->limit, "Units of epsilon that a formula may add to its inputs' rounding");
+  cmd->add_option("--seed", o->hunt.seed, "Seed of parameters and directions");
+  cmd->callback([o] {
+    std::vector<const Model*> chosen;
+    if (o->model.empty())
+      for (const auto& [name, m] : models()) chosen.push_back(m.get());
+    else
+      chosen.push_back(&find_model(o->model));
+    int failed = 0;
+    for (const Model* m : chosen) {
+      fmt::print(stderr, "{} ...\n", m->info().name);
+      const auto start = std::chrono::steady_clock::now();
+      const Stability s = hunt_rounding(*m, o->hunt);
+      const double hunted = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const long calls = evaluate_everywhere(*m, o->calls / long(chosen.size()), o->hunt.seed);
+      fmt::print("{}: {} places, {:.3g} units at {}\n  largest relative error {:.2g} at {}\n  {} calls, no bad value\n",
+                 m->info().name, s.points, s.amplified, s.amplified_where, s.relative, s.where, calls);
+      if (s.amplified > o->limit) ++failed, fmt::print("  FAILED: expected at most {:g} units\n", o->limit);
+      for (const auto& [decade, row] : single_precision_by_decade(*m, 200, 200, o->hunt.seed))
+        fmt::print("  numbers from 1e{}: float {:.2g}, recorded {:.2g}, rounded directions alone {:.2g}\n", decade,
+                   row.native, row.recorded, row.inherent);
+      fmt::print("  {:.1f} s, {:.1f} s of them for rounding\n",
+                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), hunted);
+    }
+    std::fflush(stdout);
+    if (failed > 0) throw CheckFailed(fmt::format("{} models lose digits", failed));
+  });
+}
+
+}  // namespace brdfc

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rounding of every model over everything it accepts, and the measure itself against formulas known to be bad.
+#include "analysis/stability.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "model/sampling.h"
+
+namespace brdfc {
+
+// Not in the anonymous namespace: the model adapter has members of these types.
+namespace fragile {
+
+// What textbooks print, one formula at a time.
+enum Formula { kGood, kSineFromCosine, kSumOfOpposites, kHighPower, kNegativeRarely };
+
+template <Formula F> struct Fragile {
+  template <class T> struct Type {
+    T e;
+    static ModelInfo info() {
+      return {.name = "fragile",
+              .label = "Fragile",
+              .paper = "",
+              .equations = "",
+              .doc = "",
+              .properties = {},
+              .params = {}};
+    }
+    template <class Visitor> void parameters(const Visitor& v) { v(e, NumberSpec{"e", "E", 1, 0, 1e8, 0, 1000, ""}); }
+    Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+      T f(1);
+      if (F == kGood) f = sin2_theta(wi) + wo.z * e;
+      if (F == kSineFromCosine) f = T(1) - wi.z * wi.z;
+      if (F == kSumOfOpposites) f = sin2_theta(wi + wo);
+      if (F == kHighPower) f = pow(maximum(dot(wi, reflect(wo)), tiny<T>()), e);
+      if (F == kNegativeRarely) f = select(wi.z < T(1e-9), T(-1), T(1));
+      return select(above(wi, wo), Rgb<T>(f), Rgb<T>(T(0)));
+    }
+    T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), cosine_pdf(wi), T(0)); }
+    Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+      const Vec3<T> wi = sample_cosine(u.y, u.z);
+      return sample_if(above(wi, wo), wi, eval(wi, wo) * pi<T>(), pdf(wi, wo));
+    }
+  };
+};
+
+}  // namespace fragile
+
+namespace {
+
+using namespace fragile;
+
+double effort() {
+  const char* text = std::getenv("BRDFC_EFFORT");
+  return text ? std::strtod(text, nullptr) : 1;
+}
+
+template <Formula F> double amplified() {
+  return hunt_rounding(detail::ModelOf<Fragile<F>::template Type>(), {.points = 5000}).amplified;
+}
+
+TEST(Rounding, OfGoodFormulasIsSmall) { EXPECT_LT(amplified<kGood>(), 4); }
+TEST(Rounding, SeesASineTakenFromACosine) { EXPECT_GT(amplified<kSineFromCosine>(), 1e6); }
+TEST(Rounding, SeesCancellationBetweenOppositeDirections) { EXPECT_GT(amplified<kSumOfOpposites>(), 1e6); }
+TEST(Rounding, SeesAHighPowerOfARoundedCosine) { EXPECT_GT(amplified<kHighPower>(), 1e6); }
+TEST(Rounding, RareBadValuesAreNamed) {
+  const detail::ModelOf<Fragile<kNegativeRarely>::Type> model;
+  try {
+    evaluate_everywhere(model, 100000, 1);
+    FAIL() << "a negative value passed";
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), testing::HasSubstr("fragile e="));
+    EXPECT_THAT(e.what(), testing::HasSubstr("= -1"));
+  }
+}
+
+/// Column `amplified` of cases.csv: units of epsilon that a model's formula may add to what rounding its inputs causes.
+double allowed(const std::string& model) {
+  std::ifstream in(std::string(BRDFC_SOURCE_DIR) + "/tests/cases.csv");
+  for (std::string line; std::getline(in, line);)
+    if (line.starts_with(model + ",")) return std::strtod(line.substr(line.rfind(',') + 1).c_str(), nullptr);
+  ADD_FAILURE() << "tests/cases.csv has no row for " << model;
+  return 0;
+}
+
+class Everywhere : public testing::TestWithParam<std::string> {
+ protected:
+  const Model& model() const { return find_model(GetParam()); }
+};
+
+TEST_P(Everywhere, DoubleKeepsItsDigits) {
+  const Stability s = hunt_rounding(model(), {.points = long(20000 * effort())});
+  EXPECT_GE(s.points, long(19000 * effort()));
+  EXPECT_LE(s.amplified, allowed(GetParam())) << s.amplified_where;
+}
+
+TEST_P(Everywhere, NoValueIsNanInfiniteOrNegative) {
+  // Over all models more than 1e7.
+  const long calls = std::max<long>(20000, long(1.2e7 * effort() / double(models().size())));
+  EXPECT_GE(evaluate_everywhere(model(), calls, 1), calls);
+}
+
+TEST_P(Everywhere, SinglePrecisionAndTheRecordedProgramFollow) {
+  for (const auto& [decade, row] : single_precision_by_decade(model(), std::max(4, int(40 * effort())), 100, 1)) {
+    const double limit = decade <= 5 ? 1e-3 : 1e-2;
+    // What the rounding of the directions alone does to a lobe as narrow as that is no fault of a formula.
+    EXPECT_LE(row.native, std::max(limit, 4 * row.inherent)) << "1e" << decade << ": " << row.where;
+    EXPECT_LE(row.recorded, std::max(limit, 4 * row.inherent)) << "1e" << decade << ": " << row.where;
+  }
+}
+
+std::vector<std::string> model_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, model] : models()) names.push_back(name);
+  return names;
+}
+INSTANTIATE_TEST_SUITE_P(Models, Everywhere, testing::ValuesIn(model_names()),
+                         [](const testing::TestParamInfo<std::string>& info) { return info.param; });
+
+}  // namespace
+}  // namespace brdfc
