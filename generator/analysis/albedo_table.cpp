@@ -77,6 +77,9 @@ struct Coefficients {
 
 double max_abs(const Rgb<double>& c) { return std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
 
+/// In units of what counts: of 1, or of the value itself where a model without bounds gives off more than it gets.
+double unit_of(const Rgb<double>& albedo) { return std::max(1.0, max_abs(albedo)); }
+
 class Tabulator {
  public:
   explicit Tabulator(const Model& model) : model_(model) {
@@ -429,7 +432,8 @@ class Tabulator {
           for (const NewTerm& t : group) {
             const Rgb<double> f0 = pick(f[-1], t), f1 = pick(f[0], t), f2 = pick(f[1], t);
             const double second = max_abs((f2 - f1) / h1 - (f1 - f0) / h0) * 2 / (h0 + h1);
-            if (second > noise) density[a][std::size_t(j)] = std::max(density[a][std::size_t(j)], std::sqrt(second));
+            if (second > noise)
+              density[a][std::size_t(j)] = std::max(density[a][std::size_t(j)], std::sqrt(second / unit_of(f1)));
           }
         }
       density[a].front() = density[a][1];
@@ -548,13 +552,13 @@ class Tabulator {
       }
       const Rgb<double> truth = combine(all, p.colors), interpolated = lookup(table_, model_, values, p.x[0]);
       const std::lock_guard lock(mutex);
-      table_.error = std::max(table_.error, max_abs(interpolated - truth));
+      table_.error = std::max(table_.error, max_abs(interpolated - truth) / unit_of(truth));
       table_.quadrature = std::max(table_.quadrature, error);
       if (depends_on_azimuth_) table_.anisotropy = std::max(table_.anisotropy, max_abs(combine(one, p.colors) - truth));
       for (const AlbedoTerm& t : table_.terms[p.combination]) {
         AlbedoGrid& g = table_.grids[std::size_t(t.grid)];
-        g.error = std::max(g.error,
-                           max_abs(lookup(g, position_in(g, p.x)) - pick(all, {t.mirror, monomial_of(t.colors), {}})));
+        const Rgb<double> coefficient = pick(all, {t.mirror, monomial_of(t.colors), {}});
+        g.error = std::max(g.error, max_abs(lookup(g, position_in(g, p.x)) - coefficient) / unit_of(coefficient));
       }
     });
   }

@@ -38,7 +38,8 @@ struct AlbedoGrid {
   std::vector<TableAxis> axes;  ///< none for a constant; cos_theta_o comes first if present
   int channels = 1;             ///< 1: equal in r, g and b; or 3
   std::vector<float> values;    ///< row-major, first axis slowest, channel innermost; may be negative
-  double error = 0;             ///< largest |interpolated - quadrature| at random points off the grid
+  double error = 0;             ///< largest |interpolated - quadrature| at random points off the grid, of the value
+                                ///< itself where that is more than 1
 };
 
 /// A coefficient of the polynomial in the colours.
@@ -56,7 +57,7 @@ struct AlbedoTable {
   /// The terms of every combination of choices, at index ((c0 * size1) + c1) * size2 + c2 ... with c the index
   /// of each choice; one entry for a model without choices. A black combination has no terms.
   std::vector<std::vector<AlbedoTerm>> terms;
-  double error = 0;  ///< largest |interpolated - quadrature| of the whole albedo at random points, colours included
+  double error = 0;       ///< the same of the whole albedo at random points, colours included
   double quadrature = 0;  ///< largest error estimate of the quadrature met
   double anisotropy = 0;  ///< largest |albedo at one azimuth - azimuthal average| met; 0 if it does not depend on it
   std::string doc;        ///< what the table holds, for people
