@@ -155,6 +155,38 @@ TEST_F(ReportTest, WritesPageJsonAndCsv) {
     EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << ": a temporary file was left";
 }
 
+TEST_F(ReportTest, ShowsWhatTheClosuresOfEachVersionDo) {
+  const fs::path folder = folder_ / "conformance";
+  EXPECT_TRUE(load_conformance(folder).empty());
+  fs::create_directories(folder);
+  const json agrees = {{"closure", "diffuse"},
+                       {"evaluation_l1", 1e-7},
+                       {"sampling_share", 0.0},
+                       {"verdict", "ok"},
+                       {"sampling_resolution", 4e-3}};
+  const json wrong = {{"closure", "wrong"},
+                      {"sampling_share", 0.43},
+                      {"verdict", "fault"},
+                      {"sampling_resolution", 0.01},
+                      {"fault", "differs <much>"}};
+  std::ofstream(folder / "4.5.json") << json{{"blender", "4.5.15"}, {"closures", {agrees, wrong}}};
+  std::string page;
+  put_conformance(page, load_conformance(folder));
+  EXPECT_THAT(page, HasSubstr("4.5.15"));
+  EXPECT_THAT(page, HasSubstr("agrees (0.4 %)"));
+  EXPECT_THAT(page, HasSubstr("class=\"bad\" title=\"differs &lt;much&gt;\">+43.0 % (1.0 %)"));
+
+  json unknown = agrees;
+  unknown["verdict"] = "fine";
+  std::ofstream(folder / "5.0.json") << json{{"blender", "5.0.1"}, {"closures", json::array({unknown})}};
+  try {
+    load_conformance(folder);
+    FAIL() << "an unknown verdict was accepted";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("5.0.json: closures[0].verdict"));
+  }
+}
+
 TEST_F(ReportTest, PreviewsShowThePicturesAndTheSignOfTheDifference) {
   load();
   write_report(folder_);

@@ -10,7 +10,9 @@ namespace brdfc {
 
 void add_report_command(CLI::App& app) {
   auto* command = app.add_subcommand(
-      "report", "Write index.html, report.json and report.csv about the scenes rendered in the folders of DIR");
+      "report",
+      "Write index.html, report.json and report.csv about the scenes rendered in the folders of DIR, with the\n"
+      "tables of conformance/ beside DIR, which the tests of closures write");
   const auto folder = std::make_shared<std::string>();
   command->add_option("DIR", *folder, "A folder with one folder a scene, each holding runs.json")->required();
   command->callback([folder] {

@@ -5,62 +5,12 @@
 #include <cmath>
 #include <iterator>
 
+#include "report/html.h"
 #include "report/page_style.h"
 #include "report/report.h"
 
 namespace brdfc {
 namespace {
-
-/// Appends formatted text.
-template <class... Args> void put(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
-  fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  return out;
-}
-
-constexpr const char* kMinus = "\xe2\x88\x92";
-constexpr const char* kDash = "\xe2\x80\x93";
-
-std::string with_minus(std::string text) {
-  if (!text.empty() && text.front() == '-') text.replace(0, 1, kMinus);
-  return text;
-}
-
-/// 0.00123 -> 1.2·10^−3
-std::string scientific(double v) {
-  if (v == 0) return "0";
-  int exponent = int(std::floor(std::log10(std::abs(v))));
-  std::string mantissa = fmt::format("{:.1f}", v / std::pow(10, exponent));
-  if (mantissa == "10.0" || mantissa == "-10.0") {  // 9.96 rounds up into the next decade
-    ++exponent;
-    mantissa = fmt::format("{:.1f}", v / std::pow(10, exponent));
-  }
-  return fmt::format(
-      "{}\xc2\xb7"
-      "10<sup>{}</sup>",
-      with_minus(mantissa), with_minus(std::to_string(exponent)));
-}
-
-template <class T> std::string or_dash(const std::optional<T>& v, const std::string& text) { return v ? text : kDash; }
 
 std::string cost(const FormReport& f) { return or_dash(f.cost, fmt::format("{:.2f}", f.cost.value_or(0))); }
 
@@ -290,7 +240,8 @@ void put_provenance(std::string& out, const std::vector<SceneReport>& scenes) {
 
 }  // namespace
 
-std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews) {
+std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews,
+                        const std::vector<ConformanceTable>& closures) {
   std::string out;
   put(out,
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
@@ -306,6 +257,7 @@ std::string report_html(const std::vector<SceneReport>& scenes, const std::vecto
       scenes.size(), forms);
   put_summary(out, scenes);
   for (std::size_t i = 0; i < scenes.size(); ++i) put_scene(out, scenes[i], previews[i]);
+  put_conformance(out, closures);
   out += "<div id=\"method\"></div>\n";
   put_method(out);
   put_provenance(out, scenes);

@@ -108,6 +108,26 @@ struct SceneReport {
 /// something is missing, malformed or, in an image, not finite.
 std::vector<SceneReport> load_report(const std::filesystem::path& folder);
 
+/// What the closure conformance tests measured of one closure.
+struct ConformanceRow {
+  std::string closure;
+  std::string verdict;                  ///< ok, fault, or mended: a known fault that is gone
+  std::optional<double> evaluation_l1;  ///< of its evaluation against our definition; none for deltas
+  double sampling_share = 0;            ///< light found by its own sampling against its evaluation, -1; 0 within noise
+  double sampling_resolution = 0;       ///< the smallest share that would have been noticed
+  std::string fault;                    ///< in words
+};
+struct ConformanceTable {
+  std::string blender;  ///< version
+  std::vector<ConformanceRow> rows;
+};
+
+/// The tables that tests/blender/test_conformance.py writes, VERSION.json each; none without such a folder. Throws
+/// InputError naming file and key.
+std::vector<ConformanceTable> load_conformance(const std::filesystem::path& folder);
+/// Appends the page's section about closures, nothing without tables.
+void put_conformance(std::string& page, const std::vector<ConformanceTable>&);
+
 /// Previews made for the page; names are relative to the report's folder.
 struct Previews {
   struct Form {
@@ -125,11 +145,13 @@ struct Previews {
 Previews write_previews(const std::filesystem::path& folder, const SceneReport&);
 
 /// The page's text; `previews` in the order of `scenes`.
-std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews);
+std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews,
+                        const std::vector<ConformanceTable>& closures);
 std::string report_json(const std::vector<SceneReport>& scenes);
 std::string report_csv(const std::vector<SceneReport>& scenes);
 
-/// Writes index.html, report.json, report.csv and the previews. Throws as load_report, and InputError when the
+/// Writes index.html, report.json, report.csv and the previews; what the conformance tests found is taken from the
+/// folder `conformance` beside this one, if there is one. Throws as load_report, and InputError when the
 /// folder can't be written. Returns what it measured.
 std::vector<SceneReport> write_report(const std::filesystem::path& folder);
 

@@ -112,7 +112,8 @@ std::vector<SceneReport> write_report(const fs::path& folder) {
   for (const SceneReport& scene : scenes) previews.push_back(write_previews(folder, scene));
   write_text(folder / "report.json", report_json(scenes));
   write_text(folder / "report.csv", report_csv(scenes));
-  write_text(folder / "index.html", report_html(scenes, previews));
+  const fs::path beside = fs::weakly_canonical(folder).parent_path() / "conformance";
+  write_text(folder / "index.html", report_html(scenes, previews, load_conformance(beside)));
   return scenes;
 }
 
