@@ -303,3 +303,11 @@ def test_stability_reports_the_worst_place_and_fails_beyond_the_limit():
     strict = run(*few, "--limit", "0.1")
     assert strict.returncode == 1
     assert "FAILED: expected at most 0.1 units" in strict.stdout
+
+
+def test_stability_page_refuses_a_folder_that_cannot_be(tmp_path):
+    (tmp_path / "file").write_text("")
+    few = ("stability", "lambert", "--points", "100", "--calls", "100")
+    result = run(*few, "--page", str(tmp_path / "file" / "page"))
+    assert result.returncode == 2
+    assert f"{tmp_path}/file/page: expected a folder that can be written" in result.stderr

@@ -5,13 +5,14 @@
 
 #include "analysis/checks.h"
 #include "analysis/stability.h"
+#include "analysis/stability_page.h"
 #include "app/commands.h"
 
 namespace brdfc {
 
 void add_stability_command(CLI::App& app) {
   struct Options {
-    std::string model;
+    std::string model, page;
     Hunt hunt;
     long calls = 1000000;
     double limit = 32;
@@ -27,6 +28,7 @@ void add_stability_command(CLI::App& app) {
   cmd->add_option("--calls", o->calls, "Evaluations and samples over all models that look for bad values")
       ->check(CLI::NonNegativeNumber);
   cmd->add_option("--limit", o->limit, "Units of epsilon that a formula may add to its inputs' rounding");
+  cmd->add_option("--page", o->page, "Folder for a page of maps of the errors");
   cmd->add_option("--seed", o->hunt.seed, "Seed of parameters and directions");
   cmd->callback([o] {
     std::vector<const Model*> chosen;
@@ -49,6 +51,10 @@ void add_stability_command(CLI::App& app) {
                    row.native, row.recorded, row.inherent);
       fmt::print("  {:.1f} s, {:.1f} s of them for rounding\n",
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), hunted);
+    }
+    if (!o->page.empty()) {
+      write_stability_page(o->page);
+      fmt::print(stderr, "{}/index.html\n", o->page);
     }
     std::fflush(stdout);
     if (failed > 0) throw CheckFailed(fmt::format("{} models lose digits", failed));
