@@ -256,6 +256,36 @@ def gs_albedo(p, cos_o):
     return [gs_c(p) * cs * lobe_above(p["e"], cos_o, cosine=True) for cs in p["cs"]]
 
 
+def pm_parts(p):
+    """The material's highlight and reflection as the models of those names have them."""
+    specular = {"ks": p["ks"], "cs": p["cs"], "e": p["es"], "normalisation": "book"}
+    return specular, {"kr": p["kr"], "cr": p["cr"], "e": p["e"], "below": "mirror"}
+
+
+def pm_f(p, wi, wo):
+    specular, reflection = pm_parts(p)
+    matte = [p["kd"] * c / mp.pi for c in p["cd"]]
+    parts = matte, gs_f(specular, wi, wo), gr_f(reflection, wi, wo)
+    return [sum(c) for c in zip(*parts, strict=True)]
+
+
+def pm_pdf(p, wi, wo):
+    """Where one term is alone: how often each is drawn is the sampler's choice."""
+    specular, reflection = pm_parts(p)
+    of_terms = {"kd": lambert_pdf, "ks": gs_pdf, "kr": gr_pdf}
+    terms = [k for k in of_terms if p[k] > 0]
+    if len(terms) > 1:
+        return None
+    return of_terms[terms[0]]({"kd": p, "ks": specular, "kr": reflection}[terms[0]], wi, wo)
+
+
+def pm_albedo(p, cos_o):
+    specular, reflection = pm_parts(p)
+    matte = [p["kd"] * c for c in p["cd"]]
+    parts = matte, gs_albedo(specular, cos_o), gr_albedo(reflection, cos_o)
+    return [sum(c) for c in zip(*parts, strict=True)]
+
+
 # ---- The three models that Shirley, Smits, Hu and Lafortune compare with, their section 5 ------
 
 
@@ -362,6 +392,62 @@ def ra_pdf(p, wi, wo):
     """The cosine-weighted lobe."""
     white = dict(p, tint=(1, 1, 1))
     return ra_f(white, wi, wo)[0] * abs(vec(wi)[2])
+
+
+# ---- The same paper's construction, eqs. 9 to 13, from a kernel, by numerical integrals ----------
+
+
+def kernel(p, u):
+    u = abs(u)
+    return mp.exp(-u) if p["kernel"] == "exponential" else mp.sech(u) ** 2
+
+
+@functools.cache
+def lossless_place(name, n, x):
+    """x' with marginal x, the marginal's density there, the kernel's integral over the square."""
+    p = {"kernel": name}
+    # Cut at the peak and where it has faded.
+    peak = [s * w / n for s in (-1, 1) for w in (1, 4, 12, 30, 60)] + [0]
+
+    def integral(of, low, high, *cuts):
+        ends = {low, high, *peak, *cuts}
+        return mp.quad(of, sorted(e for e in ends if low <= e <= high))
+
+    def density(t):
+        return integral(lambda d: kernel(p, n * d), -t, 1 - t)
+
+    def mass(t):
+        """Of the strip below t: by the difference d, and the length of the line where it is d."""
+        return integral(
+            lambda d: kernel(p, n * d) * (min(t, 1 - d) - max(0, -d)), -t, mp.mpf(1), 1 - t
+        )
+
+    whole = mass(mp.mpf(1))
+    # Newton's steps from a bracket: the density is known.
+    low, high, at = mp.mpf(0), mp.mpf(1), x
+    for _ in range(60):
+        error = mass(at) / whole - x
+        low, high = (at, high) if error < 0 else (low, at)
+        step = error * whole / density(at)
+        at = at - step if low < at - step < high else (low + high) / 2
+        if abs(step) < mp.mpf(10) ** -20:
+            break
+    return at, density(at), whole
+
+
+def lossless_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    if p["n"] == 0:
+        return [c / mp.pi for c in p["tint"]]
+    mp.mp.dps, n = 24, mp.mpf(p["n"])
+    a, ma, whole = lossless_place(p["kernel"], n, ki[2] ** 2)
+    b, mb, _ = lossless_place(p["kernel"], n, ko[2] ** 2)
+    f_theta = 2 * kernel(p, n * (a - b)) * whole / (ma * mb)
+    return [f_theta / (2 * mp.pi) * c for c in p["tint"]]
+
+
+def lossless_pdf(p, wi, wo):
+    return lossless_f({**p, "tint": (1, 1, 1)}, wi, wo)[0] * vec(wi)[2]
 
 
 # ---- Fresnel's equations by complex numbers ------------------------------------------------------
@@ -887,6 +973,29 @@ MODELS = {
         ],
         cosines=[1, 0.5, 0.1, 0.01],
     ),
+    "phong_material": dict(
+        f=pm_f,
+        pdf=pm_pdf,
+        albedo=pm_albedo,
+        defaults={
+            "kd": 0.4,
+            "cd": (1, 1, 0.3),
+            "ks": 0.2,
+            "cs": (1, 1, 1),
+            "es": 25,
+            "kr": 0.4,
+            "cr": (1, 1, 0.3),
+            "e": 100,
+        },
+        cases=[
+            {},
+            {"kd": 1, "ks": 0, "kr": 0},
+            {"kd": 0, "kr": 0, "es": 1000},
+            {"kd": 0, "ks": 0, "e": 1, "kr": 1},
+            {"ks": 1, "es": 3, "e": 1e5, "cs": (0.1, 0.5, 1)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
     "lambertian_specular": dict(
         f=lambda p, wi, wo: [c / mp.pi for c in p["rd"]],
         pdf=lambert_pdf,
@@ -941,6 +1050,22 @@ MODELS = {
         albedo_cases=[{"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)]
         + [{"n": 4, "around": a} for a in ("retro", "refraction")],
         cosines=[1, 0.5, 0.05],
+    ),
+    "lossless": dict(
+        f=lossless_f,
+        pdf=lossless_pdf,
+        albedo=lambda p, c: p["tint"],
+        defaults={"kernel": "sech2", "n": 4, "tint": (1, 1, 1)},
+        cases=[
+            {},
+            {"n": 0.3, "tint": (0.9, 0.5, 0.1)},
+            {"n": 25},
+            {"kernel": "exponential", "n": 0.3},
+            {"kernel": "exponential", "n": 8},
+        ],
+        cosines=[1, 0.5, 0.05],
+        # Numerical integrals.
+        floor=lambda p: 1e-12,
     ),
     "fresnel_dielectric": dict(
         albedo=dielectric_albedo,

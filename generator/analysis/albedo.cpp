@@ -33,20 +33,25 @@ std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& w
   const auto at = [&](double u) { return brdf.sample(wo, {u, 0.37, 0.71}).wi; };
   const auto same = [](const Vec3<double>& a, const Vec3<double>& b) { return length(a - b) < 1e-12; };
   std::vector<double> borders{0};
-  Vec3<double> before = at(0.5 / kProbes);
-  for (int i = 1; i < kProbes; ++i) {
-    const Vec3<double> after = at((i + 0.5) / kProbes);
-    if (!same(before, after)) {
-      double lo = (i - 0.5) / kProbes, hi = (i + 0.5) / kProbes;
+  double from = 0;
+  Vec3<double> before = at(from);
+  for (int i = 0; i <= kProbes; ++i) {
+    const double to = i < kProbes ? (i + 0.5) / kProbes : 1 - 0x1p-53;
+    const Vec3<double> after = at(to);
+    // A lobe that is drawn rarely may lie between two probes: every border up to here, one by one.
+    while (!same(before, after)) {
+      double lo = from, hi = to;
       while (hi - lo > 1e-15) {
         const double mid = 0.5 * (lo + hi);
         (same(at(mid), before) ? lo : hi) = mid;
       }
       borders.push_back(hi);
+      if (borders.size() > kProbes / 2) return {};
+      from = hi;
+      before = at(from);
     }
-    before = after;
+    from = to;
   }
-  if (borders.size() > kProbes / 2) return {};
   borders.push_back(1);
   return borders;
 }
