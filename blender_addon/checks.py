@@ -16,7 +16,7 @@ FAR_PIXEL = 1e-5
 #: Lamps below this size (metres, or radians for a sun) are hit by chance too rarely.
 SMALL_LIGHT = 0.01
 SMALL_SUN = 0.02
-#: Below this, a clamp on indirect light shows in mirrors of ordinary lights.
+#: Below this, a clamp on indirect light shows in the highlights of Blender's own closures.
 LOW_CLAMP = 10
 
 
@@ -83,8 +83,8 @@ def _bump_correction(material, scene):
     if material.cycles.use_bump_map_correction:
         return (
             "ERROR",
-            "Bump Map Correction is on in the material's settings: where a normal is bent it dims "
-            "this form or turns its mirror",
+            "Bump Map Correction is on in the material's settings: where a normal is bent it turns "
+            "the directions of this form",
         )
 
 
@@ -102,13 +102,19 @@ def _clamp_indirect(material, scene):
         )
 
 
+def _clamp_mirror(material, scene):
+    clamp = scene.cycles.sample_clamp_indirect
+    if clamp > 0:
+        return (
+            "WARNING",
+            f"Clamp Indirect is {clamp:g}: it darkens bright lights in this mirror; 0 is exact",
+        )
+
+
 def _clamp_low(material, scene):
     clamp = scene.cycles.sample_clamp_indirect
     if 0 < clamp < LOW_CLAMP:
-        return (
-            "WARNING",
-            f"Clamp Indirect is {clamp:g}: it darkens lights in this mirror; 0 is exact",
-        )
+        return "WARNING", f"Clamp Indirect is {clamp:g}: it darkens highlights; 0 is exact"
 
 
 def _clamp_direct(material, scene):
@@ -193,6 +199,7 @@ DECLARED = {
     "filter_glossy": _filter_glossy,
     "albedo_passes": _albedo_passes,
     "clamp_low": _clamp_low,
+    "clamp_mirror": _clamp_mirror,
     "normal_pass": _normal_pass,
 }
 

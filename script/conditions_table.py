@@ -10,12 +10,19 @@ from pathlib import Path
 INTRODUCTION = """\
 # What settings and scenes do to the forms
 
-Made by `script/conditions`. Each row changes one thing in a clean scene; a cell is what that does
-to the mean radiance of a form, with its standard error. Bold is what stands out of the noise by 5
-standard errors and exceeds 2 %. Forms stand for all of their kind: those of closures with a mirror
-and without, and those that draw rays with a mirror, with an anisotropic lobe, with a single lobe.
-Blender's own Diffuse and Glossy nodes are there to compare with. Passes: mean difference from the
-model's albedo, median angle from the true normal, largest difference of picture and light group.
+Made by `script/conditions`. Each row changes one thing in a clean scene, a grid of grooves under a
+sun and a bright sky, so that light bounces; a cell is what that does to the mean radiance of a
+form, with its standard error. Bold is what exceeds 2 % and 5 standard errors; there the panel warns
+if that is said. Forms stand for all of their kind: closures with a mirror, alone, with a ramp;
+drawn directions with a mirror, of an anisotropic model, alone. `coupled` has r0 = 0.5, the others
+their defaults. Blender's own Diffuse and Glossy nodes are there to compare with.
+
+Of the tilted normals (by the mesh's own, by the Normal input, by that with Bump Map Correction on)
+the worst of three views is shown, against the model's own rays without those that end below the
+surface. Passes: mean difference from the model's albedo, median angle from the true normal,
+largest difference of picture and light group. "sun without size" compares the median cells, since
+drawn directions meet that lamp as rare, bright dots; it leaves out exact forms with a mirror, which
+by its nature does not show it.
 """
 
 
@@ -29,7 +36,8 @@ def cell(row):
         text = f"{row['bias']:+.3f}"
     if not row["biased"]:
         return text
-    warned = row["code"] and any(w.startswith(row["code"]) for w in row["warned"])
+    codes = row["code"] if isinstance(row["code"], list) else [row["code"]]
+    warned = any(w.startswith(c) for w in row["warned"] for c in codes if c)
     return f"**{text}**" + (" (panel warns)" if warned else "")
 
 

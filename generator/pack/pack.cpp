@@ -112,13 +112,16 @@ Json choices_json(const ParamValues& choices) {
 
 /// What a user must know of a form; the add-on turns each into words where it applies.
 std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Shader& shader) {
-  // Measured in Cycles (script/conditions): bump-map correction dims closures whose normal is not the surface's and
-  // turns their mirrors; a clamp on indirect light, path guiding or a lamp of no size meets a sampled lobe differently
-  // from Blender's own closures; its lobes' normals are not the surface's; Filter Glossy blurs a mirror.
+  // Measured in Cycles (script/conditions): bump-map correction turns closures where a normal is bent; a clamp on
+  // indirect light or a lamp of no size meets a sampled lobe differently from Blender's own closures, and its lobes'
+  // normals are not the surface's; a clamp darkens lights in a mirror and, if it is low, highlights; Filter Glossy
+  // blurs a mirror.
   std::vector<std::string> codes = {"bump_correction"};
   if (kind == RepresentationKind::Sampled)
     codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
   else if (mirror)
+    codes.push_back("clamp_mirror");
+  else if (shader.slots > shader.closures)
     codes.push_back("clamp_low");
   if (mirror) codes.push_back("filter_glossy");
   // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes

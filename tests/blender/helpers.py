@@ -237,6 +237,13 @@ def albedo(tool, model, values, cosines, phi=0.0):
     return read_csv(text)[1][:, 1:4]
 
 
+def mirror_weight(tool, model, values, cosine):
+    """Weight of the model's mirror term, (3,)."""
+    stdin = to_csv(("cos_theta_o",), [[cosine]])
+    names, rows = read_csv(tool("albedo", model, *arguments(values), stdin=stdin))
+    return np.array([rows[0, names.index(f"mirror_{c}")] for c in "rgb"])
+
+
 def draw(tool, model, values, wo, count):
     """Directions drawn from the model in double precision, and each one's share of f cos dw."""
     # Additive recurrence on the plastic number's relative: evenly spread in three dimensions.

@@ -2,8 +2,8 @@
 """The conditions that users live in: see conditions.py.
 
 Where a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all every condition is
-measured, with BRDFC_CONDITIONS=quick a few. The rows go to conditions/<version>.json beside the
-tool; script/conditions makes the table of them.
+measured, and the rows go to conditions/<version>.json beside the tool, of which script/conditions
+makes its table; else a few.
 """
 
 import json
@@ -17,9 +17,7 @@ import pytest
 VERSION = ".".join(map(str, bpy.app.version[:2]))
 ALL = os.environ.get("BRDFC_CONDITIONS") == "all"
 
-pytestmark = pytest.mark.skipif(
-    "BRDFC_CONDITIONS" not in os.environ, reason="script/conditions measures them"
-)
+pytestmark = pytest.mark.full
 
 
 @pytest.fixture(scope="module")
@@ -31,14 +29,14 @@ def forms(extension, tool):
 def rows(extension, tool, forms):
     names = None if ALL else [c.name for c in conditions.CONDITIONS if c.quick]
     every = [*forms, *conditions.NATIVE]
-    found = conditions.measure(extension, every, names)
+    found = conditions.measure(extension, every, names, samples=4096 if ALL else 512)
     found += conditions.passes(extension, tool, every)
-    for smooth in (True, False):
-        found += conditions.normals(extension, tool, forms, smooth)
-    folder = Path(os.environ["BRDFC_TOOL"]).resolve().parent / "conditions"
-    folder.mkdir(exist_ok=True)
-    record = {"blender": bpy.app.version_string, "all": ALL, "rows": found}
-    (folder / f"{VERSION}.json").write_text(json.dumps(record, indent=1) + "\n")
+    found += conditions.normals(extension, tool, forms)
+    if ALL:
+        folder = Path(os.environ["BRDFC_TOOL"]).resolve().parent / "conditions"
+        folder.mkdir(exist_ok=True)
+        record = {"blender": bpy.app.version_string, "rows": found}
+        (folder / f"{VERSION}.json").write_text(json.dumps(record, indent=1) + "\n")
     for r in found:
         print(
             f"{r['condition']:28} {r['form']:32} {r['bias']:+9.4f} +- {r['error']:.4f} "

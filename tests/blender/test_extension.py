@@ -461,12 +461,18 @@ def test_warnings_a_form_may_declare(extension, empty, monkeypatch, code, spoil)
     assert codes(extension, material, empty) == [code]
 
 
-def test_warning_clamp_that_shows_in_mirrors(extension, empty):
-    material = clean(extension, empty, "coupled", "exact")
-    empty.cycles.sample_clamp_indirect = 10
-    assert codes(extension, material, empty) == []
-    empty.cycles.sample_clamp_indirect = 1
-    assert codes(extension, material, empty) == ["clamp_low"]
+def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
+    """In a mirror at once, in a highlight if it is low."""
+    mirror = clean(extension, empty, "coupled", "exact")
+    highlight = clean(extension, empty, "modified_phong", "exact")
+    for clamp, in_mirror, in_highlight in (
+        (0, [], []),
+        (10, ["clamp_mirror"], []),
+        (1, ["clamp_mirror"], ["clamp_low"]),
+    ):
+        empty.cycles.sample_clamp_indirect = clamp
+        assert codes(extension, mirror, empty) == in_mirror
+        assert codes(extension, highlight, empty) == in_highlight
 
 
 def test_warning_normal_pass(extension, empty):

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from goniometer import Goniometer, frame, tilted, unit
-from helpers import albedo, draw, evaluate, materials_of, with_every_model
+from helpers import albedo, draw, evaluate, materials_of, mirror_weight, with_every_model
 from worlds import coloured, gradient, half, spot, white
 
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (0.8, 0.1, 0.6), (-0.5, 0.8, 0.3), (0.2, 0.95, 0.1)]
@@ -222,14 +222,6 @@ def expected_radiance(tool, model, values, radiance):
         light = radiance(wi @ axes(normal)).reshape(len(wi), -1)
         result.append((f * light).sum(0) + weight * radiance(mirrored[None])[0])
     return np.array(result)
-
-
-def mirror_weight(tool, model, values, cos_theta):
-    from helpers import arguments, read_csv, to_csv
-
-    stdin = to_csv(("cos_theta_o",), [[cos_theta]])
-    names, rows = read_csv(tool("albedo", model, *arguments(values), stdin=stdin))
-    return np.array([rows[0, names.index(f"mirror_{c}")] for c in "rgb"])
 
 
 # The gradient alone would find most errors; it is the one of the developer's loop.
