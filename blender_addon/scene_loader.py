@@ -266,28 +266,65 @@ def glossy_material(name, values):
     It is the yardstick for run times, and the same node that artists have without the extension.
     Exponents n become the roughness of Ashikhmin and Shirley's distribution, (2 / (n + 2))^(1/4).
     """
-    material = bpy.data.materials.new(f"{name} (Glossy)")
-    tree = nodes.empty_tree(material)
-    node = tree.nodes.new("ShaderNodeBsdfAnisotropic")
-    node.distribution = "ASHIKHMIN_SHIRLEY"
     color = next((v for v in values.values() if isinstance(v, tuple)), (0.8, 0.8, 0.8))
-    node.inputs["Color"].default_value = (*color, 1.0)
-    nu, nv = (float(n) if isinstance(n, int | float) else 100.0 for n in _exponents(values))
-    ax, ay = (math.sqrt(2 / (n + 2)) for n in (nu, nv))
-    # Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the other way round below 0.
+    exponents = (float(n) if isinstance(n, int | float) else 100.0 for n in _exponents(values))
+    alpha = [math.sqrt(2 / (n + 2)) for n in exponents]
+    like = {"color": color, "alpha": alpha, "rotation": values.get("rotation", 0.0)}
+    return native_material(name, GLOSSY, like, "ASHIKHMIN_SHIRLEY")[0]
+
+
+#: Blender's own nodes that can stand in for a model, by representation: type, name of the colour.
+NATIVE = {
+    GLOSSY: ("ShaderNodeBsdfAnisotropic", "Color"),
+    "principled": ("ShaderNodeBsdfPrincipled", "Base Color"),
+    "metallic": ("ShaderNodeBsdfMetallic", "Base Color"),
+}
+
+
+def native_material(name, kind, fitted, distribution="GGX"):
+    """A material of one of Blender's own nodes, and the node. `fitted`: what script/native_nodes.py
+    found: colour, widths of the lobe along and across the tangent (0 for a mirror), rotation in
+    radians, and for some kinds edge (a colour), ior and metallic."""
+    material = bpy.data.materials.new(f"{name} ({kind})")
+    tree = nodes.empty_tree(material)
+    bsdf, color = NATIVE[kind]
+    node = tree.nodes.new(bsdf)
+    node.distribution = distribution
+    node.inputs[color].default_value = (*fitted["color"], 1.0)
+    if "edge" in fitted:
+        node.inputs["Edge Tint"].default_value = (*fitted["edge"], 1.0)
+    if "ior" in fitted:
+        node.inputs["IOR"].default_value = fitted["ior"]
+        node.inputs["Metallic"].default_value = fitted["metallic"]
+    ax, ay = fitted["alpha"]
+    turns = fitted["rotation"] / (2 * math.pi)
     node.inputs["Roughness"].default_value = (ax * ay) ** 0.25
-    ratio = math.sqrt(ax / ay)
-    node.inputs["Anisotropy"].default_value = 1 - ratio if ratio <= 1 else 1 / ratio - 1
-    if nu != nv:
-        # The frame of this project: the object's z axis along the surface.
-        axis = tree.nodes.new("ShaderNodeVectorTransform")
-        axis.vector_type, axis.convert_from, axis.convert_to = "VECTOR", "OBJECT", "WORLD"
-        axis.inputs["Vector"].default_value = (0, 0, 1)
-        tree.links.new(axis.outputs[0], node.inputs["Tangent"])
-        node.inputs["Rotation"].default_value = values.get("rotation", 0.0) / (2 * math.pi)
+    if ax != ay and kind == GLOSSY:
+        # Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the other way round below 0.
+        ratio = math.sqrt(ax / ay)
+        node.inputs["Anisotropy"].default_value = 1 - ratio if ratio <= 1 else 1 / ratio - 1
+        node.inputs["Rotation"].default_value = turns
+    elif ax != ay:
+        # Cycles: ay = (1 - 0.9 a) ax, along the tangent only.
+        if ax < ay:
+            ax, ay, turns = ay, ax, turns + 0.25
+        of = "Anisotropic" if kind == "principled" else "Anisotropy"
+        node.inputs[of].default_value = (1 - ay / ax) / 0.9
+        of = "Anisotropic Rotation" if kind == "principled" else "Rotation"
+        node.inputs[of].default_value = turns % 1
+    if ax != ay:
+        _object_tangent(tree, node)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Surface"])
-    return material
+    return material, node
+
+
+def _object_tangent(tree, node):
+    """The frame of this project: the object's z axis along the surface."""
+    axis = tree.nodes.new("ShaderNodeVectorTransform")
+    axis.vector_type, axis.convert_from, axis.convert_to = "VECTOR", "OBJECT", "WORLD"
+    axis.inputs["Vector"].default_value = (0, 0, 1)
+    tree.links.new(axis.outputs[0], node.inputs["Tangent"])
 
 
 def _texture(view):
@@ -301,7 +338,7 @@ def _texture(view):
     return _load_image(view.get("image").file_path(), space)
 
 
-def _material(name, view, representation):
+def _material(name, view, representation, native):
     model = view.get("model").text()
     if model not in pack.model_names():
         raise view.get("model").error(f"one of {', '.join(pack.model_names())}")
@@ -319,11 +356,16 @@ def _material(name, view, representation):
     defaults = {k: tuple(v) if isinstance(v, list) else v for k, v in defaults.items()}
     if representation is None:
         representation = view.get("representation").text() if view.has("representation") else "auto"
-    if representation == GLOSSY:
-        material = glossy_material(name, defaults | values)
-        node = material.node_tree.nodes["Glossy BSDF"]
+    if representation in NATIVE:
+        if representation in (fitted := native.get(name, {})):
+            material, node = native_material(name, representation, fitted[representation])
+        elif representation == GLOSSY:
+            material = glossy_material(name, defaults | values)
+            node = material.node_tree.nodes["Glossy BSDF"]
+        else:
+            raise view.error(f"a material to which Blender's {representation} node was fitted")
         colors = [k for k, p in pack.parameters(model).items() if p["kind"] == "color"]
-        targets = {colors[0]: node.inputs["Color"]} if colors else {}
+        targets = {colors[0]: node.inputs[NATIVE[representation][1]]} if colors else {}
     else:
         try:
             form = pack.resolve(model, representation, values)
@@ -400,11 +442,13 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
     view.view_transform, view.look, view.exposure, view.gamma = "Raw", "None", 0.0, 1.0
 
 
-def load_scene(path, representation=None, name=None):
+def load_scene(path, representation=None, name=None, native=None):
     """Makes a scene with clean settings from a resolved scene file, and makes it the active one.
 
-    `representation` overrides that of every material: auto, exact, sampled, or "glossy" for
-    Blender's own Glossy node. Returns the bpy scene. Raises ValueError naming file and key.
+    `representation` overrides that of every material: auto, exact, sampled, or "glossy",
+    "principled" or "metallic" for Blender's own nodes. `native`: what script/native_nodes.py
+    fitted, by material and node; only Glossy can do without. Returns the bpy scene. Raises
+    ValueError naming file and key.
     """
     path = Path(path)
     try:
@@ -432,7 +476,8 @@ def load_scene(path, representation=None, name=None):
 
     _camera(scene, view.get("camera"))
     materials = {
-        key: _material(key, entry, representation) for key, entry in view.get("materials").items()
+        key: _material(key, entry, representation, native or {})
+        for key, entry in view.get("materials").items()
     }
     for index, entry in view.get("objects").items():
         shape = entry.get("shape")

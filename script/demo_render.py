@@ -49,7 +49,7 @@ def resolved_files(folder):
         elif isinstance(value, str) and value and (folder / value).is_file():
             found.add(folder / value)
 
-    walk(json.loads(scene.read_text(encoding="utf-8")))
+    walk(read_json(scene))
     return [scene, *sorted(found)]
 
 
@@ -72,16 +72,23 @@ def shown(command):
     return shlex.join(short)
 
 
+def read_json(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
 def write_json(path, value):
     beside = path.with_name(f".{path.name}.part")
     beside.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
     beside.replace(path)
 
 
-def forms_of(scene, models):
+def forms_of(scene, models, native):
     """Forms to render: each kind that every material has, a mixture where only some have the exact
-    one, what the scene itself asks for, and Blender's own node as the unit of cost."""
+    one, what the scene itself asks for, Blender's own node as the unit of cost, and others of its
+    nodes where they were fitted to every material."""
     forms = ["glossy"]
+    fitted = [native.get(name, {}) for name in scene["materials"]]
+    forms += [node for node in ("principled", "metallic") if all(node in f for f in fitted)]
     available = [models[m["model"]]["representations"] for m in scene["materials"].values()]
     if all("exact" in a for a in available):
         forms.append("exact")
@@ -103,25 +110,30 @@ def render_reference(tool, folder, spp):
     return {"command": shown(map(str, command)), "wall_seconds": time.perf_counter() - start}
 
 
+def render_jobs(extension, folder, jobs):
+    """Renders jobs in one process, in their order; returns command and records. Each is (name,
+    scene, picture, form, samples, seed), files in `folder`."""
+    keys = ("name", "scene", "out", "representation", "spp", "seed")
+    listed = [dict(zip(keys, job, strict=True)) for job in jobs]
+    for job in listed:
+        job |= {key: str(folder / job[key]) for key in ("scene", "out")}
+        job["name"] = f"{folder.name} {job['name']}"
+        job["native"] = str(folder / "native.json")
+    file = folder / f"{Path(jobs[0][1]).stem}-jobs.json"
+    write_json(file, listed)
+    command = [sys.executable, RENDER_SCENE, "--extension", extension, "--jobs", file]
+    records = json.loads(run(command, stdout=subprocess.PIPE).stdout)
+    return {"command": shown(map(str, command)), "records": records}
+
+
 def render_blender(extension, folder, forms, spp, seeds):
-    """Renders every form with every seed, in turns in one process; returns command and records."""
+    """Renders every form with every seed, in turns."""
     jobs = [
-        {
-            "name": f"{folder.name} {form} {seed}/{seeds}",
-            "scene": str(folder / "scene.json"),
-            "out": str(folder / f"{form}-{seed}.exr"),
-            "representation": form,
-            "spp": spp,
-            "seed": seed,
-        }
+        (f"{form} {seed}/{seeds}", "scene.json", f"{form}-{seed}.exr", form, spp, seed)
         for seed in range(1, seeds + 1)
         for form in forms
     ]
-    write_json(folder / "jobs.json", jobs)
-    command = [sys.executable, RENDER_SCENE, "--extension", extension]
-    command += ["--jobs", folder / "jobs.json"]
-    records = json.loads(run(command, stdout=subprocess.PIPE).stdout)
-    return {"command": shown(map(str, command)), "records": records}
+    return render_jobs(extension, folder, jobs)
 
 
 def smaller(scene, longest):
@@ -133,29 +145,24 @@ def smaller(scene, longest):
 
 
 def render_convergence(extension, folder, scene, forms):
-    """A smaller picture in every form with more and more samples; returns command and records."""
-    out = folder / "convergence"
-    out.mkdir(exist_ok=True)
+    """A smaller picture in every form with more and more samples."""
+    (folder / "convergence").mkdir(exist_ok=True)
     # Beside the scene, so that its meshes and images are found.
     write_json(folder / "convergence.json", smaller(scene, CONVERGENCE_SIZE))
     jobs = [
-        {
-            "name": f"{folder.name} {form}, {spp} samples, {seed}/{CONVERGENCE_SEEDS}",
-            "scene": str(folder / "convergence.json"),
-            "out": str(out / f"{form}-{spp}-{seed}.exr"),
-            "representation": form,
-            "spp": spp,
-            "seed": seed,
-        }
+        (
+            f"{form}, {spp} samples, {seed}/{CONVERGENCE_SEEDS}",
+            "convergence.json",
+            f"convergence/{form}-{spp}-{seed}.exr",
+            form,
+            spp,
+            seed,
+        )
         for spp in CONVERGENCE_SPP
         for seed in range(1, CONVERGENCE_SEEDS + 1)
         for form in forms
     ]
-    write_json(folder / "convergence-jobs.json", jobs)
-    command = [sys.executable, RENDER_SCENE, "--extension", extension]
-    command += ["--jobs", folder / "convergence-jobs.json"]
-    records = json.loads(run(command, stdout=subprocess.PIPE).stdout)
-    return {"command": shown(map(str, command)), "records": records}
+    return render_jobs(extension, folder, jobs)
 
 
 def convergence_runs(forms, records):
@@ -177,9 +184,25 @@ def convergence_runs(forms, records):
     return out
 
 
-def materials_of(record):
-    """The materials of a record in the form of runs.json; Blender's own nodes have no entry."""
+def materials_of(record, native):
+    """The materials of a record in the form of runs.json; of Blender's own nodes those that were
+    fitted."""
     out = []
+    node = record["representation"]
+    for name, nodes in native.items():
+        if node in nodes:
+            error = {"relative_l1": nodes[node]["relative_l1"], "albedo": None}
+            model = f"Blender's {node.capitalize()}"
+            closures = 2 if node == "principled" else 1
+            out.append(
+                {
+                    "id": name,
+                    "model": model,
+                    "representation": "fitted",
+                    "closures": closures,
+                    "error": error,
+                }
+            )
     for name, groups in record["materials"].items():
         for group in groups:
             if "model" in group:
@@ -188,14 +211,14 @@ def materials_of(record):
     return out
 
 
-def form_run(form, records):
+def form_run(form, records, native):
     return {
         "form": form,
         "images": [Path(r["out"]).name for r in records],
         "spp": records[0]["settings"]["spp"],
         "cpu_seconds": [r["sampling_cpu_seconds"] for r in records],
         "wall_seconds": [r["wall_seconds"] for r in records],
-        "materials": materials_of(records[0]),
+        "materials": materials_of(records[0], native),
     }
 
 
@@ -220,15 +243,19 @@ def render_scene(source, options, models, versions):
     folder = options.out / source.stem
     folder.mkdir(parents=True, exist_ok=True)
     run([options.tool, "scene", source, "--out", folder])
+    if options.size:
+        write_json(folder / "scene.json", smaller(read_json(folder / "scene.json"), options.size))
     inputs = digest(*resolved_files(folder))
-    scene = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
+    scene = read_json(folder / "scene.json")
     settings = scene["settings"]
     blender_spp = max(1, settings["spp"] // options.seeds)
     reference_spp = settings["spp"] * options.reference_factor
-    forms = forms_of(scene, models)
+    native = options.native.get(source.stem, {}).get("materials", {})
+    write_json(folder / "native.json", native)
+    forms = forms_of(scene, models, native)
 
     state_file = folder / "state.json"
-    state = json.loads(state_file.read_text(encoding="utf-8")) if state_file.exists() else {}
+    state = read_json(state_file) if state_file.exists() else {}
     key = digest(versions["tool"], inputs, reference_spp)
     reference, kept_reference = cached(
         state,
@@ -238,7 +265,15 @@ def render_scene(source, options, models, versions):
         lambda: render_reference(options.tool, folder, reference_spp),
     )
     write_json(state_file, state)
-    key = digest(versions["extension"], inputs, RENDER_SCENE, forms, blender_spp, options.seeds)
+    key = digest(
+        versions["extension"],
+        inputs,
+        RENDER_SCENE,
+        folder / "native.json",
+        forms,
+        blender_spp,
+        options.seeds,
+    )
     images = [folder / f"{f}-{s}.exr" for f in forms for s in range(1, options.seeds + 1)]
     blender, kept_blender = cached(
         state,
@@ -262,7 +297,7 @@ def render_scene(source, options, models, versions):
         write_json(state_file, state)
 
     records = blender["records"]
-    runs = [form_run(f, [r for r in records if r["representation"] == f]) for f in forms]
+    runs = [form_run(f, [r for r in records if r["representation"] == f], native) for f in forms]
     provenance = {
         "Blender": records[0]["blender"],
         "Extension": f"{options.extension.name}, sha256 {versions['extension']}",
@@ -323,6 +358,10 @@ def main():
         help="also smaller pictures with 16, 256 and 1024 samples a pixel, for cost at equal error",
     )
     parser.add_argument(
+        "--native", type=Path, help="output of native_nodes.py: also render Blender's own nodes"
+    )
+    parser.add_argument("--size", type=int, help="at most so many pixels along the longer side")
+    parser.add_argument(
         "--reference-factor", type=int, default=4, help="times the scene's samples (4)"
     )
     options = parser.parse_args()
@@ -336,6 +375,7 @@ def main():
         if not path.is_file():
             parser.error(f"{path}: no such file")
 
+    options.native = read_json(options.native) if options.native else {}
     with zipfile.ZipFile(options.extension) as archive:
         models = json.loads(archive.read("manifest.json"))["models"]
     version = run([options.tool, "--version"], stdout=subprocess.PIPE, text=True)

@@ -9,8 +9,9 @@ whose repetitions take turns so that their run times can be compared:
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
-"repeat": ...}, ...]; all but scene and out are optional and default to the options of the command
-line. Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
+"repeat": ..., "native": ...}, ...]; all but scene and out are optional and default to the options
+of the command line. "native" names a file with a scene's materials of script/native_nodes.py.
+Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
 usage or input.
 """
 
@@ -92,7 +93,8 @@ def render_once(bpy, loader, job, repetition):
     with quiet():
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     start = time.perf_counter()
-    scene = loader.load_scene(job["scene"], representation=job["representation"])
+    native = json.loads(Path(job["native"]).read_text("utf-8")) if job["native"] else None
+    scene = loader.load_scene(job["scene"], job["representation"], native=native)
     load_wall = time.perf_counter() - start
     samples = job["spp"] or scene.cycles.samples
     if job["seed"] is not None:
@@ -164,6 +166,7 @@ def read_jobs(options):
         "spp": options.spp,
         "seed": options.seed,
         "repeat": options.repeat,
+        "native": None,
     }
     if options.jobs:
         try:
@@ -241,7 +244,8 @@ def main():
     parser.add_argument(
         "--representation",
         default="scene",
-        help="scene (as the file says), auto, exact, sampled, or glossy for Blender's own node",
+        help="scene (as the file says), auto, exact, sampled; glossy, principled or metallic for "
+        "Blender's own nodes",
     )
     parser.add_argument("--spp", type=int, help="samples a pixel; default: as the scene says")
     parser.add_argument("--seed", type=int, help="random numbers; default: as the scene says")

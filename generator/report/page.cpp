@@ -30,7 +30,22 @@ std::string models_of(const FormReport& f) {
   return out;
 }
 
-std::string label(const FormReport& f) { return f.form == kNativeForm ? "Blender's Glossy node" : f.form; }
+/// Blender's own nodes, by form.
+constexpr std::pair<const char*, const char*> kNodes[] = {
+    {kNativeForm, "Blender's Glossy node"},
+    {"principled", "Blender's Principled node"},
+    {"metallic", "Blender's Metallic node"},
+};
+
+bool is_native(const FormReport& f) {
+  return std::any_of(std::begin(kNodes), std::end(kNodes), [&](const auto& n) { return f.form == n.first; });
+}
+
+std::string label(const FormReport& f) {
+  const auto node =
+      std::find_if(std::begin(kNodes), std::end(kNodes), [&](const auto& n) { return f.form == n.first; });
+  return node == std::end(kNodes) ? f.form : node->second;
+}
 
 std::string accepted(const FormReport& f) {
   if (!f.test) return kDash;
@@ -65,7 +80,7 @@ void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
     put(out, "<tbody class=\"scene\">\n");
     for (std::size_t i = 0; i < s.forms.size(); ++i) {
       const FormReport& f = s.forms[i];
-      put(out, "<tr{}>", f.form == kNativeForm ? " class=\"native\"" : "");
+      put(out, "<tr{}>", is_native(f) ? " class=\"native\"" : "");
       if (i == 0)
         put(out, "<td class=\"left\" rowspan=\"{}\"><a href=\"#{}\">{}</a></td>", s.forms.size(), escaped(s.scene),
             escaped(s.scene));
@@ -199,6 +214,8 @@ samples a pixel, in units of the time which that takes.</dd>
 <dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Sampled forms are exact in
 expectation: their error is noise.</dd>
 <dt>Blender's Glossy node</dt><dd>The unit of cost, and what a scene looks like without these models.</dd>
+<dt>Blender's nodes, fitted</dt><dd>What one would take instead: parameters that come nearest to the model, by least squares of
+f cos over directions. Their own error is what is left then.</dd>
 </dl></section>
 )",
       fmt::arg("minus", kMinus), fmt::arg("epsilon", kRelMseEpsilon), fmt::arg("tile", kTestTile),

@@ -12,7 +12,8 @@
 //       "image": "reference.exr",            radiance, with its variance layer
 //       "spp": 1024, "wall_seconds": 3.1
 //     },
-//     "runs": [                              one element a form; "glossy" is Blender's own Glossy node
+//     "runs": [                              one element a form; "glossy", "principled", "metallic" are Blender's own
+//     nodes
 //       {
 //         "form": "exact",                   unique within the scene
 //         "images": ["exact-0.exr", ...],    equal samples, different seeds; their mean is shown
