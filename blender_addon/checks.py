@@ -175,6 +175,11 @@ def _albedo_passes(material, scene):
         )
 
 
+def _albedo_passes_mirror(material, scene):
+    # Measured: from 5.2 the denoiser counts a part of a mirror beside drawn directions.
+    return _albedo_passes(material, scene) if bpy.app.version >= (5, 2, 0) else None
+
+
 def _normal_pass(material, scene):
     cycles = scene.cycles
     denoised = cycles.use_denoising and cycles.denoising_input_passes == "RGB_ALBEDO_NORMAL"
@@ -198,6 +203,7 @@ DECLARED = {
     "caustics": _caustics,
     "filter_glossy": _filter_glossy,
     "albedo_passes": _albedo_passes,
+    "albedo_passes_mirror": _albedo_passes_mirror,
     "clamp_low": _clamp_low,
     "clamp_mirror": _clamp_mirror,
     "normal_pass": _normal_pass,

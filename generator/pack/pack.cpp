@@ -124,6 +124,7 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   else if (shader.slots > shader.closures)
     codes.push_back("clamp_low");
   if (mirror) codes.push_back("filter_glossy");
+  if (mirror && kind == RepresentationKind::Sampled) codes.push_back("albedo_passes_mirror");
   // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
   // do not see.
   if (kind == RepresentationKind::Exact && shader.slots > shader.closures) codes.push_back("albedo_passes");
