@@ -27,8 +27,10 @@ def manifest():
     path = ROOT / "manifest.json"
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise PackError(f"{path}: {error}; reinstall the extension") from error
+    if not isinstance(data, dict) or not isinstance(data.get("models"), dict):
+        raise PackError(f"{path}: expected an object with models; reinstall the extension")
     if data.get("format") != FORMAT:
         raise PackError(f"{path}: format {data.get('format')!r}, expected {FORMAT}")
     return data
