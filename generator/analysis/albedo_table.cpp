@@ -32,6 +32,8 @@ constexpr int kProofSamples = 1 << 13;
 // Neighbouring knots use the same samples, so that their errors go together: this share of them does not.
 constexpr double kProfileNoise = 0.05;
 constexpr AlbedoOptions kProofOptions{.absolute = 1e-6, .max_cells = 2000, .witnesses = 1 << 15};
+// Probes near the ends of all ranges at once; they follow the one at the defaults.
+constexpr std::size_t kCorners = 4;
 /// Averaged over the azimuth of the view direction.
 constexpr std::nullopt_t kAllAzimuths = std::nullopt;
 
@@ -267,7 +269,13 @@ class Tabulator {
     for (std::size_t i = 1; i < coordinates_.size(); ++i)
       defaults.push_back(model_.info().param(coordinates_[i].name)->value[0]);
     probes_.push_back(defaults);
-    for (int i = 0; i < 7; ++i) probes_.push_back(random_position(random));
+    // Near the ends of ranges, where peaks stand that random places miss.
+    for (std::size_t i = 0; i < kCorners; ++i) {
+      Position corner;
+      for (const Coordinate& c : coordinates_) corner.push_back(c.at(random() & 1 ? 0.97 : 0.03));
+      probes_.push_back(corner);
+    }
+    for (int i = 0; i < 5; ++i) probes_.push_back(random_position(random));
     // Coefficients that agree elsewhere may part at grazing views, where lobes lose what falls below the surface.
     places_ = probes_;
     for (int i = 0; i < 12; ++i) {
@@ -410,7 +418,7 @@ class Tabulator {
   std::vector<TableAxis> place_knots(const ParamValues& combination, const std::vector<NewTerm>& group) const {
     constexpr int kProfile = 33;
     const std::vector<std::size_t>& axes = group[0].axes;
-    const std::size_t lines = std::min<std::size_t>(probes_.size(), axes.size() > 1 ? 5 : 1);
+    const std::size_t lines = std::min<std::size_t>(probes_.size(), axes.size() > 1 ? 8 : 1);
     std::vector<std::vector<double>> density(axes.size(), std::vector<double>(kProfile, 0.));
     std::vector<std::vector<double>> s(axes.size(), std::vector<double>(kProfile));
     std::vector<double> bend(axes.size(), 0.);  // error = bend / knots^2
@@ -423,7 +431,9 @@ class Tabulator {
         x[axes[a]] = c.at(double(i % kProfile) / (kProfile - 1));
         profile[i] = coefficients(combination, x, kAllAzimuths, axes.size() > 1 ? kGridSamples : 4 * kProofSamples);
       });
-      for (std::size_t line = 0; line < lines; ++line)
+      for (std::size_t line = 0; line < lines; ++line) {
+        // Of few axes the random places see the peaks as well, and the ends would take more knots than they need.
+        const double weight = line > 0 && line <= kCorners && axes.size() <= 2 ? 0.5 : 1;
         for (int j = 1; j + 1 < kProfile; ++j) {
           const Coefficients* f = &profile[line * kProfile + std::size_t(j)];
           const double h0 = s[a][std::size_t(j)] - s[a][std::size_t(j) - 1],
@@ -433,9 +443,11 @@ class Tabulator {
             const Rgb<double> f0 = pick(f[-1], t), f1 = pick(f[0], t), f2 = pick(f[1], t);
             const double second = max_abs((f2 - f1) / h1 - (f1 - f0) / h0) * 2 / (h0 + h1);
             if (second > noise)
-              density[a][std::size_t(j)] = std::max(density[a][std::size_t(j)], std::sqrt(second / unit_of(f1)));
+              density[a][std::size_t(j)] =
+                  std::max(density[a][std::size_t(j)], weight * std::sqrt(second / unit_of(f1)));
           }
         }
+      }
       density[a].front() = density[a][1];
       density[a].back() = density[a][kProfile - 2];
       double total = 0;
