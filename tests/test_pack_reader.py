@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's reader of its own pack: whatever the file holds, it is read or refused in words."""
+"""The extension reads its own pack, or refuses it in words, whatever is in the file."""
 
 import importlib.util
 import random
