@@ -397,29 +397,37 @@ def ra_pdf(p, wi, wo):
 # ---- The same paper's construction, eqs. 9 to 13, from a kernel, by numerical integrals ----------
 
 
-def kernel(p, u):
+HEIGHTS = ["h0", "h1", "h2", "h3", "h4", "h5"]
+
+
+def kernel(name, heights, u):
     u = abs(u)
-    return mp.exp(-u) if p["kernel"] == "exponential" else mp.sech(u) ** 2
+    if name == "table":
+        i = min(int(u), 5)
+        return heights[5] if i == 5 else heights[i] + (heights[i + 1] - heights[i]) * (u - i)
+    return mp.exp(-u) if name == "exponential" else mp.sech(u) ** 2
 
 
 @functools.cache
-def lossless_place(name, n, x):
+def lossless_place(name, heights, n, x):
     """x' with marginal x, the marginal's density there, the kernel's integral over the square."""
-    p = {"kernel": name}
-    # Cut at the peak and where it has faded.
-    peak = [s * w / n for s in (-1, 1) for w in (1, 4, 12, 30, 60)] + [0]
+    # Cut at the peak, at a curve's knots and where it has faded.
+    peak = [s * w / n for s in (-1, 1) for w in (1, 2, 3, 4, 5, 12, 30, 60)] + [0]
 
     def integral(of, low, high, *cuts):
         ends = {low, high, *peak, *cuts}
         return mp.quad(of, sorted(e for e in ends if low <= e <= high))
 
     def density(t):
-        return integral(lambda d: kernel(p, n * d), -t, 1 - t)
+        return integral(lambda d: kernel(name, heights, n * d), -t, 1 - t)
 
     def mass(t):
         """Of the strip below t: by the difference d, and the length of the line where it is d."""
         return integral(
-            lambda d: kernel(p, n * d) * (min(t, 1 - d) - max(0, -d)), -t, mp.mpf(1), 1 - t
+            lambda d: kernel(name, heights, n * d) * (min(t, 1 - d) - max(0, -d)),
+            -t,
+            mp.mpf(1),
+            1 - t,
         )
 
     whole = mass(mp.mpf(1))
@@ -440,9 +448,11 @@ def lossless_f(p, wi, wo):
     if p["n"] == 0:
         return [c / mp.pi for c in p["tint"]]
     mp.mp.dps, n = 24, mp.mpf(p["n"])
-    a, ma, whole = lossless_place(p["kernel"], n, ki[2] ** 2)
-    b, mb, _ = lossless_place(p["kernel"], n, ko[2] ** 2)
-    f_theta = 2 * kernel(p, n * (a - b)) * whole / (ma * mb)
+    heights = tuple(mp.mpf(p[k]) for k in HEIGHTS) if p["kernel"] == "table" else ()
+    shape = p["kernel"], heights
+    a, ma, whole = lossless_place(*shape, n, ki[2] ** 2)
+    b, mb, _ = lossless_place(*shape, n, ko[2] ** 2)
+    f_theta = 2 * kernel(*shape, n * (a - b)) * whole / (ma * mb)
     return [f_theta / (2 * mp.pi) * c for c in p["tint"]]
 
 
@@ -1055,13 +1065,15 @@ MODELS = {
         f=lossless_f,
         pdf=lossless_pdf,
         albedo=lambda p, c: p["tint"],
-        defaults={"kernel": "sech2", "n": 4, "tint": (1, 1, 1)},
+        defaults={"kernel": "sech2", "n": 4, "tint": (1, 1, 1)}
+        | dict(zip(HEIGHTS, (1, 0.6, 0.2, 0.1, 0.06, 0.05), strict=True)),
         cases=[
             {},
             {"n": 0.3, "tint": (0.9, 0.5, 0.1)},
             {"n": 25},
             {"kernel": "exponential", "n": 0.3},
             {"kernel": "exponential", "n": 8},
+            {"kernel": "table", "n": 7, "h1": 0.9, "h3": 0.3},
         ],
         cosines=[1, 0.5, 0.05],
         # Numerical integrals.
@@ -1255,6 +1267,8 @@ def tolerance(function, p, wi, wo, base):
     total = mp.mpf(0)
     moves = [("wi", i) for i in range(3)] + [("wo", i) for i in range(3)]
     unused = {"ior"} if p.get("around") in ("reflection", "retro") else set()
+    if p.get("kernel") in ("sech2", "exponential"):
+        unused = set(HEIGHTS)
     moves += [(k, None) for k, v in p.items() if isinstance(v, (int, float)) and k not in unused]
     for what, i in moves:
         q, a, b = dict(p), [mp.mpf(c) for c in wi], [mp.mpf(c) for c in wo]

@@ -447,7 +447,10 @@ Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& optio
       return {samples.value, std::max(s, apart)};
     }
     // Two meshes that agree are right; the samples, which all trust the density, may then not be.
-    if (effort > 0 && d <= slack && directions_moved <= slack) return {directions.value, std::max(d, directions_moved)};
+    // Except for edges across the cells, which both may take for smooth.
+    constexpr double kEdges = 3e-5;
+    if (effort > 0 && d <= slack && directions_moved <= slack)
+      return {directions.value, std::max({d, directions_moved, std::min(apart, kEdges)})};
     // One that is thin and curved never converges over directions, however many guides there are.
     ridge = effort > 0 && d > slack;
   }

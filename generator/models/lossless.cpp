@@ -7,10 +7,11 @@
 // With A(u) the integral of k over [0, u], B that of A, and S(x') = A(n x') + A(n (1 - x')):
 //   marginal  M(x') = [B(n x') + B(n) - B(n (1 - x'))] / (2 B(n)), its density n S(x') / (2 B(n)),
 //   lobe      f_theta(x, y) = 4 B(n) k(n |x' - y'|) / (S(x') S(y')),  M(x') = x, M(y') = y,
-// which is eq. 13 put into eq. 9, with the factor 2 that eq. 8 asks for. k = sech^2 gives eq. 17.
+// which is eq. 13 put into eq. 9, with the factor 2 that eq. 8 asks for. k = sech^2 gives eq. 17. A kernel may also be
+// drawn: k linear between heights at u = 0, 1, ... 5 and constant beyond, whose integrals are sums over the pieces.
 //
 // Stable forms. v = n x' is found on the half where it is small, from x or 1 - x, whichever is smaller; B(n) - B(n - v)
-// and 1 - A are written out for each kernel, since they cancel. Newton's steps start at the ends of a bracket.
+// and 1 - A are written out for each kernel, since they cancel. Newton's steps stay in a bracket.
 // Sampling: w = A(n (x' - y')) is linear in the random number, so that only A is inverted, in closed form; then x =
 // M(x').
 #include "model/sampling.h"
@@ -34,9 +35,11 @@ std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step ste
 template <class T> struct Lossless {
   Choice kernel;
   T n;
+  static constexpr int kKnots = 6;
+  std::array<T, kKnots> heights;
   Rgb<T> tint;
 
-  enum { Sech2, Exponential };
+  enum { Sech2, Exponential, Table };
 
   static ModelInfo info() {
     return {.name = "lossless",
@@ -45,14 +48,23 @@ template <class T> struct Lossless {
             .equations = "eqs. 9-16",
             .doc = "Latitudinal reflection without loss made from a kernel; the light spreads over all azimuths.",
             .properties = {.lossless = true,
-                           .smooth = false,  // the exponential kernel has an edge at x = y
+                           .smooth = false,  // the exponential kernel has an edge at x = y, a drawn one at its knots
                            .diffuse_limit = "n=0"},
             .params = {}};
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(kernel, ChoiceSpec{"kernel", "Kernel", {"sech2", "exponential"}, "Shape k(u): sech^2 u (eq. 14) or e^-u"});
+    v(kernel, ChoiceSpec{"kernel",
+                         "Kernel",
+                         {"sech2", "exponential", "table"},
+                         "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, ... 5"});
     v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e8, 0, 100, "Glossiness n: 0 is matte"});
+    static constexpr const char* kNames[] = {"h0", "h1", "h2", "h3", "h4", "h5"};
+    static constexpr const char* kLabels[] = {"Height 0", "Height 1", "Height 2", "Height 3", "Height 4", "Height 5"};
+    static constexpr double kDrawn[] = {1, 0.6, 0.2, 0.1, 0.06, 0.05};
+    for (int i = 0; i < kKnots; ++i)
+      v(heights[std::size_t(i)], NumberSpec{kNames[i], kLabels[i], kDrawn[i], 1e-3, 1, 1e-3, 1,
+                                            "Height of the drawn kernel at the distance of this number, over 1 / n"});
     v(tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
   }
 
@@ -81,13 +93,50 @@ template <class T> struct Lossless {
   /// n; what is added at n = 0 changes no digit and keeps 0 / 0 away.
   T gloss() const { return named("n_pos", maximum(n, T(1e-17))); }
 
+  /// The drawn kernel at x, which lies in piece i: linear between two knots, constant beyond the last.
+  T drawn(int i, const T& x) const {
+    if (i == kKnots - 1) return heights[std::size_t(i)];
+    return heights[std::size_t(i)] * (T(i + 1) - x) + heights[std::size_t(i) + 1] * (x - T(i));
+  }
+  /// Its integral over [a, b], and that of (c - x) times it for c >= b: sums of positive terms, exact for these curves.
+  std::array<T, 2> integrals(const T& a, const T& b, const T& c) const {
+    T area(0), moment(0);
+    for (int i = 0; i < kKnots; ++i) {
+      T lo = maximum(a, T(i)), hi = maximum(b, T(i));
+      if (i < kKnots - 1) lo = minimum(lo, T(i + 1)), hi = minimum(hi, T(i + 1));
+      const T at_lo = drawn(i, lo), at_hi = drawn(i, hi), width = hi - lo;
+      area = area + width * (at_lo + at_hi) / T(2);
+      // Simpson's rule. Pieces outside [a, b] have no width.
+      const T from_lo = maximum(c - lo, T(0)), from_hi = maximum(c - hi, T(0));
+      moment = moment + width * (from_lo * at_lo + (from_lo + from_hi) * (at_lo + at_hi) + from_hi * at_hi) / T(6);
+    }
+    return {named("area", area), named("moment", moment)};
+  }
+  /// u with A(u) = q: piece by piece, each a quadratic equation.
+  T invert_A(const T& q) const {
+    T rest = q, u(0);
+    for (int i = 0; i + 1 < kKnots; ++i) {
+      const T h = heights[std::size_t(i)], rise = heights[std::size_t(i) + 1] - h;
+      const T part = minimum(rest, h + rise / T(2));
+      u = u + T(2) * part / (h + sqrt(maximum(h * h + T(2) * rise * part, T(0))));
+      rest = rest - part;
+    }
+    return u + maximum(rest, T(0)) / heights[kKnots - 1];
+  }
+
   T k(const T& u) const {
+    if (kernel == Table) {
+      T value = drawn(0, minimum(u, T(1)));
+      for (int i = 1; i < kKnots; ++i) value = select(u > T(i), drawn(i, minimum(u, T(i + 1))), value);
+      return named("k", value);
+    }
     const T e = exp(-u);
     if (kernel == Exponential) return e;
     return sqr(T(2) * e / (T(1) + e * e));
   }
   /// A(u) for u >= 0.
   T A(const T& u) const {
+    if (kernel == Table) return integrals(T(0), u, u)[0];
     if (kernel == Exponential) return -expm1(-u);
     const T e = expm1(T(-2) * u);
     return -e / (T(2) + e);
@@ -99,6 +148,7 @@ template <class T> struct Lossless {
     return T(2) * e * e / (T(1) + e * e);
   }
   T B(const T& u) const {
+    if (kernel == Table) return integrals(T(0), u, u)[1];
     const T small = minimum(u, T(1)), large = maximum(u, T(1));
     if (kernel == Exponential) return select(u < T(1), psi(-small), large + expm1(-large));
     const T half = expm1(small) / T(2);
@@ -107,6 +157,7 @@ template <class T> struct Lossless {
   }
   /// B(g) - B(g - v) for 0 <= v <= g/2.
   T drop(const T& g, const T& v) const {
+    if (kernel == Table) return v * A(g - v) + integrals(g - v, g, g)[1];
     const T small = minimum(v, T(1));
     if (kernel == Exponential) {
       // v (1 - e^-g) - e^-g psi(v); for large v e^-g psi(v) = e^(v-g) - e^-g (1 + v).
@@ -123,20 +174,29 @@ template <class T> struct Lossless {
     return select(g < T(1), near, far);
   }
 
-  /// v = g x' with M(x') = p, for p <= 1/2. The root lies between g p and 2 g p, so that the digits double from the
-  /// start: eight steps are enough for any type.
+  /// v = g x' with M(x') = p, for p <= 1/2. Where the kernel falls with the distance the root lies between g p and
+  /// 2 g p, so that the digits double from the start: eight steps are enough for any type. A drawn one may rise.
   T invert_marginal(const T& g, const T& p) const {
     const T target = named("target", T(2) * B(g) * p);
-    const std::array<T, 3> state = settle(8, std::array<T, 3>{T(0), g / T(2), g * p}, [&](const std::array<T, 3>& s) {
-      const T v = s[2];
-      const T F = named("F", B(v) + drop(g, v));
-      const T dF = A(v) + A(g - v);
-      const auto below = F < target;
-      const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
-      const T newton = named("newton", v - (F - target) / maximum(dF, tiny<T>()));
-      const auto inside = newton >= lo && newton <= hi;
-      return std::array<T, 3>{lo, hi, select(inside, newton, (lo + hi) / T(2))};
-    });
+    const std::array<T, 3> state =
+        settle(kernel == Table ? 20 : 8, std::array<T, 3>{T(0), g / T(2), g * p}, [&](const std::array<T, 3>& s) {
+          const T v = s[2];
+          T F, dF;
+          if (kernel == Table) {
+            const std::array<T, 2> near = integrals(T(0), v, v);
+            const T far = A(g - v);
+            F = near[1] + v * far + integrals(g - v, g, g)[1];
+            dF = near[0] + far;
+          } else {
+            F = named("F", B(v) + drop(g, v));
+            dF = A(v) + A(g - v);
+          }
+          const auto below = F < target;
+          const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
+          const T newton = named("newton", v - (F - target) / maximum(dF, tiny<T>()));
+          const auto inside = newton >= lo && newton <= hi;
+          return std::array<T, 3>{lo, hi, select(inside, newton, (lo + hi) / T(2))};
+        });
     return state[2];
   }
 
@@ -173,12 +233,15 @@ template <class T> struct Lossless {
     // Along the axis away from the end that wo is nearer to: r below it, g - r beyond.
     const T r = o.v, rest = g - r;
     const T total = A(r) + A(rest);
-    // w = A(n (x' - y')), and 1 + w and 1 - w, which tell more where it is near 1.
+    // w = A(n (x' - y')), and where A ends at 1 also 1 + w and 1 - w, which tell more when it is near.
     const T w = named("w", u.y * total - A(r)), mild = minimum(maximum(w, T(-0.75)), T(0.75));
     const T up = one_minus_A(r) + u.y * total, down = one_minus_A(rest) + (T(1) - u.y) * total;
     const auto log_of = [](const T& v) { return log(maximum(minimum(v, T(1)), tiny<T>())); };
     T near, far;
-    if (kernel == Exponential) {
+    if (kernel == Table) {
+      near = invert_A(abs(w)) * select(w < T(0), T(-1), T(1));
+      far = near;
+    } else if (kernel == Exponential) {
       near = select(w < T(0), log1p(mild), -log1p(-mild));
       far = select(up < down, log_of(up), -log_of(down));
     } else {
