@@ -9,7 +9,12 @@ Names and values are those of the models' schema: numbers, colours as (r, g, b) 
 number, choices by identifier. `lobes` sets how many directions a sampled form draws.
 """
 
+import json
+import os
+from pathlib import Path
+
 import bpy
+import numpy as np
 
 from . import checks, nodes, pack
 from .checks import Finding, enable_osl, warnings
@@ -28,7 +33,9 @@ __all__ = [
     "prepare_material",
     "set_parameters",
     "switch_representation",
+    "used_materials",
     "warnings",
+    "write_materials",
 ]
 
 
@@ -131,6 +138,56 @@ def albedo(model, cos_theta_o, **parameters):
     if not 0 < cos_theta_o <= 1:
         raise ValueError(f"cos_theta_o: expected a number in (0, 1], got {cos_theta_o!r}")
     return energy.albedo(model, _checked(model, "auto", parameters)[1], cos_theta_o)
+
+
+def _as_typed(value):
+    """0.9 for the float that is next to it, so that a value is again the one that was given."""
+    if isinstance(value, tuple):
+        return [_as_typed(channel) for channel in value]
+    return float(str(np.float32(value))) if isinstance(value, float) else value
+
+
+def used_materials():
+    """How the open file uses the models, by material: as `materials` of a scene file has it.
+
+    A parameter that a link controls is {"varies": True}. A material with several model nodes
+    has an entry for each, MATERIAL/NODE.
+    """
+    found = {}
+    for material in bpy.data.materials:
+        ours = nodes.group_nodes(material)
+        for node in ours:
+            model_name, representation = nodes.identity(node)
+            parameters = dict(pack.fixed(model_name))
+            for name in pack.parameters(model_name):
+                value = nodes.get_value(node, name)
+                parameters[name] = {"varies": True} if value is None else _as_typed(value)
+            entry = {"model": model_name, "representation": representation}
+            if lobes := pack.representation(model_name, representation).get("lobes"):
+                value = nodes.get_value(node, pack.LOBES)
+                entry["lobes"] = lobes["max"] if value is None else value
+            entry["parameters"] = parameters
+            found[material.name if len(ours) == 1 else f"{material.name}/{node.name}"] = entry
+    return found
+
+
+def write_materials(path):
+    """Writes used_materials() for `brdfc build --materials`, which makes a pack of just that.
+
+    Returns how many there are. Raises ValueError if there is none, OSError if the file can't be
+    written; an older file is then as it was.
+    """
+    materials = used_materials()
+    if not materials:
+        raise ValueError("no material of this file has a reflection model of brdfc")
+    path = Path(path)
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(json.dumps({"materials": materials}, indent=1) + "\n", encoding="utf-8")
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return len(materials)
 
 
 def scene_warnings(scene):

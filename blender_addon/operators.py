@@ -177,7 +177,34 @@ class BRDFC_OT_switch(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_write_materials(Operator):
+    """List what this file uses, for `brdfc build --materials` to make an extension of it alone"""
+
+    bl_idname = "brdfc.write_materials"
+    bl_label = "Write Materials"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(name="File", subtype="FILE_PATH", default="materials.json")
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        path = bpy.path.abspath(self.filepath)
+        try:
+            count = api.write_materials(path)
+        except (*_ERRORS, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{path}: {count} materials")
+        return {"FINISHED"}
+
+
 _CLASSES = (
+    BRDFC_OT_write_materials,
     BRDFC_OT_add_node,
     BRDFC_OT_new_material,
     BRDFC_OT_enable_osl,

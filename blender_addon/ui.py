@@ -167,6 +167,7 @@ def draw_material(layout, material, scene):
     draw_warnings(layout, material, scene)
     for node in nodes.group_nodes(material):
         draw_node(layout.box(), node, material)
+    layout.operator("brdfc.write_materials", icon="EXPORT")
 
 
 class _BrdfcPanel:

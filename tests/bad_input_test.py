@@ -301,3 +301,33 @@ def test_output_that_nobody_takes():
     with open("/dev/full", "w") as full:
         done = subprocess.run([TOOL, "list"], stdout=full, stderr=subprocess.PIPE, text=True)
     refused(done, "No space left")
+
+
+def materials(**parameters):
+    return {"materials": {"m": {"model": "phong", "parameters": parameters}}}
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"materials": {}}, ["at least one material"]),
+        (materials(e={"varies": False}), ["materials.m.parameters.e.varies", "true"]),
+        (materials(e={"texture": "a.exr"}), ["materials.m.parameters.e", "texture"]),
+        (materials(gloss={"varies": True}), ["materials.m.parameters.gloss"]),
+        (materials(e=-1), ["materials.m.parameters.e"]),
+        (scene(), ["camera"]),
+    ],
+)
+def test_a_list_of_materials(content, words, tmp_path):
+    file = tmp_path / "m.json"
+    file.write_text(json.dumps(content))
+    refused(in_time("build", "--materials", file, "--out", tmp_path / "out"), "m.json", *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_has_no_values_from_elsewhere(tmp_path):
+    file = tmp_path / "s.json"
+    content = scene(**materials(e={"varies": True}))
+    file.write_text(json.dumps(content))
+    refused(in_time("build", "--scene", file, "--out", tmp_path), "parameters.e", "varies")
+    refused(in_time("build", "--all", "--explain", "--out", tmp_path), "--explain")

@@ -16,7 +16,7 @@ namespace {
 
 struct Options {
   bool all = false, json = false;
-  std::string scene, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
+  std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
 };
 
@@ -30,14 +30,12 @@ void print_table(const PackResult& result) {
                l.table_floats, l.table_error, l.bytes);
 }
 
-/// How the scene uses its materials.
-std::vector<MaterialNeed> needs_of(const Scene& scene) {
+/// How materials are used.
+std::vector<MaterialNeed> needs_of(const std::vector<Material>& materials) {
   std::vector<MaterialNeed> needs;
-  for (const Material& m : scene.materials) {
-    MaterialNeed need{m.id, m.model, m.values, {}, m.representation, kDefaultLobes};
+  for (const Material& m : materials) {
+    MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation, m.lobes};
     for (const auto& [name, image] : m.textures) need.textured.insert(name);
-    const nlohmann::json& resolved = scene.resolved.at("materials").at(m.id);
-    need.lobes = resolved.value("lobes", kDefaultLobes);
     needs.push_back(std::move(need));
   }
   return needs;
@@ -78,7 +76,8 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
     if (std::none_of(plan.begin(), plan.end(), [&, &n = name](const auto& p) { return p.model->info().name == n; }))
       unused.push_back(name);
   if (options.json) {
-    nlohmann::ordered_json out{{"scene", options.scene}, {"models", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json out{{"scene", options.scene.empty() ? options.materials : options.scene},
+                               {"models", nlohmann::ordered_json::array()}};
     for (const PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
     out["unused_models"] = unused;
     fmt::print("{}\n", out.dump(2));
@@ -97,10 +96,15 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
 }
 
 void run(const Options& options) {
-  if (int(options.all) + int(!options.scene.empty()) + int(!options.models.empty()) != 1)
-    input_error("build: expected one of --all, --scene FILE or --model NAME");
+  if (int(options.all) + int(!options.scene.empty()) + int(!options.materials.empty()) + int(!options.models.empty()) !=
+      1)
+    input_error("build: expected one of --all, --scene FILE, --materials FILE or --model NAME");
+  if (options.json && options.scene.empty() && options.materials.empty())
+    input_error("build: --explain goes with --scene FILE or --materials FILE");
   const std::vector<PlannedModel> plan =
-      options.scene.empty() ? plan_models(options.models) : plan_scene(needs_of(load_scene(options.scene)));
+      !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials))
+      : !options.materials.empty() ? plan_scene(needs_of(load_materials(options.materials)))
+                                   : plan_models(options.models);
   PackOptions pack{options.out, options.addon, plan, {}};
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
@@ -108,7 +112,7 @@ void run(const Options& options) {
     fmt::print(stderr, "brdfc build: {}/{} {:<20} {:6.1f} s\n", done, total, what, seconds);
   };
   const PackResult result = build_pack(pack);
-  if (options.scene.empty())
+  if (options.scene.empty() && options.materials.empty())
     print_table(result);
   else
     explain(options, plan, result);
@@ -121,11 +125,13 @@ void add_build_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* c = app.add_subcommand("build", "Write the Blender extension");
   c->add_flag("--all", options->all, "Every model");
-  CLI::Option* scene = c->add_option(
+  c->add_option(
       "--scene", options->scene,
       "Only what the materials of a scene file need: models, forms, lobes, and parameters that are not constant");
-  c->add_flag("--explain", options->json, "With --scene: what is left out, why and what that saves, as JSON")
-      ->needs(scene);
+  c->add_option("--materials", options->materials,
+                "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses");
+  c->add_flag("--explain", options->json,
+              "With --scene or --materials: what is left out, why and what that saves, as JSON");
   c->add_option("--model", options->models, "Only these models (repeat for several)");
   c->add_option("--out", options->out, "Folder for the extension and its zip")->required();
   c->add_option("--addon", options->addon, "Folder with the add-on's Python");

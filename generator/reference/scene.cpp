@@ -60,6 +60,14 @@ class Loader {
  public:
   explicit Loader(const fs::path& path) : path_(path), json_(read_json(path)) {}
 
+  std::vector<Material> load_materials() {
+    const JsonView root(json_, path_.string());
+    root.only({"$schema", "materials"});
+    materials_alone_ = true;
+    read_materials(root.at("materials"));
+    return std::move(scene_.materials);
+  }
+
   Scene load() {
     const JsonView root(json_, path_.string());
     root.only(
@@ -202,7 +210,11 @@ class Loader {
             for (const ParamInfo& each : info.params) known.push_back(each.name);
             value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
           }
-          if (value.json().is_object()) {
+          if (materials_alone_ && value.json().is_object()) {
+            value.only({"varies"});
+            if (!value.at("varies").boolean()) value.at("varies").fail("true, or the parameter's value");
+            material.varying.insert(name);
+          } else if (value.json().is_object()) {
             value.only({"texture"});
             if (p->kind == ParamKind::Choice) value.error("a choice can't be textured");
             const auto image = read_texture(value.at("texture"), resolved["parameters"][name]);
@@ -215,7 +227,7 @@ class Loader {
         }
       if (const auto v = m.find("representation")) material.representation = v->text();
       resolved["representation"] = material.representation;
-      if (const auto v = m.find("lobes")) resolved["lobes"] = v->integer(1, 8);
+      if (const auto v = m.find("lobes")) resolved["lobes"] = material.lobes = v->integer(1, 8);
       try {
         material.values = complete(info, material.values);
       } catch (const InputError& e) {
@@ -474,6 +486,7 @@ class Loader {
 
   fs::path path_;
   json json_;
+  bool materials_alone_ = false;
   Scene scene_;
 };
 
@@ -502,6 +515,8 @@ Rgb<double> Environment::radiance(const Vec3<double>& direction) const {
 }
 
 Scene load_scene(const fs::path& path) { return Loader(path).load(); }
+
+std::vector<Material> load_materials(const fs::path& path) { return Loader(path).load_materials(); }
 
 void write_resolved(const Scene& scene, const fs::path& folder) {
   for (const auto& [stem, mesh] : scene.mesh_files) {

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,9 @@ struct Material {
   const Model* model = nullptr;
   ParamValues values;  ///< complete; for a textured parameter the mean of its texture
   std::map<std::string, std::shared_ptr<const Image>> textures;
+  std::set<std::string> varying;  ///< parameters that something not known here sets; only from load_materials()
   std::string representation = "auto";
+  int lobes = 1;  ///< directions that a sampled form draws
 };
 
 /// world = matrix * object + translation
@@ -106,6 +109,10 @@ struct Scene {
 
 /// Throws InputError naming the file, the key and what was expected.
 Scene load_scene(const std::filesystem::path& path);
+
+/// The materials of a file that has nothing but the schema's "materials", with {"varies": true} in place of the value
+/// of a parameter that is not constant. Throws as load_scene().
+std::vector<Material> load_materials(const std::filesystem::path& path);
 
 /// Writes scene.json, the meshes as .npy and the images as .exr into the folder, scene.json last.
 void write_resolved(const Scene& scene, const std::filesystem::path& folder);

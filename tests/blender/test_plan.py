@@ -95,3 +95,40 @@ def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):
     assert done.returncode == 2
     assert "radziszewski_alda.n" in done.stderr and "built for one scene" in done.stderr
     assert not (tmp_path / "a.exr").exists()
+
+
+def test_what_a_blend_file_uses_is_all_that_a_pack_holds(extension, empty, tool, tmp_path):
+    api, bpy = extension.api, extension.api.bpy
+    api.new_material("radziszewski_alda", n=7.0, tint=(0.9, 0.5, 0.25), lobes=2)
+    varied = api.new_material("ward", ax=0.25, normalisation="duer")
+    node = extension.nodes.group_nodes(varied)[0]
+    value = varied.node_tree.nodes.new("ShaderNodeValue")
+    varied.node_tree.links.new(value.outputs[0], extension.nodes.sockets(node)["ay"])
+    bpy.data.materials.new("of another kind")
+    file = tmp_path / "materials.json"
+    assert bpy.ops.brdfc.write_materials(filepath=str(file)) == {"FINISHED"}
+    content = json.loads(file.read_text())["materials"]
+    assert set(content) == {"Radziszewski-Alda", "Ward"}
+    assert content["Ward"]["parameters"]["ay"] == {"varies": True}
+    assert content["Radziszewski-Alda"]["lobes"] == 2
+
+    why = json.loads(tool("build", "--materials", file, "--out", tmp_path / "cut", "--explain"))
+    lobe, ward = why["models"]
+    assert (lobe["model"], lobe["free"]) == ("radziszewski_alda", [])
+    assert lobe["fixed"]["n"] == 7 and lobe["fixed"]["tint"] == [0.9, 0.5, 0.25]
+    assert (ward["model"], ward["free"]) == ("ward", ["ay"])
+    assert ward["fixed"]["normalisation"] == "duer"
+    assert "lambert" in why["unused_models"]
+    for model in why["models"]:
+        for form in model["forms"]:
+            assert form["after"]["bytes"] < form["before"]["bytes"] / 2
+
+
+def test_a_list_of_materials_that_cannot_be_written(extension, empty, tmp_path):
+    bpy = extension.api.bpy
+    with pytest.raises(RuntimeError, match="no material of this file"):
+        bpy.ops.brdfc.write_materials(filepath=str(tmp_path / "none.json"))
+    assert not (tmp_path / "none.json").exists()
+    extension.api.new_material("lambert")
+    with pytest.raises(RuntimeError, match="absent"):
+        bpy.ops.brdfc.write_materials(filepath=str(tmp_path / "absent" / "m.json"))
