@@ -180,7 +180,7 @@ void put_scene(std::string& out, const SceneReport& s, const Previews& p) {
                                               escaped(p.forms[i].equal_time), scientific(f.equal_time.rel_mse))
                                 : std::string(),
         p.forms[i].p_values.empty() ? std::string()
-                                    : fmt::format("<br><a href=\"{}\">p-values</a>: {} of the pixels",
+                                    : fmt::format("<br>pixels accepted (<a href=\"{}\">p-values</a>): {}",
                                                   escaped(p.forms[i].p_values), accepted(f)));
   }
   out += "</div>\n";
