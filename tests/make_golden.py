@@ -397,14 +397,14 @@ def ra_pdf(p, wi, wo):
 # ---- The same paper's construction, eqs. 9 to 13, from a kernel, by numerical integrals ----------
 
 
-HEIGHTS = ["h0", "h1", "h2", "h3", "h4", "h5"]
+HEIGHTS = ["h0", "h1", "h2", "h3"]
 
 
 def kernel(name, heights, u):
     u = abs(u)
     if name == "table":
-        i = min(int(u), 5)
-        return heights[5] if i == 5 else heights[i] + (heights[i + 1] - heights[i]) * (u - i)
+        i = min(int(u), 3)
+        return heights[3] if i == 3 else heights[i] + (heights[i + 1] - heights[i]) * (u - i)
     return mp.exp(-u) if name == "exponential" else mp.sech(u) ** 2
 
 
@@ -1066,7 +1066,7 @@ MODELS = {
         pdf=lossless_pdf,
         albedo=lambda p, c: p["tint"],
         defaults={"kernel": "sech2", "n": 4, "tint": (1, 1, 1)}
-        | dict(zip(HEIGHTS, (1, 0.6, 0.2, 0.1, 0.06, 0.05), strict=True)),
+        | dict(zip(HEIGHTS, (1, 0.6, 0.2, 0.1), strict=True)),
         cases=[
             {},
             {"n": 0.3, "tint": (0.9, 0.5, 0.1)},

@@ -11,7 +11,7 @@
 // log(h.n) = log1p(-s2) / 2 keeps its digits however small s2 is. cos theta = (1 - xi)^(1/(e+1)) is taken
 // as 1 - cos theta = -expm1(log1p(-xi) / (e+1)) for the same reason. The tangent of eq. 19, infinite at
 // xi_1 = 1, is kept as a ratio of sine and cosine; over the full circle that is the paper's map of four quadrants.
-#include "model/sampling.h"
+#include "model/half_vector.h"
 
 namespace brdfc {
 
@@ -47,17 +47,11 @@ template <class T> struct AshikhminShirley {
     v(diffuse, ChoiceSpec{"diffuse", "Diffuse Term", {"paper"}, "paper: eq. 14"});
   }
 
-  /// The half vector in the turned frame, |wi + wo| / 2 = k.h, and 1 - k.h from |wi - wo|^2 = 4 (1 - (k.h)^2).
-  struct Half {
-    Vec3<T> h;
-    T kh, one_minus_kh;
-  };
-  Half half(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const Vec3<T> sum = sum_of_units(wi, wo);
-    const T len = maximum(length(sum), tiny<T>());
-    const Vec3<T> apart = difference_of_units(wi, wo);
-    const T kh = len / T(2);
-    return {rotate_z(sum / len, cos(rotation), sin(rotation)), kh, dot(apart, apart) / (T(4) * (T(1) + kh))};
+  /// The half vector in the turned frame.
+  HalfVector<T> half(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    HalfVector<T> k(wi, wo);
+    k.h = rotate_z(k.h, cos(rotation), sin(rotation));
+    return k;
   }
 
   /// p_h(h), eq. 5.
@@ -72,19 +66,19 @@ template <class T> struct AshikhminShirley {
   }
 
   /// F(k.h), eq. 11.
-  Rgb<T> fresnel(const Half& k) const {
-    return named("F", rs + (Rgb<T>(T(1)) - rs) * named("one_minus_kh5", pow5(k.one_minus_kh)));
+  Rgb<T> fresnel(const HalfVector<T>& k) const {
+    return named("F", rs + (Rgb<T>(T(1)) - rs) * named("one_minus_kh5", pow5(k.one_minus_oh)));
   }
 
   /// Specular term, eq. 16.
   Rgb<T> specular(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const Half k = half(wi, wo);
-    return fresnel(k) * (p_h(k.h) / (T(4) * k.kh * maximum(wi.z, wo.z)));
+    const HalfVector<T> k = half(wi, wo);
+    return fresnel(k) * (p_h(k.h) / (T(4) * k.oh * maximum(wi.z, wo.z)));
   }
 
   T specular_pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const Half k = half(wi, wo);
-    return p_h(k.h) / (T(4) * k.kh);
+    const HalfVector<T> k = half(wi, wo);
+    return p_h(k.h) / (T(4) * k.oh);
   }
 
   /// Diffuse term, eq. 14.
@@ -138,9 +132,9 @@ template <class T> struct AshikhminShirley {
     if (part == Specular) {
       // f cos / pdf leaves F min(1, cos_i / cos_o): the power cancels.
       const Vec3<T> wi = sample_specular(wo, u.y, u.z);
-      const Half k = half(wi, wo);
+      const HalfVector<T> k = half(wi, wo);
       const T ratio = wi.z / maximum(maximum(wi.z, wo.z), tiny<T>());
-      return sample_if(above(wi, wo), wi, fresnel(k) * ratio, p_h(k.h) / (T(4) * k.kh));
+      return sample_if(above(wi, wo), wi, fresnel(k) * ratio, p_h(k.h) / (T(4) * k.oh));
     }
     const auto specular_lobe = u.x < specular_share();
     const Vec3<T> glossy = sample_specular(wo, u.y, u.z), matte = sample_cosine(u.y, u.z);

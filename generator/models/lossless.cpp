@@ -8,7 +8,7 @@
 //   marginal  M(x') = [B(n x') + B(n) - B(n (1 - x'))] / (2 B(n)), its density n S(x') / (2 B(n)),
 //   lobe      f_theta(x, y) = 4 B(n) k(n |x' - y'|) / (S(x') S(y')),  M(x') = x, M(y') = y,
 // which is eq. 13 put into eq. 9, with the factor 2 that eq. 8 asks for. k = sech^2 gives eq. 17. A kernel may also be
-// drawn: k linear between heights at u = 0, 1, ... 5 and constant beyond, whose integrals are sums over the pieces.
+// drawn: k linear between heights at u = 0, 1, 2, 3 and constant beyond, whose integrals are sums over the pieces.
 //
 // Stable forms. v = n x' is found on the half where it is small, from x or 1 - x, whichever is smaller; B(n) - B(n - v)
 // and 1 - A are written out for each kernel, since they cancel. Newton's steps stay in a bracket.
@@ -35,7 +35,7 @@ std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step ste
 template <class T> struct Lossless {
   Choice kernel;
   T n;
-  static constexpr int kKnots = 6;
+  static constexpr int kKnots = 4;
   std::array<T, kKnots> heights;
   Rgb<T> tint;
 
@@ -57,11 +57,11 @@ template <class T> struct Lossless {
     v(kernel, ChoiceSpec{"kernel",
                          "Kernel",
                          {"sech2", "exponential", "table"},
-                         "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, ... 5"});
+                         "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, 2, 3"});
     v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e8, 0, 100, "Glossiness n: 0 is matte"});
-    static constexpr const char* kNames[] = {"h0", "h1", "h2", "h3", "h4", "h5"};
-    static constexpr const char* kLabels[] = {"Height 0", "Height 1", "Height 2", "Height 3", "Height 4", "Height 5"};
-    static constexpr double kDrawn[] = {1, 0.6, 0.2, 0.1, 0.06, 0.05};
+    static constexpr const char* kNames[] = {"h0", "h1", "h2", "h3"};
+    static constexpr const char* kLabels[] = {"Height 0", "Height 1", "Height 2", "Height 3"};
+    static constexpr double kDrawn[] = {1, 0.6, 0.2, 0.1};
     for (int i = 0; i < kKnots; ++i)
       v(heights[std::size_t(i)], NumberSpec{kNames[i], kLabels[i], kDrawn[i], 1e-3, 1, 1e-3, 1,
                                             "Height of the drawn kernel at the distance of this number, over 1 / n"});
@@ -98,19 +98,36 @@ template <class T> struct Lossless {
     if (i == kKnots - 1) return heights[std::size_t(i)];
     return heights[std::size_t(i)] * (T(i + 1) - x) + heights[std::size_t(i) + 1] * (x - T(i));
   }
-  /// Its integral over [a, b], and that of (c - x) times it for c >= b: sums of positive terms, exact for these curves.
-  std::array<T, 2> integrals(const T& a, const T& b, const T& c) const {
-    T area(0), moment(0);
+  /// A(u) and B(u) of the drawn kernel, by the piece that u lies in: sums of positive terms, exact for these curves.
+  std::array<T, 2> drawn_integrals(const T& u) const {
+    T t = u, left = heights[0], right = heights[1], area(0), moment(0), whole_area(0), whole_moment(0);
+    for (std::size_t i = 1; i < kKnots; ++i) {
+      // Over the piece before: its own integrals, and what lies below it.
+      whole_moment = whole_moment + whole_area + (T(2) * heights[i - 1] + heights[i]) / T(6);
+      whole_area = whole_area + (heights[i - 1] + heights[i]) / T(2);
+      const auto past = u > T(int(i));
+      t = select(past, u - T(int(i)), t);
+      left = select(past, heights[i], left);
+      right = select(past, heights[std::min<std::size_t>(i + 1, kKnots - 1)], right);
+      area = select(past, whole_area, area);
+      moment = select(past, whole_moment, moment);
+    }
+    // Beyond the last knot both ends are one height, and t may be any.
+    return {named("area", area + t * (left + left + t * (right - left)) / T(2)),
+            named("moment", moment + t * (area + t * (T(3) * left + t * (right - left)) / T(6)))};
+  }
+  /// The integral of (b - x) k over [a, b]: sums of positive terms.
+  T drawn_moment(const T& a, const T& b) const {
+    T moment(0);
     for (int i = 0; i < kKnots; ++i) {
       T lo = maximum(a, T(i)), hi = maximum(b, T(i));
       if (i < kKnots - 1) lo = minimum(lo, T(i + 1)), hi = minimum(hi, T(i + 1));
-      const T at_lo = drawn(i, lo), at_hi = drawn(i, hi), width = hi - lo;
-      area = area + width * (at_lo + at_hi) / T(2);
+      const T at_lo = drawn(i, lo), at_hi = drawn(i, hi);
       // Simpson's rule. Pieces outside [a, b] have no width.
-      const T from_lo = maximum(c - lo, T(0)), from_hi = maximum(c - hi, T(0));
-      moment = moment + width * (from_lo * at_lo + (from_lo + from_hi) * (at_lo + at_hi) + from_hi * at_hi) / T(6);
+      const T from_lo = maximum(b - lo, T(0)), from_hi = maximum(b - hi, T(0));
+      moment = moment + (hi - lo) * (from_lo * at_lo + (from_lo + from_hi) * (at_lo + at_hi) + from_hi * at_hi) / T(6);
     }
-    return {named("area", area), named("moment", moment)};
+    return named("moment", moment);
   }
   /// u with A(u) = q: piece by piece, each a quadratic equation.
   T invert_A(const T& q) const {
@@ -136,7 +153,7 @@ template <class T> struct Lossless {
   }
   /// A(u) for u >= 0.
   T A(const T& u) const {
-    if (kernel == Table) return integrals(T(0), u, u)[0];
+    if (kernel == Table) return drawn_integrals(u)[0];
     if (kernel == Exponential) return -expm1(-u);
     const T e = expm1(T(-2) * u);
     return -e / (T(2) + e);
@@ -148,7 +165,7 @@ template <class T> struct Lossless {
     return T(2) * e * e / (T(1) + e * e);
   }
   T B(const T& u) const {
-    if (kernel == Table) return integrals(T(0), u, u)[1];
+    if (kernel == Table) return drawn_integrals(u)[1];
     const T small = minimum(u, T(1)), large = maximum(u, T(1));
     if (kernel == Exponential) return select(u < T(1), psi(-small), large + expm1(-large));
     const T half = expm1(small) / T(2);
@@ -157,7 +174,7 @@ template <class T> struct Lossless {
   }
   /// B(g) - B(g - v) for 0 <= v <= g/2.
   T drop(const T& g, const T& v) const {
-    if (kernel == Table) return v * A(g - v) + integrals(g - v, g, g)[1];
+    if (kernel == Table) return v * A(g - v) + drawn_moment(g - v, g);
     const T small = minimum(v, T(1));
     if (kernel == Exponential) {
       // v (1 - e^-g) - e^-g psi(v); for large v e^-g psi(v) = e^(v-g) - e^-g (1 + v).
@@ -183,9 +200,9 @@ template <class T> struct Lossless {
           const T v = s[2];
           T F, dF;
           if (kernel == Table) {
-            const std::array<T, 2> near = integrals(T(0), v, v);
+            const std::array<T, 2> near = drawn_integrals(v);
             const T far = A(g - v);
-            F = near[1] + v * far + integrals(g - v, g, g)[1];
+            F = near[1] + v * far + drawn_moment(g - v, g);
             dF = near[0] + far;
           } else {
             F = named("F", B(v) + drop(g, v));
