@@ -302,7 +302,7 @@ TEST(Landmarks, CoupledWithWhiteMatteIsAPerfectFurnaceAtEveryAngle) {
 
 TEST(Landmarks, TheConstructionFromSech2IsTheClosedForm) {
   // Two ways to the same function: a kernel with its marginal inverted, and eq. 17.
-  for (const double n : {0., 1e-9, 0.001, 0.3, 0.99, 1.01, 4., 25., 1e3, 1e6, 1e8}) {
+  for (const double n : {0., 1e-9, 0.001, 0.3, 0.99, 1.01, 4., 25., 1e3, 1e4}) {
     const auto made = find_model("lossless").make_double({{"n", n}});
     const auto closed = find_model("radziszewski_alda").make_double({{"n", n}, {"part", std::string("latitudinal")}});
     Random random(7);

@@ -12,6 +12,7 @@
 //
 // Stable forms. v = n x' is found on the half where it is small, from x or 1 - x, whichever is smaller; B(n) - B(n - v)
 // and 1 - A are written out for each kernel, since they cancel. Newton's steps stay in a bracket.
+// n ends at 1e4: places are up to n / 2, of which single precision leaves the kernel too few digits from 1e5.
 // Sampling: w = A(n (x' - y')) is linear in the random number, so that only A is inverted, in closed form; then x =
 // M(x').
 #include "model/sampling.h"
@@ -58,7 +59,7 @@ template <class T> struct Lossless {
                          "Kernel",
                          {"sech2", "exponential", "table"},
                          "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, 2, 3"});
-    v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e8, 0, 100, "Glossiness n: 0 is matte"});
+    v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e4, 0, 100, "Glossiness n: 0 is matte"});
     static constexpr const char* kNames[] = {"h0", "h1", "h2", "h3"};
     static constexpr const char* kLabels[] = {"Height 0", "Height 1", "Height 2", "Height 3"};
     static constexpr double kDrawn[] = {1, 0.6, 0.2, 0.1};
@@ -234,7 +235,13 @@ template <class T> struct Lossless {
     const T g = gloss();
     const Place i = place(g, wi), o = place(g, wo);
     const T same = abs(i.v - o.v), across = maximum(g - i.v - o.v, T(0));
-    const T u = named("u", select(i.low + o.low < T(1.5) && i.low + o.low > T(0.5), across, same));
+    const T near = select(i.low + o.low < T(1.5) && i.low + o.low > T(0.5), across, same);
+    // Far from both ends S no longer changes, and the places' difference is that of the directions over S: large places
+    // would leave it few digits.
+    const T x_minus_y = select(wi.z + wo.z < T(1), (wi.z - wo.z) * (wi.z + wo.z),
+                               (wo.x - wi.x) * (wo.x + wi.x) + (wo.y - wi.y) * (wo.y + wi.y));
+    const T far = abs(x_minus_y) * (T(2) * B(g) / S(g, i.v));
+    const T u = named("u", select(minimum(i.v, o.v) > T(40), far, near));
     // Over S S in two steps: B is large with g and small with g^2.
     return T(2) * (B(g) / S(g, i.v)) * (k(u) / S(g, o.v)) / pi<T>();
   }
