@@ -6,6 +6,8 @@ ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 BUILD=$ROOT/build
 ENVS=$ROOT/.env
 TOOL=$BUILD/brdfc
+# The one of the tools' environment: what stands first in PATH may be anything.
+OIIOTOOL=$ENVS/tools/bin/oiiotool
 
 # An inherited PYTHONPATH or virtual environment would leak packages into ours (and break bpy's own).
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
@@ -81,22 +83,29 @@ PY
   return 1
 }
 
+env_is_ready() { # env_is_ready FOLDER STAMP
+  [ "$(cat "$1/.stamp" 2>/dev/null)" = "$2" ] && "$1/bin/python" -c '' 2>/dev/null
+}
+
 # setup_env NAME PYTHON-VERSION: .env/NAME from script/requirements/NAME.txt. Nothing is done, and no network
 # used, while the requirements are those of the stamp. Returns 1 when there is no such interpreter.
 setup_env() {
   local name=$1 wanted=$2 env=$ENVS/$1 requirements=$ROOT/script/requirements/$1.txt python stamp
   stamp="$wanted $(sha256sum <"$requirements")"
-  if [ "$(cat "$env/.stamp" 2>/dev/null)" = "$stamp" ] && "$env/bin/python" -c '' 2>/dev/null; then
-    return 0
-  fi
+  env_is_ready "$env" "$stamp" && return 0
   python=$(find_python "$wanted") || return 1
-  say "Making Python environment .env/$name ($python; $(grep -v '^#' "$requirements" | tr '\n' ' '))"
-  rm -rf "$env"
   mkdir -p "$ENVS"
-  "$python" -m venv "$env" || die "could not make the Python environment $env"
-  "$env/bin/python" -m pip install --disable-pip-version-check --quiet -r "$requirements" ||
-    die "pip could not install $requirements (if its index lacks a package, give another one in PIP_EXTRA_INDEX_URL)"
-  printf '%s\n' "$stamp" >"$env/.stamp"
+  (
+    # Two scripts at once would pull the environment from under each other's pip, which then installs elsewhere.
+    flock 9
+    ! env_is_ready "$env" "$stamp" || exit 0
+    say "Making Python environment .env/$name ($python; $(grep -v '^#' "$requirements" | tr '\n' ' '))"
+    rm -rf "$env"
+    "$python" -m venv "$env" || die "could not make the Python environment $env"
+    "$env/bin/python" -m pip install --disable-pip-version-check --quiet -r "$requirements" ||
+      die "pip could not install $requirements (if its index lacks a package, give another one in PIP_EXTRA_INDEX_URL)"
+    printf '%s\n' "$stamp" >"$env/.stamp"
+  ) 9>"$ENVS/.lock" || exit
 }
 
 # setup_blender 4.5: an environment with that Blender. Returns 1, saying so, when its interpreter is missing.
