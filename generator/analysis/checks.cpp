@@ -81,24 +81,6 @@ class Worst {
 
 template <class F> void for_all(std::size_t n, const F& f) { tbb::parallel_for(std::size_t(0), n, f); }
 
-double relative(double a, double b) {
-  const double scale = std::max(std::abs(a), std::abs(b));
-  return scale > 0 ? std::abs(a - b) / scale : 0;
-}
-double relative(const Rgb<double>& a, const Rgb<double>& b) {
-  return std::max({relative(a.r, b.r), relative(a.g, b.g), relative(a.b, b.b)});
-}
-double relative(const Wide& a, const Wide& b) {
-  const Wide scale = maximum(Wide(abs(a)), Wide(abs(b)));
-  return scale > 0 ? double(abs(Wide(a - b)) / scale) : 0;
-}
-double relative(const Rgb<Wide>& a, const Rgb<Wide>& b) {
-  return std::max({relative(a.r, b.r), relative(a.g, b.g), relative(a.b, b.b)});
-}
-
-template <class T> Rgb<double> to_double(const Rgb<T>& c) { return {double(c.r), double(c.g), double(c.b)}; }
-template <class T> Vec3<double> to_double(const Vec3<T>& v) { return {double(v.x), double(v.y), double(v.z)}; }
-
 /// "n=0 m=1" as values.
 ParamValues parse_limit(const ModelInfo& info, const std::string& text) {
   std::vector<std::string> assignments;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Random directions and parameters that the checks share.
+// Random directions, parameters and differences that the checks share.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <random>
 #include <string>
@@ -18,7 +19,21 @@ Vec3<double> uniform_direction(Random&);  ///< above the surface, uniform in sol
 Vec3<double> uniform_cube(Random&);       ///< three numbers for sample()
 
 /// Are views from inside meant?
-bool two_sided(const Model&, const Brdf<double>&);
+template <class T> bool two_sided(const Model& model, const Brdf<T>& brdf) {
+  return model.has_transmit() || brdf.scatters_through();
+}
+
+/// |a - b| over the larger of both, 0 for two zeros; the largest of the channels.
+template <class T> double relative(const T& a, const T& b) {
+  const T scale = maximum(T(abs(a)), T(abs(b)));
+  return scale > T(0) ? double(T(abs(T(a - b))) / scale) : 0;
+}
+template <class T> double relative(const Rgb<T>& a, const Rgb<T>& b) {
+  return std::max({relative(a.r, b.r), relative(a.g, b.g), relative(a.b, b.b)});
+}
+
+template <class T> Rgb<double> to_double(const Rgb<T>& c) { return {double(c.r), double(c.g), double(c.b)}; }
+template <class T> Vec3<double> to_double(const Vec3<T>& v) { return {double(v.x), double(v.y), double(v.z)}; }
 
 /// What rounding and symmetries are judged by: f, or the weight of the term on wi's side where there are delta
 /// terms alone.

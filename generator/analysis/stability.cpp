@@ -14,17 +14,6 @@
 namespace brdfc {
 namespace {
 
-template <class T> Rgb<double> to_double(const Rgb<T>& c) { return {double(c.r), double(c.g), double(c.b)}; }
-template <class T> Vec3<double> to_double(const Vec3<T>& v) { return {double(v.x), double(v.y), double(v.z)}; }
-
-template <class T> double relative(const T& a, const T& b) {
-  const T scale = maximum(T(abs(a)), T(abs(b)));
-  return scale > T(0) ? double(T(abs(T(a - b))) / scale) : 0;
-}
-template <class T> double relative(const Rgb<T>& a, const Rgb<T>& b) {
-  return std::max({relative(a.r, b.r), relative(a.g, b.g), relative(a.b, b.b)});
-}
-
 template <class T> std::unique_ptr<Brdf<T>> make(const Model& m, const ParamValues& v) {
   if constexpr (std::same_as<T, float>)
     return m.make_float(v);
@@ -46,7 +35,7 @@ template <class Narrow, class Better> class Pair {
     }
     narrow_ = make<Narrow>(model, values_);
     better_ = make<Better>(model, values_);
-    two_sided_ = model.has_transmit() || narrow_->scatters_through();
+    two_sided_ = two_sided(model, *narrow_);
   }
 
   const ParamValues& values() const { return values_; }

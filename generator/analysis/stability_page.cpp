@@ -11,6 +11,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include "analysis/probes.h"
 
@@ -99,56 +100,55 @@ struct Figure {
   Map map;
 };
 
+/// The printed value's error, or that of our formula without one.
+double error_of(const Model& model, const ParamValues& v, const Vec3<double>& wi, const Vec3<double>& wo,
+                std::optional<double> printed) {
+  return relative_error(printed ? *printed : model.make_double(v)->eval(wi, wo).r,
+                        model.make_wide(v)->eval(exact(wi), exact(wo)).r);
+}
+
+/// In the plane of incidence of kOblique, away from ideal reflection towards the normal.
+const Vec3<double> kOblique = direction(std::sqrt(0.75), 0.4);
+Vec3<double> beside_reflection(double angle) {
+  const double c = std::cos(kPi / 6 - angle), s = std::sin(kPi / 6 - angle);
+  return {-s * std::cos(0.4), -s * std::sin(0.4), c};
+}
+
 std::vector<Figure> printed_forms() {
   constexpr double kCosR = 0.6, kN0 = 1e-3, kN1 = 1e8;
-  const auto radziszewski_alda = [](double n) {
-    return find_model("radziszewski_alda").make_wide({{"n", n}, {"part", std::string("latitudinal")}});
-  };
-  const auto latitudinal = [=](bool printed) {
+  const auto only = [](bool printed, double value) { return printed ? std::optional(value) : std::nullopt; };
+  const auto latitudinal = [=](bool printed) -> Map {
     return [=](double x, double y) {
       const double n = by_factors(kN0, kN1, y);
       const Vec3<double> wi = direction(x, 1), wo = direction(kCosR, 2);
-      const Wide truth = radziszewski_alda(n)->eval(exact(wi), exact(wo)).r;
-      const double ours =
-          find_model("radziszewski_alda").make_double({{"n", n}, {"part", std::string("latitudinal")}})->eval(wi, wo).r;
-      return relative_error(printed ? printed_f_theta(n, wi.z * wi.z, kCosR * kCosR) / (2 * kPi) : ours, truth);
+      return error_of(find_model("radziszewski_alda"), {{"n", n}, {"part", std::string("latitudinal")}}, wi, wo,
+                      only(printed, printed_f_theta(n, wi.z * wi.z, kCosR * kCosR) / (2 * kPi)));
     };
   };
-  const auto specular = [](bool printed) {
+  const auto specular = [=](bool printed) -> Map {
     return [=](double x, double y) {
-      const double n = by_factors(1, 1e8, y), offset = by_factors(1e-12, 1, x);
-      const Vec3<double> wo = direction(std::sqrt(0.75), 0.4);
-      // In the plane of incidence, away from ideal reflection towards the normal.
-      const double c = std::cos(kPi / 6 - offset / 2), s = std::sin(kPi / 6 - offset / 2);
-      const Vec3<double> wi = {-s * std::cos(0.4), -s * std::sin(0.4), c};
-      const ParamValues v{{"nu", n}, {"nv", n}, {"rs", 1.}, {"part", std::string("specular")}};
-      const Model& m = find_model("ashikhmin_shirley");
-      const Wide truth = m.make_wide(v)->eval(exact(wi), exact(wo)).r;
-      return relative_error(printed ? printed_specular(n, n, wi, wo) : m.make_double(v)->eval(wi, wo).r, truth);
+      const double n = by_factors(1, 1e8, y);
+      const Vec3<double> wi = beside_reflection(by_factors(1e-12, 1, x) / 2);
+      return error_of(find_model("ashikhmin_shirley"),
+                      {{"nu", n}, {"nv", n}, {"rs", 1.}, {"part", std::string("specular")}}, wi, kOblique,
+                      only(printed, printed_specular(n, n, wi, kOblique)));
     };
   };
-  // In the plane of incidence, away from ideal reflection towards the normal.
-  const auto highlight = [](bool printed) {
+  const auto highlight = [=](bool printed) -> Map {
     return [=](double x, double y) {
-      const double e = by_factors(1, 1e8, y), offset = by_factors(1e-12, 1, x);
-      const Vec3<double> wo = direction(std::sqrt(0.75), 0.4);
-      const double c = std::cos(kPi / 6 - offset), s = std::sin(kPi / 6 - offset);
-      const Vec3<double> wi = {-s * std::cos(0.4), -s * std::sin(0.4), c};
-      const Model& m = find_model("phong");
-      const ParamValues v{{"ks", 1.}, {"e", e}};
-      const Wide truth = m.make_wide(v)->eval(exact(wi), exact(wo)).r;
-      return relative_error(printed ? printed_highlight(e, wi, wo) : m.make_double(v)->eval(wi, wo).r, truth);
+      const double e = by_factors(1, 1e8, y);
+      const Vec3<double> wi = beside_reflection(by_factors(1e-12, 1, x));
+      return error_of(find_model("phong"), {{"ks", 1.}, {"e", e}}, wi, kOblique,
+                      only(printed, printed_highlight(e, wi, kOblique)));
     };
   };
   // Opposite directions, where the printed difference sin alpha - (2 beta / pi)^3 meets tan beta.
-  const auto rough = [](bool printed) {
+  const auto rough = [=](bool printed) -> Map {
     return [=](double x, double y) {
       const double sigma = 0.66 * y, c = by_factors(1e-12, 1, x);
       const Vec3<double> wo = direction(c, 0.3), wi = direction(0.5 * c, 0.3 + 0.9 * kPi);
-      const Model& m = find_model("oren_nayar");
-      const ParamValues v{{"rho", 1.}, {"sigma", sigma}};
-      const Wide truth = m.make_wide(v)->eval(exact(wi), exact(wo)).r;
-      return relative_error(printed ? printed_rough(sigma, wi, wo) : m.make_double(v)->eval(wi, wo).r, truth);
+      return error_of(find_model("oren_nayar"), {{"rho", 1.}, {"sigma", sigma}}, wi, wo,
+                      only(printed, printed_rough(sigma, wi, wo)));
     };
   };
   const char* cosine = "cos theta_i from 0 to 1, cos theta_r = 0.6";

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "analysis/albedo.h"
+#include "analysis/probes.h"
 #include "app/commands.h"
 #include "app/csv.h"
 
@@ -49,7 +50,7 @@ void add_albedo_command(CLI::App& app) {
     } else {
       std::vector<double> row;
       while (in->next(row)) {
-        const bool inside = (model.has_transmit() || bound.brdf->scatters_through()) && row[0] < 0 && row[0] >= -1;
+        const bool inside = two_sided(model, *bound.brdf) && row[0] < 0 && row[0] >= -1;
         if (!inside && !(row[0] > 0 && row[0] <= 1))
           input_error("{}: cos_theta_o: expected a number in (0, 1], got {}", in->where(), row[0]);
         write(row[0]);

@@ -50,6 +50,12 @@ template <class T> Vec3<T> sample_cosine(const T& u1, const T& u2) {
   return {sinTheta * cos(phi), sinTheta * sin(phi), sqrt(maximum(T(1) - u1, T(0)))};
 }
 
+/// sinh x without cancellation, for x that e^x does not overflow.
+template <class T> T stable_sinh(const T& x) {
+  const T half = expm1(x) / T(2);
+  return half + half / (T(2) * half + T(1));
+}
+
 /// A sample that does not exist where `exists` fails: weight and density 0.
 template <class Flag, class T>
 Sample<T> sample_if(const Flag& exists, const Vec3<T>& wi, const Rgb<T>& weight, const T& pdf) {

@@ -169,8 +169,7 @@ template <class T> struct Lossless {
     if (kernel == Table) return drawn_integrals(u)[1];
     const T small = minimum(u, T(1)), large = maximum(u, T(1));
     if (kernel == Exponential) return select(u < T(1), psi(-small), large + expm1(-large));
-    const T half = expm1(small) / T(2);
-    const T sinh = half + half / (T(2) * half + T(1));
+    const T sinh = stable_sinh(small);
     return select(u < T(1), log1p(sinh * sinh) / T(2), large + log1p(exp(T(-2) * large)) - T(0.69314718055994530942));
   }
   /// B(g) - B(g - v) for 0 <= v <= g/2.
@@ -183,10 +182,7 @@ template <class T> struct Lossless {
       return -v * expm1(-g) - tail;
     }
     // ln cosh g - ln cosh(g - v) = -ln(cosh v - tanh g sinh v) for small g, with e^(2v - 2g) for large.
-    const T half = expm1(small / T(2)) / T(2);
-    const T sinh_half = half + half / (T(2) * half + T(1));
-    const T e = expm1(small) / T(2);
-    const T sinh = e + e / (T(2) * e + T(1));
+    const T sinh_half = stable_sinh(small / T(2)), sinh = stable_sinh(small);
     const T near = -log1p(T(2) * sinh_half * sinh_half - A(minimum(g, T(1))) * sinh);
     const T far = v - log1p(exp(T(2) * (v - g)) * -expm1(T(-2) * v) / (T(1) + exp(T(-2) * g)));
     return select(g < T(1), near, far);

@@ -89,8 +89,7 @@ template <class T> struct RadziszewskiAlda {
 
   /// sinh^2 n for n <= 1, of 1 for larger n.
   static T sinh2(const T& n) {
-    const T half = expm1(minimum(n, T(1))) / T(2);
-    const T sinh = half + half / (T(2) * half + T(1));
+    const T sinh = stable_sinh(minimum(n, T(1)));
     return named("sinh2", sinh * sinh);
   }
 

@@ -91,8 +91,7 @@ void check_exr_header(const fs::path& path) {
 File read_file(const fs::path& path) {
   if (!fs::exists(path)) input_error("{}: no such image file", path.string());
   static const std::set<std::string> types{".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff"};
-  std::string type = path.extension().string();
-  std::transform(type.begin(), type.end(), type.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string type = ending(path);
   if (!types.count(type))
     input_error("{}: expected an image file that ends in one of {}", path.string(), fmt::join(types, ", "));
   if (type == ".exr") check_exr_header(path);
@@ -156,6 +155,12 @@ void check_finite(const Image& image, const std::string& name) {
 }
 
 }  // namespace
+
+std::string ending(const fs::path& path) {
+  std::string text = path.extension().string();
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return text;
+}
 
 void write_beside(const fs::path& path, const std::function<void(const fs::path&)>& write) {
   std::error_code error;

@@ -41,6 +41,9 @@ enum class ColorSpace {
   Srgb     ///< decoded from the sRGB transfer curve
 };
 
+/// The file's extension in small letters, with its dot.
+std::string ending(const std::filesystem::path& path);
+
 /// Runs write(temporary) with a name beside `path` that keeps its extension, then renames it to `path`, so
 /// that nobody sees half a file. Creates missing folders. Throws InputError if `path` can't be written.
 void write_beside(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);

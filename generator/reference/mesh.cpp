@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <bit>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -146,8 +145,7 @@ void check_ply_header(const std::filesystem::path& path) {
 
 Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
   if (!std::filesystem::is_regular_file(path)) input_error("{}: no such mesh file", path.string());
-  std::string type = path.extension().string();
-  std::transform(type.begin(), type.end(), type.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string type = ending(path);
   // The importer knows some fifty formats more, many of them poorly guarded against damaged files.
   if (type != ".obj" && type != ".ply" && type != ".stl")
     input_error("{}: expected a mesh file that ends in .obj, .ply or .stl", path.string());

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "analysis/albedo.h"
+#include "analysis/probes.h"
 #include "model/horizon.h"
 #include "model/sampling.h"
 
@@ -24,7 +25,7 @@ std::vector<std::string> frame_names() {
 /// The shader's frame has its normal on the viewer's side. For a model of two sides z is turned outwards by `side`.
 Vec3<Expr> recorded_wo(const Model& model, const Brdf<Expr>& brdf) {
   Vec3<Expr> wo = raise_to_horizon(Vec3<Expr>{Expr::input("wo_x"), Expr::input("wo_y"), Expr::input("wo_z")});
-  if (model.has_transmit() || brdf.scatters_through()) wo.z = wo.z * Expr::input("side");
+  if (two_sided(model, brdf)) wo.z = wo.z * Expr::input("side");
   return wo;
 }
 
@@ -202,7 +203,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
       const ParamValues values = random_values(model.info(), choices, rng);
       const BoundModel truth = bind_model(model, values);
       Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
-      if ((model.has_transmit() || truth.brdf->scatters_through()) && view % 2 == 1) wo.z = -wo.z;
+      if (two_sided(model, *truth.brdf) && view % 2 == 1) wo.z = -wo.z;
       FloatInputs inputs = float_inputs(values, wo);
       const double distance = model.has_medium() ? 3 * uniform(rng) : 0;
       set_input(inputs, "path_length", distance);
