@@ -97,6 +97,31 @@ template <Defect D> struct Faulty {
   };
 };
 
+// Matte, but for a spike of half a hundredth of the light in a place that no convention leads to.
+template <class T> struct Spiked {
+  static constexpr double kShare = 0.005, kHeight = 1e-6;  // of the light; 1 - cosine at the spike's rim
+  static ModelInfo info() {
+    return {.name = "spiked", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor&) {}
+  static Vec3<T> axis() { return {T(0.6), T(0), T(0.8)}; }
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return Rgb<T>(pdf(wi, wo) / maximum(wi.z, tiny<T>())); }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const T spike = select(T(1) - dot(wi, axis()) < T(kHeight), T(kShare / kHeight) / (T(2) * pi<T>()), T(0));
+    return select(above(wi, wo), T(1 - kShare) * cosine_pdf(wi) + spike, T(0));
+  }
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const T c = T(1) - u.y * T(kHeight / kShare), s = sqrt(maximum(T(1) - c * c, T(0)));
+    const T x = s * cos(T(2) * pi<T>() * u.z), y = s * sin(T(2) * pi<T>() * u.z);
+    const Vec3<T> inside{T(0.8) * x + T(0.6) * c, y, T(0.8) * c - T(0.6) * x};
+    const Vec3<T> matte = sample_cosine((u.y - T(kShare)) / T(1 - kShare), u.z);
+    const auto spike = u.y < T(kShare);
+    const Vec3<T> wi{select(spike, inside.x, matte.x), select(spike, inside.y, matte.y),
+                     select(spike, inside.z, matte.z)};
+    return sample_if(above(wi, wo), wi, Rgb<T>(T(1)), pdf(wi, wo));
+  }
+};
+
 }  // namespace faulty
 
 namespace {
@@ -274,6 +299,31 @@ TEST(AlbedoValue, IsGoodToItsErrorForRidgesThatAreThinAndCurved) {
       EXPECT_LT(a.error, 2e-3) << b.label << " cos_theta_o=" << c;
       EXPECT_NEAR(a.scattered.r, mean.scattered[0].r, 2 * a.error + 10 * mean.error) << b.label << " cos_theta_o=" << c;
     }
+}
+
+TEST(AlbedoValue, FindsAThinPeakThatHoldsLittleOfTheLight) {
+  const Model& m = find_model("lossless");
+  for (const char* shape : {"0.1", "1e-3"})
+    for (const char* n : {"n=60", "n=1000", "n=1e4"})
+      for (const double c : {1., 0.7, 0.3, 0.03}) {
+        const std::string height = shape;
+        const BoundModel b =
+            bind_model(m, parse_values(m.info(), {"kernel=table", n, "h1=" + height, "h2=" + height, "h3=" + height}));
+        const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
+        EXPECT_NEAR(a.scattered.r, 1, 2 * a.error) << b.label << " cos_theta_o=" << c;
+        EXPECT_LT(a.error, 2e-5) << b.label << " cos_theta_o=" << c;
+      }
+}
+
+TEST(AlbedoValue, AdmitsASpikeThatItMissed) {
+  const detail::ModelOf<Spiked> model;
+  const BoundModel b = bind_model(model, {});
+  for (const double c : {1., 0.5, 0.05}) {
+    const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
+    EXPECT_NEAR(a.scattered.r, 1, a.error) << c;
+    // It is not spread over the whole range either.
+    EXPECT_LT(a.error, 0.01) << c;
+  }
 }
 
 // ---- tables ----------------------------------------------------------------------------------------------

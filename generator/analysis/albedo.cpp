@@ -212,6 +212,16 @@ std::vector<Rect> Guides::cells(std::size_t most) const {
         const std::vector<Rect> parts = cells(r, most);
         out.insert(out.end(), parts.begin(), parts.end());
       }
+  // Where a peak on that cone holds a hundredth of the light, too few samples fall to lead to it: cells there are
+  // halved towards it down to all scales.
+  for (std::size_t i = 0, n = out.size(); i < n; ++i)
+    while (out[i].x1 - out[i].x0 > 1e-8 && (out[i].x0 == theta_o_ || out[i].x1 == theta_o_)) {
+      const double middle = 0.5 * (out[i].x0 + out[i].x1);
+      Rect far = out[i];
+      (out[i].x0 == theta_o_ ? out[i].x1 : out[i].x0) = middle;
+      (far.x0 == theta_o_ ? far.x0 : far.x1) = middle;
+      out.push_back(far);
+    }
   return out;
 }
 
@@ -265,6 +275,18 @@ class AlbedoIntegrator {
   CubatureResult over_directions(const CubatureOptions& options, int guides) const {
     return integrate_hemisphere(
         guide_, wo_, n_, [&](const Vec3<double>& wi, double* out) { evaluate(wi, out); }, options, guides);
+  }
+
+  /// How much of the guide's density the cells of over_directions() miss, up to the chance of the share of lost
+  /// samples.
+  double missed_density(const CubatureOptions& options, int guides) const {
+    const auto density = [&](const Vec3<double>& wi, double* out) {
+      out[0] = guide_.pdf(wi, wo_);
+      require_value(out[0], "pdf", label_, wi, wo_);
+    };
+    const SampledAlbedo drawn = sampled_albedo(guide_, wo_.z, std::atan2(wo_.y, wo_.x), label_);
+    const double found = integrate_hemisphere(guide_, wo_, 1, density, options, guides).value[0];
+    return std::max(std::abs(1 - drawn.lost - found) - 7 * drawn.lost_error, 0.);
   }
 
   /// f cos / pdf at a sample of the guide.
@@ -447,10 +469,13 @@ Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& optio
       return {samples.value, std::max(s, apart)};
     }
     // Two meshes that agree are right; the samples, which all trust the density, may then not be.
-    // Except for edges across the cells, which both may take for smooth.
+    // Except for edges across the cells, which both may take for smooth, and for peaks that both missed: the density is
+    // then seen to miss them too.
     constexpr double kEdges = 3e-5;
-    if (effort > 0 && d <= slack && directions_moved <= slack)
-      return {directions.value, std::max({d, directions_moved, std::min(apart, kEdges)})};
+    if (effort > 0 && d <= slack && directions_moved <= slack) {
+      const bool missed = apart > kEdges && integrator.missed_density(cubature, 512 << effort) > kEdges;
+      return {directions.value, std::max({d, directions_moved, missed ? apart : std::min(apart, kEdges)})};
+    }
     // One that is thin and curved never converges over directions, however many guides there are.
     ridge = effort > 0 && d > slack;
   }
