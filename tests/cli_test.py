@@ -311,3 +311,33 @@ def test_stability_page_refuses_a_folder_that_cannot_be(tmp_path):
     result = run(*few, "--page", str(tmp_path / "file" / "page"))
     assert result.returncode == 2
     assert f"{tmp_path}/file/page: expected a folder that can be written" in result.stderr
+
+
+# ---- fit ----------------------------------------------------------------------------------------
+
+
+def test_fit_prints_its_error_by_view_and_its_closures():
+    result = run("fit", "phong", "e=20")
+    table = rows(result)
+    assert len(table) == 64 and table[0]["cos_theta_o"] > table[-1]["cos_theta_o"]
+    l1 = sorted(row["relative_l1"] for row in table)
+    assert f"median {100 * l1[31]:.2g} %" in result.stderr
+    assert l1[31] < 0.01 < l1[-1] < 0.2
+
+    header = EVAL_HEADER + "\n"
+    pair = "-0.6,0,0.8,0.6,0,0.8\n"
+    fitted = rows(run("fit", "phong", "e=20", "--pairs", stdin=header + pair))[0]["f_cos_r"]
+    truth = rows(run("eval", "phong", "e=20", stdin=header + pair))[0]["f_r"] * 0.8
+    assert fitted == pytest.approx(truth, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["fit", "ashikhmin_shirley", "nu=10"], ["ashikhmin_shirley", "anisotropic"]),
+        (["fit", "radziszewski_alda", "around=refraction"], ["lets light through"]),
+        (["build", "--model", "phong", "--error", "2", "--out", "x"], ["--error", "--scene"]),
+    ],
+)
+def test_what_can_not_be_fitted(args, words, tmp_path):
+    refused(run(*args), *words)

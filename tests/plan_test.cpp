@@ -58,6 +58,35 @@ TEST(Plan, NamesTheMaterialWhoseFormDoesNotExist) {
   }
 }
 
+TEST(Plan, FitsWhereTheErrorIsAllowed) {
+  const auto forms = [](const std::vector<MaterialNeed>& needs, double error) {
+    return plan_scene(needs, {error, false})[0].forms;
+  };
+  const auto fitted = ElementsAre(RepresentationKind::Fitted), sampled = ElementsAre(RepresentationKind::Sampled);
+  EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.03), fitted);
+  EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.001), sampled);
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})})[0].forms, sampled) << "not unasked";
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "fitted")})[0].forms, fitted);
+  EXPECT_THAT(forms({need("a", "coupled", {})}, 0.5), ElementsAre(RepresentationKind::Exact));
+
+  const std::vector<MaterialNeed> two = {need("a", "phong", {"e=20"}), need("b", "phong", {"e=30"})};
+  EXPECT_THAT(forms(two, 0.5), sampled);
+  EXPECT_THAT(plan_scene(two, {0.5, false})[0].reasons, testing::Contains(HasSubstr("form fitted: a and b")));
+  try {
+    plan_scene({two[0], need("b", "phong", {"e=30"}, "fitted")});
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("material b"));
+    EXPECT_THAT(e.what(), HasSubstr("a and b have other parameters"));
+  }
+  EXPECT_THAT(forms({need("a", "phong", {"e=20"}, "sampled")}, 0.5), sampled);
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "sampled")}, {0.5, true})[0].forms,
+              ElementsAre(RepresentationKind::Sampled, RepresentationKind::Fitted));
+  auto textured = need("c", "phong", {"e=20"}, "fitted");
+  textured.textured.insert("ks");
+  EXPECT_THROW(plan_scene({textured}), InputError);
+}
+
 TEST(Plan, FoldedTablesInterpolateToTheSame) {
   const Model& m = find_model("coupled");
   const AlbedoTable whole = tabulate_albedo(m);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "app/commands.h"
 #include "pack/pack.h"
@@ -16,6 +17,7 @@ namespace {
 
 struct Options {
   bool all = false, json = false;
+  std::optional<double> error;  // percent
   std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
 };
@@ -101,9 +103,14 @@ void run(const Options& options) {
     input_error("build: expected one of --all, --scene FILE, --materials FILE or --model NAME");
   if (options.json && options.scene.empty() && options.materials.empty())
     input_error("build: --explain goes with --scene FILE or --materials FILE");
+  if (options.error && options.scene.empty() && options.materials.empty())
+    input_error("build: --error goes with --scene FILE or --materials FILE");
+  // A .blend says what its nodes are, and not what they might be.
+  Budget budget{{}, !options.materials.empty()};
+  if (options.error) budget.error = *options.error / 100;
   const std::vector<PlannedModel> plan =
-      !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials))
-      : !options.materials.empty() ? plan_scene(needs_of(load_materials(options.materials)))
+      !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials), budget)
+      : !options.materials.empty() ? plan_scene(needs_of(load_materials(options.materials)), budget)
                                    : plan_models(options.models);
   PackOptions pack{options.out, options.addon, plan, {}};
   const auto start = std::chrono::steady_clock::now();
@@ -132,6 +139,12 @@ void add_build_command(CLI::App& app) {
                 "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses");
   c->add_flag("--explain", options->json,
               "With --scene or --materials: what is left out, why and what that saves, as JSON");
+  c->add_option(
+       "--error", options->error,
+       "With --scene or --materials: percent of the light (relative L1 of f cos) that a fitted form may be off,\n"
+       "where a material of a scene leaves its form open, or beside the sampled form of a .blend; without, no\n"
+       "form is fitted unasked")
+      ->check(CLI::Range(0.0, 100.0));
   c->add_option("--model", options->models, "Only these models (repeat for several)");
   c->add_option("--out", options->out, "Folder for the extension and its zip")->required();
   c->add_option("--addon", options->addon, "Folder with the add-on's Python");

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc closure: what a closure of Cycles computes by our definition, for the tests that hold Cycles against it.
-#include <iostream>
-
 #include "app/commands.h"
 #include "app/csv.h"
 #include "model/model.h"
@@ -86,17 +84,7 @@ void add_closure_command(CLI::App& app) {
     const LobeKind kind = lobe_named(o->kind);
     const ModelInfo info = schema(o->kind);
     const Lobe c = lobe(kind, complete(info, parse_values(info, o->values)));
-    CsvReader in(std::cin, "stdin", {"wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"});
-    if (in.empty()) input_error("stdin: expected a CSV table with the header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z");
-    CsvWriter out("f_cos_r,f_cos_g,f_cos_b");
-    std::vector<double> row;
-    while (in.next(row)) {
-      const Vec3<double> wi = in.unit_vector(row, 0), wo = in.unit_vector(row, 3);
-      if (!(wi.z > 0 && wo.z > 0)) input_error("{}: expected directions above the surface", in.where());
-      const Rgb<double> f = evaluate(c, wi, wo);
-      out.row({f.r, f.g, f.b});
-    }
-    out.finish();
+    print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(c, wi, wo); });
   });
 }
 

@@ -21,6 +21,7 @@ void add_sample_command(CLI::App&);
 void add_albedo_command(CLI::App&);
 void add_check_command(CLI::App&);
 void add_stability_command(CLI::App&);
+void add_fit_command(CLI::App&);
 void add_build_command(CLI::App&);
 void add_render_command(CLI::App&);
 void add_scene_command(CLI::App&);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <functional>
 #include <istream>
 #include <string>
 #include <vector>
@@ -53,5 +54,9 @@ class CsvWriter {
   void write();
   std::string text_;
 };
+
+/// Reads direction pairs above the surface, wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, from stdin and prints
+/// f_cos_r,f_cos_g,f_cos_b.
+void print_f_cos(const std::function<Rgb<double>(const Vec3<double>& wi, const Vec3<double>& wo)>& f_cos);
 
 }  // namespace brdfc

@@ -284,9 +284,10 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   for (RepresentationKind kind : plan.forms) {
     const Shader shader = write_shader(model, kind, table, plan.fixed, plan.max_lobes);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
-    const bool cut = !plan.fixed.empty() || plan.max_lobes < kMaxLobes;
+    // A fitted form exists for these parameters only.
+    const bool cut = kind != RepresentationKind::Fitted && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
     const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
-    const RepresentationError error = measure_error(model, kind);
+    const RepresentationError error = measure_error(model, kind, plan.fixed);
     const auto cost = costs.find(info.name + "," + name_of(kind));
     const std::string file = "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;

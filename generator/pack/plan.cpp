@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <map>
 
+#include "represent/fit.h"
+
 namespace brdfc {
 namespace {
 
@@ -11,7 +13,27 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
   return format_values(info, {{name, value}});
 }
 
-RepresentationKind chosen_form(const MaterialNeed& need) {
+/// Why the materials of a model have no common fitted form; nothing if they have one.
+std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs) {
+  const MaterialNeed& first = *needs.front();
+  if (const auto reason = unfit(*first.model, first.values)) return reason;
+  for (const MaterialNeed* need : needs) {
+    if (!need->textured.empty()) return fmt::format("{} varies over {}", *need->textured.begin(), need->id);
+    if (need->values != first.values) return fmt::format("{} and {} have other parameters", first.id, need->id);
+  }
+  return std::nullopt;
+}
+
+double fitted_error(const MaterialNeed& need) {
+  return *measure_error(*need.model, RepresentationKind::Fitted, need.values).relative_l1;
+}
+
+bool fits(const std::vector<const MaterialNeed*>& needs, const Budget& budget) {
+  return budget.error && !unfit(needs) && fitted_error(*needs.front()) <= *budget.error;
+}
+
+RepresentationKind chosen_form(const MaterialNeed& need, const std::vector<const MaterialNeed*>& needs,
+                               const Budget& budget) {
   const std::vector<RepresentationKind> known = representations(*need.model);
   // A form may exist for some choices only.
   const auto lacking = [&](RepresentationKind kind) {
@@ -20,9 +42,16 @@ RepresentationKind chosen_form(const MaterialNeed& need) {
     return std::string();
   };
   if (need.representation == "auto")
-    for (RepresentationKind kind : known)
-      if (lacking(kind).empty()) return kind;
+    for (RepresentationKind kind : known) {
+      if (!lacking(kind).empty()) continue;
+      return kind == RepresentationKind::Sampled && fits(needs, budget) ? RepresentationKind::Fitted : kind;
+    }
   const RepresentationKind kind = representation_named(need.representation);
+  if (kind == RepresentationKind::Fitted) {
+    if (const auto reason = unfit(needs))
+      input_error("material {}: {} has no form 'fitted' here: {}", need.id, need.model->info().name, *reason);
+    return kind;
+  }
   if (std::find(known.begin(), known.end(), kind) == known.end())
     input_error("material {}: {} has no form '{}'", need.id, need.model->info().name, need.representation);
   if (const std::string choice = lacking(kind); !choice.empty())
@@ -31,7 +60,7 @@ RepresentationKind chosen_form(const MaterialNeed& need) {
   return kind;
 }
 
-PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed*>& needs) {
+PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed*>& needs, const Budget& budget) {
   const ModelInfo& info = model.info();
   PlannedModel plan;
   plan.model = &model;
@@ -39,7 +68,7 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
   std::set<RepresentationKind> used;
   for (const MaterialNeed* need : needs) {
     plan.materials.push_back(need->id);
-    used.insert(chosen_form(*need));
+    used.insert(chosen_form(*need, needs, budget));
     plan.max_lobes = std::max(plan.max_lobes, std::min(need->lobes, kMaxLobes));
   }
   for (const RepresentationKind kind : representations(model)) {
@@ -47,6 +76,17 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
       plan.forms.push_back(kind);
     else
       plan.reasons.push_back(fmt::format("form {}: no material uses it", name_of(kind)));
+  }
+  const bool drawn = used.count(RepresentationKind::Sampled) > 0;
+  if (used.count(RepresentationKind::Fitted) || (budget.offer && drawn && fits(needs, budget))) {
+    plan.forms.push_back(RepresentationKind::Fitted);
+  } else if (budget.error && drawn) {
+    const auto reason = unfit(needs);
+    plan.reasons.push_back("form fitted: " + (reason ? *reason
+                                              : fits(needs, budget)
+                                                  ? std::string("the materials ask for another")
+                                                  : fmt::format("off by {:.2g} of the light, and {:g} is allowed",
+                                                                fitted_error(*needs.front()), *budget.error)));
   }
   if (used.count(RepresentationKind::Sampled) && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
@@ -142,11 +182,11 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
   return plan;
 }
 
-std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>& needs) {
+std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>& needs, const Budget& budget) {
   std::map<std::string, std::vector<const MaterialNeed*>> by_model;
   for (const MaterialNeed& need : needs) by_model[need.model->info().name].push_back(&need);
   std::vector<PlannedModel> plan;
-  for (const auto& [name, list] : by_model) plan.push_back(plan_model(*list.front()->model, list));
+  for (const auto& [name, list] : by_model) plan.push_back(plan_model(*list.front()->model, list, budget));
   return plan;
 }
 

@@ -2,6 +2,7 @@
 // What of each model a pack holds: everything, or only what the materials of a scene need.
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -34,10 +35,17 @@ struct PlannedModel {
 /// Whole models in every form. Throws InputError for an unknown name; no names: every model.
 std::vector<PlannedModel> plan_models(const std::vector<std::string>& names);
 
+/// What a scene may cost.
+struct Budget {
+  std::optional<double> error;  ///< relative L1 of f cos that a form may have where the material leaves the form open
+  bool offer = false;           ///< a fitted form that keeps the error comes beside a sampled one that is asked for
+};
+
 /// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same
 /// constant is fixed, a form that none uses is left out. Throws InputError naming the material for a representation
-/// that its model does not have.
-std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&);
+/// that its model does not have. A form that is left open is exact where there is one; else fitted, if the budget has
+/// an error and the fit keeps it; else sampled.
+std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Budget& = {});
 
 /// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and
 /// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out.

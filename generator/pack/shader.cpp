@@ -300,20 +300,29 @@ class AlbedoText {
   std::string positions_;
 };
 
-std::string closure_text(ClosureKind kind, std::size_t index) {
-  switch (kind) {
+std::string closure_text(const RecordedClosure& closure, std::size_t i) {
+  const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
+  const auto microfacet = [&](const char* distribution) {
+    return fmt::format("weight_{} * microfacet(\"{}\", {}, vector(0.0), alpha_{}, alpha_{}, 1.0, 0)", i, distribution,
+                       n, i, i);
+  };
+  switch (closure.kind) {
     case ClosureKind::Diffuse:
-      return fmt::format("weight_{} * diffuse(frame_n)", index);
+      return fmt::format("weight_{} * diffuse({})", i, n);
     case ClosureKind::Burley:
-      return fmt::format("weight_{} * burley_diffuse_bsdf(frame_n, color(1), 0.0)", index);
+      return fmt::format("weight_{} * burley_diffuse_bsdf({}, color(1), 0.0)", i, n);
     case ClosureKind::DiffuseRamp:
-      return fmt::format("weight_{} * diffuse_ramp(frame_n, ramp_{})", index, index);
+      return fmt::format("weight_{} * diffuse_ramp({}, ramp_{})", i, n, i);
     case ClosureKind::Reflection:
-      return fmt::format("weight_{} * reflection(frame_n)", index);
+      return fmt::format("weight_{} * reflection({})", i, n);
     case ClosureKind::Refraction:
-      return fmt::format("weight_{} * refraction(frame_n, ior_{})", index, index);
+      return fmt::format("weight_{} * refraction({}, ior_{})", i, n, i);
     case ClosureKind::PhongRamp:
-      return fmt::format("weight_{} * phong_ramp(frame_n, exponent_{}, ramp_{})", index, index, index);
+      return fmt::format("weight_{} * phong_ramp({}, exponent_{}, ramp_{})", i, n, i, i);
+    case ClosureKind::Ggx:
+      return microfacet("ggx");
+    case ClosureKind::Beckmann:
+      return microfacet("beckmann");
   }
   throw std::logic_error("no OSL for this closure");
 }
@@ -342,7 +351,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
   shader.lobes = sampled && max_lobes > 1;
 
-  std::vector<ClosureKind> kinds;
+  std::vector<RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
   std::set<std::string> inputs;
   int operations = 0, mirror_operations = 0;
@@ -355,7 +364,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     statements.add(choices, r.statements);
     inputs.insert(r.inputs.begin(), r.inputs.end());
     if (!kinds.empty() && kinds != r.closures)
-      throw std::logic_error(info.name + ": exact closures must be the same for every combination of choices");
+      throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
     kinds = r.closures;
     if (sampled && model.has_mirror()) {
       const Recording m = record_mirror(model, values, 4);
@@ -401,14 +410,23 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     }
   } else {
     for (std::size_t c = 0; c < kinds.size(); ++c) {
+      const ClosureKind closure = kinds[c].kind;
       body += fmt::format("    color weight_{};\n", c);
-      if (has_ramp(kinds[c])) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
-      if (kinds[c] == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
-      if (kinds[c] == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
+      if (has_ramp(closure)) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
+      if (closure == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
+      if (has_facets(closure)) body += fmt::format("    float alpha_{};\n", c);
+      if (closure == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
+      if (kinds[c].turned) body += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
       terms.push_back(closure_text(kinds[c], c));
-      shader.slots += slots(kinds[c]);
+      shader.slots += slots(closure);
     }
     body += statements.print(4);
+    for (std::size_t c = 0; c < kinds.size(); ++c)
+      if (kinds[c].turned)
+        body += fmt::format(
+            "    normal normal_{0} = normalize(frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * "
+            "normal_{0}_z);\n",
+            c);
   }
   shader.closures = int(terms.size());
   if (shader.slots > kMaxClosures)

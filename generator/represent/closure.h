@@ -17,6 +17,8 @@ enum class ClosureKind {
   DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, no cosine
   PhongRamp,    ///< phong_ramp(N, e, colours): ramp8(cos^e a) (N.wi) (e+2)/(2 pi) cos^e a
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
+  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): without Fresnel term, Smith's height-correlated masking
+  Beckmann,     ///< microfacet("beckmann", ...): the same, with Walter's rational masking as Cycles has it
   Refraction,   ///< refraction(N, ior): delta in the direction of ideal refraction, none beyond the critical angle
 };
 
@@ -24,19 +26,26 @@ enum class ClosureKind {
 inline constexpr int kRampSize = 8;
 inline bool has_ramp(ClosureKind kind) { return kind == ClosureKind::DiffuseRamp || kind == ClosureKind::PhongRamp; }
 
+inline bool has_facets(ClosureKind kind) { return kind == ClosureKind::Ggx || kind == ClosureKind::Beckmann; }
+
 template <class T> struct Closure {
   ClosureKind kind;
   Rgb<T> weight;
   Vec3<T> normal;
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
   T exponent;                          ///< PhongRamp
+  T alpha;                             ///< Ggx, Beckmann: roughness
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
+  bool turned = false;                 ///< `normal` is not the surface's
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
-      : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0), ior(1) {}
+      : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0), alpha(1), ior(1) {}
 };
 
 template <class T> using ClosureSum = std::vector<Closure<T>>;
+
+/// f cos(theta_i) of facets without Fresnel term, for directions above the surface in the frame of the closure.
+double microfacet(ClosureKind, double alpha_x, double alpha_y, const Vec3<double>& wi, const Vec3<double>& wo);
 
 /// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface.
 Rgb<double> evaluate(const Closure<double>&, const Vec3<double>& wi, const Vec3<double>& wo);

@@ -22,20 +22,10 @@ Vec3<double> in_frame(const Lobe& c, const Vec3<double>& v) {
   return {dot(x, v), dot(y, v), dot(c.normal, v)};
 }
 
-/// Smith's Lambda of a direction in the frame.
-double lambda(const Lobe& c, const Vec3<double>& v) {
-  const double a2 = (sqr(c.alpha_x * v.x) + sqr(c.alpha_y * v.y)) / sqr(v.z);
-  if (c.kind == LobeKind::Ggx) return a2 / (2 * (std::sqrt(1 + a2) + 1));
-  // Walter's rational fit, which leaves out all shadowing below a2 = 0.39.
-  if (a2 < 0.39) return 0;
-  const double a = 1 / std::sqrt(a2);
-  return ((0.396 * a - 1.259) * a + 1) / ((2.181 * a + 3.535) * a);
-}
-
 /// f cos(theta_i) without weight; directions in the frame, above the surface.
-double microfacet(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
-  const Vec3<double> h = normalize(wi + wo);
+double facets(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   if (c.kind == LobeKind::AshikhminShirley) {
+    const Vec3<double> h = normalize(wi + wo);
     const double nu = 2 / sqr(c.alpha_x) - 2, nv = 2 / sqr(c.alpha_y) - 2;
     const double s2 = sqr(h.x) + sqr(h.y);
     // (h.n)^((nu hx^2 + nv hy^2) / (1 - (h.n)^2))
@@ -43,10 +33,7 @@ double microfacet(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo)
     const double lobe = std::exp(0.5 * e * std::log1p(-std::min(s2, 1.0)));
     return std::sqrt((nu + 1) * (nv + 1)) * kInvPi / 8 * lobe * wi.z / (dot(h, wo) * std::max(wi.z, wo.z));
   }
-  const double t2 = sqr(h.x / c.alpha_x) + sqr(h.y / c.alpha_y), z2 = sqr(h.z);
-  const double D = c.kind == LobeKind::Ggx ? kInvPi / (c.alpha_x * c.alpha_y * sqr(t2 + z2))
-                                           : kInvPi * std::exp(-t2 / z2) / (c.alpha_x * c.alpha_y * sqr(z2));
-  return D / (4 * wo.z * (1 + lambda(c, wi) + lambda(c, wo)));
+  return microfacet(c.kind == LobeKind::Ggx ? ClosureKind::Ggx : ClosureKind::Beckmann, c.alpha_x, c.alpha_y, wi, wo);
 }
 
 /// Uniform in a cone that the linear flank widens, normalised without the flank's loss.
@@ -99,7 +86,7 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
     case LobeKind::Beckmann:
     case LobeKind::AshikhminShirley:
       if (cosTheta_i <= 0 || cosTheta_o <= 0) return Rgb<double>(0.0);
-      return c.weight * microfacet(c, in_frame(c, wi), in_frame(c, wo));
+      return c.weight * facets(c, in_frame(c, wi), in_frame(c, wo));
     case LobeKind::DiffuseToon:
       return cosTheta_i > 0 ? c.weight * toon(c, cosTheta_i) : Rgb<double>(0.0);
     case LobeKind::GlossyToon:

@@ -10,6 +10,7 @@
 #include "analysis/probes.h"
 #include "model/horizon.h"
 #include "model/sampling.h"
+#include "represent/fit.h"
 
 namespace brdfc {
 namespace {
@@ -34,7 +35,7 @@ template <class T> Rgb<T> medium(const Brdf<T>& brdf, const T& side, const T& di
   return select(side < T(0), brdf.transmittance(distance), Rgb<T>(T(1)));
 }
 
-/// The closures, as the shader has to weigh them.
+/// The closures of an exact form, as the shader has to weigh them.
 std::optional<ClosureSum<Expr>> recorded_exact(const Model& model, const Brdf<Expr>& brdf) {
   auto sum = brdf.exact(recorded_wo(model, brdf));
   if (sum && model.has_medium()) {
@@ -44,15 +45,28 @@ std::optional<ClosureSum<Expr>> recorded_exact(const Model& model, const Brdf<Ex
   return sum;
 }
 
+ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& values) {
+  const Vec3<Expr> wo = recorded_wo(model, brdf);
+  ClosureSum<Expr> sum = fit_of(model, values).closures(wo);
+  if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf.mirror(wo));
+  return sum;
+}
+
 std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
 
-void output_exact(const ClosureSum<Expr>& sum, Program& program, std::vector<ClosureKind>& kinds) {
+void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<RecordedClosure>& recorded) {
   for (std::size_t c = 0; c < sum.size(); ++c) {
-    kinds.push_back(sum[c].kind);
+    recorded.push_back({sum[c].kind, sum[c].turned});
     program.output(fmt::format("weight_{}", c), sum[c].weight);
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
+    if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
+    if (sum[c].turned) {
+      program.output(fmt::format("normal_{}_x", c), sum[c].normal.x);
+      program.output(fmt::format("normal_{}_y", c), sum[c].normal.y);
+      program.output(fmt::format("normal_{}_z", c), sum[c].normal.z);
+    }
     if (sum[c].kind == ClosureKind::Refraction) program.output(fmt::format("ior_{}", c), sum[c].ior);
   }
 }
@@ -66,8 +80,8 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
   program.output("weight", s.weight);
 }
 
-Recording finish(const Program& program, int indent, std::vector<ClosureKind> kinds = {}) {
-  return {program.print_osl(indent, frame_names()), std::move(kinds), program.operations(), program.inputs()};
+Recording finish(const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
+  return {program.print_osl(indent, frame_names()), std::move(closures), program.operations(), program.inputs()};
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
@@ -98,6 +112,25 @@ void require_finite(const Model& model, const ParamValues& values, const Vec3<do
                                    format_values(model.info(), values), wo.x, wo.y, wo.z));
 }
 
+/// The fit is in double precision; what single precision adds is rounding.
+RepresentationError fitted_error(const Model& model, const ParamValues& values) {
+  RepresentationError out;
+  double sum1 = 0, sum2 = 0;
+  Fit::Error worst;
+  const std::vector<Fit::Error>& errors = fit_of(model, values).errors();
+  for (const Fit::Error& e : errors) {
+    sum1 += e.relative_l1 / double(errors.size());
+    sum2 += e.relative_l2 / double(errors.size());
+    out.albedo = std::max(out.albedo, e.albedo);
+    if (e.relative_l1 > worst.relative_l1) worst = e;
+  }
+  out.relative_l1 = sum1;
+  out.relative_l2 = sum2;
+  out.note = fmt::format("closures fitted to the model, at worst {:.2g} of the light off, seen at a cosine of {:.2g}",
+                         worst.relative_l1, worst.cos_theta_o);
+  return out;
+}
+
 /// Parameters a slider reaches, drawn uniformly; a wide range logarithmically, as its effect is.
 ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt19937_64& rng) {
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -116,12 +149,22 @@ ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt
 
 }  // namespace
 
-const char* name_of(RepresentationKind kind) { return kind == RepresentationKind::Exact ? "exact" : "sampled"; }
+const char* name_of(RepresentationKind kind) {
+  switch (kind) {
+    case RepresentationKind::Exact:
+      return "exact";
+    case RepresentationKind::Sampled:
+      return "sampled";
+    case RepresentationKind::Fitted:
+      return "fitted";
+  }
+  throw std::logic_error("a form without a name");
+}
 
 RepresentationKind representation_named(const std::string& name) {
-  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled})
+  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled, RepresentationKind::Fitted})
     if (name == name_of(kind)) return kind;
-  input_error("unknown representation '{}': expected one of exact, sampled", name);
+  input_error("unknown representation '{}': expected one of exact, sampled, fitted", name);
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
@@ -157,20 +200,22 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   Program program;
-  std::vector<ClosureKind> kinds;
+  std::vector<RecordedClosure> closures;
   if (kind == RepresentationKind::Exact) {
     const auto sum = recorded_exact(model, *brdf);
     if (!sum) input_error("{}: has no exact representation", model.info().name);
-    output_exact(*sum, program, kinds);
+    output_closures(*sum, program, closures);
+  } else if (kind == RepresentationKind::Fitted) {
+    output_closures(recorded_fit(model, *brdf, fixed), program, closures);
   } else {
     output_sampled(model, *brdf, program);
   }
   int used = 0;
-  for (ClosureKind k : kinds) used += slots(k);
+  for (const RecordedClosure& c : closures) used += slots(c.kind);
   if (used > kMaxClosures)
-    input_error("{}: the exact form needs {} closure slots, and Cycles keeps {}", model.info().name, used,
+    input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", model.info().name, name_of(kind), used,
                 kMaxClosures);
-  return finish(program, indent, std::move(kinds));
+  return finish(program, indent, std::move(closures));
 }
 
 Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
@@ -178,10 +223,11 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {ClosureKind::Reflection});
+  return finish(program, indent, {{ClosureKind::Reflection, false}});
 }
 
-RepresentationError measure_error(const Model& model, RepresentationKind kind) {
+RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
+  if (kind == RepresentationKind::Fitted) return fitted_error(model, fixed);
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -193,9 +239,9 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
     Recorder recorder;
     const std::unique_ptr<Brdf<Expr>> recorded = model.record(with_choices(model.info(), choices));
     Program program;
-    std::vector<ClosureKind> kinds;
+    std::vector<RecordedClosure> kinds;
     if (kind == RepresentationKind::Exact)
-      output_exact(*recorded_exact(model, *recorded), program, kinds);
+      output_closures(*recorded_exact(model, *recorded), program, kinds);
     else
       output_sampled(model, *recorded, program);
 
@@ -217,10 +263,10 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind) {
       if (kind == RepresentationKind::Exact) {
         const auto out = program.run<float>(inputs);
         for (std::size_t c = 0; c < kinds.size(); ++c) {
-          Closure<double> closure(kinds[c], executed(out, fmt::format("weight_{}", c), false));
-          if (has_ramp(kinds[c]))
+          Closure<double> closure(kinds[c].kind, executed(out, fmt::format("weight_{}", c), false));
+          if (has_ramp(kinds[c].kind))
             for (std::size_t i = 0; i < kRampSize; ++i) closure.ramp[i] = executed(out, ramp_entry(c, i), true);
-          if (kinds[c] == ClosureKind::PhongRamp)
+          if (kinds[c].kind == ClosureKind::PhongRamp)
             closure.exponent = executed(out, fmt::format("exponent_{}", c), false).r;
           closures.push_back(closure);
         }

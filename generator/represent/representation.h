@@ -11,15 +11,16 @@
 namespace brdfc {
 
 enum class RepresentationKind {
-  Exact,   ///< closures that equal the model
-  Sampled  ///< the shader samples the model itself, one narrow lobe per sample
+  Exact,    ///< closures that equal the model
+  Sampled,  ///< the shader samples the model itself, one narrow lobe per sample
+  Fitted    ///< closures that come close to the model, for one set of parameters (fit.h)
 };
 
 const char* name_of(RepresentationKind);
 /// Throws InputError that lists the known names.
 RepresentationKind representation_named(const std::string&);
 
-/// The forms a model has, preferred first.
+/// The forms a model has whatever its parameters are, preferred first.
 std::vector<RepresentationKind> representations(const Model&);
 
 /// How many lobes a sampled shader may trace per shading point.
@@ -31,15 +32,21 @@ ParamValues form_choices(const Model&, RepresentationKind);
 
 /// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
 /// sampled, u_0, u_1, u_2; and assign what `kind` says.
+struct RecordedClosure {
+  ClosureKind kind;
+  bool turned;  ///< has a normal of its own
+  bool operator==(const RecordedClosure&) const = default;
+};
 struct Recording {
   std::string statements;
-  std::vector<ClosureKind> closures;  ///< Exact: closure i has weight_i, ramp_i[8] if it is a ramp, and exponent_i
+  std::vector<RecordedClosure> closures;  ///< all but Sampled
   int operations = 0;
   std::vector<std::string> inputs;
 };
 
-/// Exact: assigns the weights and ramps of its closures. Sampled: assigns wi_x, wi_y, wi_z and weight.
-/// Throws InputError if more closures than Cycles keeps would be needed.
+/// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
+/// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z. A fitted form needs all parameters in
+/// `fixed`. Throws InputError if more closures than Cycles keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
@@ -54,6 +61,8 @@ struct RepresentationError {
 
 /// Executes the recorded form in float at random parameters and directions (fixed seed). Throws ValueError naming
 /// model, parameters, directions and value for a result that is NaN, infinite or negative.
-RepresentationError measure_error(const Model&, RepresentationKind);
+/// Of a fitted form, at the parameters in `fixed`, which the others do without: mean over views with cosines spread
+/// evenly, the worst in `note`.
+RepresentationError measure_error(const Model&, RepresentationKind, const ParamValues& fixed = {});
 
 }  // namespace brdfc

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc fit: how close a few closures of Cycles come to a model.
+#include <algorithm>
+
+#include "app/commands.h"
+#include "app/csv.h"
+#include "represent/fit.h"
+
+namespace brdfc {
+
+void add_fit_command(CLI::App& app) {
+  struct Options {
+    std::string model;
+    std::vector<std::string> values;
+    bool pairs = false;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "fit",
+      "Error of the fitted form by view angle: closures of Cycles whose sum comes close to a model at these "
+      "parameters.\n"
+      "stdout: CSV with header cos_theta_o,relative_l1,relative_l2,albedo,negative: the integral of the difference of\n"
+      "f cos over the albedo, the same by squares, the albedo's difference, and what is negative of f cos.\n"
+      "stderr: the middle, the 95th percentile and the largest of relative_l1");
+  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
+  cmd->add_option("values", o->values, "name=value; a colour is three numbers or one");
+  cmd->add_flag("--pairs", o->pairs,
+                "f cos(theta_i) of the closures instead, for direction pairs.\n"
+                "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
+                "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
+  cmd->callback([o] {
+    const Model& model = find_model(o->model);
+    const ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
+    if (const auto reason = unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
+    const Fit& fit = fit_of(model, values);
+    if (o->pairs) {
+      print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(fit.closures(wo), wi, wo); });
+      return;
+    }
+    fmt::print("cos_theta_o,relative_l1,relative_l2,albedo,negative\n");
+    std::vector<double> l1;
+    for (const Fit::Error& e : fit.errors()) l1.push_back(e.relative_l1);
+    std::sort(l1.begin(), l1.end());
+    const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
+    fmt::print(stderr,
+               "{} {}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
+               o->model, format_values(model.info(), values), quantile(0.5), quantile(0.95), quantile(1));
+    for (const Fit::Error& e : fit.errors())
+      fmt::print("{:.6g},{:.3g},{:.3g},{:.3g},{:.3g}\n", e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo,
+                 e.negative);
+  });
+}
+
+}  // namespace brdfc

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A fitted form: a few closures of Cycles whose sum comes close to a BRDF for every view, so that Cycles can send light
+// to it from lamps. For a material whose parameters are all known.
+//
+// The closures are phong_ramps about axes in the plane of incidence, and a diffuse_ramp. Both take eight colours that
+// may be negative, so each is a family that is linear in eight numbers, and a view is a linear problem: least absolute
+// differences of f cos(theta_i), by iteratively reweighted least squares over directions drawn from the model and from
+// lobes of every width; the albedo is a constraint, and a sum below 0 is fined. Axes and exponents come from the
+// moments of the model's own lobe. All is tabulated over the view angle, and linear between.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/table.h"
+#include "model/model.h"
+#include "represent/closure.h"
+
+namespace brdfc {
+
+/// Why closures can't be fitted to a model with these parameters; nothing if they can.
+std::optional<std::string> unfit(const Model&, const ParamValues&);
+
+class Fit {
+ public:
+  /// `values` are complete. Throws ValueError where the model gives a value that is NaN, infinite or negative.
+  Fit(const Model&, const ParamValues& values);
+
+  /// The closures for a view above the surface. Their weights add up to the albedo, or where facets
+  /// shadow each other to a little more.
+  template <class T> ClosureSum<T> closures(const Vec3<T>& wo) const;
+
+  /// The closures of a view against the model.
+  struct Error {
+    double cos_theta_o = 1;
+    double relative_l1 = 0;  ///< integral of |difference of f cos| over the albedo, largest channel
+    double relative_l2 = 0;  ///< root of the integral of its square over that of the model's, largest channel
+    double albedo = 0;       ///< largest difference
+    double negative = 0;     ///< integral of what lies below 0, over the albedo
+  };
+  /// At cosines evenly spaced from 1 to 0, whatever the tables' knots.
+  const std::vector<Error>& errors() const { return errors_; }
+
+ private:
+  struct Lobe {
+    std::shared_ptr<const Table> offset, exponent;  ///< angle from the mirror direction, towards the normal
+  };
+  /// A closure's weight, and the colours of its ramp times that weight, by channel; one channel if `tint_` does. One
+  /// colour without a ramp.
+  struct Linear {
+    std::shared_ptr<const Table> weight;
+    std::vector<std::vector<std::shared_ptr<const Table>>> colour;
+  };
+  std::vector<Lobe> lobes_;
+  std::vector<Linear> linear_;  ///< of the lobes, of the diffuse_ramp, of the facets
+  std::vector<Closure<double>> facets_;
+  Rgb<double> tint_;  ///< of all closures
+  std::vector<Error> errors_;
+};
+
+/// The fit for these values, made at first use and kept while the program runs.
+const Fit& fit_of(const Model&, const ParamValues& values);
+
+extern template ClosureSum<double> Fit::closures(const Vec3<double>&) const;
+extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&) const;
+
+}  // namespace brdfc

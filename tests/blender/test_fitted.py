@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fitted forms in Cycles are the sums of closures that `brdfc fit` judges, and return the model's
+light."""
+
+import json
+import math
+
+import bpy
+import numpy as np
+import pytest
+from goniometer import Goniometer, tilted, unit
+from helpers import arguments, read_csv, script_material, to_csv
+
+#: A model for each family of closures, one of three channels, one beside a mirror.
+MATERIALS = {
+    "phong": {"e": 40.0, "ks": (0.9, 0.6, 0.2)},
+    "oren_nayar": {"sigma": 0.6},
+    "cook_torrance": {"f0": (0.9, 0.5, 0.05)},
+    "schlick_double": {},
+}
+SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
+COSINES = (0.1, 0.4, 0.8, 1.0)
+FACETS = 96
+
+
+@pytest.fixture(scope="module")
+def sources(tool, tmp_path_factory):
+    """OSL by model, from a pack of these materials alone."""
+    folder = tmp_path_factory.mktemp("fitted")
+    listed = {
+        name: {"model": name, "parameters": values, "representation": "fitted"}
+        for name, values in MATERIALS.items()
+    }
+    file = folder / "materials.json"
+    file.write_text(json.dumps({"materials": listed}))
+    tool("build", "--materials", file, "--out", folder)
+    shaders = folder / "brdfc_shaders" / "shaders"
+    assert {p.stem for p in shaders.iterdir()} == {f"brdfc_{name}_fitted" for name in MATERIALS}
+    return {name: (shaders / f"brdfc_{name}_fitted.osl").read_text() for name in MATERIALS}
+
+
+def start(extension, sources):
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    extension.scene_loader.apply_clean_settings(bpy.context.scene, max_bounces=0)
+    return [script_material(extension, name, sources[name]) for name in MATERIALS]
+
+
+def fitted(tool, name, wi, wo):
+    header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
+    stdin = to_csv(header, np.hstack([wi, wo]))
+    return read_csv(tool("fit", name, *arguments(MATERIALS[name]), "--pairs", stdin=stdin))[1]
+
+
+def test_a_sun_on_a_fitted_form(extension, tool, sources):
+    """Every pair is within 1e-3 of the largest value of what the tool says of the closures."""
+    rng = np.random.default_rng(3)
+    which = np.repeat(np.arange(len(MATERIALS)), FACETS)
+    lit_pairs = {name: [] for name in MATERIALS}
+    for towards in SUNS:
+        materials = start(extension, sources)
+        normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
+        # Every other facet faces halfway between sun and camera, more or less: the highlight.
+        half = unit(unit(towards) + (0, 0, 1))
+        near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
+        normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+        meter = Goniometer(bpy.context.scene, materials, normals, samples=4, which=which)
+        wi = meter.local(meter.add_sun(unit(towards)))
+        wo, picture = meter.wo(), meter.measure()
+        for i, name in enumerate(MATERIALS):
+            lit = (which == i) & (wi[:, 2] > 1e-4)
+            dark = (which == i) & (wi[:, 2] < -1e-4)
+            assert (picture[dark] == 0).all(), f"{name} is lit from below"
+            lit_pairs[name].append(np.hstack([wi[lit], wo[lit], picture[lit]]))
+    for name, found in lit_pairs.items():
+        wi, wo, measured = np.split(np.concatenate(found), 3, axis=1)
+        expected = fitted(tool, name, wi, wo)
+        off, largest = np.abs(measured - expected).max(), expected.max()
+        print(f"{name}: off by {off:.2g} of {largest:.2g}")
+        assert largest > 0.1, name
+        assert off <= 1e-3 * largest, name
+
+
+@pytest.mark.full
+def test_furnace_of_a_fitted_form(extension, tool, sources):
+    """Sampling returns what evaluation says: the albedo of the model, off by what `brdfc fit`
+    states for that view and by noise."""
+    materials = start(extension, sources)
+    per_cosine = 60
+    cosines = np.repeat(COSINES, per_cosine)
+    which = np.repeat(np.arange(len(MATERIALS)), len(cosines))
+    cosines = np.tile(cosines, len(MATERIALS))
+    turns = np.random.default_rng(4).uniform(0, 2 * math.pi, len(cosines))
+    meter = Goniometer(
+        bpy.context.scene, materials, tilted(cosines, turns), samples=256, which=which
+    )
+    meter.add_world()
+    picture = meter.measure()
+    for i, name in enumerate(MATERIALS):
+        values = arguments(MATERIALS[name])
+        stdin = "cos_theta_o\n" + "".join(f"{c}\n" for c in COSINES)
+        columns, rows = read_csv(tool("albedo", name, *values, stdin=stdin))
+        total = [columns.index(f"albedo_{c}") for c in "rgb"]
+        errors = read_csv(tool("fit", name, *values))[1]
+        for cosine, truth in zip(COSINES, rows[:, total], strict=True):
+            chosen = picture[(which == i) & (cosines == cosine)]
+            nearest = errors[np.argsort(np.abs(errors[:, 0] - cosine))[:2], 3].max()
+            noise = 5 * chosen.std(0, ddof=1).max() / math.sqrt(per_cosine)
+            error = np.abs(chosen.mean(0) - truth).max()
+            print(f"{name} at {cosine}: {error:.2g}, stated {nearest:.2g}, noise {noise:.2g}")
+            assert error <= nearest + noise + 1e-3, f"{name} at {cosine}"
+            assert noise < 0.03

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Closures fitted to a model come as close to it as they say.
+#include "represent/fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "analysis/albedo.h"
+#include "pack/plan.h"
+#include "pack/shader.h"
+
+namespace brdfc {
+namespace {
+
+using testing::HasSubstr;
+
+ParamValues values_of(const Model& m, const std::vector<std::string>& text) {
+  return complete(m.info(), parse_values(m.info(), text));
+}
+
+struct Row {
+  const char* model;
+  std::vector<std::string> values;
+  double median, worst;  ///< relative L1 over views
+};
+/// Bounds are a quarter above what was measured.
+const Row kRows[] = {{"modified_phong", {"ks=1", "e=50"}, 0.006, 0.06},
+                     {"phong", {"ks=1", "e=20"}, 0.007, 0.2},
+                     {"phong", {"e=1000"}, 0.007, 0.14},
+                     {"max_phong", {"e=50"}, 0.02, 0.2},
+                     {"oren_nayar", {"sigma=0.6"}, 0.016, 0.04},
+                     {"lossless", {}, 0.017, 0.03},
+                     {"blinn", {"ks=0.9,0.5,0.1", "e=100"}, 0.06, 0.42}};
+
+TEST(Fit, ComesAsCloseAsMeasured) {
+  for (const Row& row : kRows) {
+    const Model& m = find_model(row.model);
+    std::vector<double> l1;
+    for (const Fit::Error& e : fit_of(m, values_of(m, row.values)).errors()) {
+      l1.push_back(e.relative_l1);
+      EXPECT_LE(e.negative, 0.01) << row.model << " at " << e.cos_theta_o;
+      EXPECT_LE(e.albedo, 0.045) << row.model << " at " << e.cos_theta_o;
+    }
+    std::sort(l1.begin(), l1.end());
+    EXPECT_LE(l1[l1.size() / 2], row.median) << row.model;
+    EXPECT_LE(l1.back(), row.worst) << row.model;
+  }
+}
+
+/// By another quadrature: a grid over the angles from the mirror direction.
+TEST(Fit, StatesItsError) {
+  const Model& m = find_model("phong");
+  const ParamValues values = values_of(m, {"e=20"});
+  const Fit& fit = fit_of(m, values);
+  const auto brdf = m.make_double(values);
+  for (const std::size_t k : {5u, 30u, 55u, 62u}) {
+    const Fit::Error& e = fit.errors()[k];
+    const Vec3<double> wo = direction(e.cos_theta_o, 0);
+    const ClosureSum<double> sum = fit.closures(wo);
+    double difference = 0, albedo = 0;
+    constexpr int kHeights = 600, kTurns = 300;
+    for (int i = 0; i < kHeights; ++i)
+      for (int j = 0; j < kTurns; ++j) {
+        const double theta = (i + 0.5) / kHeights * kPi / 2, phi = (j + 0.5) / kTurns * kPi;
+        const Vec3<double> wi = direction(std::cos(theta), phi);
+        const double w = std::sin(theta), f = brdf->eval(wi, wo).r * wi.z;
+        difference += w * std::abs(evaluate(sum, wi, wo).r - f);
+        albedo += w * f;
+      }
+    EXPECT_NEAR(difference / albedo, e.relative_l1, 0.1 * e.relative_l1 + 2e-4) << e.cos_theta_o;
+  }
+}
+
+/// Facets weigh what they would reflect without shadowing each other, which is a little more.
+TEST(Fit, WeightsAddUpToTheAlbedo) {
+  for (const char* name : {"phong", "blinn", "oren_nayar"}) {
+    const Model& m = find_model(name);
+    const ParamValues values = complete(m.info(), {});
+    const BoundModel bound = bind_model(m, values);
+    for (const double c : {0.15, 0.5, 0.93}) {
+      Rgb<double> weights(0.0);
+      for (const auto& closure : fit_of(m, values).closures(direction(c, 1))) {
+        EXPECT_GE(closure.weight.r, 0);
+        weights += closure.weight;
+      }
+      const double albedo = brdfc::albedo(*bound.brdf, c).total().r;
+      EXPECT_NEAR(weights.r, albedo, 0.07 * albedo) << name << " at " << c;
+    }
+  }
+}
+
+/// Between two views the light that a fixed direction gets changes little more than in the model.
+TEST(Fit, HasNoStepsBetweenViews) {
+  const Model& m = find_model("max_phong");
+  const ParamValues values = values_of(m, {"e=50"});
+  const Fit& fit = fit_of(m, values);
+  const auto brdf = m.make_double(values);
+  const Vec3<double> wi = direction(0.6, kPi + 0.05);
+  double largest = 0, largest_of_model = 0, scale = 0, before = 0, before_of_model = 0;
+  for (int i = 0; i <= 8000; ++i) {
+    const Vec3<double> wo = direction(0.05 + 0.95 * i / 8000, 0);
+    const double f = evaluate(fit.closures(wo), wi, wo).r, truth = brdf->eval(wi, wo).r * wi.z;
+    if (i > 0) {
+      largest = std::max(largest, std::abs(f - before));
+      largest_of_model = std::max(largest_of_model, std::abs(truth - before_of_model));
+    }
+    scale = std::max(scale, truth);
+    before = f, before_of_model = truth;
+  }
+  EXPECT_LT(largest, 1.5 * largest_of_model + 1e-4 * scale);
+}
+
+TEST(Fit, KeepsColoursThatDifferByAngle) {
+  const Model& m = find_model("cook_torrance");
+  const ParamValues values = values_of(m, {"f0=0.9,0.5,0.05"});
+  const auto brdf = m.make_double(values);
+  const Vec3<double> wo = direction(0.8, 0), mirror{-wo.x, 0, wo.z};
+  const Rgb<double> fit = evaluate(fit_of(m, values).closures(wo), mirror, wo),
+                    truth = brdf->eval(mirror, wo) * mirror.z;
+  EXPECT_NEAR(fit.r / truth.r, 1, 0.1);
+  EXPECT_NEAR(fit.b / truth.b, 1, 0.1);
+}
+
+TEST(Fit, SaysWhyThereIsNone) {
+  const auto why = [](const char* name, const std::vector<std::string>& text = {}) {
+    const Model& m = find_model(name);
+    return unfit(m, values_of(m, text)).value_or("");
+  };
+  EXPECT_THAT(why("ashikhmin_shirley", {"nu=10", "nv=100"}), HasSubstr("anisotropic"));
+  EXPECT_EQ(why("ashikhmin_shirley", {"nu=100", "nv=100", "rotation=1"}), "");
+  EXPECT_THAT(why("glass"), HasSubstr("ideally"));
+  EXPECT_EQ(why("radziszewski_alda"), "");
+  EXPECT_THAT(why("radziszewski_alda", {"around=refraction"}), HasSubstr("through"));
+  EXPECT_EQ(why("coupled"), "");
+}
+
+TEST(Fit, ShadersStayWithinBounds) {
+  for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
+    const Model& m = find_model(name);
+    const ParamValues values = values_of(m, {text});
+    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, values), values);
+    EXPECT_LE(s.operations, 600) << name;
+    EXPECT_LE(s.closures, 9) << name;
+    EXPECT_THAT(s.source, HasSubstr("phong_ramp(normal_0, exponent_0, ramp_0)"));
+  }
+}
+
+}  // namespace
+}  // namespace brdfc
