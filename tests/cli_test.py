@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool's commands list, eval, sample, albedo, check, stability: output, exit status, messages.
+"""The tool's commands on models: list, eval, sample, albedo, kernel, check, stability.
+
+Their output, exit status and messages.
 
 The tool is the program in the environment variable BRDFC_TOOL, build/brdfc if that is not set.
 """
@@ -250,6 +252,86 @@ def test_albedo_refuses_a_cosine_out_of_range(cosine):
         "stdin line 3",
         "cos_theta_o",
     )
+
+
+# ---- kernel -------------------------------------------------------------------------------------
+
+
+def drawn(path, points):
+    path.write_text("u,k\n" + "".join(f"{u!r},{k!r}\n" for u, k in points))
+    return str(path)
+
+
+def kernel(*args):
+    """The parameters as other commands take them, and the three errors stated."""
+    result = run("kernel", *args)
+    assert result.returncode == 0, result.stderr
+    errors = [
+        float(word.strip(";,")) for word in result.stderr.split() if "e" in word and "." in word
+    ]
+    assert len(errors) == 3, result.stderr
+    return result.stdout.split(), errors
+
+
+def test_kernel_of_four_heights_comes_back(tmp_path):
+    file = drawn(tmp_path / "k.csv", [(0, 2), (0.5, 1.8), (1, 0.4), (1.5, 0.6)])
+    parameters, errors = kernel(file, "--n", "5")
+    assert parameters == ["n=10", "kernel=table", "h0=1", "h1=0.9", "h2=0.2", "h3=0.3"]
+    assert max(errors) < 1e-12
+
+
+def test_kernel_of_sech2_differs_from_it_by_the_stated_error(tmp_path):
+    places = [5 * i / 49 for i in range(50)]
+    file = drawn(tmp_path / "k.csv", [(u, 1 / math.cosh(u) ** 2) for u in places])
+    parameters, (_, l1, l1_view) = kernel(file)  # n = 4, the model's default
+    steps, views, lines = 1000, 8, []
+    for view in range(views):
+        y = (view + 0.5) / views
+        wo = f"{math.sqrt(1 - y)!r},0,{math.sqrt(y)!r}"
+        xs = [(i + 0.5) / steps for i in range(steps)]
+        lines += [f"{-math.sqrt(1 - x)!r},0,{math.sqrt(x)!r},{wo}" for x in xs]
+    stdin = "\n".join([EVAL_HEADER, *lines, ""])
+    f, g = (
+        [row["f_r"] for row in rows(run("eval", "lossless", *p, stdin=stdin))]
+        for p in (["n=4"], parameters)
+    )
+    apart = [math.pi / steps * abs(a - b) for a, b in zip(f, g, strict=True)]
+    sums = [sum(apart[i * steps : (i + 1) * steps]) for i in range(views)]
+    # The curve's own chords differ from sech^2 by up to 2e-3.
+    assert l1 == pytest.approx(sum(sums) / views, abs=2e-3)
+    assert l1_view == pytest.approx(max(sums), abs=2e-3)
+    assert 0.01 < l1 < 0.06
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["header u,k"]),
+        ("u,h\n0,1\n1,1\n", ["line 1", "'k' is missing"]),
+        ("u,k\n0,1\n1\n", ["line 3", "expected 2 values", "got 1"]),
+        ("u,k\n0,1\n1,high\n", ["line 3", "k", "finite number", "'high'"]),
+        ("u,k\n0,1\nnan,1\n", ["line 3", "u", "finite number", "'nan'"]),
+        ("u,k\n0,1\n2,1\n1,1\n", ["line 4", "u", "more than 2", "got 1"]),
+        ("u,k\n0,1\n0,0.5\n", ["line 3", "u", "more than 0", "got 0"]),
+        ("u,k\n-1,1\n2,1\n", ["line 2", "u", "at least 0", "got -1"]),
+        ("u,k\n0,1\n2,-0.5\n", ["line 3", "k", "above 0", "got -0.5"]),
+        ("u,k\n0,1\n2,0\n", ["line 3", "k", "above 0", "got 0"]),
+        ("u,k\n0,1\n", ["at least two points", "got 1"]),
+        ("u,k\n", ["at least two points", "got 0"]),
+    ],
+)
+def test_kernel_says_what_is_wrong_with_a_curve(text, words, tmp_path):
+    file = tmp_path / "curve.csv"
+    file.write_text(text)
+    refused(run("kernel", str(file)), "curve.csv", *words)
+
+
+def test_kernel_refuses_a_glossiness_out_of_range_and_a_file_that_is_none(tmp_path):
+    file = drawn(tmp_path / "k.csv", [(0, 1), (1, 0.5)])
+    for n in ("0", "-1", "1e5", "nan"):
+        refused(run("kernel", file, "--n", n), "--n", "(0, 10000]")
+    refused(run("kernel", str(tmp_path / "none.csv")), "none.csv", "header u,k", "read")
+    refused(run("kernel", str(tmp_path)), str(tmp_path), "header u,k")
 
 
 # ---- check --------------------------------------------------------------------------------------

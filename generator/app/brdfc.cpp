@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   brdfc::add_probe_command(app);
   brdfc::add_sample_command(app);
   brdfc::add_albedo_command(app);
+  brdfc::add_kernel_command(app);
   brdfc::add_check_command(app);
   brdfc::add_stability_command(app);
   brdfc::add_fit_command(app);

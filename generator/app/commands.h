@@ -19,6 +19,7 @@ void add_closure_command(CLI::App&);
 void add_probe_command(CLI::App&);
 void add_sample_command(CLI::App&);
 void add_albedo_command(CLI::App&);
+void add_kernel_command(CLI::App&);
 void add_check_command(CLI::App&);
 void add_stability_command(CLI::App&);
 void add_fit_command(CLI::App&);

@@ -1,47 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The construction behind Radziszewski and Alda's latitudinal lobe, for other kernels than theirs: any symmetric
-// positive kernel becomes a reflection that loses no light and looks the same from either side.
+// Reflection without loss from a kernel: sech^2 (eq. 14), e^-u, or four heights of a drawn curve. The construction, its
+// equations and stable forms are in model/kernel_lobe.h.
 //
-// M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008, eqs. 9-16; "this particular
-// choice is not unique". x = cos^2 theta_i, y = cos^2 theta_r; the kernel is k(n |x' - y'|) over [0, 1]^2.
-// With A(u) the integral of k over [0, u], B that of A, and S(x') = A(n x') + A(n (1 - x')):
-//   marginal  M(x') = [B(n x') + B(n) - B(n (1 - x'))] / (2 B(n)), its density n S(x') / (2 B(n)),
-//   lobe      f_theta(x, y) = 4 B(n) k(n |x' - y'|) / (S(x') S(y')),  M(x') = x, M(y') = y,
-// which is eq. 13 put into eq. 9, with the factor 2 that eq. 8 asks for. k = sech^2 gives eq. 17. A kernel may also be
-// drawn: k linear between heights at u = 0, 1, 2, 3 and constant beyond, whose integrals are sums over the pieces.
-//
-// Stable forms. v = n x' is found on the half where it is small, from x or 1 - x, whichever is smaller; B(n) - B(n - v)
-// and 1 - A are written out for each kernel, since they cancel. Newton's steps stay in a bracket.
-// n ends at 1e4: places are up to n / 2, of which single precision leaves the kernel too few digits from 1e5.
-// Sampling: w = A(n (x' - y')) is linear in the random number, so that only A is inverted, in closed form; then x =
-// M(x').
-#include "model/sampling.h"
+// M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008, eqs. 9-16.
+#include "model/kernel_lobe.h"
 
 namespace brdfc {
 
-/// iterate(), ended early where numbers can tell that nothing changes any more.
-template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
-  for (int i = 0; i < count; ++i) {
-    const std::array<T, N> next = step(state);
-    if (next == state) break;
-    state = next;
-  }
-  return state;
-}
-template <std::size_t N, class Step>
-std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step step) {
-  return iterate(count, state, step);
-}
-
-template <class T> struct Lossless {
-  Choice kernel;
-  T n;
-  static constexpr int kKnots = 4;
-  std::array<T, kKnots> heights;
-  Rgb<T> tint;
-
-  enum { Sech2, Exponential, Table };
-
+template <class T> struct Lossless : KernelLobe<T, EvenKnots<T, 4>> {
   static ModelInfo info() {
     return {.name = "lossless",
             .label = "Lossless Kernel",
@@ -55,231 +21,20 @@ template <class T> struct Lossless {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(kernel, ChoiceSpec{"kernel",
-                         "Kernel",
-                         {"sech2", "exponential", "table"},
-                         "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, 2, 3"});
-    v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e4, 0, 100, "Glossiness n: 0 is matte"});
+    v(this->kernel,
+      ChoiceSpec{"kernel",
+                 "Kernel",
+                 {"sech2", "exponential", "table"},
+                 "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, 2, 3"});
+    v(this->n, NumberSpec{"n", "Glossiness", 4, 0, 1e4, 0, 100, "Glossiness n: 0 is matte"});
     static constexpr const char* kNames[] = {"h0", "h1", "h2", "h3"};
     static constexpr const char* kLabels[] = {"Height 0", "Height 1", "Height 2", "Height 3"};
     static constexpr double kDrawn[] = {1, 0.6, 0.2, 0.1};
-    for (int i = 0; i < kKnots; ++i)
-      v(heights[std::size_t(i)], NumberSpec{kNames[i], kLabels[i], kDrawn[i], 1e-3, 1, 1e-3, 1,
-                                            "Height of the drawn kernel at the distance of this number, over 1 / n"});
-    v(tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
-  }
-
-  /// e^v - 1 - v, by halving: e^v - 1 - v = (e^(v/2) - 1)^2 + 2 (e^(v/2) - 1 - v/2), all of one sign.
-  static T psi(const T& v) {
-    T sum(0), scale(1), z = v;
-    for (int i = 0; i < 4; ++i) {
-      z = z / T(2);
-      sum = sum + scale * sqr(expm1(z));
-      scale = scale * T(2);
-    }
-    // |z| <= 1/16: the rest of the series is below 1e-17.
-    const T series =
-        z * z / T(2) *
-        (T(1) +
-         z / T(3) *
-             (T(1) +
-              z / T(4) *
-                  (T(1) +
-                   z / T(5) *
-                       (T(1) +
-                        z / T(6) * (T(1) + z / T(7) * (T(1) + z / T(8) * (T(1) + z / T(9) * (T(1) + z / T(10)))))))));
-    return sum + scale * series;
-  }
-
-  /// n; what is added at n = 0 changes no digit and keeps 0 / 0 away.
-  T gloss() const { return named("n_pos", maximum(n, T(1e-17))); }
-
-  /// The drawn kernel at x, which lies in piece i: linear between two knots, constant beyond the last.
-  T drawn(int i, const T& x) const {
-    if (i == kKnots - 1) return heights[std::size_t(i)];
-    return heights[std::size_t(i)] * (T(i + 1) - x) + heights[std::size_t(i) + 1] * (x - T(i));
-  }
-  /// A(u) and B(u) of the drawn kernel, by the piece that u lies in: sums of positive terms, exact for these curves.
-  std::array<T, 2> drawn_integrals(const T& u) const {
-    T t = u, left = heights[0], right = heights[1], area(0), moment(0), whole_area(0), whole_moment(0);
-    for (std::size_t i = 1; i < kKnots; ++i) {
-      // Over the piece before: its own integrals, and what lies below it.
-      whole_moment = whole_moment + whole_area + (T(2) * heights[i - 1] + heights[i]) / T(6);
-      whole_area = whole_area + (heights[i - 1] + heights[i]) / T(2);
-      const auto past = u > T(int(i));
-      t = select(past, u - T(int(i)), t);
-      left = select(past, heights[i], left);
-      right = select(past, heights[std::min<std::size_t>(i + 1, kKnots - 1)], right);
-      area = select(past, whole_area, area);
-      moment = select(past, whole_moment, moment);
-    }
-    // Beyond the last knot both ends are one height, and t may be any.
-    return {named("area", area + t * (left + left + t * (right - left)) / T(2)),
-            named("moment", moment + t * (area + t * (T(3) * left + t * (right - left)) / T(6)))};
-  }
-  /// The integral of (b - x) k over [a, b]: sums of positive terms.
-  T drawn_moment(const T& a, const T& b) const {
-    T moment(0);
-    for (int i = 0; i < kKnots; ++i) {
-      T lo = maximum(a, T(i)), hi = maximum(b, T(i));
-      if (i < kKnots - 1) lo = minimum(lo, T(i + 1)), hi = minimum(hi, T(i + 1));
-      const T at_lo = drawn(i, lo), at_hi = drawn(i, hi);
-      // Simpson's rule. Pieces outside [a, b] have no width.
-      const T from_lo = maximum(b - lo, T(0)), from_hi = maximum(b - hi, T(0));
-      moment = moment + (hi - lo) * (from_lo * at_lo + (from_lo + from_hi) * (at_lo + at_hi) + from_hi * at_hi) / T(6);
-    }
-    return named("moment", moment);
-  }
-  /// u with A(u) = q: piece by piece, each a quadratic equation.
-  T invert_A(const T& q) const {
-    T rest = q, u(0);
-    for (int i = 0; i + 1 < kKnots; ++i) {
-      const T h = heights[std::size_t(i)], rise = heights[std::size_t(i) + 1] - h;
-      const T part = minimum(rest, h + rise / T(2));
-      u = u + T(2) * part / (h + sqrt(maximum(h * h + T(2) * rise * part, T(0))));
-      rest = rest - part;
-    }
-    return u + maximum(rest, T(0)) / heights[kKnots - 1];
-  }
-
-  T k(const T& u) const {
-    if (kernel == Table) {
-      T value = drawn(0, minimum(u, T(1)));
-      for (int i = 1; i < kKnots; ++i) value = select(u > T(i), drawn(i, minimum(u, T(i + 1))), value);
-      return named("k", value);
-    }
-    const T e = exp(-u);
-    if (kernel == Exponential) return e;
-    return sqr(T(2) * e / (T(1) + e * e));
-  }
-  /// A(u) for u >= 0.
-  T A(const T& u) const {
-    if (kernel == Table) return drawn_integrals(u)[0];
-    if (kernel == Exponential) return -expm1(-u);
-    const T e = expm1(T(-2) * u);
-    return -e / (T(2) + e);
-  }
-  /// 1 - A(u).
-  T one_minus_A(const T& u) const {
-    const T e = exp(-u);
-    if (kernel == Exponential) return e;
-    return T(2) * e * e / (T(1) + e * e);
-  }
-  T B(const T& u) const {
-    if (kernel == Table) return drawn_integrals(u)[1];
-    const T small = minimum(u, T(1)), large = maximum(u, T(1));
-    if (kernel == Exponential) return select(u < T(1), psi(-small), large + expm1(-large));
-    const T sinh = stable_sinh(small);
-    return select(u < T(1), log1p(sinh * sinh) / T(2), large + log1p(exp(T(-2) * large)) - T(0.69314718055994530942));
-  }
-  /// B(g) - B(g - v) for 0 <= v <= g/2.
-  T drop(const T& g, const T& v) const {
-    if (kernel == Table) return v * A(g - v) + drawn_moment(g - v, g);
-    const T small = minimum(v, T(1));
-    if (kernel == Exponential) {
-      // v (1 - e^-g) - e^-g psi(v); for large v e^-g psi(v) = e^(v-g) - e^-g (1 + v).
-      const T tail = select(v < T(1), exp(-g) * psi(small), exp(v - g) - exp(-g) * (T(1) + v));
-      return -v * expm1(-g) - tail;
-    }
-    // ln cosh g - ln cosh(g - v) = -ln(cosh v - tanh g sinh v) for small g, with e^(2v - 2g) for large.
-    const T sinh_half = stable_sinh(small / T(2)), sinh = stable_sinh(small);
-    const T near = -log1p(T(2) * sinh_half * sinh_half - A(minimum(g, T(1))) * sinh);
-    const T far = v - log1p(exp(T(2) * (v - g)) * -expm1(T(-2) * v) / (T(1) + exp(T(-2) * g)));
-    return select(g < T(1), near, far);
-  }
-
-  /// v = g x' with M(x') = p, for p <= 1/2. Where the kernel falls with the distance the root lies between g p and
-  /// 2 g p, so that the digits double from the start: eight steps are enough for any type. A drawn one may rise.
-  T invert_marginal(const T& g, const T& p) const {
-    const T target = named("target", T(2) * B(g) * p);
-    const std::array<T, 3> state =
-        settle(kernel == Table ? 20 : 8, std::array<T, 3>{T(0), g / T(2), g * p}, [&](const std::array<T, 3>& s) {
-          const T v = s[2];
-          T F, dF;
-          if (kernel == Table) {
-            const std::array<T, 2> near = drawn_integrals(v);
-            const T far = A(g - v);
-            F = near[1] + v * far + drawn_moment(g - v, g);
-            dF = near[0] + far;
-          } else {
-            F = named("F", B(v) + drop(g, v));
-            dF = A(v) + A(g - v);
-          }
-          const auto below = F < target;
-          const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
-          const T newton = named("newton", v - (F - target) / maximum(dF, tiny<T>()));
-          const auto inside = newton >= lo && newton <= hi;
-          return std::array<T, 3>{lo, hi, select(inside, newton, (lo + hi) / T(2))};
-        });
-    return state[2];
-  }
-
-  /// A direction's place on the kernel's axis: distance v to the nearer end, and which end that is.
-  struct Place {
-    T v, low;  ///< low: 1 at the horizon's end, 0 at the normal's
-  };
-  Place place(const T& g, const Vec3<T>& w) const {
-    const T x = w.z * w.z, y = sin2_theta(w);
-    // Not exactly normalised directions must not leave the half.
-    const T p = minimum(minimum(x, y) / (x + y), T(0.5));
-    return {invert_marginal(g, p), select(x < y, T(1), T(0))};
-  }
-  T S(const T& g, const T& v) const { return A(v) + A(g - v); }
-
-  /// f_theta / (2 pi).
-  T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const T g = gloss();
-    const Place i = place(g, wi), o = place(g, wo);
-    const T same = abs(i.v - o.v), across = maximum(g - i.v - o.v, T(0));
-    const T near = select(i.low + o.low < T(1.5) && i.low + o.low > T(0.5), across, same);
-    // Far from both ends S no longer changes, and the places' difference is that of the directions over S: large places
-    // would leave it few digits.
-    const T x_minus_y = select(wi.z + wo.z < T(1), (wi.z - wo.z) * (wi.z + wo.z),
-                               (wo.x - wi.x) * (wo.x + wi.x) + (wo.y - wi.y) * (wo.y + wi.y));
-    const T far = abs(x_minus_y) * (T(2) * B(g) / S(g, i.v));
-    const T u = named("u", select(minimum(i.v, o.v) > T(40), far, near));
-    // Over S S in two steps: B is large with g and small with g^2.
-    return T(2) * (B(g) / S(g, i.v)) * (k(u) / S(g, o.v)) / pi<T>();
-  }
-
-  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return tint * select(above(wi, wo), lobe(wi, wo), T(0)); }
-
-  /// The cosine-weighted lobe is itself a density.
-  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), lobe(wi, wo) * wi.z, T(0)); }
-
-  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const T g = gloss();
-    const Place o = place(g, wo);
-    // Along the axis away from the end that wo is nearer to: r below it, g - r beyond.
-    const T r = o.v, rest = g - r;
-    const T total = A(r) + A(rest);
-    // w = A(n (x' - y')), and where A ends at 1 also 1 + w and 1 - w, which tell more when it is near.
-    const T w = named("w", u.y * total - A(r)), mild = minimum(maximum(w, T(-0.75)), T(0.75));
-    const T up = one_minus_A(r) + u.y * total, down = one_minus_A(rest) + (T(1) - u.y) * total;
-    const auto log_of = [](const T& v) { return log(maximum(minimum(v, T(1)), tiny<T>())); };
-    T near, far;
-    if (kernel == Table) {
-      near = invert_A(abs(w)) * select(w < T(0), T(-1), T(1));
-      far = near;
-    } else if (kernel == Exponential) {
-      near = select(w < T(0), log1p(mild), -log1p(-mild));
-      far = select(up < down, log_of(up), -log_of(down));
-    } else {
-      near = T(0.5) * (log1p(mild) - log1p(-mild));
-      far = T(0.5) * log(maximum(up, tiny<T>()) / maximum(down, tiny<T>()));
-    }
-    const T step = named("step", select(abs(w) < T(0.5), near, far));
-    const T v = minimum(maximum(r + step, T(0)), g);
-    // x = M(x') from the end that is nearer.
-    const auto crossed = v > g / T(2);
-    const T from_end = select(crossed, g - v, v);
-    const T p = clamp01((B(from_end) + drop(g, from_end)) / (T(2) * B(g)));
-    const auto low = select(crossed, T(1) - o.low, o.low) > T(0.5);
-    const T x = select(low, p, T(1) - p), y = select(low, T(1) - p, p);
-    const T phi = T(2) * pi<T>() * u.z;
-    const T s = sqrt(y);
-    const Vec3<T> wi = {s * cos(phi), s * sin(phi), sqrt(x)};
-    return sample_if(above(wi, wo), wi, tint, pdf(wi, wo));
+    for (int i = 0; i < this->drawn.count(); ++i)
+      v(this->drawn.heights[std::size_t(i)],
+        NumberSpec{kNames[i], kLabels[i], kDrawn[i], 1e-3, 1, 1e-3, 1,
+                   "Height of the drawn kernel at the distance of this number, over 1 / n"});
+    v(this->tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
   }
 };
 
