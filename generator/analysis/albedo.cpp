@@ -148,7 +148,7 @@ Point2 Sequence2::next() {
   return u;
 }
 
-Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) {
+Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brdf_(brdf), wo_(wo) {
   sin_o_ = std::hypot(wo.x, wo.y);
   theta_o_ = std::atan2(sin_o_, wo.z);
   // Beyond the critical angle nothing comes through: f jumps there.
@@ -213,15 +213,23 @@ std::vector<Rect> Guides::cells(std::size_t most) const {
         out.insert(out.end(), parts.begin(), parts.end());
       }
   // Where a peak on that cone holds a hundredth of the light, too few samples fall to lead to it: cells there are
-  // halved towards it down to all scales.
-  for (std::size_t i = 0, n = out.size(); i < n; ++i)
-    while (out[i].x1 - out[i].x0 > 1e-8 && (out[i].x0 == theta_o_ || out[i].x1 == theta_o_)) {
-      const double middle = 0.5 * (out[i].x0 + out[i].x1);
+  // halved towards it as long as that changes what is seen.
+  const auto value = [&](double theta, double phi) {
+    const Vec3<double> wi = direction_at(theta, phi);
+    return max_component(brdf_.eval(wi, wo_)) + brdf_.pdf(wi, wo_);
+  };
+  for (std::size_t i = 0, n = out.size(); i < n; ++i) {
+    const auto at_cone = [&] { return out[i].x0 == theta_o_ || out[i].x1 == theta_o_; };
+    const double phi = 0.5 * (out[i].y0 + out[i].y1), peak = at_cone() ? value(theta_o_, phi) : 0;
+    while (at_cone() && out[i].x1 - out[i].x0 > 1e-8) {
+      const double middle = 0.5 * (out[i].x0 + out[i].x1), beside = value(middle, phi);
+      if (std::abs(peak - beside) <= 0.1 * std::max(peak, beside)) break;
       Rect far = out[i];
       (out[i].x0 == theta_o_ ? out[i].x1 : out[i].x0) = middle;
       (far.x0 == theta_o_ ? far.x0 : far.x1) = middle;
       out.push_back(far);
     }
+  }
   return out;
 }
 

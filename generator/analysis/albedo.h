@@ -72,6 +72,8 @@ class Guides {
   std::vector<Rect> cells(const Rect&, std::size_t most) const;
 
  private:
+  const Brdf<double>& brdf_;
+  Vec3<double> wo_;
   double sin_o_, theta_o_, cos_phi_, sin_phi_;
   double edge_ = 0;  // angle at which what is let through ends, if the model scatters through; else 0
   std::vector<std::vector<Point2>> lobes_;
