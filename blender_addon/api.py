@@ -31,6 +31,7 @@ __all__ = [
     "models",
     "new_material",
     "prepare_material",
+    "set_kernel",
     "set_parameters",
     "switch_representation",
     "used_materials",
@@ -107,14 +108,52 @@ def set_parameters(material, **parameters):
 
     Raises ValueError as new_material does, and for a parameter that a link controls.
     """
-    node = _the_node(material)
+    _set(_the_node(material), f"material {material.name!r}", parameters)
+
+
+def _set(node, what, parameters):
     _, values = _checked(*nodes.identity(node), parameters)
     present = nodes.sockets(node)
     for name in values:
         if name in present and present[name].is_linked:
-            raise ValueError(f"{name!r} of material {material.name!r} is controlled by a link")
+            raise ValueError(f"{name!r} of {what} is controlled by a link")
     for name, value in values.items():
         nodes.set_value(node, name, value)
+
+
+#: The model whose kernel may be drawn, and its heights: equally far apart, the last at u = 3.
+KERNEL_MODEL = "lossless"
+_HEIGHTS = ("h0", "h1", "h2", "h3")
+
+
+def set_kernel(group, curve):
+    """Draws the kernel of a group node of `lossless` as a Float Curve node has it.
+
+    The curve's x from 0 to 1 is the distance u from 0 to 3, y the height relative to the largest.
+    Raises ValueError for another node, and where a height is not positive or too small beside the
+    largest; nothing is changed then.
+    """
+    if not nodes.is_ours(group) or nodes.identity(group)[0] != KERNEL_MODEL:
+        raise ValueError(f"node {group.name!r}: expected a node of the model {KERNEL_MODEL!r}")
+    if curve.bl_idname != "ShaderNodeFloatCurve":
+        raise ValueError(f"node {curve.name!r}: expected a Float Curve, got {curve.bl_label}")
+    mapping = curve.mapping
+    mapping.initialize()  # a new curve can't be evaluated before
+    places = [i / (len(_HEIGHTS) - 1) for i in range(len(_HEIGHTS))]
+    heights = [mapping.evaluate(mapping.curves[0], x) for x in places]
+    lowest = pack.parameters(KERNEL_MODEL).get("h0", {"min": 0})["min"]
+    for x, height in zip(places, heights, strict=True):
+        where = f"curve {curve.name!r} at x = {x:.3g}"
+        if not height > 0:
+            raise ValueError(f"{where}: expected a height above 0, got {height:.3g}")
+        if height < lowest * max(heights):
+            raise ValueError(
+                f"{where}: expected at least {lowest:g} of the largest height, "
+                f"got {height / max(heights):.3g} of it"
+            )
+    relative = [height / max(heights) for height in heights]
+    values = dict(zip(_HEIGHTS, relative, strict=True))
+    _set(group, f"node {group.name!r}", {"kernel": "table", **values})
 
 
 def get_parameters(material):

@@ -177,6 +177,55 @@ class BRDFC_OT_switch(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_kernel(Operator):
+    """Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"""
+
+    bl_idname = "brdfc.kernel"
+    bl_label = "Kernel from Float Curve"
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(
+        name="Node", description="Name of the group node; empty for the active one"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def execute(self, context):
+        material = context.object.active_material
+        try:
+            node = self._group(material)
+            api.set_kernel(node, self._curve(node.id_data))
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def _group(self, material):
+        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n)[0] == api.KERNEL_MODEL]
+        wanted = [n for n in ours if n.name == self.node] if self.node else ours
+        active = [n for n in wanted if n == n.id_data.nodes.active]
+        if not wanted or (len(wanted) > 1 and not active):
+            raise ValueError(
+                f"material {material.name!r}: expected an active node of the model "
+                f"{api.KERNEL_MODEL!r}"
+            )
+        return (active or wanted)[0]
+
+    def _curve(self, tree):
+        curves = [n for n in tree.nodes if n.bl_idname == "ShaderNodeFloatCurve"]
+        chosen = curves if len(curves) == 1 else [n for n in curves if n.select]
+        if len(chosen) != 1:
+            raise ValueError(
+                f"expected one Float Curve node beside the model's, or one that is selected; "
+                f"there are {len(curves)}, {len(chosen)} selected"
+                if curves
+                else "expected a Float Curve node beside the model's; there is none"
+            )
+        return chosen[0]
+
+
 class BRDFC_OT_write_materials(Operator):
     """List what this file uses, for `brdfc build --materials` to make an extension of it alone"""
 
@@ -210,5 +259,6 @@ _CLASSES = (
     BRDFC_OT_enable_osl,
     BRDFC_OT_fix_material,
     BRDFC_OT_switch,
+    BRDFC_OT_kernel,
 )
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

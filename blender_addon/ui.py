@@ -6,7 +6,7 @@ import math
 import bpy
 from bpy.types import Menu, Panel
 
-from . import checks, energy, nodes, pack
+from . import api, checks, energy, nodes, pack
 
 _WRAP = 46  # characters of a panel's line; Blender does not wrap labels
 
@@ -145,6 +145,8 @@ def draw_node(layout, node, material, editable=True):
         button = layout.operator("brdfc.switch", text="Update", icon="FILE_REFRESH")
         button.node, button.representation = node.name, representation
     _draw_values(layout, node)
+    if model_name == api.KERNEL_MODEL:
+        layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
 
 
 def draw_warnings(layout, material, scene):

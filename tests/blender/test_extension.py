@@ -729,6 +729,93 @@ def test_operator_switch(extension, empty):
         bpy.ops.brdfc.switch(node="nonsense", representation="exact")
 
 
+@pytest.fixture
+def drawn(extension, empty):
+    """A `lossless` node and a Float Curve beside it, in the active object's material."""
+    material = extension.api.new_material("lossless")
+    mesh = bpy.data.meshes.new("Mesh")
+    mesh.materials.append(material)
+    target = bpy.data.objects.new("Object", mesh)
+    empty.collection.objects.link(target)
+    bpy.context.view_layer.objects.active = target
+    curve = material.node_tree.nodes.new("ShaderNodeFloatCurve")
+    draw(curve, 0.5, 0.4, 0.3, 0.05)
+    return extension.nodes.group_nodes(material)[0], curve
+
+
+def draw(curve, *heights):
+    """Straight lines between heights at x = 0, 1/3, 2/3, 1."""
+    points = curve.mapping.curves[0].points
+    while len(points) < len(heights):
+        points.new(0.5, 0.5)
+    for i, (point, height) in enumerate(zip(points, heights, strict=True)):
+        point.location = (i / (len(heights) - 1), height)
+        point.handle_type = "VECTOR"
+    curve.mapping.use_clip = False
+    curve.mapping.update()
+
+
+def kernel_of(extension, node):
+    names = ("kernel", "h0", "h1", "h2", "h3")
+    return [extension.nodes.get_value(node, name) for name in names]
+
+
+def test_kernel_from_a_float_curve(extension, drawn):
+    node, curve = drawn
+    assert kernel_of(extension, node)[0] == "sech2"
+    assert bpy.ops.brdfc.kernel() == {"FINISHED"}
+    kernel, *heights = kernel_of(extension, node)
+    assert kernel == "table"
+    # Blender evaluates curves through a table of 256 places, which rounds corners off.
+    assert heights == pytest.approx([1, 0.8, 0.6, 0.1], rel=1e-2)
+    # By a script, and where the largest is not the first.
+    draw(curve, 0.2, 0.4, 0.3, 0.1)
+    extension.api.set_kernel(node, curve)
+    assert kernel_of(extension, node)[1:] == pytest.approx([0.5, 1, 0.75, 0.25], rel=1e-2)
+    # Of several curves, the one that is selected.
+    other = node.id_data.nodes.new("ShaderNodeFloatCurve")
+    draw(other, 0.5, 0.4, 0.3, 0.05)
+    curve.select, other.select = False, True
+    assert bpy.ops.brdfc.kernel(node=node.name) == {"FINISHED"}
+    assert kernel_of(extension, node)[1:] == pytest.approx([1, 0.8, 0.6, 0.1], rel=1e-2)
+
+
+def test_kernel_says_what_is_wrong_with_a_curve(extension, drawn):
+    node, curve = drawn
+    tree, before = node.id_data, kernel_of(extension, node)
+    for heights, message in (
+        ((0.5, 0.4, 0.3, 0), "at x = 1: expected a height above 0, got 0"),
+        ((0.5, -0.4, 0.3, 0.1), "at x = 0.333: expected a height above 0"),
+        ((1, 0.4, 0.3, 0.0005), "at x = 1: expected at least 0.001 of the largest height"),
+    ):
+        draw(curve, *heights)
+        with pytest.raises(ValueError, match=message):
+            extension.api.set_kernel(node, curve)
+        with pytest.raises(RuntimeError, match=message):
+            bpy.ops.brdfc.kernel()
+    draw(curve, 0.5, 0.4, 0.3, 0.1)
+    with pytest.raises(ValueError, match="expected a Float Curve"):
+        extension.api.set_kernel(node, node)
+    with pytest.raises(ValueError, match="expected a node of the model 'lossless'"):
+        extension.api.set_kernel(curve, curve)
+    value = tree.nodes.new("ShaderNodeValue")
+    link = tree.links.new(value.outputs[0], extension.nodes.sockets(node)["h2"])
+    with pytest.raises(RuntimeError, match="'h2' .* controlled by a link"):
+        bpy.ops.brdfc.kernel()
+    tree.links.remove(link)
+    other = tree.nodes.new("ShaderNodeFloatCurve")
+    curve.select = other.select = True
+    with pytest.raises(RuntimeError, match="one that is selected; there are 2, 2 selected"):
+        bpy.ops.brdfc.kernel()
+    tree.nodes.remove(curve)
+    tree.nodes.remove(other)
+    with pytest.raises(RuntimeError, match="there is none"):
+        bpy.ops.brdfc.kernel()
+    with pytest.raises(RuntimeError, match="expected an active node"):
+        bpy.ops.brdfc.kernel(node="nonsense")
+    assert kernel_of(extension, node) == before
+
+
 def test_operator_add_node(extension, empty):
     material = bpy.data.materials.new("mine")
     if material.node_tree is None:
@@ -765,7 +852,7 @@ def test_disable_leaves_nothing_behind(extension, empty):
         for name in dir(bpy.app.handlers)
         if isinstance(getattr(bpy.app.handlers, name), list)
     }
-    assert len(names) == 10
+    assert len(names) == 11
     menus = ("NODE_MT_category_shader_shader", "MATERIAL_MT_context_menu")
     with_extension = [draw_functions(menu) for menu in menus]
     try:
