@@ -22,7 +22,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kViews = 33, kTrialViews = 9, kErrorViews = 64;
+constexpr int kViews = 33, kErrorViews = 64;
+constexpr std::size_t kTrialStride = 4;
 /// The height of the last view; below it the closures keep their shape.
 constexpr double kLastCosine = 2e-3;
 constexpr int kPoints = 3000, kSteps = 14;
@@ -48,8 +49,8 @@ template <class T> Vec3<T> beside_mirror(const Vec3<T>& wo, const T& angle) {
   return {out.x * along, out.y * along, up};
 }
 
-/// What is drawn about `axis`: the model's own samples, and lobes from exponent `e` down to the whole sphere, each
-/// direction counted by the density of all of them together.
+/// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
+/// down to the whole sphere, each direction counted by the density of all of them together.
 Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec3<double>& axis, double e, int count) {
   std::vector<double> exponents;
   for (double x = std::max(4 * e, 1.0); x > 0.5; x /= 5) exponents.push_back(x);
@@ -60,13 +61,6 @@ Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec
     double p = share_model * brdf.pdf(wi, wo) + share_lobe * kInvPi / 2;
     for (const double x : exponents) p += share_lobe * power_lobe_pdf(x, axis, wi);
     return p;
-  };
-  // Any axis may be asked for, also below the surface, where about_axis() is not smooth.
-  const bool down = axis.z < 0;
-  const auto turned = [&](const Vec3<double>& s) {
-    if (!down) return about_axis(axis, s);
-    const Vec3<double> w = about_axis(-axis, s);
-    return -w;
   };
   Points points;
   const auto add = [&](const Vec3<double>& wi) {
@@ -82,7 +76,7 @@ Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec
   for (const double x : exponents)
     for (int i = 0; i < of_lobe; ++i) {
       const Vec3<double> u = sequence.next();
-      add(turned(sample_power_lobe(x, u.x, u.y)));
+      add(about_axis(axis, sample_power_lobe(x, u.x, u.y)));
     }
   for (int i = 0; i < of_lobe; ++i) {
     const Vec3<double> u = sequence.next();
@@ -277,26 +271,38 @@ bool turns(const Brdf<double>& brdf) {
   return false;
 }
 
+/// Of the last view, as view() and place() measure heights.
+double last_place() { return std::sqrt(2 * kInvPi * std::asin(kLastCosine)); }
 /// How far along its axis of the tables a view is: knots crowd towards the horizon, where lobes change most.
 template <class T> T place(const Vec3<T>& wo) {
   // The angle above the surface, from its half, keeps its digits at the horizon.
   const T height = named("height_o", T(2) * atan(wo.z / (T(1) + sqrt(sin2_theta(wo)))));
-  const double last = std::sqrt(2 * kInvPi * std::asin(kLastCosine));
-  return (T(1) - sqrt(maximum(height, T(0)) * T(2 * kInvPi))) / T(1 - last);
+  return (T(1) - sqrt(maximum(height, T(0)) * T(2 * kInvPi))) / T(1 - last_place());
 }
 /// The view at which place() is x.
 Vec3<double> view(double x) {
-  const double last = std::sqrt(2 * kInvPi * std::asin(kLastCosine));
-  const double height = kPi / 2 * sqr(1 - x * (1 - last));
+  const double height = kPi / 2 * sqr(1 - x * (1 - last_place()));
   return {std::cos(height), 0, std::sin(height)};
 }
 
-/// Views and what was found for them.
-struct Cell {
+/// The model from one view.
+struct View {
   Vec3<double> wo;
-  std::vector<Placed> lobes;
+  Moments lobe;
   Points points;
-  MatrixXd a, f;
+  MatrixXd f;
+};
+View seen(const BoundModel& bound, const Vec3<double>& wo, int points) {
+  View v{wo, moments(bound, wo), {}, {}};
+  v.points = spread_points(*bound.brdf, wo, beside_mirror(wo, v.lobe.offset), v.lobe.narrow, points);
+  v.f = scattering(bound, v.points, wo);
+  return v;
+}
+
+/// A view and what was found for it.
+struct Cell : View {
+  std::vector<Placed> lobes;
+  MatrixXd a;
   VectorXd scale;  ///< what the columns were divided by
   MatrixXd x;      ///< a column a channel
 };
@@ -308,18 +314,15 @@ struct Fitted {
   double error = 0;  ///< relative L1, mean over the views
 };
 
-Fitted fit_views(const BoundModel& bound, Family family, int views) {
+/// Fits every `stride`-th view, from that along the normal on.
+Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family family) {
   Fitted out;
-  const Moments at_normal = moments(bound, view(0));
+  const Moments& at_normal = views[0].lobe;
   out.facets = facets(family, at_normal);
-  out.cells.resize(std::size_t(views));
-  tbb::parallel_for(0, views, [&](int i) {
-    Cell& c = out.cells[std::size_t(i)];
-    c.wo = view(double(i) / (views - 1));
-    const Moments m = moments(bound, c.wo);
-    c.lobes = placed(family, m, at_normal, std::asin(c.wo.z));
-    c.points = spread_points(*bound.brdf, c.wo, beside_mirror(c.wo, m.offset), m.narrow, kPoints);
-    c.f = scattering(bound, c.points, c.wo);
+  for (std::size_t i = 0; i < views.size(); i += stride) out.cells.push_back({views[i], {}, {}, {}, {}});
+  tbb::parallel_for(std::size_t(0), out.cells.size(), [&](std::size_t i) {
+    Cell& c = out.cells[i];
+    c.lobes = placed(family, c.lobe, at_normal, std::asin(c.wo.z));
     c.a = dictionary(c.lobes, out.facets, c.points, c.wo);
     // About the integral of a column over all directions: that over those above the surface may vanish.
     c.scale = VectorXd::Constant(c.a.cols(), 1.0 / kRampSize);
@@ -356,7 +359,8 @@ Fitted fit_views(const BoundModel& bound, Family family, int views) {
       const VectorXd weight = weights_of(c.points), f = c.f.col(channel);
       c.x.col(channel) = near = solve(c.a, weight, f, near, Eigen::Index(out.facets.size()));
       const double albedo = f.dot(weight);
-      if (albedo > 0) error[std::size_t(channel)] += (c.a * near - f).cwiseAbs().dot(weight) / albedo / views;
+      if (albedo > 0)
+        error[std::size_t(channel)] += (c.a * near - f).cwiseAbs().dot(weight) / albedo / double(out.cells.size());
     }
   });
   out.error = *std::max_element(error.begin(), error.end());
@@ -375,14 +379,17 @@ std::optional<std::string> unfit(const Model& model, const ParamValues& values) 
 
 Fit::Fit(const Model& model, const ParamValues& values) {
   const BoundModel bound = bind_model(model, values);
+  std::vector<View> views(kViews);
+  tbb::parallel_for(0, kViews,
+                    [&](int i) { views[std::size_t(i)] = seen(bound, view(double(i) / (kViews - 1)), kPoints); });
   // Few views tell which closures suit.
   Family family = kFamilies[0];
   double least = std::numeric_limits<double>::infinity();
   for (const Family f : kFamilies) {
-    const double error = fit_views(bound, f, kTrialViews).error;
+    const double error = fit_views(views, kTrialStride, f).error;
     if (error < least) least = error, family = f;
   }
-  const Fitted fitted = fit_views(bound, family, kViews);
+  const Fitted fitted = fit_views(views, 1, family);
   const std::vector<Cell>& cells = fitted.cells;
   tint_ = fitted.tint;
   facets_ = fitted.facets;
@@ -423,15 +430,15 @@ Fit::Fit(const Model& model, const ParamValues& values) {
   errors_.resize(kErrorViews);
   tbb::parallel_for(std::size_t(0), errors_.size(), [&](std::size_t i) {
     const Vec3<double> wo = direction(1 - (double(i) + 0.5) / kErrorViews, 0);
-    const Moments m = moments(bound, wo);
-    const Points points = spread_points(*bound.brdf, wo, beside_mirror(wo, m.offset), m.narrow, 2 * kPoints);
-    const MatrixXd f = scattering(bound, points, wo);
+    const View v = seen(bound, wo, 2 * kPoints);
+    const Points& points = v.points;
+    const MatrixXd& f = v.f;
     const ClosureSum<double> sum = closures(wo);
     Eigen::Array3d absolute = Eigen::Array3d::Zero(), square = absolute, albedo = absolute, squares = absolute,
                    signed_difference = absolute, negative = absolute;
     for (std::size_t p = 0; p < points.wi.size(); ++p) {
-      const Rgb<double> v = evaluate(sum, points.wi[p], wo);
-      const Eigen::Array3d fit(v.r, v.g, v.b), truth = f.row(Eigen::Index(p)).transpose().array();
+      const Rgb<double> sum_here = evaluate(sum, points.wi[p], wo);
+      const Eigen::Array3d fit(sum_here.r, sum_here.g, sum_here.b), truth = f.row(Eigen::Index(p)).transpose().array();
       const Eigen::Array3d d = fit - truth;
       const double w = points.weight[p];
       absolute += w * d.abs();

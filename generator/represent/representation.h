@@ -30,13 +30,13 @@ inline constexpr int kDefaultLobes = 1;
 /// The choices that a form is confined to, because the closures of an exact one are known for some choices only.
 ParamValues form_choices(const Model&, RepresentationKind);
 
-/// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
-/// sampled, u_0, u_1, u_2; and assign what `kind` says.
 struct RecordedClosure {
   ClosureKind kind;
   bool turned;  ///< has a normal of its own
   bool operator==(const RecordedClosure&) const = default;
 };
+/// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
+/// sampled, u_0, u_1, u_2; and assign what `kind` says.
 struct Recording {
   std::string statements;
   std::vector<RecordedClosure> closures;  ///< all but Sampled
