@@ -15,7 +15,7 @@ import math
 import bpy
 import numpy as np
 from goniometer import Goniometer, frame, tilted, unit
-from helpers import empty_tree, read_csv, script_material, to_csv
+from helpers import empty_tree, pairs_csv, read_csv, script_material
 from worlds import gradient, spot, white
 
 #: Coloured. diffuse_ramp is drawn in proportion to the cosine, which it does not contain: where its
@@ -207,9 +207,7 @@ FACETS = 96
 
 def defined(tool, case, wi, wo):
     """f cos by our definition, without the weight, (n, 3)."""
-    header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
-    stdin = to_csv(header, np.hstack([wi, wo]))
-    return read_csv(tool("closure", *case.definition, stdin=stdin))[1]
+    return read_csv(tool("closure", *case.definition, stdin=pairs_csv(wi, wo)))[1]
 
 
 def evaluation(extension, tool, cases=None):
@@ -383,8 +381,7 @@ def expected_in_worlds(tool, cases, radiances):
         weight = np.concatenate([w[k] for (_, w), k in zip(grids, kept, strict=True)])
         kind = np.repeat(np.arange(len(COSINES)), sizes)
         towards = np.einsum("ni,nij->nj", wi, axes[kind])
-        header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
-        stdin = to_csv(header, np.hstack([wi, wo[kind]]))
+        stdin = pairs_csv(wi, wo[kind])
         for i, case in enumerate(cases):
             if (TILTED in case.definition) != (normal is TILT):
                 continue

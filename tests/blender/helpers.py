@@ -223,10 +223,15 @@ def arguments(values):
     ]
 
 
+def pairs_csv(wi, wo):
+    """Pairs of directions, each of shape (n, 3), as the tool reads them."""
+    header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
+    return to_csv(header, np.hstack([wi, wo]))
+
+
 def evaluate(tool, model, values, wi, wo):
     """f of the model, (n, 3), for directions of shape (n, 3) in the local frame."""
-    header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
-    text = tool("eval", model, *arguments(values), stdin=to_csv(header, np.hstack([wi, wo])))
+    text = tool("eval", model, *arguments(values), stdin=pairs_csv(wi, wo))
     return read_csv(text)[1][:, :3]
 
 

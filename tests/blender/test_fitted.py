@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
-from helpers import arguments, read_csv, script_material, to_csv
+from helpers import arguments, pairs_csv, read_csv, script_material
 
 #: A model for each family of closures, one of three channels, one beside a mirror.
 MATERIALS = {
@@ -46,9 +46,8 @@ def start(extension, sources):
 
 
 def fitted(tool, name, wi, wo):
-    header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
-    stdin = to_csv(header, np.hstack([wi, wo]))
-    return read_csv(tool("fit", name, *arguments(MATERIALS[name]), "--pairs", stdin=stdin))[1]
+    values = arguments(MATERIALS[name])
+    return read_csv(tool("fit", name, *values, "--pairs", stdin=pairs_csv(wi, wo)))[1]
 
 
 def test_a_sun_on_a_fitted_form(extension, tool, sources):
