@@ -37,7 +37,6 @@ void add_fit_command(CLI::App& app) {
       print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(fit.closures(wo), wi, wo); });
       return;
     }
-    fmt::print("cos_theta_o,relative_l1,relative_l2,albedo,negative\n");
     std::vector<double> l1;
     for (const Fit::Error& e : fit.errors()) l1.push_back(e.relative_l1);
     std::sort(l1.begin(), l1.end());
@@ -45,9 +44,10 @@ void add_fit_command(CLI::App& app) {
     fmt::print(stderr,
                "{} {}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
                o->model, format_values(model.info(), values), quantile(0.5), quantile(0.95), quantile(1));
+    CsvWriter out("cos_theta_o,relative_l1,relative_l2,albedo,negative");
     for (const Fit::Error& e : fit.errors())
-      fmt::print("{:.6g},{:.3g},{:.3g},{:.3g},{:.3g}\n", e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo,
-                 e.negative);
+      out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
+    out.finish();
   });
 }
 

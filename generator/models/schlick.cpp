@@ -56,9 +56,10 @@ template <class T> struct Schlick {
 
   Rgb<T> mirror(const Vec3<T>& wo) const { return S(clamp01(T(1) - wo.z)) * c(); }
 
-  /// Z(t) / pi.
+  /// Z(t) / pi. Below a roughness of 1e-16 the lobe stops growing, whose share b is then lost in the rounding of c:
+  /// divided by o.h at grazing angles it would overflow single precision.
   T Z(const Vec3<T>& h, const T& sin2) const {
-    const T d = maximum(sin2 + rough * (h.z * h.z), tiny<T>());
+    const T d = maximum(sin2 + rough * (h.z * h.z), T(1e-16));
     return named("Z", rough / d / d / pi<T>());
   }
   /// A(w)^2 / p.

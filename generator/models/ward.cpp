@@ -55,22 +55,22 @@ template <class T> struct Ward {
   /// (n.i + n.o) / 2 = (o.h)(n.h).
   static T middle(const Vec3<T>& wi, const Vec3<T>& wo) { return maximum((wi.z + wo.z) / T(2), tiny<T>()); }
 
-  /// 1 / N.
-  T inverse_norm(const Vec3<T>& wi, const Vec3<T>& wo, const T& inverse_cos2) const {
+  /// x / N, one factor at a time: where x is 0 for steep facets, 1 / N may be infinite.
+  T over_norm(const T& x, const Vec3<T>& wi, const Vec3<T>& wo, const T& inverse_cos2) const {
     const T zi = maximum(wi.z, tiny<T>()), zo = maximum(wo.z, tiny<T>());
     switch (normalisation) {
       case Duer:
-        return T(1) / zi / zo;
+        return x / zi / zo;
       case Original:
-        return T(1) / sqrt(zi) / sqrt(zo);
+        return x / sqrt(zi) / sqrt(zo);
       default:
-        return inverse_cos2 / sqr(middle(wi, wo));
+        return x * inverse_cos2 / middle(wi, wo) / middle(wi, wo);
     }
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const std::array<T, 2> g = gaussian(wi, wo);
-    return ks * select(above(wi, wo), g[0] / T(4) * inverse_norm(wi, wo, g[1]), T(0));
+    return ks * select(above(wi, wo), over_norm(g[0] / T(4), wi, wo, g[1]), T(0));
   }
 
   /// p_h / (4 (o.h)), p_h = E / (pi ax ay (n.h)^3).
@@ -83,7 +83,7 @@ template <class T> struct Ward {
     const Vec3<T> h = sample_gaussian_slopes(ax, ay, u.y, u.z);
     const Vec3<T> wi = h * (T(2) * dot(wo, h)) - wo;
     const T inverse_cos2 = T(1) / (h.z * h.z);
-    const T weight = wi.z * inverse_norm(wi, wo, inverse_cos2) * middle(wi, wo) / inverse_cos2;
+    const T weight = wi.z * over_norm(middle(wi, wo) / inverse_cos2, wi, wo, inverse_cos2);
     return sample_if(above(wi, wo), wi, ks * weight, pdf(wi, wo));
   }
 };
