@@ -38,7 +38,7 @@ TEST(Fit, ComesAsCloseAsMeasured) {
   for (const Row& row : kRows) {
     const Model& m = find_model(row.model);
     std::vector<double> l1;
-    for (const Fit::Error& e : fit_of(m, values_of(m, row.values)).errors()) {
+    for (const ViewError& e : fit_of(m, values_of(m, row.values)).errors()) {
       l1.push_back(e.relative_l1);
       EXPECT_LE(e.negative, 0.01) << row.model << " at " << e.cos_theta_o;
       EXPECT_LE(e.albedo, 0.045) << row.model << " at " << e.cos_theta_o;
@@ -56,7 +56,7 @@ TEST(Fit, StatesItsError) {
   const Fit& fit = fit_of(m, values);
   const auto brdf = m.make_double(values);
   for (const std::size_t k : {5u, 30u, 55u, 62u}) {
-    const Fit::Error& e = fit.errors()[k];
+    const ViewError& e = fit.errors()[k];
     const Vec3<double> wo = direction(e.cos_theta_o, 0);
     const ClosureSum<double> sum = fit.closures(wo);
     double difference = 0, albedo = 0;

@@ -38,14 +38,14 @@ void add_fit_command(CLI::App& app) {
       return;
     }
     std::vector<double> l1;
-    for (const Fit::Error& e : fit.errors()) l1.push_back(e.relative_l1);
+    for (const ViewError& e : fit.errors()) l1.push_back(e.relative_l1);
     std::sort(l1.begin(), l1.end());
     const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
     fmt::print(stderr,
                "{} {}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
                o->model, format_values(model.info(), values), quantile(0.5), quantile(0.95), quantile(1));
     CsvWriter out("cos_theta_o,relative_l1,relative_l2,albedo,negative");
-    for (const Fit::Error& e : fit.errors())
+    for (const ViewError& e : fit.errors())
       out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
     out.finish();
   });

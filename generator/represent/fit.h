@@ -17,6 +17,7 @@
 #include "core/table.h"
 #include "model/model.h"
 #include "represent/closure.h"
+#include "represent/view.h"
 
 namespace brdfc {
 
@@ -32,16 +33,8 @@ class Fit {
   /// shadow each other to a little more.
   template <class T> ClosureSum<T> closures(const Vec3<T>& wo) const;
 
-  /// The closures of a view against the model.
-  struct Error {
-    double cos_theta_o = 1;
-    double relative_l1 = 0;  ///< integral of |difference of f cos| over the albedo, largest channel
-    double relative_l2 = 0;  ///< root of the integral of its square over that of the model's, largest channel
-    double albedo = 0;       ///< largest difference
-    double negative = 0;     ///< integral of what lies below 0, over the albedo
-  };
   /// At cosines evenly spaced from 1 to 0, whatever the tables' knots.
-  const std::vector<Error>& errors() const { return errors_; }
+  const std::vector<ViewError>& errors() const { return errors_; }
 
  private:
   struct Lobe {
@@ -57,7 +50,7 @@ class Fit {
   std::vector<Linear> linear_;  ///< of the lobes, of the diffuse_ramp, of the facets
   std::vector<Closure<double>> facets_;
   Rgb<double> tint_;  ///< of all closures
-  std::vector<Error> errors_;
+  std::vector<ViewError> errors_;
 };
 
 /// The fit for these values, made at first use and kept while the program runs.

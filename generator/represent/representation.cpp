@@ -116,9 +116,9 @@ void require_finite(const Model& model, const ParamValues& values, const Vec3<do
 RepresentationError fitted_error(const Model& model, const ParamValues& values) {
   RepresentationError out;
   double sum1 = 0, sum2 = 0;
-  Fit::Error worst;
-  const std::vector<Fit::Error>& errors = fit_of(model, values).errors();
-  for (const Fit::Error& e : errors) {
+  ViewError worst;
+  const std::vector<ViewError>& errors = fit_of(model, values).errors();
+  for (const ViewError& e : errors) {
     sum1 += e.relative_l1 / double(errors.size());
     sum2 += e.relative_l2 / double(errors.size());
     out.albedo = std::max(out.albedo, e.albedo);

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A model as one view sees it, and closures held against it: what fits have in common.
+#pragma once
+
+#include <Eigen/Dense>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "analysis/albedo.h"
+#include "represent/closure.h"
+
+namespace brdfc {
+
+/// Directions above the surface with the solid angle that each stands for.
+struct Points {
+  std::vector<Vec3<double>> wi;
+  std::vector<double> weight;
+};
+
+/// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
+/// down to the whole sphere, each direction counted by the density of all of them together.
+Points spread_points(const Brdf<double>&, const Vec3<double>& wo, const Vec3<double>& axis, double e, int count);
+
+Eigen::VectorXd weights_of(const Points&);
+
+/// In the plane of incidence, `angle` from the mirror direction towards the normal and on.
+template <class T> Vec3<T> beside_mirror(const Vec3<T>& wo, const T& angle) {
+  const T sinTheta = sqrt(sin2_theta(wo));
+  // Towards the mirror side, along the surface; at normal incidence any direction will do.
+  const auto oblique = sinTheta > T(1e-6);
+  const T scale = T(-1) / select(oblique, sinTheta, T(1));
+  const Vec3<T> out = {select(oblique, wo.x * scale, T(1)), select(oblique, wo.y * scale, T(0)), T(0)};
+  const T c = cos(angle), s = sin(angle);
+  const T along = sinTheta * c - wo.z * s, up = wo.z * c + sinTheta * s;
+  return {out.x * along, out.y * along, up};
+}
+
+/// The lobe that f^2 makes, of the brightest channel: squared, because a wide base would draw the axis to itself.
+struct Moments {
+  double offset = 0;            ///< of its axis from the mirror direction
+  double narrow = 1, wide = 1;  ///< exponents that have the variances of its two widths
+};
+
+/// The model from one view.
+struct View {
+  Vec3<double> wo;
+  Moments lobe;
+  Points points;
+  Eigen::MatrixXd f;  ///< f cos(theta_i) of the points, a column a channel
+};
+/// Throws ValueError where the model gives a value that is NaN, infinite or negative.
+View seen(const BoundModel&, const Vec3<double>& wo, int points);
+
+/// Where the channels of all views differ by a factor alone, leaves one column of each that serves them all, and
+/// returns the factors.
+std::optional<Rgb<double>> make_grey(std::vector<View>&);
+
+/// Least absolute differences over the columns of `a`, whose integrals are about 1, with the integral of f kept, and
+/// drawn towards `near`. The last `positive` coefficients are not negative, and that at `none` is 0.
+Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& weight, const Eigen::VectorXd& f,
+                      const Eigen::VectorXd& near, Eigen::Index positive, std::optional<Eigen::Index> none);
+
+/// The closures of a view against the model.
+struct ViewError {
+  double cos_theta_o = 1;
+  double relative_l1 = 0;  ///< integral of |difference of f cos| over the albedo, largest channel
+  double relative_l2 = 0;  ///< root of the integral of its square over that of the model's, largest channel
+  double albedo = 0;       ///< largest difference
+  double negative = 0;     ///< integral of what lies below 0, over the albedo
+};
+/// At cosines evenly spaced from 1 to 0.
+std::vector<ViewError> view_errors(const BoundModel&,
+                                   const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures);
+
+/// Whether f changes when both directions turn about the normal.
+bool turns(const Brdf<double>&);
+
+}  // namespace brdfc
