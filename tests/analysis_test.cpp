@@ -374,6 +374,14 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
   std::set<int> in_both;
   for (const AlbedoTerm& term : both) in_both.insert(term.grid);
   for (const AlbedoTerm& term : specular) EXPECT_TRUE(in_both.count(term.grid));
+  // Of the tabulated diffuse term the grids are those of the specular term, taken from 1: nothing is left to lose.
+  const auto& same = t.terms_for(m, parse_values(m.info(), {"part=specular", "diffuse=tabulated"}));
+  ASSERT_EQ(same.size(), specular.size());
+  for (std::size_t i = 0; i < same.size(); ++i) EXPECT_EQ(same[i].grid, specular[i].grid);
+  for (const double c : {0.05, 0.4, 1.})
+    for (const char* rs : {"rs=0", "rs=0.3", "rs=1"})
+      EXPECT_NEAR(lookup(t, m, parse_values(m.info(), {"diffuse=tabulated", "rd=1", "nu=7", "nv=500", rs}), c).g, 1,
+                  1e-6);
 
   // Isotropic exponents in the slider's range, against quadrature.
   std::mt19937_64 random(6);

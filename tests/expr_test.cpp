@@ -111,6 +111,37 @@ TEST(Expr, ALookUpIsAnArrayAndACall) {
   EXPECT_THROW(lookup(other, std::array<Expr, 2>{Expr::input("x"), Expr::input("y")}), ExprError);
 }
 
+TEST(Expr, ALookUpOverFourAxesIsTheSameRecordedAndComputed) {
+  Recorder recorder;
+  Program program;
+  std::vector<double> values;
+  for (int i = 0; i < 2 * 3 * 2 * 4; ++i) values.push_back((i * 7) % 11);
+  const auto table = make_table("grid", {2, 3, 2, 4}, values);
+  const char* names[] = {"x", "y", "z", "w"};
+  std::array<Expr, 4> inputs;
+  for (std::size_t k = 0; k < 4; ++k) inputs[k] = Expr::input(names[k]);
+  program.output("v", lookup(table, inputs));
+  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("brdfc_table4(grid, 2, 3, 2, 4, 1.0 * clamp(x, 0.0, 1.0), 2.0 * "));
+  // At a knot, and in the middle between two on the last axis.
+  EXPECT_EQ(lookup(table, std::array<double, 4>{1, 0.5, 0, 2 / 3.}), values[((1 * 3 + 1) * 2 + 0) * 4 + 2]);
+  EXPECT_DOUBLE_EQ(lookup(table, std::array<double, 4>{1, 1, 1, 0.5}), 0.5 * (values[45] + values[46]));
+  for (const double x : {0., 0.3, 1.7})
+    for (const double w : {-1., 0.4, 0.9})
+      EXPECT_EQ(
+          program.run<double>({{"x", {x, x, x}}, {"y", {0.7, 0.7, 0.7}}, {"z", {0.2, 0.2, 0.2}}, {"w", {w, w, w}}})
+              .at("v")[0],
+          lookup(table, std::array<double, 4>{x, 0.7, 0.2, w}));
+}
+
+TEST(Expr, ColoursDivideByChannel) {
+  Recorder recorder;
+  Program program;
+  program.output("z", Rgb<Expr>::input("a") / Rgb<Expr>::input("b"));
+  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("z = a / b;"));
+  const auto z = program.run<double>({{"a", {1, 2, 3}}, {"b", {2, 8, 0.5}}}).at("z");
+  EXPECT_EQ(z, (std::array<double, 3>{0.5, 0.25, 6}));
+}
+
 TEST(Expr, RefusesWhatItCannotExpress) {
   Recorder recorder;
   EXPECT_THROW(log(Expr(0.0)), ExprError);

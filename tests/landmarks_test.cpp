@@ -132,6 +132,35 @@ TEST(CoupledDielectric, LosesNothingAndHasWalshsConstant) {
   EXPECT_GT(table, 1e-12) << "the table is not in use";
 }
 
+TEST(AshikhminShirley, Eq12WithTheTrueAlbedoLosesNothingWhereEq14LosesHalf) {
+  const double stated = find_model("ashikhmin_shirley").info().properties.tabulated.error;
+  EXPECT_LE(stated, 0.02);
+  double worst = 0, sum = 0;
+  int count = 0;
+  const std::pair<const char*, const char*> exponents[] = {
+      {"nu=0", "nv=0"}, {"nu=10", "nv=10"}, {"nu=10", "nv=1000"}, {"nu=1e4", "nv=1e4"}, {"nu=1e8", "nv=1e8"}};
+  for (const auto& [nu, nv] : exponents)
+    for (const char* rs : {"rs=0", "rs=0.05", "rs=1"}) {
+      const BoundModel b = bound("ashikhmin_shirley", {"diffuse=tabulated", "rd=1", rs, nu, nv});
+      for (const double c : {1., 0.5, 0.174, 0.05}) {
+        // Samples, because sharp lobes take quadrature long.
+        const SampledAlbedo a = sampled_albedo(*b.brdf, c, 0.3, b.label, 1 << 15);
+        const double off = std::abs(a.scattered.g - 1);
+        EXPECT_LE(off, stated + 4 * a.standard_error) << b.label << " cos_theta_o=" << c;
+        worst = std::max(worst, off);
+        sum += off;
+        ++count;
+      }
+    }
+  EXPECT_LE(sum / count, 0.005);
+  EXPECT_GT(worst, 1e-4) << "the tables are not in use";
+  const auto at_80_degrees = [](const char* diffuse) {
+    return albedo_at(bound("ashikhmin_shirley", {diffuse, "rd=1", "nu=10", "nv=10"}), std::cos(80 * kPi / 180));
+  };
+  EXPECT_NEAR(at_80_degrees("diffuse=paper"), 0.46, 0.01);
+  EXPECT_NEAR(at_80_degrees("diffuse=tabulated"), 1, stated);
+}
+
 TEST(Coupled, Eq6IsInvertedToMachinePrecision) {
   const BoundModel b = bound("coupled", {});
   double worst = 0;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -70,6 +71,29 @@ Coordinate coordinate(const ParamInfo& p) {
   return c;
 }
 
+/// The text of all that the model computes with these choices: equal texts are equal models.
+std::string formula(const Model& model, const ParamValues& combination) {
+  Recorder recorder;
+  const auto direction = [](const char* x, const char* y, const char* z) {
+    return Vec3<Expr>{Expr::input(x), Expr::input(y), Expr::input(z)};
+  };
+  const Vec3<Expr> wi = direction("wi_x", "wi_y", "wi_z"), wo = direction("wo_x", "wo_y", "wo_z");
+  const auto brdf = model.record(combination);
+  const Sample<Expr> sample = brdf->sample(wo, direction("u1", "u2", "u3"));
+  Program program;
+  program.output("f", brdf->eval(wi, wo));
+  program.output("pdf", brdf->pdf(wi, wo));
+  program.output("sample_x", sample.wi.x);
+  program.output("sample_y", sample.wi.y);
+  program.output("sample_z", sample.wi.z);
+  program.output("sample_weight", sample.weight);
+  program.output("sample_pdf", sample.pdf);
+  program.output("mirror", brdf->mirror(wo));
+  program.output("transmit", brdf->transmit(wo));
+  program.output("ior", brdf->ior());
+  return program.print_osl(0, {});
+}
+
 /// Coefficients of the polynomial in the colours, by monomial: index = powers of the colours as digits, the first
 /// colour's the lowest, each running to the colour's degree.
 struct Coefficients {
@@ -97,14 +121,25 @@ class Tabulator {
       throw ValueError(
           fmt::format("{}: expected at most 5 colours in an albedo table, got {}", model.info().name, colors_.size()));
     table_.model = model.info().name;
-    for (const Choices& c : choice_combinations(model.info())) combinations_.push_back(with_choices(model.info(), c));
+    const std::vector<Choices> all = choice_combinations(model.info());
+    std::map<std::string, std::size_t> known;
+    for (const Choices& c : all) {
+      const ParamValues combination = with_choices(model.info(), c);
+      // A choice may say nothing beside another one.
+      const std::string text = all.size() > 1 ? formula(model, combination) : "";
+      const auto [it, is_new] = known.emplace(text, combinations_.size());
+      if (is_new) combinations_.push_back(combination);
+      stands_for_.push_back(it->second);
+    }
   }
 
   AlbedoTable run() {
     study_degrees();
     study_azimuth();
     make_probes();
-    for (const ParamValues& combination : combinations_) add_terms(combination);
+    std::vector<std::vector<AlbedoTerm>> terms;
+    for (const ParamValues& combination : combinations_) terms.push_back(terms_of(combination));
+    for (const std::size_t c : stands_for_) table_.terms.push_back(terms[c]);
     prove();
     describe();
     return std::move(table_);
@@ -170,6 +205,7 @@ class Tabulator {
   }
 
   /// Colours whose half does not give the mean of 0 and 1 enter squared; prove() finds what is no polynomial at all.
+  /// A quotient whose integral is linear leaves noise.
   void study_degrees() {
     degrees_.assign(colors_.size(), 1);
     std::mt19937_64 random(5);
@@ -189,9 +225,10 @@ class Tabulator {
             pointers.push_back(models.back().get());
           }
           const MeanAlbedo m = mean_albedos(*guide, pointers, x[0], 0, label(values), kGridSamples);
-          // The same samples for all three: what a straight line leaves is no noise.
+          // The same samples for all three: what a straight line leaves is no noise, unless tables stand in a quotient.
+          const double noise = table_error(model_.info(), values) > 0 ? kSame + 7 * m.error : 0;
           for (const std::vector<Rgb<double>>& v : {m.scattered, m.mirror})
-            if (max_abs(v[0] + v[2] - v[1] * 2.) > 1e-9 * max_abs(v[0] + v[2])) degrees_[c] = 2;
+            if (max_abs(v[0] + v[2] - v[1] * 2.) > noise + 1e-9 * max_abs(v[0] + v[2])) degrees_[c] = 2;
         }
       }
   }
@@ -299,7 +336,7 @@ class Tabulator {
     return t.mirror ? c.mirror[t.monomial] : c.scattered[t.monomial];
   }
 
-  void add_terms(const ParamValues& combination) {
+  std::vector<AlbedoTerm> terms_of(const ParamValues& combination) {
     // Coefficients at the probes, and along each coordinate through each of them.
     constexpr int kSteps = 4;
     std::vector<Coefficients> at_probe(places_.size());
@@ -317,7 +354,7 @@ class Tabulator {
     std::vector<AlbedoTerm> terms;
     std::vector<NewTerm> missing;
     for (const NewTerm& t : wanted) {
-      const int shared = find_shared(t, at_probe);
+      const int shared = find_shared(t, at_probe, table_error(model_.info(), combination));
       if (shared >= 0)
         terms.push_back({t.mirror, color_names(t.monomial), shared});
       else
@@ -351,7 +388,7 @@ class Tabulator {
         missing = std::move(rest);
       }
     }
-    table_.terms.push_back(std::move(terms));
+    return terms;
   }
 
   std::vector<std::string> color_names(std::size_t monomial) const {
@@ -361,15 +398,34 @@ class Tabulator {
     return names;
   }
 
-  /// A grid that has this coefficient's values at every place, or -1.
-  int find_shared(const NewTerm& t, const std::vector<Coefficients>& at_probe) const {
-    for (std::size_t g = 0; g < signatures_.size(); ++g) {
-      bool same = true;
-      for (std::size_t i = 0; i < at_probe.size(); ++i)
-        same = same && max_abs(pick(at_probe[i], t) - signatures_[g][i]) <= kSame + 14 * noise(at_probe[i], t);
-      if (same) return int(g);
-    }
+  /// A grid that has this coefficient's values at every place, or -1. What a model takes from tables of its own albedo
+  /// is `slack` from a grid, its negative or the rest that it leaves of 1: no need to integrate all of it again.
+  int find_shared(const NewTerm& t, const std::vector<Coefficients>& at_probe, double slack) {
+    const auto same = [&](std::size_t g, double offset, double sign, double tolerance) {
+      for (std::size_t i = 0; i < at_probe.size(); ++i) {
+        const Rgb<double> wanted = Rgb<double>(offset) + signatures_[g][i] * sign;
+        if (max_abs(pick(at_probe[i], t) - wanted) > tolerance + kSame + 14 * noise(at_probe[i], t)) return false;
+      }
+      return true;
+    };
+    for (std::size_t g = 0; g < signatures_.size(); ++g)
+      if (same(g, 0, 1, 0)) return int(g);
+    if (slack == 0) return -1;
+    for (std::size_t g = 0; g < signatures_.size(); ++g)
+      for (const double offset : {0., 1.}) {
+        if (!same(g, offset, -1, slack)) continue;
+        AlbedoGrid grid = table_.grids[g];
+        for (float& v : grid.values) v = float(offset) - v;
+        return add_grid(std::move(grid), t, at_probe);
+      }
     return -1;
+  }
+
+  int add_grid(AlbedoGrid grid, const NewTerm& t, const std::vector<Coefficients>& at_probe) {
+    table_.grids.push_back(std::move(grid));
+    signatures_.emplace_back();
+    for (const Coefficients& c : at_probe) signatures_.back().push_back(pick(c, t));
+    return int(table_.grids.size()) - 1;
   }
 
   /// One grid per term of the group, all on the same knots.
@@ -405,10 +461,7 @@ class Tabulator {
           g.values.push_back(float(v.b));
         }
       }
-      out.push_back(int(table_.grids.size()));
-      table_.grids.push_back(std::move(g));
-      signatures_.emplace_back();
-      for (const Coefficients& c : at_probe) signatures_.back().push_back(pick(c, group[t]));
+      out.push_back(add_grid(std::move(g), group[t], at_probe));
     }
     return out;
   }
@@ -522,7 +575,7 @@ class Tabulator {
     for (std::size_t c = 0; c < combinations_.size(); ++c) {
       // Later combinations share most grids with the first; what depends on nothing needs no search.
       std::size_t axes = 0;
-      for (const AlbedoTerm& t : table_.terms[c]) axes = std::max(axes, table_.grids[std::size_t(t.grid)].axes.size());
+      for (const AlbedoTerm& t : known_terms(c)) axes = std::max(axes, table_.grids[std::size_t(t.grid)].axes.size());
       const int n = axes == 0 ? 4 : c == 0 ? 64 : 16;
       for (int i = 0; i < n; ++i) {
         Position x = random_position(random);
@@ -567,12 +620,16 @@ class Tabulator {
       table_.error = std::max(table_.error, max_abs(interpolated - truth) / unit_of(truth));
       table_.quadrature = std::max(table_.quadrature, error);
       if (depends_on_azimuth_) table_.anisotropy = std::max(table_.anisotropy, max_abs(combine(one, p.colors) - truth));
-      for (const AlbedoTerm& t : table_.terms[p.combination]) {
+      for (const AlbedoTerm& t : known_terms(p.combination)) {
         AlbedoGrid& g = table_.grids[std::size_t(t.grid)];
         const Rgb<double> coefficient = pick(all, {t.mirror, monomial_of(t.colors), {}});
         g.error = std::max(g.error, max_abs(lookup(g, position_in(g, p.x)) - coefficient) / unit_of(coefficient));
       }
     });
+  }
+
+  const std::vector<AlbedoTerm>& known_terms(std::size_t combination) const {
+    return table_.terms_for(model_, combinations_[combination]);
   }
 
   std::size_t monomial_of(const std::vector<std::string>& names) const {
@@ -616,8 +673,9 @@ class Tabulator {
   const Model& model_;
   std::vector<Coordinate> coordinates_;  // the view cosine first
   std::vector<std::string> colors_;
-  std::vector<int> degrees_;  // of the polynomial in each colour
-  std::vector<ParamValues> combinations_;
+  std::vector<int> degrees_;               // of the polynomial in each colour
+  std::vector<ParamValues> combinations_;  // that differ
+  std::vector<std::size_t> stands_for_;    // of each combination of choices, the one that is the same
   bool depends_on_azimuth_ = false;
   std::vector<char> turns_;       // per coordinate: does nothing but turn the model; empty if nothing does
   std::vector<Position> probes_;  // lines through these tell what a coefficient depends on

@@ -310,7 +310,7 @@ std::vector<CheckRow> check_model(const Model& model, const CheckOptions& option
         const std::string where = fmt::format("{} cos_theta_o={:.6g} phi_o={:.6g}", m.label, cos_o, phi);
         const Albedo a = precise(m, cos_o, phi);
         const Rgb<double> t = a.total();
-        above.add(max_component(t), 1 + kAlbedo + a.error, where);
+        above.add(max_component(t), 1 + kAlbedo + a.error + table_error(info, cases[i]), where);
         const SampledAlbedo s = sampled_albedo(*m.brdf, cos_o, phi, m.label, std::max(1024, scaled(1 << 13)));
         const Rgb<double> d = a.scattered - s.scattered;
         mean.add(std::max({std::abs(d.r), std::abs(d.g), std::abs(d.b)}), kAlbedo + a.error + 7 * s.standard_error,

@@ -395,6 +395,7 @@ Rgb<Expr> operator*(const Rgb<Expr>& a, const Rgb<Expr>& b) { return color_binar
 Rgb<Expr> operator*(const Rgb<Expr>& a, const Expr& s) { return color_binary(Op::Mul, a.id(), s.id()); }
 Rgb<Expr> operator*(const Expr& s, const Rgb<Expr>& a) { return a * s; }
 Rgb<Expr> operator/(const Rgb<Expr>& a, const Expr& s) { return color_binary(Op::Div, a.id(), s.id()); }
+Rgb<Expr> operator/(const Rgb<Expr>& a, const Rgb<Expr>& b) { return color_binary(Op::Div, a.id(), b.id()); }
 Rgb<Expr>& operator+=(Rgb<Expr>& a, const Rgb<Expr>& b) { return a = a + b; }
 Rgb<Expr> select(const Condition& c, const Rgb<Expr>& a, const Rgb<Expr>& b) {
   if (c.is_literal()) return c.literal() ? a : b;
@@ -507,8 +508,11 @@ std::map<std::string, std::array<T, 3>> Program::run(const std::map<std::string,
           case 2:
             out.fill(lookup<T, 2>(n.table, {arg(0)[0], arg(1)[0]}));
             break;
-          default:
+          case 3:
             out.fill(lookup<T, 3>(n.table, {arg(0)[0], arg(1)[0], arg(2)[0]}));
+            break;
+          default:
+            out.fill(lookup<T, 4>(n.table, {arg(0)[0], arg(1)[0], arg(2)[0], arg(3)[0]}));
         }
         break;
       case Op::LoopVar:

@@ -193,6 +193,7 @@ Rgb<Expr> operator*(const Rgb<Expr>&, const Rgb<Expr>&);
 Rgb<Expr> operator*(const Rgb<Expr>&, const Expr&);
 Rgb<Expr> operator*(const Expr&, const Rgb<Expr>&);
 Rgb<Expr> operator/(const Rgb<Expr>&, const Expr&);
+Rgb<Expr> operator/(const Rgb<Expr>&, const Rgb<Expr>&);
 Rgb<Expr>& operator+=(Rgb<Expr>&, const Rgb<Expr>&);
 Rgb<Expr> select(const Condition&, const Rgb<Expr>&, const Rgb<Expr>&);
 Expr max_component(const Rgb<Expr>&);

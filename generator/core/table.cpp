@@ -12,7 +12,7 @@ std::shared_ptr<const Table> make_table(std::string name, std::vector<int> sizes
     if (s < 2) throw std::logic_error("table " + name + ": an axis needs two knots");
     count *= std::size_t(s);
   }
-  if (sizes.empty() || sizes.size() > 3 || count != values.size())
+  if (sizes.empty() || sizes.size() > 4 || count != values.size())
     throw std::logic_error("table " + name + ": sizes do not match its values");
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!std::isfinite(values[i])) throw ValueError(fmt::format("table {}: value {} is {}", name, i, values[i]));

@@ -10,7 +10,7 @@
 
 namespace brdfc {
 
-/// Values on a regular grid over [0, 1]^d, d = 1, 2 or 3, row-major with the first axis slowest.
+/// Values on a regular grid over [0, 1]^d, d = 1 to 4, row-major with the first axis slowest.
 struct Table {
   std::string name;        ///< an identifier; names the array in OSL
   std::vector<int> sizes;  ///< knots of each axis, at least 2
@@ -46,7 +46,7 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
 
 /// The recorded look-up: an array and a call in OSL.
 template <std::size_t D> Expr lookup(const std::shared_ptr<const Table>& table, const std::array<Expr, D>& x) {
-  static_assert(D >= 1 && D <= 3);
+  static_assert(D >= 1 && D <= 4);
   return detail::record_lookup(table, {x.begin(), x.end()});
 }
 

@@ -49,6 +49,7 @@ template <Numeric T> Rgb<T> operator*(const Rgb<T>& a, const Rgb<T>& b) { return
 template <Numeric T> Rgb<T> operator*(const Rgb<T>& a, const T& s) { return {a.r * s, a.g * s, a.b * s}; }
 template <Numeric T> Rgb<T> operator*(const T& s, const Rgb<T>& a) { return a * s; }
 template <Numeric T> Rgb<T> operator/(const Rgb<T>& a, const T& s) { return {a.r / s, a.g / s, a.b / s}; }
+template <Numeric T> Rgb<T> operator/(const Rgb<T>& a, const Rgb<T>& b) { return {a.r / b.r, a.g / b.g, a.b / b.b}; }
 template <Numeric T> Rgb<T>& operator+=(Rgb<T>& a, const Rgb<T>& b) { return a = a + b; }
 template <Numeric T> Rgb<T> select(bool condition, const Rgb<T>& a, const Rgb<T>& b) { return condition ? a : b; }
 template <Numeric T> T max_component(const Rgb<T>& c) { return maximum(c.r, maximum(c.g, c.b)); }

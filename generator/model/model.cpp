@@ -157,6 +157,12 @@ ParamValues parse_values(const ModelInfo& info, const std::vector<std::string>& 
   return complete(info, values);
 }
 
+double table_error(const ModelInfo& info, const ParamValues& given) {
+  const TabulatedChoice& t = info.properties.tabulated;
+  if (t.error == 0) return 0;
+  return std::get<std::string>(complete(info, given).at(t.parameter)) == t.choice ? t.error : 0;
+}
+
 std::string format_values(const ModelInfo& info, const ParamValues& values) {
   std::string text;
   for (const ParamInfo& p : info.params) {

@@ -50,6 +50,12 @@ struct ParamInfo {
   ParamKind kind = ParamKind::Number;
 };
 
+/// A choice under which f holds tables of an integral instead of a formula for it.
+struct TabulatedChoice {
+  std::string parameter, choice;
+  double error = 0;  ///< how far interpolation takes the albedo from what is claimed of it, at most; 0: no such choice
+};
+
 /// What the paper or this project claims of a model; tests try to prove each claim, also the negative ones.
 struct ModelProperties {
   bool reciprocal = true;      ///< f(wi, wo) = f(wo, wi)
@@ -63,6 +69,7 @@ struct ModelProperties {
   std::string diffuse_limit = "";
   /// Assignments ("n=1e8") at which nearly all of the light leaves in the direction of ideal reflection; "" if none do.
   std::string specular_limit = "";
+  TabulatedChoice tabulated = {};
 };
 
 struct ModelInfo {
@@ -142,6 +149,8 @@ class Model {
 ParamValues complete(const ModelInfo&, const ParamValues&);
 /// Reads "name=value" (colours as r,g,b or one grey number). Throws InputError.
 ParamValues parse_values(const ModelInfo&, const std::vector<std::string>& assignments);
+/// The error that the model declares for a tabulated choice, 0 unless these values make it.
+double table_error(const ModelInfo&, const ParamValues&);
 /// Text in the form parse_values reads, parameters in schema order.
 std::string format_values(const ModelInfo&, const ParamValues&);
 
