@@ -83,9 +83,8 @@ def as_f(p, wi, wo):
             f += as_ph(p, h) / (4 * hk * max(k1[2], k2[2])) * fresnel
         if p["part"] != "specular" and p.get("diffuse") == "tabulated":
             exponents = float(p["nu"]), float(p["nv"])
-            f += rd / mp.pi / as_rest_mean(*exponents, rs)
-            for k in (k1, k2):
-                f *= as_rest(float(k[2]), as_azimuth(p, k), *exponents, rs)
+            rest = [as_rest(float(k[2]), as_azimuth(p, k), *exponents, rs) for k in (k1, k2)]
+            f += rd * rest[0] * rest[1] / (mp.pi * as_rest_mean(*exponents, rs))
         elif p["part"] != "specular":
             fade = [1 - (1 - k[2] / 2) ** 5 for k in (k1, k2)]
             f += 28 * rd / (23 * mp.pi) * (1 - rs) * fade[0] * fade[1]

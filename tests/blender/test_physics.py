@@ -142,6 +142,7 @@ SAMPLED = with_every_model(
     ("ashikhmin_shirley", {"nu": 20.0, "nv": 20.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.5, 0.2)}),
     ("ashikhmin_shirley", {"nu": 5.0, "nv": 100.0, "rotation": 0.5, "part": "specular"}),
     ("ashikhmin_shirley", {"part": "diffuse", "rd": 1.0}),
+    ("ashikhmin_shirley", {"diffuse": "tabulated", "nu": 5.0, "nv": 100.0, "rd": 1.0}),
     ("radziszewski_alda", {"n": 2.0}),
     ("radziszewski_alda", {"n": 12.0, "tint": (1.0, 0.6, 0.2)}),
     ("radziszewski_alda", {"n": 4.0, "part": "latitudinal"}),
@@ -375,6 +376,7 @@ TABLES = with_every_model(
     ("ashikhmin_shirley", {"nu": 37.0, "nv": 37.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.4, 0.2)}),
     ("ashikhmin_shirley", {"nu": 3.0, "nv": 900.0, "part": "specular", "rs": 1.0}),
     ("ashikhmin_shirley", {"part": "diffuse", "rd": (0.9, 0.5, 0.1)}),
+    ("ashikhmin_shirley", {"diffuse": "tabulated", "nu": 37.0, "nv": 37.0, "rs": 0.5, "rd": 0.7}),
     ("radziszewski_alda", {"n": 7.0, "tint": (0.9, 0.5, 0.1)}),
 )
 
