@@ -142,7 +142,6 @@ SAMPLED = with_every_model(
     ("ashikhmin_shirley", {"nu": 20.0, "nv": 20.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.5, 0.2)}),
     ("ashikhmin_shirley", {"nu": 5.0, "nv": 100.0, "rotation": 0.5, "part": "specular"}),
     ("ashikhmin_shirley", {"part": "diffuse", "rd": 1.0}),
-    ("ashikhmin_shirley", {"diffuse": "tabulated", "nu": 5.0, "nv": 100.0, "rd": 1.0}),
     ("radziszewski_alda", {"n": 2.0}),
     ("radziszewski_alda", {"n": 12.0, "tint": (1.0, 0.6, 0.2)}),
     ("radziszewski_alda", {"n": 4.0, "part": "latitudinal"}),
@@ -367,6 +366,25 @@ def test_as_fig2_centre_and_rim(extension, empty, tool):
     assert rim == pytest.approx(0.83, abs=0.03)
 
 
+def test_ashikhmin_shirley_loses_nothing_by_eq_12(extension, empty):
+    cosines = (1.0, 0.5, 0.17)
+    replicas = 64
+    normals = np.repeat(tilted(cosines, np.array([0.0, 0.7, 1.4])), replicas, 0)
+    reflected = {}
+    for diffuse in ("paper", "tabulated"):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        values = {"nu": 10.0, "nv": 10.0, "rd": 1.0, "diffuse": diffuse}
+        scene, material = start(extension, "ashikhmin_shirley", "sampled", values, max_bounces=1)
+        meter = Goniometer(scene, material, normals, samples=1024, perspective=True)
+        meter.add_world()
+        reflected[diffuse] = meter.measure()[:, 0].reshape(len(cosines), replicas).mean(1)
+    print(reflected)
+    # What the model declares for its tables; there they are far better than that.
+    assert np.abs(reflected["tabulated"] - 1).max() < 0.02
+    # Eq. 14 loses more than half.
+    assert reflected["paper"][2] < 0.47
+
+
 # The Albedo output of the shaders, the panel's numbers and the model must agree.
 
 TABLES = with_every_model(
@@ -376,7 +394,6 @@ TABLES = with_every_model(
     ("ashikhmin_shirley", {"nu": 37.0, "nv": 37.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.4, 0.2)}),
     ("ashikhmin_shirley", {"nu": 3.0, "nv": 900.0, "part": "specular", "rs": 1.0}),
     ("ashikhmin_shirley", {"part": "diffuse", "rd": (0.9, 0.5, 0.1)}),
-    ("ashikhmin_shirley", {"diffuse": "tabulated", "nu": 37.0, "nv": 37.0, "rs": 0.5, "rd": 0.7}),
     ("radziszewski_alda", {"n": 7.0, "tint": (0.9, 0.5, 0.1)}),
 )
 
