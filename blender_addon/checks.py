@@ -132,6 +132,15 @@ def _zero_size_lights(material, scene):
         )
 
 
+def _zero_size_lights_fit(material, scene):
+    if tiny := _tiny_lights(scene):
+        return (
+            "WARNING",
+            f"Lamps too small for a controlled form ({', '.join(tiny[:3])}): they light its "
+            "closures alone, which are off by what Error says; enlarge the lamp",
+        )
+
+
 def _far_camera(material, scene):
     if _far_orthographic(scene):
         return (
@@ -199,6 +208,7 @@ DECLARED = {
     "clamp_indirect": _clamp_indirect,
     "clamp_direct": _clamp_direct,
     "zero_size_lights": _zero_size_lights,
+    "zero_size_lights_fit": _zero_size_lights_fit,
     "orthographic_far": _far_camera,
     "caustics": _caustics,
     "filter_glossy": _filter_glossy,

@@ -138,6 +138,18 @@ class BRDFC_OT_fix_material(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_no_guiding(Operator):
+    """Turn path guiding off, which the forms of this extension can't follow"""
+
+    bl_idname = "brdfc.no_guiding"
+    bl_label = "Turn Off Path Guiding"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        context.scene.cycles.use_guiding = False
+        return {"FINISHED"}
+
+
 class BRDFC_OT_switch(Operator):
     """Use another form of the same model; values and links stay"""
 
@@ -258,6 +270,7 @@ _CLASSES = (
     BRDFC_OT_new_material,
     BRDFC_OT_enable_osl,
     BRDFC_OT_fix_material,
+    BRDFC_OT_no_guiding,
     BRDFC_OT_switch,
     BRDFC_OT_kernel,
 )

@@ -161,6 +161,8 @@ def draw_warnings(layout, material, scene):
         layout.operator("brdfc.enable_osl", icon="CHECKMARK")
     if "bump_correction" in codes:
         layout.operator("brdfc.fix_material", icon="CHECKMARK")
+    if "path_guiding" in codes:
+        layout.operator("brdfc.no_guiding", icon="CHECKMARK")
     return found
 
 

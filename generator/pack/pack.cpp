@@ -117,12 +117,16 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   // normals are not the surface's; a clamp darkens lights in a mirror and, if it is low, highlights; Filter Glossy
   // blurs a mirror.
   std::vector<std::string> codes = {"bump_correction"};
-  if (kind == RepresentationKind::Sampled)
+  if (kind == RepresentationKind::Controlled)
+    codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "zero_size_lights_fit", "orthographic_far"});
+  else if (kind == RepresentationKind::Sampled)
     codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
   else if (mirror)
     codes.push_back("clamp_mirror");
   else if (shader.slots > shader.closures)
     codes.push_back("clamp_low");
+  // Cycles drops glossy closures behind a diffuse surface; ramps it does not.
+  if (shader.facets) codes.push_back("caustics");
   if (mirror) codes.push_back("filter_glossy");
   if (mirror && kind == RepresentationKind::Sampled) codes.push_back("albedo_passes_mirror");
   // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
@@ -284,8 +288,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   for (RepresentationKind kind : plan.forms) {
     const Shader shader = write_shader(model, kind, table, plan.fixed, plan.max_lobes);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
-    // A fitted form exists for these parameters only.
-    const bool cut = kind != RepresentationKind::Fitted && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
+    // A form of a fit exists for these parameters only.
+    const bool cut = !is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
     const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
     const RepresentationError error = measure_error(model, kind, plan.fixed);
     const auto cost = costs.find(info.name + "," + name_of(kind));

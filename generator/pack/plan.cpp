@@ -13,7 +13,7 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
   return format_values(info, {{name, value}});
 }
 
-/// Why the materials of a model have no common fitted form; nothing if they have one.
+/// Why the materials of a model have no common form made of a fit; nothing if they have one.
 std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs) {
   const MaterialNeed& first = *needs.front();
   if (const auto reason = unfit(*first.model, first.values)) return reason;
@@ -47,9 +47,10 @@ RepresentationKind chosen_form(const MaterialNeed& need, const std::vector<const
       return kind == RepresentationKind::Sampled && fits(needs, budget) ? RepresentationKind::Fitted : kind;
     }
   const RepresentationKind kind = representation_named(need.representation);
-  if (kind == RepresentationKind::Fitted) {
+  if (is_fit(kind)) {
     if (const auto reason = unfit(needs))
-      input_error("material {}: {} has no form 'fitted' here: {}", need.id, need.model->info().name, *reason);
+      input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
+                  *reason);
     return kind;
   }
   if (std::find(known.begin(), known.end(), kind) == known.end())
@@ -88,6 +89,7 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
                                                   : fmt::format("off by {:.2g} of the light, and {:g} is allowed",
                                                                 fitted_error(*needs.front()), *budget.error)));
   }
+  if (used.count(RepresentationKind::Controlled)) plan.forms.push_back(RepresentationKind::Controlled);
   if (used.count(RepresentationKind::Sampled) && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
   for (const ParamInfo& p : info.params) {

@@ -53,7 +53,9 @@ const std::set<std::string>& reserved_words() {
                                               "frame_b",
                                               "mirror_weight",
                                               "side",
-                                              "path_length"};
+                                              "path_length",
+                                              "residual_weight",
+                                              "residual_colour"};
   return words;
 }
 
@@ -346,7 +348,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     if (fixed.emplace(name, value).first->second != value)
       input_error("{}: the {} form exists only for {}={}", info.name, name_of(kind), name,
                   std::get<std::string>(value));
-  const bool sampled = kind == RepresentationKind::Sampled;
+  const bool sampled = kind == RepresentationKind::Sampled, controlled = kind == RepresentationKind::Controlled;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
   shader.lobes = sampled && max_lobes > 1;
@@ -417,10 +419,26 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (has_facets(closure)) body += fmt::format("    float alpha_{};\n", c);
       if (closure == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
       if (kinds[c].turned) body += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
+      shader.facets = shader.facets || has_facets(closure);
       terms.push_back(closure_text(kinds[c], c));
       shader.slots += slots(closure);
     }
+    if (controlled)
+      body +=
+          "    vector u_all = brdfc_random(0);\n"
+          "    float u_0 = u_all[0];\n    float u_1 = u_all[1];\n    float u_2 = u_all[2];\n"
+          "    float wi_x, wi_y, wi_z, residual_weight;\n    color residual_colour;\n";
     body += statements.print(4);
+    if (controlled) {
+      terms.push_back(
+          "residual_weight * brdfc_ray_coloured(frame_t * wi_x + frame_b * wi_y + frame_n * wi_z, I, residual_colour)");
+      shader.slots += slots(ClosureKind::PhongRamp);
+    }
+    for (std::size_t c = 0; c < kinds.size(); ++c)
+      if (kinds[c].undivided) {
+        body += fmt::format("    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= weight_{};\n", kRampSize, c, c);
+        ++shader.operations;
+      }
     for (std::size_t c = 0; c < kinds.size(); ++c)
       if (kinds[c].turned)
         body += fmt::format(
@@ -428,6 +446,10 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
             "normal_{0}_z);\n",
             c);
   }
+  if (controlled && shader.operations > kMaxOperations)
+    input_error(
+        "{}: the controlled form has {} operations with these parameters, and may have {}: take fitted or sampled",
+        info.name, shader.operations, kMaxOperations);
   shader.closures = int(terms.size());
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,

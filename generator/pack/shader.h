@@ -11,22 +11,27 @@
 namespace brdfc {
 
 struct Shader {
-  std::string name;    ///< of the shader and, with .osl, of its file
-  std::string source;  ///< stands alone
-  int closures = 0;    ///< most that one shading point adds
-  int slots = 0;       ///< what they take of Cycles' kMaxClosures
-  int operations = 0;  ///< most that one combination of choices executes, a loop's body counted once
-  bool lobes = false;  ///< has the Lobes parameter
+  std::string name;     ///< of the shader and, with .osl, of its file
+  std::string source;   ///< stands alone
+  int closures = 0;     ///< most that one shading point adds
+  int slots = 0;        ///< what they take of Cycles' kMaxClosures
+  int operations = 0;   ///< most that one combination of choices executes, a loop's body counted once
+  bool lobes = false;   ///< has the Lobes parameter
+  bool facets = false;  ///< has closures of facets
 };
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
 /// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. Throws
-/// InputError if the closures would exceed what Cycles keeps or the table what an array holds.
+/// InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
+/// kMaxOperations.
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
                     int max_lobes = kMaxLobes);
 
 /// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
 std::string balanced_sum(const std::vector<std::string>& terms);
+
+/// Operations of a form that is made for a scene; the compiler takes a quarter of a second for them.
+inline constexpr int kMaxOperations = 600;
 
 /// Numbers in one OSL array; more compile slowly.
 inline constexpr std::size_t kMaxArray = 32768;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Cycles closures a form may use, as data over a scalar type. evaluate() is their definition in double
-// precision (read off what Cycles computes and proved against it by the closure conformance tests); the
-// generator prints the same data as OSL. Directions are in the local frame of the model.
+// The Cycles closures a form may use, as data over a scalar type. evaluate() is their definition (read off what Cycles
+// computes and proved against it by the closure conformance tests); the generator prints the same data as OSL.
+// Directions are in the local frame of the model.
 #pragma once
 
 #include <array>
+#include <stdexcept>
 #include <vector>
 
 #include "core/vec.h"
@@ -36,7 +37,7 @@ template <class T> struct Closure {
   T exponent;                          ///< PhongRamp
   T alpha;                             ///< Ggx, Beckmann: roughness
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
-  bool turned = false;                 ///< `normal` is not the surface's
+  bool turned = false;                 ///< `normal` is not the surface's; that of facets is
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
       : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0), alpha(1), ior(1) {}
@@ -44,10 +45,60 @@ template <class T> struct Closure {
 
 template <class T> using ClosureSum = std::vector<Closure<T>>;
 
-/// f cos(theta_i) of facets without Fresnel term, for directions above the surface in the frame of the closure.
-double microfacet(ClosureKind, double alpha_x, double alpha_y, const Vec3<double>& wi, const Vec3<double>& wo);
+/// Smith's Lambda.
+template <class T> T lambda(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& v) {
+  const T a2 = (sqr(alpha_x * v.x) + sqr(alpha_y * v.y)) / maximum(sqr(v.z), tiny<T>());
+  if (kind == ClosureKind::Ggx) return a2 / (T(2) * (sqrt(T(1) + a2) + T(1)));
+  // Walter's rational fit, which leaves out all shadowing below a2 = 0.39.
+  const T a = T(1) / sqrt(maximum(a2, tiny<T>()));
+  return select(a2 < T(0.39), T(0), ((T(0.396) * a - T(1.259)) * a + T(1)) / ((T(2.181) * a + T(3.535)) * a));
+}
 
-/// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface.
+/// f cos(theta_i) of facets without Fresnel term, for directions above the surface in the frame of the closure.
+template <class T>
+T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const Vec3<T> h = normalize(wi + wo);
+  const T z2 = maximum(sqr(h.z), tiny<T>()), t2 = sqr(h.x / alpha_x) + sqr(h.y / alpha_y);
+  const T density = kind == ClosureKind::Ggx ? T(1) / sqr(t2 + z2) : exp(-t2 / z2) / sqr(z2);
+  const T D = T(kInvPi) / (alpha_x * alpha_y) * density;
+  return D / (T(4) * wo.z * (T(1) + lambda(kind, alpha_x, alpha_y, wi) + lambda(kind, alpha_x, alpha_y, wo)));
+}
+
+/// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface. `ramp` is a
+/// function that gives the ramp's colour at a position, which may lie above 1.
+template <class T, class Ramp>
+Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const Ramp& ramp) {
+  const T cosTheta_i = c.turned ? dot(c.normal, wi) : wi.z, cosTheta_o = c.turned ? dot(c.normal, wo) : wo.z;
+  const auto lit = cosTheta_i > T(0), both = lit && cosTheta_o > T(0);
+  const Rgb<T> none(T(0));
+  switch (c.kind) {
+    case ClosureKind::Diffuse:
+      return select(lit, c.weight * (cosTheta_i * T(kInvPi)), none);
+    case ClosureKind::Burley: {
+      const T pair = (T(1) - pow5(T(1) - cosTheta_i) / T(2)) * (T(1) - pow5(T(1) - cosTheta_o) / T(2));
+      return select(lit, c.weight * (cosTheta_i * T(kInvPi) * pair), none);
+    }
+    case ClosureKind::DiffuseRamp:
+      return select(lit, c.weight * ramp(cosTheta_i) * T(kInvPi), none);
+    case ClosureKind::PhongRamp: {
+      // Between wi and the mirror direction about the closure's normal.
+      const T cosAlpha = T(2) * cosTheta_o * cosTheta_i - dot(wo, wi);
+      const T lobe = pow(maximum(cosAlpha, tiny<T>()), c.exponent);
+      const T height = cosTheta_i * ((c.exponent + T(2)) * T(kInvPi / 2)) * lobe;
+      return select(both && cosAlpha > T(0), c.weight * ramp(lobe) * height, none);
+    }
+    case ClosureKind::Ggx:
+    case ClosureKind::Beckmann:
+      if (c.turned) throw std::logic_error("facets stand on the surface");
+      return select(both, c.weight * microfacet(c.kind, c.alpha, c.alpha, wi, wo), none);
+    case ClosureKind::Reflection:
+    case ClosureKind::Refraction:
+      return none;
+  }
+  throw std::logic_error("closure of unknown kind");
+}
+
+/// With the colours of its own ramp.
 Rgb<double> evaluate(const Closure<double>&, const Vec3<double>& wi, const Vec3<double>& wo);
 Rgb<double> evaluate(const ClosureSum<double>&, const Vec3<double>& wi, const Vec3<double>& wo);
 

@@ -62,10 +62,13 @@ std::vector<Closure<double>> facets(Family family, const Moments& at_normal) {
   return out;
 }
 
-/// The closure of a lobe without colours.
+/// The closure of a lobe without colours. Its axis is beside_mirror(wo, offset), so its normal, halfway between axis
+/// and viewer, is turned towards the viewer by half of that.
 template <class T> Closure<T> lobe_closure(const Vec3<T>& wo, const T& offset, const T& exponent) {
   Closure<T> c(ClosureKind::PhongRamp, Rgb<T>(T(1)));
-  c.normal = normalize(beside_mirror(wo, offset) + wo);
+  const T half = offset / T(2);
+  c.normal = mirror_side(wo) * -sin(half);
+  c.normal.z = cos(half);
   c.turned = true;
   c.exponent = exponent;
   return c;
@@ -222,10 +225,11 @@ Fit::Fit(const Model& model, const ParamValues& values) {
         return std::max(albedo - of_facets, 1e-2 * albedo) * (own / all + 1e-3) / (1 + 1e-3 * double(lobes + 1));
       });
     for (int channel = 0; channel < channels; ++channel) {
-      l.colour.emplace_back();
-      for (int k = 0; k < entries; ++k)
-        l.colour.back().push_back(table(fmt::format("colour_of_{}_{}_{}", j, k, channel),
-                                        [&](const Cell& c) { return c.x(first + k, channel) / c.scale[first + k]; }));
+      std::vector<double> numbers;
+      for (const Cell& c : cells)
+        for (int k = 0; k < entries; ++k) numbers.push_back(c.x(first + k, channel) / c.scale[first + k]);
+      const std::vector<int> sizes = ramp ? std::vector<int>{kViews, kRampSize} : std::vector<int>{kViews};
+      l.colour.push_back(make_table(fmt::format("colour_of_{}_{}", j, channel), sizes, std::move(numbers)));
     }
     linear_.push_back(std::move(l));
   }
@@ -233,38 +237,54 @@ Fit::Fit(const Model& model, const ParamValues& values) {
   errors_ = view_errors(bound, [&](const Vec3<double>& wo) { return closures(wo); });
 }
 
-template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo) const {
-  const std::array<T, 1> x = {named("place", place(wo))};
+template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const T& place) const {
+  const std::array<T, 1> x = {place};
+  if (j < lobes_.size()) return lobe_closure(wo, lookup(lobes_[j].offset, x), lookup(lobes_[j].exponent, x));
+  if (j == lobes_.size()) return Closure<T>(ClosureKind::DiffuseRamp, Rgb<T>(T(1)));
+  const Closure<double>& facet = facets_[j - lobes_.size() - 1];
+  Closure<T> c(facet.kind, Rgb<T>(T(1)));
+  c.alpha = T(facet.alpha);
+  return c;
+}
+
+template <class T, std::size_t D> Rgb<T> Fit::colour(std::size_t j, const std::array<T, D>& at) const {
+  const auto& channels = linear_[j].colour;
   const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
+  if (channels.size() == 1) return tint * lookup(channels[0], at);
+  return Rgb<T>(lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at));
+}
+
+template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const T& share, bool divided) const {
+  const T x = named("place", place(wo));
   ClosureSum<T> sum;
   for (std::size_t j = 0; j < linear_.size(); ++j) {
-    if (j < lobes_.size())
-      sum.push_back(lobe_closure(wo, lookup(lobes_[j].offset, x), lookup(lobes_[j].exponent, x)));
-    else if (j == lobes_.size())
-      sum.emplace_back(ClosureKind::DiffuseRamp, Rgb<T>(T(1)));
-    else {
-      const Closure<double>& facet = facets_[j - lobes_.size() - 1];
-      sum.emplace_back(facet.kind, Rgb<T>(T(1)));
-      sum.back().alpha = T(facet.alpha);
-    }
-    Closure<T>& c = sum.back();
-    const auto& colour = linear_[j].colour;
-    const auto entry = [&](std::size_t k) {
-      const auto channel = [&](std::size_t i) { return lookup(colour[i][k], x); };
-      return colour.size() == 1 ? tint * channel(0) : Rgb<T>(channel(0), channel(1), channel(2));
-    };
+    Closure<T>& c = sum.emplace_back(shape(j, wo, x));
     if (!has_ramp(c.kind)) {
-      c.weight = entry(0);
+      c.weight = colour(j, std::array<T, 1>{x});
       continue;
     }
-    const T weight = maximum(lookup(linear_[j].weight, x), T(1e-20));
+    const T weight = maximum(lookup(linear_[j].weight, std::array<T, 1>{x}), T(1e-20)) * share;
     c.weight = Rgb<T>(weight);
-    for (std::size_t k = 0; k < kRampSize; ++k) c.ramp[k] = entry(k) / weight;
+    for (std::size_t k = 0; k < kRampSize; ++k)
+      c.ramp[k] = colour(j, std::array<T, 2>{x, T(double(k) / (kRampSize - 1))}) / (divided ? weight : T(1));
   }
   return sum;
 }
-template ClosureSum<double> Fit::closures(const Vec3<double>&) const;
-template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&) const;
+template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, bool) const;
+template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Expr&, bool) const;
+
+template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo) const {
+  const T x = named("place", place(wo));
+  Rgb<T> sum(T(0));
+  for (std::size_t j = 0; j < linear_.size(); ++j) {
+    Closure<T> c = shape(j, wo, x);
+    if (!has_ramp(c.kind)) c.weight = colour(j, std::array<T, 1>{x});
+    sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, std::array<T, 2>{x, position}); });
+  }
+  return sum;
+}
+template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&) const;
+template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&) const;
 
 const Fit& fit_of(const Model& model, const ParamValues& values) {
   static std::mutex mutex;

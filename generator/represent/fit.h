@@ -30,8 +30,11 @@ class Fit {
   Fit(const Model&, const ParamValues& values);
 
   /// The closures for a view above the surface. Their weights add up to the albedo, or where facets
-  /// shadow each other to a little more.
-  template <class T> ClosureSum<T> closures(const Vec3<T>& wo) const;
+  /// shadow each other to a little more. Those with ramps have `share` of theirs and colours that make up for it; not
+  /// `divided`, the colours still have to be divided by the weight.
+  template <class T> ClosureSum<T> closures(const Vec3<T>& wo, const T& share = T(1), bool divided = true) const;
+  /// f cos(theta_i) of their sum; directions above the surface.
+  template <class T> Rgb<T> f_cos(const Vec3<T>& wi, const Vec3<T>& wo) const;
 
   /// At cosines evenly spaced from 1 to 0, whatever the tables' knots.
   const std::vector<ViewError>& errors() const { return errors_; }
@@ -40,12 +43,17 @@ class Fit {
   struct Lobe {
     std::shared_ptr<const Table> offset, exponent;  ///< angle from the mirror direction, towards the normal
   };
-  /// A closure's weight, and the colours of its ramp times that weight, by channel; one channel if `tint_` does. One
-  /// colour without a ramp.
+  /// A closure's weight, and the colours of its ramp times that weight, by channel, over the view and the position in
+  /// the ramp; one channel if `tint_` does. Without a ramp, one colour over the view.
   struct Linear {
     std::shared_ptr<const Table> weight;
-    std::vector<std::vector<std::shared_ptr<const Table>>> colour;
+    std::vector<std::shared_ptr<const Table>> colour;
   };
+  /// Closure j without weight and colours.
+  template <class T> Closure<T> shape(std::size_t j, const Vec3<T>& wo, const T& place) const;
+  /// Colour of closure j; `at` is what its tables run over.
+  template <class T, std::size_t D> Rgb<T> colour(std::size_t j, const std::array<T, D>& at) const;
+
   std::vector<Lobe> lobes_;
   std::vector<Linear> linear_;  ///< of the lobes, of the diffuse_ramp, of the facets
   std::vector<Closure<double>> facets_;
@@ -56,7 +64,9 @@ class Fit {
 /// The fit for these values, made at first use and kept while the program runs.
 const Fit& fit_of(const Model&, const ParamValues& values);
 
-extern template ClosureSum<double> Fit::closures(const Vec3<double>&) const;
-extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&) const;
+extern template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, bool) const;
+extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Expr&, bool) const;
+extern template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&) const;
+extern template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&) const;
 
 }  // namespace brdfc

@@ -49,6 +49,7 @@ double toon(const Lobe& c, double cosAngle) {
 Rgb<double> used_by_forms(ClosureKind kind, const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   Closure<double> closure(kind, c.weight);
   closure.normal = c.normal;
+  closure.turned = true;
   closure.ramp = c.ramp;
   closure.exponent = c.exponent;
   return evaluate(closure, wi, wo);

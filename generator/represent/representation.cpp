@@ -10,16 +10,17 @@
 #include "analysis/probes.h"
 #include "model/horizon.h"
 #include "model/sampling.h"
-#include "represent/fit.h"
+#include "represent/controlled.h"
 
 namespace brdfc {
 namespace {
 
 /// Names the statements around a recording use; a recording may not declare them.
 std::vector<std::string> frame_names() {
-  std::vector<std::string> names = {"Normal",  "Tangent",     "Lobes", "BSDF",   "Albedo",        "frame_n",
-                                    "frame_t", "frame_b",     "wi",    "weight", "mirror_weight", "lobe",
-                                    "side",    "path_length", "u",     "wo",     "sum",           "position"};
+  std::vector<std::string> names = {
+      "Normal", "Tangent",  "Lobes",           "BSDF",           "Albedo", "frame_n",     "frame_t", "frame_b",
+      "wi",     "weight",   "mirror_weight",   "lobe",           "side",   "path_length", "u",       "wo",
+      "sum",    "position", "residual_weight", "residual_colour"};
   return names;
 }
 
@@ -45,18 +46,21 @@ std::optional<ClosureSum<Expr>> recorded_exact(const Model& model, const Brdf<Ex
   return sum;
 }
 
-ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& values) {
-  const Vec3<Expr> wo = recorded_wo(model, brdf);
-  ClosureSum<Expr> sum = fit_of(model, values).closures(wo);
-  if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf.mirror(wo));
+ClosureSum<Expr> with_mirror(const Model& model, const Brdf<Expr>& brdf, ClosureSum<Expr> sum) {
+  if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf.mirror(recorded_wo(model, brdf)));
   return sum;
+}
+
+ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& values) {
+  return with_mirror(model, brdf, fit_of(model, values).closures(recorded_wo(model, brdf), Expr(1), false));
 }
 
 std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
 
-void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<RecordedClosure>& recorded) {
+void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<RecordedClosure>& recorded,
+                     bool divided = true) {
   for (std::size_t c = 0; c < sum.size(); ++c) {
-    recorded.push_back({sum[c].kind, sum[c].turned});
+    recorded.push_back({sum[c].kind, sum[c].turned, has_ramp(sum[c].kind) && !divided});
     program.output(fmt::format("weight_{}", c), sum[c].weight);
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
@@ -71,9 +75,22 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
   }
 }
 
+Vec3<Expr> recorded_u() { return {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")}; }
+
+void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamValues& values, Program& program,
+                       std::vector<RecordedClosure>& recorded) {
+  const Controlled<Expr> c = controlled(brdf, fit_of(model, values), recorded_wo(model, brdf), recorded_u());
+  output_closures(with_mirror(model, brdf, c.closures), program, recorded, false);
+  program.output("wi_x", c.wi.x);
+  program.output("wi_y", c.wi.y);
+  program.output("wi_z", c.wi.z);
+  program.output("residual_weight", c.weight);
+  program.output("residual_colour", c.colour);
+}
+
 void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program) {
   const Vec3<Expr> wo = recorded_wo(model, brdf);
-  const Sample<Expr> s = brdf.sample(wo, {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
+  const Sample<Expr> s = brdf.sample(wo, recorded_u());
   program.output("wi_x", s.wi.x);
   program.output("wi_y", s.wi.y);
   program.output("wi_z", brdf.scatters_through() ? s.wi.z * Expr::input("side") : s.wi.z);
@@ -131,6 +148,44 @@ RepresentationError fitted_error(const Model& model, const ParamValues& values) 
   return out;
 }
 
+/// What single precision makes of the drawn residuals. The same numbers drive both, so that what differs is the
+/// arithmetic and not the noise.
+RepresentationError controlled_error(const Model& model, const ParamValues& values) {
+  constexpr int kViews = 6, kPoints = 256;
+  Recorder recorder;
+  const std::unique_ptr<Brdf<Expr>> recorded = model.record(values);
+  Program program;
+  std::vector<RecordedClosure> kinds;
+  output_controlled(model, *recorded, values, program, kinds);
+  const BoundModel truth = bind_model(model, values);
+  const RepresentationError of_fit = fitted_error(model, values);
+  RepresentationError out;
+  Sequence3 points(1);
+  for (int view = 0; view < kViews; ++view) {
+    const Vec3<double> wo = direction((view + 0.5) / kViews, view);
+    FloatInputs inputs = float_inputs(values, wo);
+    Rgb<double> difference(0.0);
+    for (int i = 0; i < kPoints; ++i) {
+      const Vec3<float> v = Vec3<float>::from(points.next());
+      set_input(inputs, "u_0", v.x);
+      set_input(inputs, "u_1", v.y);
+      set_input(inputs, "u_2", v.z);
+      const auto run = program.run<float>(inputs);
+      for (const auto& [name, value] : run)
+        require_finite(model, values, wo, name, value, !name.starts_with("weight_") && name != "residual_weight");
+      const std::array<float, 3> colour = run.at("residual_colour");
+      const double weight = run.at("residual_weight")[0] / double(kPoints);
+      const Residual<double> exact = sample_residual(*truth.brdf, fit_of(model, values), wo, Vec3<double>::from(v));
+      difference += Rgb<double>(colour[0], colour[1], colour[2]) * weight - exact.weight / double(kPoints);
+    }
+    out.albedo = std::max({out.albedo, std::abs(difference.r), std::abs(difference.g), std::abs(difference.b)});
+  }
+  out.note = fmt::format(
+      "equals the model in expectation; a lamp of no size sees {}, which have {:.2g} of the light off on average",
+      of_fit.note, *of_fit.relative_l1);
+  return out;
+}
+
 /// Parameters a slider reaches, drawn uniformly; a wide range logarithmically, as its effect is.
 ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt19937_64& rng) {
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -157,14 +212,17 @@ const char* name_of(RepresentationKind kind) {
       return "sampled";
     case RepresentationKind::Fitted:
       return "fitted";
+    case RepresentationKind::Controlled:
+      return "controlled";
   }
   throw std::logic_error("a form without a name");
 }
 
 RepresentationKind representation_named(const std::string& name) {
-  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled, RepresentationKind::Fitted})
+  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled, RepresentationKind::Fitted,
+                                  RepresentationKind::Controlled})
     if (name == name_of(kind)) return kind;
-  input_error("unknown representation '{}': expected one of exact, sampled, fitted", name);
+  input_error("unknown representation '{}': expected one of exact, sampled, fitted, controlled", name);
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
@@ -206,7 +264,9 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
     if (!sum) input_error("{}: has no exact representation", model.info().name);
     output_closures(*sum, program, closures);
   } else if (kind == RepresentationKind::Fitted) {
-    output_closures(recorded_fit(model, *brdf, fixed), program, closures);
+    output_closures(recorded_fit(model, *brdf, fixed), program, closures, false);
+  } else if (kind == RepresentationKind::Controlled) {
+    output_controlled(model, *brdf, fixed, program, closures);
   } else {
     output_sampled(model, *brdf, program);
   }
@@ -223,11 +283,12 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false}});
+  return finish(program, indent, {{ClosureKind::Reflection, false, false}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
   if (kind == RepresentationKind::Fitted) return fitted_error(model, fixed);
+  if (kind == RepresentationKind::Controlled) return controlled_error(model, fixed);
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);

@@ -11,12 +11,17 @@
 namespace brdfc {
 
 enum class RepresentationKind {
-  Exact,    ///< closures that equal the model
-  Sampled,  ///< the shader samples the model itself, one narrow lobe per sample
-  Fitted    ///< closures that come close to the model, for one set of parameters (fit.h)
+  Exact,      ///< closures that equal the model
+  Sampled,    ///< the shader samples the model itself, one narrow lobe per sample
+  Fitted,     ///< closures that come close to the model, for one set of parameters (fit.h)
+  Controlled  ///< those and a sample of what they lack (controlled.h)
 };
 
 const char* name_of(RepresentationKind);
+/// Made of a fit: for one set of parameters, which must all be known.
+inline bool is_fit(RepresentationKind kind) {
+  return kind == RepresentationKind::Fitted || kind == RepresentationKind::Controlled;
+}
 /// Throws InputError that lists the known names.
 RepresentationKind representation_named(const std::string&);
 
@@ -32,11 +37,12 @@ ParamValues form_choices(const Model&, RepresentationKind);
 
 struct RecordedClosure {
   ClosureKind kind;
-  bool turned;  ///< has a normal of its own
+  bool turned;     ///< has a normal of its own
+  bool undivided;  ///< the colours of its ramp have to be divided by its weight
   bool operator==(const RecordedClosure&) const = default;
 };
 /// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
-/// sampled, u_0, u_1, u_2; and assign what `kind` says.
+/// sampled or controlled, u_0, u_1, u_2; and assign what `kind` says.
 struct Recording {
   std::string statements;
   std::vector<RecordedClosure> closures;  ///< all but Sampled
@@ -45,8 +51,9 @@ struct Recording {
 };
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
-/// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z. A fitted form needs all parameters in
-/// `fixed`. Throws InputError if more closures than Cycles keeps would be needed.
+/// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
+/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed`. Throws InputError if more
+/// closures than Cycles keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
@@ -61,7 +68,7 @@ struct RepresentationError {
 
 /// Executes the recorded form in float at random parameters and directions (fixed seed). Throws ValueError naming
 /// model, parameters, directions and value for a result that is NaN, infinite or negative.
-/// Of a fitted form, at the parameters in `fixed`, which the others do without: mean over views with cosines spread
+/// Of a form of a fit, at the parameters in `fixed`, which the others do without: mean over views with cosines spread
 /// evenly, the worst in `note`.
 RepresentationError measure_error(const Model&, RepresentationKind, const ParamValues& fixed = {});
 

@@ -24,15 +24,19 @@ Points spread_points(const Brdf<double>&, const Vec3<double>& wo, const Vec3<dou
 
 Eigen::VectorXd weights_of(const Points&);
 
-/// In the plane of incidence, `angle` from the mirror direction towards the normal and on.
-template <class T> Vec3<T> beside_mirror(const Vec3<T>& wo, const T& angle) {
+/// Along the surface towards the mirror side; at normal incidence any direction will do.
+template <class T> Vec3<T> mirror_side(const Vec3<T>& wo) {
   const T sinTheta = sqrt(sin2_theta(wo));
-  // Towards the mirror side, along the surface; at normal incidence any direction will do.
   const auto oblique = sinTheta > T(1e-6);
   const T scale = T(-1) / select(oblique, sinTheta, T(1));
-  const Vec3<T> out = {select(oblique, wo.x * scale, T(1)), select(oblique, wo.y * scale, T(0)), T(0)};
-  const T c = cos(angle), s = sin(angle);
-  const T along = sinTheta * c - wo.z * s, up = wo.z * c + sinTheta * s;
+  return {select(oblique, wo.x * scale, T(1)), select(oblique, wo.y * scale, T(0)), T(0)};
+}
+
+/// In the plane of incidence, `angle` from the mirror direction towards the normal and on.
+inline Vec3<double> beside_mirror(const Vec3<double>& wo, double angle) {
+  const Vec3<double> out = mirror_side(wo);
+  const double sinTheta = std::sqrt(sin2_theta(wo)), c = std::cos(angle), s = std::sin(angle);
+  const double along = sinTheta * c - wo.z * s, up = wo.z * c + sinTheta * s;
   return {out.x * along, out.y * along, up};
 }
 

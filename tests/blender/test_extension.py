@@ -424,6 +424,17 @@ def test_warning_small_lamps(extension, empty):
     assert codes(extension, material, empty) == ["zero_size_lights"]
 
 
+def test_warning_small_lamps_of_a_controlled_form(extension, empty, monkeypatch):
+    material = clean(extension, empty)
+    entry = extension.pack.representation("lambert", "exact")
+    monkeypatch.setitem(entry, "warnings", ["zero_size_lights_fit"])
+    assert codes(extension, material, empty) == []
+    data = bpy.data.lights.new("tiny", "POINT")
+    data.shadow_soft_size = 0
+    empty.collection.objects.link(bpy.data.objects.new("tiny", data))
+    assert codes(extension, material, empty) == ["zero_size_lights_fit"]
+
+
 def test_warning_far_orthographic_camera(extension, empty):
     material = clean(extension, empty, *sampled_forms(extension)[0])
     camera = helpers.add_camera(empty, location=(0, -10, 0), orthographic=4)
@@ -703,6 +714,12 @@ def test_operator_new_material(extension, empty):
     material.cycles.use_bump_map_correction = True
     assert bpy.ops.brdfc.fix_material() == {"FINISHED"}
     assert material.cycles.use_bump_map_correction is False
+    empty.cycles.use_guiding = True
+    layout = Layout()
+    extension.ui.draw_material(layout, material, empty)
+    assert "operator brdfc.no_guiding" in "\n".join(layout.log)
+    assert bpy.ops.brdfc.no_guiding() == {"FINISHED"}
+    assert empty.cycles.use_guiding is False
     with pytest.raises(RuntimeError, match="unknown model"):
         bpy.ops.brdfc.new_material(model="nonsense")
     assert target.active_material == material
