@@ -249,22 +249,22 @@ template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const
 
 template <class T, std::size_t D> Rgb<T> Fit::colour(std::size_t j, const std::array<T, D>& at) const {
   const auto& channels = linear_[j].colour;
-  const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
-  if (channels.size() == 1) return tint * lookup(channels[0], at);
+  if (channels.size() == 1) return Rgb<T>(lookup(channels[0], at));
   return Rgb<T>(lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at));
 }
 
 template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const T& share, bool divided) const {
   const T x = named("place", place(wo));
+  const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
   ClosureSum<T> sum;
   for (std::size_t j = 0; j < linear_.size(); ++j) {
     Closure<T>& c = sum.emplace_back(shape(j, wo, x));
     if (!has_ramp(c.kind)) {
-      c.weight = colour(j, std::array<T, 1>{x});
+      c.weight = tint * colour(j, std::array<T, 1>{x});
       continue;
     }
     const T weight = maximum(lookup(linear_[j].weight, std::array<T, 1>{x}), T(1e-20)) * share;
-    c.weight = Rgb<T>(weight);
+    c.weight = tint * weight;
     for (std::size_t k = 0; k < kRampSize; ++k)
       c.ramp[k] = colour(j, std::array<T, 2>{x, T(double(k) / (kRampSize - 1))}) / (divided ? weight : T(1));
   }
@@ -281,7 +281,7 @@ template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo) const
     if (!has_ramp(c.kind)) c.weight = colour(j, std::array<T, 1>{x});
     sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, std::array<T, 2>{x, position}); });
   }
-  return sum;
+  return Rgb<T>(T(tint_.r), T(tint_.g), T(tint_.b)) * sum;
 }
 template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&) const;
 template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&) const;

@@ -31,7 +31,7 @@ class Fit {
 
   /// The closures for a view above the surface. Their weights add up to the albedo, or where facets
   /// shadow each other to a little more. Those with ramps have `share` of theirs and colours that make up for it; not
-  /// `divided`, the colours still have to be divided by the weight.
+  /// `divided`, the colours still have to be divided by the weight's largest channel.
   template <class T> ClosureSum<T> closures(const Vec3<T>& wo, const T& share = T(1), bool divided = true) const;
   /// f cos(theta_i) of their sum; directions above the surface.
   template <class T> Rgb<T> f_cos(const Vec3<T>& wi, const Vec3<T>& wo) const;
@@ -51,13 +51,13 @@ class Fit {
   };
   /// Closure j without weight and colours.
   template <class T> Closure<T> shape(std::size_t j, const Vec3<T>& wo, const T& place) const;
-  /// Colour of closure j; `at` is what its tables run over.
+  /// Colour of closure j without tint; `at` is what its tables run over.
   template <class T, std::size_t D> Rgb<T> colour(std::size_t j, const std::array<T, D>& at) const;
 
   std::vector<Lobe> lobes_;
   std::vector<Linear> linear_;  ///< of the lobes, of the diffuse_ramp, of the facets
   std::vector<Closure<double>> facets_;
-  Rgb<double> tint_;  ///< of all closures
+  Rgb<double> tint_;  ///< of all closures, in their weights; its largest channel is 1
   std::vector<ViewError> errors_;
 };
 

@@ -38,7 +38,7 @@ ParamValues form_choices(const Model&, RepresentationKind);
 struct RecordedClosure {
   ClosureKind kind;
   bool turned;     ///< has a normal of its own
-  bool undivided;  ///< the colours of its ramp have to be divided by its weight
+  bool undivided;  ///< the colours of its ramp have to be divided by its weight's largest channel
   bool operator==(const RecordedClosure&) const = default;
 };
 /// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
