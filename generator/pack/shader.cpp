@@ -436,7 +436,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     }
     for (std::size_t c = 0; c < kinds.size(); ++c)
       if (kinds[c].undivided) {
-        body += fmt::format("    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= brdfc_max_component(weight_{});\n", kRampSize, c, c);
+        body += fmt::format("    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= brdfc_max_component(weight_{});\n",
+                            kRampSize, c, c);
         ++shader.operations;
       }
     for (std::size_t c = 0; c < kinds.size(); ++c)
