@@ -5,6 +5,7 @@
 #include "app/commands.h"
 #include "app/csv.h"
 #include "represent/fit.h"
+#include "represent/twin.h"
 
 namespace brdfc {
 
@@ -12,7 +13,7 @@ void add_fit_command(CLI::App& app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
-    bool pairs = false;
+    bool pairs = false, twin = false;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
@@ -24,6 +25,7 @@ void add_fit_command(CLI::App& app) {
       "stderr: the middle, the 95th percentile and the largest of relative_l1");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "name=value; a colour is three numbers or one");
+  cmd->add_flag("--twin", o->twin, "Of the twin instead: Blender's own nodes with weights, roughness and tilt by view");
   cmd->add_flag("--pairs", o->pairs,
                 "f cos(theta_i) of the closures instead, for direction pairs.\n"
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
@@ -32,21 +34,22 @@ void add_fit_command(CLI::App& app) {
     const Model& model = find_model(o->model);
     const ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
     if (const auto reason = unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
-    const Fit& fit = fit_of(model, values);
     if (o->pairs) {
-      print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(fit.closures(wo), wi, wo); });
+      print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) {
+        return evaluate(o->twin ? twin_of(model, values).closures(wo) : fit_of(model, values).closures(wo), wi, wo);
+      });
       return;
     }
+    const std::vector<ViewError>& errors = o->twin ? twin_of(model, values).errors() : fit_of(model, values).errors();
     std::vector<double> l1;
-    for (const ViewError& e : fit.errors()) l1.push_back(e.relative_l1);
+    for (const ViewError& e : errors) l1.push_back(e.relative_l1);
     std::sort(l1.begin(), l1.end());
     const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
     fmt::print(stderr,
                "{} {}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
                o->model, format_values(model.info(), values), quantile(0.5), quantile(0.95), quantile(1));
     CsvWriter out("cos_theta_o,relative_l1,relative_l2,albedo,negative");
-    for (const ViewError& e : fit.errors())
-      out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
+    for (const ViewError& e : errors) out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
     out.finish();
   });
 }

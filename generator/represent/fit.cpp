@@ -7,8 +7,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <limits>
-#include <map>
-#include <mutex>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
@@ -286,13 +284,6 @@ template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo) const
 template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&) const;
 template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&) const;
 
-const Fit& fit_of(const Model& model, const ParamValues& values) {
-  static std::mutex mutex;
-  static std::map<std::string, std::unique_ptr<Fit>> made;
-  const std::lock_guard lock(mutex);
-  std::unique_ptr<Fit>& fit = made[model.info().name + " " + format_values(model.info(), values)];
-  if (!fit) fit = std::make_unique<Fit>(model, values);
-  return *fit;
-}
+const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }
 
 }  // namespace brdfc

@@ -4,7 +4,11 @@
 
 #include <Eigen/Dense>
 #include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "analysis/albedo.h"
@@ -76,6 +80,16 @@ struct ViewError {
 /// At cosines evenly spaced from 1 to 0.
 std::vector<ViewError> view_errors(const BoundModel&,
                                    const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures);
+
+/// The form of these values, made at first use and kept while the program runs.
+template <class Form> const Form& made_once(const Model& model, const ParamValues& values) {
+  static std::mutex mutex;
+  static std::map<std::string, std::unique_ptr<Form>> made;
+  const std::lock_guard lock(mutex);
+  std::unique_ptr<Form>& form = made[model.info().name + " " + format_values(model.info(), values)];
+  if (!form) form = std::make_unique<Form>(model, values);
+  return *form;
+}
 
 /// Whether f changes when both directions turn about the normal.
 bool turns(const Brdf<double>&);

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "represent/twin.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <nlopt.hpp>
+
+#include "analysis/probes.h"
+
+namespace brdfc {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Leaning and roughness are sought at every third knot, with fewer points; weights at all.
+constexpr int kStride = 3, kFewPoints = 1200, kPoints = 3000, kTrials = 240;
+/// The view of the first knot, which is level with the surface, is this much above it.
+constexpr double kLastCosine = 2e-3;
+constexpr std::size_t kFacets = 3;
+constexpr double kLeastRoughness = 0.03;
+
+/// Pairs of facet lobes, and how far each leans towards the viewer where the search begins.
+struct Dictionary {
+  std::array<ClosureKind, kFacets> kinds;
+  std::array<double, kFacets> lean;
+};
+constexpr Dictionary kDictionaries[] = {
+    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0, 0}},
+    {{ClosureKind::Beckmann, ClosureKind::Beckmann, ClosureKind::Ggx}, {0, 0, 0}},
+    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0.3, 0.9}},
+};
+
+/// Lean, roughness and spread of each pair of facet lobes, one after the other.
+using Shape = std::vector<double>;
+constexpr std::size_t kShape = 3;
+
+/// One of a pair, on the side of the plane of incidence that the sign of `spread` says.
+Closure<double> facet(ClosureKind kind, double lean, double roughness, double spread, const Vec3<double>& wo) {
+  const Vec3<double> n = {0, 0, 1};
+  Closure<double> c(kind, Rgb<double>(1.0));
+  c.normal = normalize(n * (1 - lean) + wo * lean + cross(n, wo) * spread);
+  c.turned = true;
+  c.alpha = sqr(roughness);
+  return c;
+}
+
+/// A lean below which the facets turn away from the viewer, and a little more.
+double least_lean(const Vec3<double>& wo) { return std::max(-0.9 * wo.z / std::max(1 - wo.z, 1e-3), -2.0); }
+
+/// What each closure gives at the points, the matte one last; facets of which nothing is above the surface give 0.
+MatrixXd columns(const Dictionary& dictionary, const Shape& shape, const View& view) {
+  MatrixXd a(Eigen::Index(view.points.wi.size()), Eigen::Index(kFacets + 1));
+  const Closure<double> matte(ClosureKind::Diffuse, Rgb<double>(1.0));
+  for (std::size_t j = 0; j <= kFacets; ++j) {
+    const double* s = shape.data() + kShape * j;
+    const Closure<double> left = j < kFacets ? facet(dictionary.kinds[j], s[0], s[1], s[2], view.wo) : matte,
+                          right = j < kFacets ? facet(dictionary.kinds[j], s[0], s[1], -s[2], view.wo) : matte;
+    for (std::size_t p = 0; p < view.points.wi.size(); ++p) {
+      const Vec3<double>& wi = view.points.wi[p];
+      a(Eigen::Index(p), Eigen::Index(j)) = (evaluate(left, wi, view.wo).r + evaluate(right, wi, view.wo).r) / 2;
+    }
+  }
+  return a;
+}
+
+VectorXd weights_for(const MatrixXd& a, const View& view, Eigen::Index channel) {
+  return solve(a, weights_of(view.points), view.f.col(channel), VectorXd::Zero(a.cols()), a.cols(), std::nullopt);
+}
+
+/// Relative L1, over all channels.
+double error_of(const Dictionary& dictionary, const Shape& shape, const View& view) {
+  const MatrixXd a = columns(dictionary, shape, view);
+  const VectorXd weight = weights_of(view.points);
+  double off = 0, light = 0;
+  for (Eigen::Index channel = 0; channel < view.f.cols(); ++channel) {
+    off += (a * weights_for(a, view, channel) - view.f.col(channel)).cwiseAbs().dot(weight);
+    light += view.f.col(channel).dot(weight);
+  }
+  return light > 0 ? off / light : 0;
+}
+
+/// Roughness of facets whose lobe is as wide as cos^e about its axis, seen along the normal.
+double roughness_of(double e) { return std::pow(1 / (2 * std::max(e, 0.5) + 1), 0.25); }
+
+/// A better shape for a view than `shape`, which is moved into the view's bounds.
+Shape improved(const Dictionary& dictionary, Shape shape, const View& view) {
+  nlopt::opt search(nlopt::LN_BOBYQA, unsigned(shape.size()));
+  Shape low(shape.size()), high(shape.size()), step(shape.size());
+  for (std::size_t j = 0; j < kFacets; ++j) {
+    const std::size_t i = kShape * j;
+    low[i] = least_lean(view.wo), high[i] = 1, step[i] = 0.02;
+    low[i + 1] = kLeastRoughness, high[i + 1] = 1, step[i + 1] = 0.1 * shape[i + 1];
+    low[i + 2] = 0, high[i + 2] = 1, step[i + 2] = 0.02;
+  }
+  for (std::size_t i = 0; i < shape.size(); ++i) shape[i] = std::clamp(shape[i], low[i], high[i]);
+  search.set_lower_bounds(low);
+  search.set_upper_bounds(high);
+  search.set_initial_step(step);
+  search.set_maxeval(kTrials);
+  search.set_ftol_rel(1e-3);
+  std::pair<const Dictionary&, const View&> data(dictionary, view);
+  search.set_min_objective(
+      [](const std::vector<double>& x, std::vector<double>&, void* d) {
+        const auto& seen_ = *static_cast<std::pair<const Dictionary&, const View&>*>(d);
+        return error_of(seen_.first, x, seen_.second);
+      },
+      &data);
+  double least = 0;
+  try {
+    search.optimize(shape, least);
+  } catch (const nlopt::roundoff_limited&) {
+    // The best shape so far is in `shape`.
+  }
+  return shape;
+}
+
+/// Shapes of every kStride-th knot, from that along the normal down.
+struct Found {
+  std::vector<Shape> shapes;
+  double error = 0;  ///< mean over the views
+};
+Found search(const Dictionary& dictionary, const std::vector<View>& views) {
+  Found found;
+  const double e = views.front().lobe.narrow;
+  Shape shape;
+  const double widths[kFacets] = {1, 0.5, 4};
+  for (std::size_t j = 0; j < kFacets; ++j)
+    shape.insert(shape.end(),
+                 {dictionary.lean[j], std::clamp(roughness_of(e / widths[j]), kLeastRoughness, 1.0), 0.02});
+  for (const View& v : views) {
+    shape = improved(dictionary, shape, v);
+    found.shapes.push_back(shape);
+    found.error += error_of(dictionary, shape, v) / double(views.size());
+  }
+  return found;
+}
+
+Vec3<double> view_at(int knot) {
+  const double z = std::max(double(knot) / (kTwinKnots - 1), kLastCosine);
+  return {std::sqrt(1 - z * z), 0, z};
+}
+
+/// Linear between knots.
+template <class V> V between(const std::vector<V>& table, double cosTheta) {
+  const double position = std::clamp(cosTheta, 0.0, 1.0) * (kTwinKnots - 1);
+  const auto i = std::min(std::size_t(position), std::size_t(kTwinKnots - 2));
+  const double t = position - double(i);
+  return table[i] * (1 - t) + table[i + 1] * t;
+}
+
+}  // namespace
+
+Twin::Twin(const Model& model, const ParamValues& values) {
+  const BoundModel bound = bind_model(model, values);
+  std::vector<View> views(kTwinKnots);
+  tbb::parallel_for(0, kTwinKnots, [&](int k) { views[std::size_t(k)] = seen(bound, view_at(k), kPoints); });
+  // A mirror has a colour of its own.
+  if (!model.has_mirror()) tint_ = make_grey(views);
+  const Eigen::Index channels = views.front().f.cols();
+
+  // From the normal down, for what is found of one view is where the next one starts.
+  std::vector<View> few;
+  for (int k = kTwinKnots - 1; k >= 0; k -= kStride) {
+    View v = seen(bound, view_at(k), kFewPoints);
+    if (tint_) v.f = MatrixXd(v.f.rowwise().maxCoeff());
+    few.push_back(std::move(v));
+  }
+  std::vector<Found> found(std::size(kDictionaries));
+  tbb::parallel_for(std::size_t(0), found.size(), [&](std::size_t i) { found[i] = search(kDictionaries[i], few); });
+  const auto best =
+      std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.error < b.error; });
+  const Dictionary& dictionary = kDictionaries[best - found.begin()];
+
+  for (const ClosureKind kind : dictionary.kinds) parts_.push_back({kind, {}, {}, {}, {}});
+  parts_.push_back({ClosureKind::Diffuse, {}, {}, {}, {}});
+  for (int k = 0; k < kTwinKnots; ++k) {
+    const std::size_t i = std::size_t(kTwinKnots - 1 - k), at = std::min(i / kStride, best->shapes.size() - 2);
+    const double t = double(i) / kStride - double(at);
+    Shape shape;
+    for (std::size_t j = 0; j < kShape * kFacets; ++j)
+      shape.push_back(best->shapes[at][j] * (1 - t) + best->shapes[at + 1][j] * t);
+    const View& view = views[std::size_t(k)];
+    const MatrixXd a = columns(dictionary, shape, view);
+    MatrixXd x(a.cols(), 3);
+    for (Eigen::Index channel = 0; channel < 3; ++channel)
+      x.col(channel) = channel < channels ? weights_for(a, view, channel) : VectorXd(x.col(0));
+    for (std::size_t j = 0; j < parts_.size(); ++j) {
+      const Eigen::Index row = Eigen::Index(j);
+      parts_[j].weight.push_back({x(row, 0), x(row, 1), x(row, 2)});
+      if (j >= kFacets) continue;
+      parts_[j].lean.push_back(shape[kShape * j]);
+      parts_[j].roughness.push_back(shape[kShape * j + 1]);
+      parts_[j].spread.push_back(shape[kShape * j + 2]);
+    }
+    const VectorXd total = view.f.transpose() * weights_of(view.points);
+    albedo_.push_back(channels == 1 ? Rgb<double>(total[0]) : Rgb<double>{total[0], total[1], total[2]});
+  }
+  if (model.has_mirror()) {
+    parts_.push_back({ClosureKind::Reflection, {}, {}, {}, {}});
+    for (int k = 0; k < kTwinKnots; ++k) {
+      parts_.back().weight.push_back(bound.brdf->mirror(view_at(k)));
+      albedo_[std::size_t(k)] += parts_.back().weight.back();
+    }
+  }
+  errors_ = view_errors(bound, [&](const Vec3<double>& wo) { return closures(wo); });
+}
+
+ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {
+  ClosureSum<double> sum;
+  for (const TwinClosure& part : parts_) {
+    const Rgb<double> weight = between(part.weight, wo.z) * tint_.value_or(Rgb<double>(1.0));
+    if (!has_facets(part.kind)) {
+      sum.emplace_back(part.kind, weight);
+      continue;
+    }
+    for (const double side : {1, -1}) {
+      sum.push_back(facet(part.kind, between(part.lean, wo.z), between(part.roughness, wo.z),
+                          side * between(part.spread, wo.z), wo));
+      sum.back().weight = weight / 2.0;
+    }
+  }
+  return sum;
+}
+
+const Twin& twin_of(const Model& model, const ParamValues& values) { return made_once<Twin>(model, values); }
+
+}  // namespace brdfc
