@@ -25,6 +25,7 @@ __all__ = [
     "CompileError",
     "PackError",
     "Finding",
+    "add_twin",
     "albedo",
     "enable_osl",
     "get_parameters",
@@ -94,8 +95,14 @@ def new_material(model, representation="auto", **parameters):
     return material
 
 
+def _for_eevee(node):
+    users = [link.to_node for socket in node.outputs for link in socket.links]
+    return bool(users) and all(getattr(user, "target", None) == "EEVEE" for user in users)
+
+
 def _the_node(material):
-    ours = nodes.group_nodes(material)
+    """The one node of this extension; what only EEVEE shows does not count."""
+    ours = [n for n in nodes.group_nodes(material) if not _for_eevee(n)]
     if len(ours) != 1:
         raise ValueError(
             f"material {material.name!r} has {len(ours)} nodes of this extension, expected one"
@@ -168,6 +175,45 @@ def switch_representation(material, representation):
     """Changes the form of a material with one model; values and links stay."""
     nodes.switch(_the_node(material), representation)
     prepare_material(material)
+
+
+#: The form that is made of Blender's own nodes.
+TWIN = "twin"
+
+
+def has_twin(material):
+    """Whether a material shows a twin in EEVEE."""
+    return any(
+        n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE"
+        for n in material.node_tree.nodes
+    )
+
+
+def add_twin(material):
+    """Gives a material of one model its twin for EEVEE, in an output of its own.
+
+    The outputs that there are become those for Cycles. Raises ValueError where the extension has no
+    twin of the model (`brdfc build --materials FILE --twin` makes one), the model is inside another
+    group, or the material has an output for EEVEE.
+    """
+    node = _the_node(material)
+    tree = material.node_tree
+    if node.id_data != tree:
+        raise ValueError(f"material {material.name!r}: its model is inside another node group")
+    if has_twin(material):
+        raise ValueError(f"material {material.name!r} has an output for EEVEE already")
+    twin = nodes.add_group_node(tree, nodes.identity(node)[0], TWIN)
+    twin.location = (node.location.x, node.location.y - 400)
+    normal = nodes.sockets(node)[pack.NORMAL]
+    if normal.is_linked:
+        tree.links.new(normal.links[0].from_socket, nodes.sockets(twin)[pack.NORMAL])
+    for output in tree.nodes:
+        if output.bl_idname == "ShaderNodeOutputMaterial" and output.target == "ALL":
+            output.target = "CYCLES"
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    output.target = "EEVEE"
+    output.location = (twin.location.x + 300, twin.location.y)
+    tree.links.new(twin.outputs["BSDF"], output.inputs["Surface"])
 
 
 def albedo(model, cos_theta_o, **parameters):

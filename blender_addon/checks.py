@@ -320,7 +320,9 @@ def warnings(material, scene):
     ours = nodes.group_nodes(material)
     if not ours:
         return []
-    found = scene_warnings(scene)
+    # Blender's own nodes run anywhere.
+    scripted = any(not nodes.is_native(node.node_tree) for node in ours)
+    found = scene_warnings(scene) if scripted else []
     for node in ours:
         found += node_warnings(node, material, scene)
     return list(dict.fromkeys(found))

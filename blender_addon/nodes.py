@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Node groups around an OSL script node.
+"""Node groups around an OSL script node, and for twins around Blender's own nodes.
 
 A group is made once per model, representation and version of the shader, and reused. Source and
 bytecode both lie inside the .blend, so a saved file renders where the extension is not installed.
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from . import pack
+from . import pack, twin
 
 #: Custom property of a group: which model and representation it is, and its sockets' identifiers.
 TAG = "brdfc"
@@ -79,6 +79,11 @@ def _captured_stderr():
             lines += sink.read().decode(errors="replace").splitlines()
 
 
+def is_native(group):
+    """Whether a group of this extension is made of Blender's own nodes, without a script."""
+    return "script_inputs" not in group[TAG]
+
+
 def expected_inputs(model_name, representation):
     """Identifiers of the script node's inputs and the types of their sockets."""
     inputs = {
@@ -96,6 +101,8 @@ def script_problem(group):
 
     A shader that fails to compile raises nothing in Cycles: it leaves a node without sockets.
     """
+    if is_native(group):
+        return None
     script = next((n for n in group.nodes if n.bl_idname == "ShaderNodeScript"), None)
     if script is None:
         return "has no script node"
@@ -220,20 +227,40 @@ def _add_parameter(group, group_input, script_input, parameter):
     return socket
 
 
-def _vector_socket(group, group_input, script_input, name, text):
+_VECTORS = {
+    pack.NORMAL: "Shading normal; unlinked, the one of the surface",
+    pack.TANGENT: "First axis of anisotropy; unlinked, the object's Z axis along the surface",
+}
+
+
+def _vector_socket(group, name, text):
     # Without a value, an unlinked input keeps the shader's own default: the shading normal, and
     # the frame that the shader builds for itself.
-    socket = _socket(group, name, "NodeSocketVector", text, hide_value=True)
-    group.links.new(group_input.outputs[-2], script_input)
-    return socket
+    return _socket(group, name, "NodeSocketVector", text, hide_value=True)
+
+
+def _start_group(group):
+    """Output sockets, and the nodes that stand for the group's inputs and outputs."""
+    for output, kind in (("BSDF", "NodeSocketShader"), ("Albedo", "NodeSocketColor")):
+        group.interface.new_socket(output, in_out="OUTPUT", socket_type=kind)
+    return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+
+
+def _fill_native_group(group, source):
+    """A twin has the sockets of the other forms; what it looks like does not hang on a tangent."""
+    group_input, group_output = _start_group(group)
+    group_input.location = (-300, 0)
+    sockets = {name: _vector_socket(group, name, text) for name, text in _VECTORS.items()}
+    normal = group_input.outputs[pack.NORMAL]
+    for name, output in zip(OUTPUTS, twin.wire(group, json.loads(source), normal), strict=True):
+        group.links.new(output, group_output.inputs[name])
+    group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
+    group[TAG]["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
 
 
 def _fill_group(group, model_name, representation, text):
     entry = pack.representation(model_name, representation)
-    for output, kind in (("BSDF", "NodeSocketShader"), ("Albedo", "NodeSocketColor")):
-        group.interface.new_socket(output, in_out="OUTPUT", socket_type=kind)
-    group_input = group.nodes.new("NodeGroupInput")
-    group_output = group.nodes.new("NodeGroupOutput")
+    group_input, group_output = _start_group(group)
     script = group.nodes.new("ShaderNodeScript")
     script.mode = "INTERNAL"
     group_input.location, group_output.location = (-500, 0), (300, 0)
@@ -259,14 +286,9 @@ def _fill_group(group, model_name, representation, text):
             default_value=lobes["default"],
         )
         group.links.new(group_input.outputs[-2], inputs[pack.LOBES])
-    for name, text_ in (
-        (pack.NORMAL, "Shading normal; unlinked, the one of the surface"),
-        (
-            pack.TANGENT,
-            "First axis of anisotropy; unlinked, the object's Z axis along the surface",
-        ),
-    ):
-        sockets[name] = _vector_socket(group, group_input, inputs[name], name, text_)
+    for name, text_ in _VECTORS.items():
+        sockets[name] = _vector_socket(group, name, text_)
+        group.links.new(group_input.outputs[-2], inputs[name])
     for output in OUTPUTS:
         group.links.new(script.outputs[output], group_output.inputs[output])
     tag["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
@@ -299,13 +321,12 @@ def ensure_group(model_name, representation="auto"):
     if group := find_group(model_name, representation):
         return group
     stem, source = pack.source(model_name, representation)
-    text = bpy.data.texts.new(f"{stem}.osl")
+    native = pack.is_native(model_name, representation)
+    text = None if native else bpy.data.texts.new(f"{stem}.osl")
     group = bpy.data.node_groups.new(
         f"{pack.model(model_name)['label']} ({representation})", "ShaderNodeTree"
     )
     try:
-        text.write(source)
-        text.cursor_set(0)
         group.color_tag = "SHADER"
         group.description = pack.model(model_name)["doc"]
         group[TAG] = {
@@ -314,10 +335,16 @@ def ensure_group(model_name, representation="auto"):
             "digest": pack.digest(model_name, representation),
             "choices": json.dumps(pack.form_choices(model_name, representation)),
         }
-        _fill_group(group, model_name, representation, text)
+        if native:
+            _fill_native_group(group, source)
+        else:
+            text.write(source)
+            text.cursor_set(0)
+            _fill_group(group, model_name, representation, text)
     except BaseException:
         bpy.data.node_groups.remove(group)
-        bpy.data.texts.remove(text)
+        if text is not None:
+            bpy.data.texts.remove(text)
         raise
     return group
 

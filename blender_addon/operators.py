@@ -189,6 +189,26 @@ class BRDFC_OT_switch(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_add_twin(Operator):
+    """Give the active material an output for EEVEE, made of Blender's own nodes"""
+
+    bl_idname = "brdfc.add_twin"
+    bl_label = "Add Twin for EEVEE"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def execute(self, context):
+        try:
+            api.add_twin(context.object.active_material)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 class BRDFC_OT_kernel(Operator):
     """Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"""
 
@@ -265,6 +285,7 @@ class BRDFC_OT_write_materials(Operator):
 
 
 _CLASSES = (
+    BRDFC_OT_add_twin,
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,
     BRDFC_OT_new_material,

@@ -124,9 +124,15 @@ def _file(relative):
     return path
 
 
+def is_native(model_name, name):
+    """Whether a form is made of Blender's own nodes and needs no Open Shading Language."""
+    return "nodes" in representation(model_name, name)
+
+
 def source(model_name, name):
-    """File stem and text of the OSL source."""
-    path = _file(representation(model_name, name)["shader"])
+    """File stem and text of the OSL source, or of what Blender's own nodes take."""
+    entry = representation(model_name, name)
+    path = _file(entry["nodes"] if is_native(model_name, name) else entry["shader"])
     return path.stem, path.read_text(encoding="utf-8")
 
 

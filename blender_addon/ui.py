@@ -137,6 +137,7 @@ def draw_node(layout, node, material, editable=True):
     """Model, form, error, cost, energy and values of one group node."""
     model_name, representation = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL")
+    entry = {"representations": {}}
     if nodes.is_current(node):
         entry = pack.model(model_name)
         _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
@@ -145,6 +146,10 @@ def draw_node(layout, node, material, editable=True):
         button = layout.operator("brdfc.switch", text="Update", icon="FILE_REFRESH")
         button.node, button.representation = node.name, representation
     _draw_values(layout, node)
+    if api.TWIN in entry["representations"] and representation != api.TWIN:
+        row = layout.row()
+        row.enabled = not api.has_twin(material)
+        row.operator("brdfc.add_twin", icon="NODE_MATERIAL")
     if model_name == api.KERNEL_MODEL:
         layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
 

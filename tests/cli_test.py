@@ -418,7 +418,9 @@ def test_fit_prints_its_error_by_view_and_its_closures():
     [
         (["fit", "ashikhmin_shirley", "nu=10"], ["ashikhmin_shirley", "anisotropic"]),
         (["fit", "radziszewski_alda", "around=refraction"], ["lets light through"]),
+        (["fit", "ward", "ax=0.5", "--twin"], ["ward", "anisotropic"]),
         (["build", "--model", "phong", "--error", "2", "--out", "x"], ["--error", "--scene"]),
+        (["build", "--model", "phong", "--twin", "--out", "x"], ["--twin", "--scene"]),
     ],
 )
 def test_what_can_not_be_fitted(args, words, tmp_path):

@@ -16,7 +16,7 @@ namespace brdfc {
 namespace {
 
 struct Options {
-  bool all = false, json = false;
+  bool all = false, json = false, twin = false;
   std::optional<double> error;  // percent
   std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
@@ -105,8 +105,10 @@ void run(const Options& options) {
     input_error("build: --explain goes with --scene FILE or --materials FILE");
   if (options.error && options.scene.empty() && options.materials.empty())
     input_error("build: --error goes with --scene FILE or --materials FILE");
+  if (options.twin && options.scene.empty() && options.materials.empty())
+    input_error("build: --twin goes with --scene FILE or --materials FILE");
   // A .blend says what its nodes are, and not what they might be.
-  Budget budget{{}, !options.materials.empty()};
+  Budget budget{{}, options.twin, !options.materials.empty()};
   if (options.error) budget.error = *options.error / 100;
   const std::vector<PlannedModel> plan =
       !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials), budget)
@@ -145,6 +147,10 @@ void add_build_command(CLI::App& app) {
        "where a material of a scene leaves its form open, or beside the sampled form of a .blend; without, no\n"
        "form is fitted unasked")
       ->check(CLI::Range(0.0, 100.0));
+  c->add_flag(
+      "--twin", options->twin,
+      "With --scene or --materials: also twins, Blender's own nodes for where Open Shading Language does not run,\n"
+      "of every material whose parameters are constant");
   c->add_option("--model", options->models, "Only these models (repeat for several)");
   c->add_option("--out", options->out, "Folder for the extension and its zip")->required();
   c->add_option("--addon", options->addon, "Folder with the add-on's Python");

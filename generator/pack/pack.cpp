@@ -18,6 +18,7 @@
 
 #include "analysis/albedo_table.h"
 #include "core/hash.h"
+#include "pack/nodes.h"
 #include "pack/shader.h"
 
 namespace brdfc {
@@ -117,6 +118,7 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   // normals are not the surface's; a clamp darkens lights in a mirror and, if it is low, highlights; Filter Glossy
   // blurs a mirror.
   std::vector<std::string> codes = {"bump_correction"};
+  if (kind == RepresentationKind::Twin) return codes;
   if (kind == RepresentationKind::Controlled)
     codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "zero_size_lights_fit", "orthographic_far"});
   else if (kind == RepresentationKind::Sampled)
@@ -286,20 +288,22 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
 
   j["auto"] = name_of(plan.forms.front());
   for (RepresentationKind kind : plan.forms) {
-    const Shader shader = write_shader(model, kind, table, plan.fixed, plan.max_lobes);
+    const bool twin = kind == RepresentationKind::Twin;
+    const Shader shader =
+        twin ? write_nodes(model, plan.fixed) : write_shader(model, kind, table, plan.fixed, plan.max_lobes);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
-    // A form of a fit exists for these parameters only.
+    // What is fitted exists for these parameters only.
     const bool cut = !is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
     const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
     const RepresentationError error = measure_error(model, kind, plan.fixed);
     const auto cost = costs.find(info.name + "," + name_of(kind));
-    const std::string file = "shaders/" + shader.name + ".osl";
+    const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
                            table.size(), table.error, shader.source.size(), whole.closures, whole.operations,
                            whole_table.size(), whole.source.size()});
     j["representations"][name_of(kind)] = {
-        {"shader", file},
+        {twin ? "nodes" : "shader", file},
         {"choices", choices_json(form_choices(model, kind))},
         {"closures", shader.closures},
         {"slots", shader.slots},

@@ -90,6 +90,13 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
                                                                 fitted_error(*needs.front()), *budget.error)));
   }
   if (used.count(RepresentationKind::Controlled)) plan.forms.push_back(RepresentationKind::Controlled);
+  if (used.count(RepresentationKind::Twin) || budget.twin) {
+    const auto reason = unfit(needs);
+    if (reason)
+      plan.reasons.push_back("form twin: " + *reason);
+    else
+      plan.forms.push_back(RepresentationKind::Twin);
+  }
   if (used.count(RepresentationKind::Sampled) && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
   for (const ParamInfo& p : info.params) {

@@ -38,6 +38,7 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names);
 /// What a scene may cost.
 struct Budget {
   std::optional<double> error;  ///< relative L1 of f cos that a form may have where the material leaves the form open
+  bool twin = false;            ///< a twin comes beside the other forms where there can be one
   bool offer = false;           ///< a fitted form that keeps the error comes beside a sampled one that is asked for
 };
 

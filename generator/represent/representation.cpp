@@ -11,6 +11,8 @@
 #include "model/horizon.h"
 #include "model/sampling.h"
 #include "represent/controlled.h"
+#include "represent/fit.h"
+#include "represent/twin.h"
 
 namespace brdfc {
 namespace {
@@ -129,12 +131,11 @@ void require_finite(const Model& model, const ParamValues& values, const Vec3<do
                                    format_values(model.info(), values), wo.x, wo.y, wo.z));
 }
 
-/// The fit is in double precision; what single precision adds is rounding.
-RepresentationError fitted_error(const Model& model, const ParamValues& values) {
+/// Fits are in double precision; what single precision adds is rounding.
+RepresentationError fitted_error(const std::vector<ViewError>& errors, const std::string& what) {
   RepresentationError out;
   double sum1 = 0, sum2 = 0;
   ViewError worst;
-  const std::vector<ViewError>& errors = fit_of(model, values).errors();
   for (const ViewError& e : errors) {
     sum1 += e.relative_l1 / double(errors.size());
     sum2 += e.relative_l2 / double(errors.size());
@@ -143,7 +144,7 @@ RepresentationError fitted_error(const Model& model, const ParamValues& values) 
   }
   out.relative_l1 = sum1;
   out.relative_l2 = sum2;
-  out.note = fmt::format("closures fitted to the model, at worst {:.2g} of the light off, seen at a cosine of {:.2g}",
+  out.note = fmt::format("{} fitted to the model, at worst {:.2g} of the light off, seen at a cosine of {:.2g}", what,
                          worst.relative_l1, worst.cos_theta_o);
   return out;
 }
@@ -158,7 +159,7 @@ RepresentationError controlled_error(const Model& model, const ParamValues& valu
   std::vector<RecordedClosure> kinds;
   output_controlled(model, *recorded, values, program, kinds);
   const BoundModel truth = bind_model(model, values);
-  const RepresentationError of_fit = fitted_error(model, values);
+  const RepresentationError of_fit = fitted_error(fit_of(model, values).errors(), "closures");
   RepresentationError out;
   Sequence3 points(1);
   for (int view = 0; view < kViews; ++view) {
@@ -214,15 +215,17 @@ const char* name_of(RepresentationKind kind) {
       return "fitted";
     case RepresentationKind::Controlled:
       return "controlled";
+    case RepresentationKind::Twin:
+      return "twin";
   }
   throw std::logic_error("a form without a name");
 }
 
 RepresentationKind representation_named(const std::string& name) {
   for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled, RepresentationKind::Fitted,
-                                  RepresentationKind::Controlled})
+                                  RepresentationKind::Controlled, RepresentationKind::Twin})
     if (name == name_of(kind)) return kind;
-  input_error("unknown representation '{}': expected one of exact, sampled, fitted, controlled", name);
+  input_error("unknown representation '{}': expected one of exact, sampled, fitted, controlled, twin", name);
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
@@ -255,6 +258,7 @@ ParamValues form_choices(const Model& model, RepresentationKind kind) {
 }
 
 Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent) {
+  if (kind == RepresentationKind::Twin) throw std::logic_error("a twin has no shader");
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   Program program;
@@ -287,8 +291,9 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
-  if (kind == RepresentationKind::Fitted) return fitted_error(model, fixed);
+  if (kind == RepresentationKind::Fitted) return fitted_error(fit_of(model, fixed).errors(), "closures");
   if (kind == RepresentationKind::Controlled) return controlled_error(model, fixed);
+  if (kind == RepresentationKind::Twin) return fitted_error(twin_of(model, fixed).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);

@@ -11,16 +11,18 @@
 namespace brdfc {
 
 enum class RepresentationKind {
-  Exact,      ///< closures that equal the model
-  Sampled,    ///< the shader samples the model itself, one narrow lobe per sample
-  Fitted,     ///< closures that come close to the model, for one set of parameters (fit.h)
-  Controlled  ///< those and a sample of what they lack (controlled.h)
+  Exact,       ///< closures that equal the model
+  Sampled,     ///< the shader samples the model itself, one narrow lobe per sample
+  Fitted,      ///< closures that come close to the model, for one set of parameters (fit.h)
+  Controlled,  ///< those and a sample of what they lack (controlled.h)
+  Twin         ///< no shader but Blender's own nodes, close to the model for one set of parameters (twin.h)
 };
 
 const char* name_of(RepresentationKind);
 /// Made of a fit: for one set of parameters, which must all be known.
 inline bool is_fit(RepresentationKind kind) {
-  return kind == RepresentationKind::Fitted || kind == RepresentationKind::Controlled;
+  return kind == RepresentationKind::Fitted || kind == RepresentationKind::Controlled ||
+         kind == RepresentationKind::Twin;
 }
 /// Throws InputError that lists the known names.
 RepresentationKind representation_named(const std::string&);

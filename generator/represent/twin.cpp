@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Leaning and roughness are sought at every third knot, with fewer points; weights at all.
-constexpr int kStride = 3, kFewPoints = 1200, kPoints = 3000, kTrials = 240;
+constexpr int kStride = 3, kFewPoints = 1000, kPoints = 3000, kTrials = 240;
 /// The view of the first knot, which is level with the surface, is this much above it.
 constexpr double kLastCosine = 2e-3;
 constexpr std::size_t kFacets = 3;

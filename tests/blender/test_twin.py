@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Twins without Open Shading Language: Blender's own nodes make of the curves what the tool judges,
+and stand where the shader does."""
+
+import json
+import math
+
+import bpy
+import numpy as np
+import pytest
+from goniometer import Goniometer, tilted, unit
+from helpers import arguments, pairs_csv, read_csv
+
+#: One colour for all closures, and three channels beside a mirror.
+MATERIALS = {
+    "phong": {"e": 40.0, "ks": (0.9, 0.6, 0.2)},
+    "schlick_double": {"rd": (0.8, 0.4, 0.1)},
+}
+SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
+FACETS = 96
+
+
+@pytest.fixture(scope="module")
+def folder(tool, tmp_path_factory):
+    """A pack of these materials alone."""
+    folder = tmp_path_factory.mktemp("twin")
+    listed = {name: {"model": name, "parameters": values} for name, values in MATERIALS.items()}
+    file = folder / "materials.json"
+    file.write_text(json.dumps({"materials": listed}))
+    tool("build", "--materials", file, "--twin", "--out", folder)
+    return folder / "brdfc_shaders"
+
+
+@pytest.fixture
+def lean(extension, folder, monkeypatch):
+    """The extension as it is with that pack."""
+    monkeypatch.setattr(extension.pack, "ROOT", folder)
+    extension.pack.manifest.cache_clear()
+    yield extension
+    monkeypatch.undo()
+    extension.pack.manifest.cache_clear()
+
+
+def start(lean):
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    lean.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    scene.cycles.shading_system = False
+    return scene, [lean.api.new_material(name, "twin") for name in MATERIALS]
+
+
+def test_a_sun_on_a_twin(lean, tool):
+    """Every pair is within 1e-3 of the largest value of what the tool says of the nodes."""
+    rng = np.random.default_rng(3)
+    which = np.repeat(np.arange(len(MATERIALS)), FACETS)
+    found = {name: [] for name in MATERIALS}
+    for towards in SUNS:
+        scene, materials = start(lean)
+        normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
+        half = unit(unit(towards) + (0, 0, 1))
+        near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
+        normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+        meter = Goniometer(scene, materials, normals, samples=4, which=which)
+        wi = meter.local(meter.add_sun(unit(towards)))
+        wo, picture = meter.wo(), meter.measure()
+        for i, name in enumerate(MATERIALS):
+            lit = (which == i) & (wi[:, 2] > 1e-3) & (wo[:, 2] > 0.02)
+            found[name].append(np.hstack([wi[lit], wo[lit], picture[lit]]))
+    for name, rows in found.items():
+        wi, wo, measured = np.split(np.concatenate(rows), 3, axis=1)
+        values = arguments(MATERIALS[name])
+        stdin = pairs_csv(wi, wo)
+        expected = read_csv(tool("fit", name, *values, "--twin", "--pairs", stdin=stdin))[1]
+        off, largest = np.abs(measured - expected).max(), expected.max()
+        print(f"{name}: off by {off:.2g} of {largest:.2g}")
+        assert largest > 0.1, name
+        assert off <= 1e-3 * largest, name
+
+
+@pytest.mark.full
+def test_a_white_world_on_a_twin(lean, tool):
+    """The furnace gives the model's albedo, off by what is stated and by noise."""
+    scene, materials = start(lean)
+    per_cosine, cosine_list = 40, (0.2, 0.6, 1.0)
+    cosines = np.tile(np.repeat(cosine_list, per_cosine), len(MATERIALS))
+    which = np.repeat(np.arange(len(MATERIALS)), len(cosine_list) * per_cosine)
+    turns = np.random.default_rng(4).uniform(0, 2 * math.pi, len(cosines))
+    meter = Goniometer(scene, materials, tilted(cosines, turns), samples=128, which=which)
+    meter.add_world()
+    picture = meter.measure()
+    for i, name in enumerate(MATERIALS):
+        values = arguments(MATERIALS[name])
+        stdin = "cos_theta_o\n" + "".join(f"{c}\n" for c in cosine_list)
+        columns, rows = read_csv(tool("albedo", name, *values, stdin=stdin))
+        total = [columns.index(f"albedo_{c}") for c in "rgb"]
+        errors = read_csv(tool("fit", name, *values, "--twin"))[1]
+        for cosine, truth in zip(cosine_list, rows[:, total], strict=True):
+            chosen = picture[(which == i) & (cosines == cosine)]
+            stated = errors[np.argsort(np.abs(errors[:, 0] - cosine))[:2], 3].max()
+            noise = 5 * chosen.std(0, ddof=1).max() / math.sqrt(per_cosine)
+            error = np.abs(chosen.mean(0) - truth).max()
+            print(f"{name} at {cosine}: {error:.2g}, stated {stated:.2g}, noise {noise:.2g}")
+            assert error <= stated + noise + 2e-3, f"{name} at {cosine}"
+
+
+def test_a_twin_stands_beside_its_model(lean, empty):
+    """The shader is for Cycles, the twin for EEVEE; that OSL is off concerns the shader alone."""
+    api = lean.api
+    material = api.new_material("phong", "sampled")
+    tree = material.node_tree
+    bump = tree.nodes.new("ShaderNodeBump")
+    node = lean.nodes.group_nodes(material)[0]
+    tree.links.new(bump.outputs["Normal"], lean.nodes.sockets(node)["Normal"])
+    empty.cycles.shading_system = False
+    assert "osl_off" in {f.code for f in api.warnings(material, empty)}
+    api.add_twin(material)
+    outputs = {n.target: n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial"}
+    assert set(outputs) == {"CYCLES", "EEVEE"}
+    shown = {t: o.inputs["Surface"].links[0].from_node for t, o in outputs.items()}
+    assert [lean.nodes.identity(shown[t])[1] for t in ("CYCLES", "EEVEE")] == ["sampled", "twin"]
+    twin = shown["EEVEE"]
+    assert lean.nodes.sockets(twin)["Normal"].links[0].from_node == bump
+    assert not any(n.bl_idname == "ShaderNodeScript" for n in twin.node_tree.nodes)
+    with pytest.raises(ValueError, match="output for EEVEE already"):
+        api.add_twin(material)
+
+    api.switch_representation(material, "twin")
+    assert "osl_off" not in {f.code for f in api.warnings(material, empty)}
+    api.switch_representation(material, "sampled")
+    assert lean.nodes.identity(shown["CYCLES"])[1] == "sampled"
+
+
+def test_no_twin_in_the_whole_extension(extension, empty):
+    material = extension.api.new_material("phong")
+    with pytest.raises(ValueError, match="no representation 'twin'"):
+        extension.api.add_twin(material)
+    assert len(material.node_tree.nodes) == 2
