@@ -25,6 +25,9 @@ constexpr std::size_t kTrialStride = 4;
 /// The height of the last view; below it the closures keep their shape.
 constexpr double kLastCosine = 2e-3;
 constexpr int kPoints = 3000;
+/// Closure columns are scaled to unit integral, so that this is a share of the light: what the fit may not gain by
+/// larger colours of opposite signs.
+constexpr double kRidge = 1e-5;
 
 struct Placed {
   double offset, exponent;
@@ -158,7 +161,7 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
     VectorXd near = VectorXd::Zero(out.cells[0].a.cols());
     for (Cell& c : out.cells) {
       const VectorXd weight = weights_of(c.points), f = c.f.col(channel);
-      c.x.col(channel) = near = solve(c.a, weight, f, near, Eigen::Index(out.facets.size()), first_of_diffuse);
+      c.x.col(channel) = near = solve(c.a, weight, f, near, kRidge, Eigen::Index(out.facets.size()), first_of_diffuse);
       const double albedo = f.dot(weight);
       if (albedo > 0)
         error[std::size_t(channel)] += (c.a * near - f).cwiseAbs().dot(weight) / albedo / double(out.cells.size());

@@ -20,6 +20,8 @@ constexpr int kStride = 3, kFewPoints = 1000, kPoints = 3000, kTrials = 240;
 constexpr double kLastCosine = 2e-3;
 constexpr std::size_t kFacets = 3;
 constexpr double kLeastRoughness = 0.03;
+/// How strongly a view is held to the weights of the one above it: what is as good either way would show as rings.
+constexpr double kRidge = 1e-3, kSlightRidge = 1e-5;
 
 /// Pairs of facet lobes, and how far each leans towards the viewer where the search begins.
 struct Dictionary {
@@ -65,8 +67,8 @@ MatrixXd columns(const Dictionary& dictionary, const Shape& shape, const View& v
   return a;
 }
 
-VectorXd weights_for(const MatrixXd& a, const View& view, Eigen::Index channel) {
-  return solve(a, weights_of(view.points), view.f.col(channel), VectorXd::Zero(a.cols()), a.cols(), std::nullopt);
+VectorXd weights_for(const MatrixXd& a, const View& view, Eigen::Index channel, const VectorXd& near, double ridge) {
+  return solve(a, weights_of(view.points), view.f.col(channel), near, ridge, a.cols(), std::nullopt);
 }
 
 /// Relative L1, over all channels.
@@ -75,7 +77,9 @@ double error_of(const Dictionary& dictionary, const Shape& shape, const View& vi
   const VectorXd weight = weights_of(view.points);
   double off = 0, light = 0;
   for (Eigen::Index channel = 0; channel < view.f.cols(); ++channel) {
-    off += (a * weights_for(a, view, channel) - view.f.col(channel)).cwiseAbs().dot(weight);
+    off += (a * weights_for(a, view, channel, VectorXd::Zero(a.cols()), kSlightRidge) - view.f.col(channel))
+               .cwiseAbs()
+               .dot(weight);
     light += view.f.col(channel).dot(weight);
   }
   return light > 0 ? off / light : 0;
@@ -134,6 +138,8 @@ Found search(const Dictionary& dictionary, const std::vector<View>& views) {
     found.shapes.push_back(shape);
     found.error += error_of(dictionary, shape, v) / double(views.size());
   }
+  // Along the normal nothing leans, whatever the numbers: those of the next view go on.
+  found.shapes[0] = found.shapes[1];
   return found;
 }
 
@@ -175,27 +181,37 @@ Twin::Twin(const Model& model, const ParamValues& values) {
 
   for (const ClosureKind kind : dictionary.kinds) parts_.push_back({kind, {}, {}, {}, {}});
   parts_.push_back({ClosureKind::Diffuse, {}, {}, {}, {}});
-  for (int k = 0; k < kTwinKnots; ++k) {
-    const std::size_t i = std::size_t(kTwinKnots - 1 - k), at = std::min(i / kStride, best->shapes.size() - 2);
+  for (TwinClosure& part : parts_) {
+    part.weight.resize(kTwinKnots);
+    if (!has_facets(part.kind)) continue;
+    for (std::vector<double>* table : {&part.lean, &part.roughness, &part.spread}) table->resize(kTwinKnots);
+  }
+  albedo_.resize(kTwinKnots);
+  MatrixXd x = MatrixXd::Zero(Eigen::Index(parts_.size()), channels);
+  // Along the normal there is none above: a few views from below lead there.
+  constexpr int kLead = 9;
+  for (int step = -kLead; step < kTwinKnots; ++step) {
+    const auto i = std::size_t(std::abs(step));
+    const std::size_t k = kTwinKnots - 1 - i, at = std::min(i / kStride, best->shapes.size() - 2);
     const double t = double(i) / kStride - double(at);
     Shape shape;
     for (std::size_t j = 0; j < kShape * kFacets; ++j)
       shape.push_back(best->shapes[at][j] * (1 - t) + best->shapes[at + 1][j] * t);
-    const View& view = views[std::size_t(k)];
+    const View& view = views[k];
     const MatrixXd a = columns(dictionary, shape, view);
-    MatrixXd x(a.cols(), 3);
-    for (Eigen::Index channel = 0; channel < 3; ++channel)
-      x.col(channel) = channel < channels ? weights_for(a, view, channel) : VectorXd(x.col(0));
+    for (Eigen::Index channel = 0; channel < channels; ++channel)
+      x.col(channel) = weights_for(a, view, channel, x.col(channel), step == -kLead ? kSlightRidge : kRidge);
+    const auto colour = [&](const auto& of_channels) {
+      return channels == 1 ? Rgb<double>(of_channels[0]) : Rgb<double>{of_channels[0], of_channels[1], of_channels[2]};
+    };
     for (std::size_t j = 0; j < parts_.size(); ++j) {
-      const Eigen::Index row = Eigen::Index(j);
-      parts_[j].weight.push_back({x(row, 0), x(row, 1), x(row, 2)});
+      parts_[j].weight[k] = colour(x.row(Eigen::Index(j)));
       if (j >= kFacets) continue;
-      parts_[j].lean.push_back(shape[kShape * j]);
-      parts_[j].roughness.push_back(shape[kShape * j + 1]);
-      parts_[j].spread.push_back(shape[kShape * j + 2]);
+      parts_[j].lean[k] = shape[kShape * j];
+      parts_[j].roughness[k] = shape[kShape * j + 1];
+      parts_[j].spread[k] = shape[kShape * j + 2];
     }
-    const VectorXd total = view.f.transpose() * weights_of(view.points);
-    albedo_.push_back(channels == 1 ? Rgb<double>(total[0]) : Rgb<double>{total[0], total[1], total[2]});
+    albedo_[k] = colour(VectorXd(view.f.transpose() * weights_of(view.points)));
   }
   if (model.has_mirror()) {
     parts_.push_back({ClosureKind::Reflection, {}, {}, {}, {}});

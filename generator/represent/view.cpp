@@ -17,9 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kErrorViews = 64, kPoints = 3000, kSteps = 14;
-/// Closure columns are scaled to unit integral, so that this is a share of the light: what the fit may not gain by
-/// larger colours of opposite signs.
-constexpr double kRidge = 1e-5;
 
 MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<double>& wo) {
   MatrixXd f(Eigen::Index(points.wi.size()), 3);
@@ -127,7 +124,7 @@ std::optional<Rgb<double>> make_grey(std::vector<View>& views) {
   return Rgb<double>{ratio[0], ratio[1], ratio[2]};
 }
 
-VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, const VectorXd& near,
+VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, const VectorXd& near, double ridge,
                Eigen::Index positive, std::optional<Eigen::Index> none) {
   const Eigen::Index n = a.cols();
   const double albedo = f.dot(weight);
@@ -142,9 +139,9 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
     const MatrixXd scaled = (r + fine).cwiseSqrt().asDiagonal() * a;
     MatrixXd normal = MatrixXd::Zero(n, n);
     normal.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
-    const double ridge = kRidge * normal.trace() / double(n);
-    normal.diagonal().array() += ridge;
-    const VectorXd right_f = a.transpose() * r.cwiseProduct(f) + ridge * near;
+    const double pull = ridge * normal.trace() / double(n);
+    normal.diagonal().array() += pull;
+    const VectorXd right_f = a.transpose() * r.cwiseProduct(f) + pull * near;
     for (bool again = true; again;) {
       MatrixXd m(n + 1, n + 1);
       m << MatrixXd(normal.selfadjointView<Eigen::Lower>()), integral, integral.transpose(), 0;

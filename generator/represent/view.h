@@ -65,9 +65,11 @@ View seen(const BoundModel&, const Vec3<double>& wo, int points);
 std::optional<Rgb<double>> make_grey(std::vector<View>&);
 
 /// Least absolute differences over the columns of `a`, whose integrals are about 1, with the integral of f kept, and
-/// drawn towards `near`. The last `positive` coefficients are not negative, and that at `none` is 0.
+/// drawn towards `near` by `ridge`, in units of the mean square of a column. The last `positive` coefficients are not
+/// negative, and that at `none` is 0.
 Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& weight, const Eigen::VectorXd& f,
-                      const Eigen::VectorXd& near, Eigen::Index positive, std::optional<Eigen::Index> none);
+                      const Eigen::VectorXd& near, double ridge, Eigen::Index positive,
+                      std::optional<Eigen::Index> none);
 
 /// The closures of a view against the model.
 struct ViewError {
