@@ -2,6 +2,8 @@
 // Directions and colours over any scalar type.
 #pragma once
 
+#include <array>
+
 #include "core/scalar.h"
 
 namespace brdfc {
@@ -57,5 +59,21 @@ template <Numeric T> T max_component(const Rgb<T>& c) { return maximum(c.r, maxi
 /// Luminance of linear Rec.709 primaries (ITU-R BT.709), used only to choose between lobes.
 template <Numeric T> T luminance(const Rgb<T>& c) { return T(0.2126) * c.r + T(0.7152) * c.g + T(0.0722) * c.b; }
 template <Numeric T> const Rgb<T>& named(const char*, const Rgb<T>& c) { return c; }
+
+/// u and v of an orthonormal frame (u, v, w) that varies smoothly with w, for w.z >= 0.
+template <class T> std::array<Vec3<T>, 2> across_axis(const Vec3<T>& w) {
+  const T a = T(1) / (T(1) + w.z), b = -w.x * w.y * a;
+  return {{{T(1) - w.x * w.x * a, b, -w.x}, {b, T(1) - w.y * w.y * a, -w.y}}};
+}
+/// s.x u + s.y v + s.z w in that frame.
+template <class T> Vec3<T> about_axis(const Vec3<T>& w, const Vec3<T>& s) {
+  const auto [u, v] = across_axis(w);
+  return u * s.x + v * s.y + w * s.z;
+}
+/// The components of s in that frame: the inverse of about_axis().
+template <class T> Vec3<T> seen_along_axis(const Vec3<T>& w, const Vec3<T>& s) {
+  const auto [u, v] = across_axis(w);
+  return {dot(u, s), dot(v, s), dot(w, s)};
+}
 
 }  // namespace brdfc

@@ -34,11 +34,4 @@ template <class T> Vec3<T> sample_power_lobe(const T& e, const T& u1, const T& u
   return {sinAlpha * cos(phi), sinAlpha * sin(phi), T(1) - one_minus_cos};
 }
 
-/// s.x u + s.y v + s.z w in an orthonormal frame (u, v, w) that varies smoothly with w, for w.z >= 0.
-template <class T> Vec3<T> about_axis(const Vec3<T>& w, const Vec3<T>& s) {
-  const T a = T(1) / (T(1) + w.z), b = -w.x * w.y * a;
-  const Vec3<T> u = {T(1) - w.x * w.x * a, b, -w.x}, v = {b, T(1) - w.y * w.y * a, -w.y};
-  return u * s.x + v * s.y + w * s.z;
-}
-
 }  // namespace brdfc

@@ -37,7 +37,7 @@ template <class T> struct Closure {
   T exponent;                          ///< PhongRamp
   T alpha;                             ///< Ggx, Beckmann: roughness
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
-  bool turned = false;                 ///< `normal` is not the surface's; that of facets is
+  bool turned = false;                 ///< `normal` is not the surface's; it is not below it
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
       : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0), alpha(1), ior(1) {}
@@ -89,7 +89,10 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     }
     case ClosureKind::Ggx:
     case ClosureKind::Beckmann:
-      if (c.turned) throw std::logic_error("facets stand on the surface");
+      if (c.turned) {
+        const Vec3<T> i = seen_along_axis(c.normal, wi), o = seen_along_axis(c.normal, wo);
+        return select(both, c.weight * microfacet(c.kind, c.alpha, c.alpha, i, o), none);
+      }
       return select(both, c.weight * microfacet(c.kind, c.alpha, c.alpha, wi, wo), none);
     case ClosureKind::Reflection:
     case ClosureKind::Refraction:
