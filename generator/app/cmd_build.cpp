@@ -108,7 +108,7 @@ void run(const Options& options) {
   if (options.twin && options.scene.empty() && options.materials.empty())
     input_error("build: --twin goes with --scene FILE or --materials FILE");
   // A .blend says what its nodes are, and not what they might be.
-  Budget budget{{}, options.twin, !options.materials.empty()};
+  Budget budget{{}, !options.materials.empty(), options.twin};
   if (options.error) budget.error = *options.error / 100;
   const std::vector<PlannedModel> plan =
       !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials), budget)

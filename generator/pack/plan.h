@@ -38,8 +38,8 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names);
 /// What a scene may cost.
 struct Budget {
   std::optional<double> error;  ///< relative L1 of f cos that a form may have where the material leaves the form open
-  bool twin = false;            ///< a twin comes beside the other forms where there can be one
   bool offer = false;           ///< a fitted form that keeps the error comes beside a sampled one that is asked for
+  bool twin = false;            ///< a twin comes beside the other forms where there can be one
 };
 
 /// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same

@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Leaning and roughness are sought at every third knot, with fewer points; weights at all.
-constexpr int kStride = 3, kFewPoints = 1000, kPoints = 3000, kTrials = 240;
+constexpr int kStride = 3, kFewPoints = 800, kPoints = 3000, kTrials = 160, kRounds = 2;
 /// The view of the first knot, which is level with the surface, is this much above it.
 constexpr double kLastCosine = 2e-3;
 constexpr std::size_t kFacets = 3;
@@ -23,15 +23,17 @@ constexpr double kLeastRoughness = 0.03;
 /// How strongly a view is held to the weights of the one above it: what is as good either way would show as rings.
 constexpr double kRidge = 1e-3, kSlightRidge = 1e-5;
 
-/// Pairs of facet lobes, and how far each leans towards the viewer where the search begins.
+/// Pairs of facet lobes, and where the search begins: how far each leans towards the viewer, and all to the sides.
 struct Dictionary {
   std::array<ClosureKind, kFacets> kinds;
   std::array<double, kFacets> lean;
+  double spread;
 };
 constexpr Dictionary kDictionaries[] = {
-    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0, 0}},
-    {{ClosureKind::Beckmann, ClosureKind::Beckmann, ClosureKind::Ggx}, {0, 0, 0}},
-    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0.3, 0.9}},
+    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0, 0}, 0.02},
+    {{ClosureKind::Beckmann, ClosureKind::Beckmann, ClosureKind::Ggx}, {0, 0, 0}, 0.02},
+    {{ClosureKind::Beckmann, ClosureKind::Beckmann, ClosureKind::Ggx}, {0, 0, 0}, 0.1},
+    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0.3, 0.9}, 0.02},
 };
 
 /// Lean, roughness and spread of each pair of facet lobes, one after the other.
@@ -103,7 +105,7 @@ Shape improved(const Dictionary& dictionary, Shape shape, const View& view) {
   search.set_upper_bounds(high);
   search.set_initial_step(step);
   search.set_maxeval(kTrials);
-  search.set_ftol_rel(1e-3);
+  search.set_ftol_rel(3e-4);
   std::pair<const Dictionary&, const View&> data(dictionary, view);
   search.set_min_objective(
       [](const std::vector<double>& x, std::vector<double>&, void* d) {
@@ -131,10 +133,11 @@ Found search(const Dictionary& dictionary, const std::vector<View>& views) {
   Shape shape;
   const double widths[kFacets] = {1, 0.5, 4};
   for (std::size_t j = 0; j < kFacets; ++j)
-    shape.insert(shape.end(),
-                 {dictionary.lean[j], std::clamp(roughness_of(e / widths[j]), kLeastRoughness, 1.0), 0.02});
+    shape.insert(shape.end(), {dictionary.lean[j], std::clamp(roughness_of(e / widths[j]), kLeastRoughness, 1.0),
+                               dictionary.spread});
   for (const View& v : views) {
-    shape = improved(dictionary, shape, v);
+    // A search that begins again where it ended, with wide steps, leaves many a bad place.
+    for (int round = 0; round < kRounds; ++round) shape = improved(dictionary, shape, v);
     found.shapes.push_back(shape);
     found.error += error_of(dictionary, shape, v) / double(views.size());
   }
