@@ -869,7 +869,8 @@ def test_disable_leaves_nothing_behind(extension, empty):
         for name in dir(bpy.app.handlers)
         if isinstance(getattr(bpy.app.handlers, name), list)
     }
-    assert len(names) == 11
+    # None is left out here for its name.
+    assert len(names) == len(extension.ui._CLASSES) + len(extension.operators._CLASSES) > 10
     menus = ("NODE_MT_category_shader_shader", "MATERIAL_MT_context_menu")
     with_extension = [draw_functions(menu) for menu in menus]
     try:
