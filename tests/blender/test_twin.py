@@ -49,6 +49,7 @@ def start(lean):
     return scene, [lean.api.new_material(name, "twin") for name in MATERIALS]
 
 
+@pytest.mark.full
 def test_a_sun_on_a_twin(lean, tool):
     """Every pair is within 1e-3 of the largest value of what the tool says of the nodes."""
     rng = np.random.default_rng(3)
