@@ -123,22 +123,26 @@ def _clamp_direct(material, scene):
         return "WARNING", f"Clamp Direct is {clamp:g}: it darkens highlights of this form"
 
 
-def _zero_size_lights(material, scene):
+def _too_small(scene, form, consequence):
     if tiny := _tiny_lights(scene):
-        return (
-            "WARNING",
-            f"Lamps too small for a sampled form ({', '.join(tiny[:3])}): their highlights are "
-            "noisy or missing; enlarge the lamp or use another representation",
-        )
+        names = ", ".join(tiny[:3])
+        return "WARNING", f"Lamps too small for a {form} form ({names}): {consequence}"
+
+
+def _zero_size_lights(material, scene):
+    return _too_small(
+        scene,
+        "sampled",
+        "their highlights are noisy or missing; enlarge the lamp or use another representation",
+    )
 
 
 def _zero_size_lights_fit(material, scene):
-    if tiny := _tiny_lights(scene):
-        return (
-            "WARNING",
-            f"Lamps too small for a controlled form ({', '.join(tiny[:3])}): they light its "
-            "closures alone, which are off by what Error says; enlarge the lamp",
-        )
+    return _too_small(
+        scene,
+        "controlled",
+        "they light its closures alone, which are off by what Error says; enlarge the lamp",
+    )
 
 
 def _far_camera(material, scene):

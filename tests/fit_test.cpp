@@ -10,15 +10,12 @@
 #include "analysis/albedo.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
+#include "support.h"
 
 namespace brdfc {
 namespace {
 
 using testing::HasSubstr;
-
-ParamValues values_of(const Model& m, const std::vector<std::string>& text) {
-  return complete(m.info(), parse_values(m.info(), text));
-}
 
 struct Row {
   const char* model;

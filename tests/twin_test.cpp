@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pack/nodes.h"
+#include "support.h"
 
 namespace brdfc {
 namespace {
@@ -23,7 +24,7 @@ const Row kRows[] = {{"blinn", {"e=100"}, 0.017}, {"phong", {"ks=0.9,0.5,0.1", "
 
 const Twin& twin_of_row(const Row& row) {
   const Model& m = find_model(row.model);
-  return twin_of(m, complete(m.info(), parse_values(m.info(), row.values)));
+  return twin_of(m, values_of(m, row.values));
 }
 
 TEST(Twin, ComesAsCloseAsMeasured) {
@@ -42,7 +43,7 @@ TEST(Twin, ComesAsCloseAsMeasured) {
 TEST(Twin, StatesItsError) {
   const Row& row = kRows[1];
   const Model& m = find_model(row.model);
-  const auto brdf = m.make_double(complete(m.info(), parse_values(m.info(), row.values)));
+  const auto brdf = m.make_double(values_of(m, row.values));
   const Twin& twin = twin_of_row(row);
   for (const std::size_t k : {5u, 30u, 50u}) {
     const ViewError& e = twin.errors()[k];
@@ -67,7 +68,7 @@ TEST(Twin, StatesItsError) {
 TEST(Twin, TakesWhatNodesAccept) {
   for (const Row& row : kRows) {
     const Model& m = find_model(row.model);
-    const auto j = nlohmann::json::parse(write_nodes(m, complete(m.info(), parse_values(m.info(), row.values))).source);
+    const auto j = nlohmann::json::parse(write_nodes(m, values_of(m, row.values)).source);
     for (const auto& closure : j.at("closures")) {
       for (const auto& channel : closure.at("weight")) {
         ASSERT_EQ(channel.size(), std::size_t(kTwinKnots));

@@ -8,6 +8,21 @@
 #include "represent/twin.h"
 
 namespace brdfc {
+namespace {
+
+void print_errors(const std::vector<ViewError>& errors, const std::string& label) {
+  std::vector<double> l1;
+  for (const ViewError& e : errors) l1.push_back(e.relative_l1);
+  std::sort(l1.begin(), l1.end());
+  const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
+  fmt::print(stderr, "{}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
+             label, quantile(0.5), quantile(0.95), quantile(1));
+  CsvWriter out("cos_theta_o,relative_l1,relative_l2,albedo,negative");
+  for (const ViewError& e : errors) out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
+  out.finish();
+}
+
+}  // namespace
 
 void add_fit_command(CLI::App& app) {
   struct Options {
@@ -34,23 +49,14 @@ void add_fit_command(CLI::App& app) {
     const Model& model = find_model(o->model);
     const ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
     if (const auto reason = unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
-    if (o->pairs) {
-      print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) {
-        return evaluate(o->twin ? twin_of(model, values).closures(wo) : fit_of(model, values).closures(wo), wi, wo);
-      });
-      return;
-    }
-    const std::vector<ViewError>& errors = o->twin ? twin_of(model, values).errors() : fit_of(model, values).errors();
-    std::vector<double> l1;
-    for (const ViewError& e : errors) l1.push_back(e.relative_l1);
-    std::sort(l1.begin(), l1.end());
-    const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
-    fmt::print(stderr,
-               "{} {}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
-               o->model, format_values(model.info(), values), quantile(0.5), quantile(0.95), quantile(1));
-    CsvWriter out("cos_theta_o,relative_l1,relative_l2,albedo,negative");
-    for (const ViewError& e : errors) out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
-    out.finish();
+    const auto print = [&](const auto& form) {
+      if (o->pairs)
+        print_f_cos(
+            [&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(form.closures(wo), wi, wo); });
+      else
+        print_errors(form.errors(), o->model + " " + format_values(model.info(), values));
+    };
+    o->twin ? print(twin_of(model, values)) : print(fit_of(model, values));
   });
 }
 

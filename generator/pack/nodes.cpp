@@ -25,28 +25,26 @@ const char* node_of(ClosureKind kind) {
   }
 }
 
-Json by_channel(const std::vector<Rgb<double>>& values, bool grey) {
-  Json channels = Json::array();
-  for (int c = 0; c < (grey ? 1 : 3); ++c) {
-    std::vector<float> numbers;
-    for (const Rgb<double>& v : values) numbers.push_back(float(c == 0 ? v.r : c == 1 ? v.g : v.b));
-    channels.push_back(numbers);
-  }
-  return channels;
+/// Nodes are in single precision.
+std::vector<float> floats(const std::shared_ptr<const Table>& table) {
+  return {table->values.begin(), table->values.end()};
 }
 
-std::vector<float> floats(const std::vector<double>& values) { return {values.begin(), values.end()}; }
+Json by_channel(const Channels& tables) {
+  Json channels = Json::array();
+  for (const auto& table : tables) channels.push_back(floats(table));
+  return channels;
+}
 
 }  // namespace
 
 Shader write_nodes(const Model& model, const ParamValues& values) {
   const Twin& twin = twin_of(model, values);
-  const bool grey = twin.tint().has_value();
   Shader out;
   out.name = fmt::format("brdfc_{}_twin", model.info().name);
   Json closures = Json::array();
   for (const TwinClosure& part : twin.parts()) {
-    Json j = {{"kind", node_of(part.kind)}, {"weight", by_channel(part.weight, grey)}};
+    Json j = {{"kind", node_of(part.kind)}, {"weight", by_channel(part.weight)}};
     if (has_facets(part.kind)) {
       j["lean"] = floats(part.lean);
       j["roughness"] = floats(part.roughness);
@@ -60,7 +58,7 @@ Shader write_nodes(const Model& model, const ParamValues& values) {
   out.source = Json{{"format", 1},
                     {"tint", {tint.r, tint.g, tint.b}},
                     {"closures", closures},
-                    {"albedo", by_channel(twin.albedo(), grey)}}
+                    {"albedo", by_channel(twin.albedo())}}
                    .dump() +
                "\n";
   return out;

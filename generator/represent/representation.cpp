@@ -159,7 +159,8 @@ RepresentationError controlled_error(const Model& model, const ParamValues& valu
   std::vector<RecordedClosure> kinds;
   output_controlled(model, *recorded, values, program, kinds);
   const BoundModel truth = bind_model(model, values);
-  const RepresentationError of_fit = fitted_error(fit_of(model, values).errors(), "closures");
+  const Fit& fit = fit_of(model, values);
+  const RepresentationError of_fit = fitted_error(fit.errors(), "closures");
   RepresentationError out;
   Sequence3 points(1);
   for (int view = 0; view < kViews; ++view) {
@@ -176,7 +177,7 @@ RepresentationError controlled_error(const Model& model, const ParamValues& valu
         require_finite(model, values, wo, name, value, !name.starts_with("weight_") && name != "residual_weight");
       const std::array<float, 3> colour = run.at("residual_colour");
       const double weight = run.at("residual_weight")[0] / double(kPoints);
-      const Residual<double> exact = sample_residual(*truth.brdf, fit_of(model, values), wo, Vec3<double>::from(v));
+      const Residual<double> exact = sample_residual(*truth.brdf, fit, wo, Vec3<double>::from(v));
       difference += Rgb<double>(colour[0], colour[1], colour[2]) * weight - exact.weight / double(kPoints);
     }
     out.albedo = std::max({out.albedo, std::abs(difference.r), std::abs(difference.g), std::abs(difference.b)});

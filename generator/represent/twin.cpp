@@ -151,12 +151,10 @@ Vec3<double> view_at(int knot) {
   return {std::sqrt(1 - z * z), 0, z};
 }
 
-/// Linear between knots.
-template <class V> V between(const std::vector<V>& table, double cosTheta) {
-  const double position = std::clamp(cosTheta, 0.0, 1.0) * (kTwinKnots - 1);
-  const auto i = std::min(std::size_t(position), std::size_t(kTwinKnots - 2));
-  const double t = position - double(i);
-  return table[i] * (1 - t) + table[i + 1] * t;
+/// One of three channels over the view, or one for all.
+Rgb<double> colour(const Channels& channels, const std::array<double, 1>& at) {
+  if (channels.size() == 1) return Rgb<double>(lookup(channels[0], at));
+  return {lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at)};
 }
 
 }  // namespace
@@ -172,8 +170,8 @@ Twin::Twin(const Model& model, const ParamValues& values) {
   // From the normal down, for what is found of one view is where the next one starts.
   std::vector<View> few;
   for (int k = kTwinKnots - 1; k >= 0; k -= kStride) {
-    View v = seen(bound, view_at(k), kFewPoints);
-    if (tint_) v.f = MatrixXd(v.f.rowwise().maxCoeff());
+    View v = seen(bound, view_at(k), kFewPoints, views[std::size_t(k)].lobe);
+    if (tint_) v.f = brightest(v.f);
     few.push_back(std::move(v));
   }
   std::vector<Found> found(std::size(kDictionaries));
@@ -182,15 +180,10 @@ Twin::Twin(const Model& model, const ParamValues& values) {
       std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.error < b.error; });
   const Dictionary& dictionary = kDictionaries[best - found.begin()];
 
-  for (const ClosureKind kind : dictionary.kinds) parts_.push_back({kind, {}, {}, {}, {}});
-  parts_.push_back({ClosureKind::Diffuse, {}, {}, {}, {}});
-  for (TwinClosure& part : parts_) {
-    part.weight.resize(kTwinKnots);
-    if (!has_facets(part.kind)) continue;
-    for (std::vector<double>* table : {&part.lean, &part.roughness, &part.spread}) table->resize(kTwinKnots);
-  }
-  albedo_.resize(kTwinKnots);
-  MatrixXd x = MatrixXd::Zero(Eigen::Index(parts_.size()), channels);
+  // Rows are knots; columns are numbers of the shape, weights channel by channel, and channels of the albedo.
+  const Eigen::Index closures_count = Eigen::Index(kFacets + 1);
+  MatrixXd shapes(kTwinKnots, Eigen::Index(kShape * kFacets)), weights(kTwinKnots, closures_count * channels),
+      light(kTwinKnots, channels), x = MatrixXd::Zero(closures_count, channels);
   // Along the normal there is none above: a few views from below lead there.
   constexpr int kLead = 9;
   for (int step = -kLead; step < kTwinKnots; ++step) {
@@ -204,39 +197,54 @@ Twin::Twin(const Model& model, const ParamValues& values) {
     const MatrixXd a = columns(dictionary, shape, view);
     for (Eigen::Index channel = 0; channel < channels; ++channel)
       x.col(channel) = weights_for(a, view, channel, x.col(channel), step == -kLead ? kSlightRidge : kRidge);
-    const auto colour = [&](const auto& of_channels) {
-      return channels == 1 ? Rgb<double>(of_channels[0]) : Rgb<double>{of_channels[0], of_channels[1], of_channels[2]};
-    };
-    for (std::size_t j = 0; j < parts_.size(); ++j) {
-      parts_[j].weight[k] = colour(x.row(Eigen::Index(j)));
-      if (j >= kFacets) continue;
-      parts_[j].lean[k] = shape[kShape * j];
-      parts_[j].roughness[k] = shape[kShape * j + 1];
-      parts_[j].spread[k] = shape[kShape * j + 2];
+    const auto row = Eigen::Index(k);
+    shapes.row(row) = Eigen::Map<const VectorXd>(shape.data(), Eigen::Index(shape.size()));
+    weights.row(row) = x.reshaped();
+    light.row(row) = view.f.transpose() * weights_of(view.points);
+  }
+  const auto table = [](const std::string& name, const auto& column) {
+    return make_table(name, {kTwinKnots}, {column.begin(), column.end()});
+  };
+  for (std::size_t j = 0; j <= kFacets; ++j) {
+    TwinClosure part{j < kFacets ? dictionary.kinds[j] : ClosureKind::Diffuse, {}, {}, {}, {}};
+    if (j < kFacets) {
+      const auto number = Eigen::Index(kShape * j);
+      part.lean = table(fmt::format("lean_of_{}", j), shapes.col(number));
+      part.roughness = table(fmt::format("roughness_of_{}", j), shapes.col(number + 1));
+      part.spread = table(fmt::format("spread_of_{}", j), shapes.col(number + 2));
     }
-    albedo_[k] = colour(VectorXd(view.f.transpose() * weights_of(view.points)));
+    for (Eigen::Index channel = 0; channel < channels; ++channel)
+      part.weight.push_back(
+          table(fmt::format("weight_of_{}", j), weights.col(channel * closures_count + Eigen::Index(j))));
+    parts_.push_back(std::move(part));
   }
   if (model.has_mirror()) {
-    parts_.push_back({ClosureKind::Reflection, {}, {}, {}, {}});
+    MatrixXd mirror(kTwinKnots, channels);
     for (int k = 0; k < kTwinKnots; ++k) {
-      parts_.back().weight.push_back(bound.brdf->mirror(view_at(k)));
-      albedo_[std::size_t(k)] += parts_.back().weight.back();
+      const Rgb<double> m = bound.brdf->mirror(view_at(k));
+      mirror.row(k) << m.r, m.g, m.b;
     }
+    light += mirror;
+    TwinClosure part{ClosureKind::Reflection, {}, {}, {}, {}};
+    for (const auto& channel : mirror.colwise()) part.weight.push_back(table("weight_of_mirror", channel));
+    parts_.push_back(std::move(part));
   }
+  for (const auto& channel : light.colwise()) albedo_.push_back(table("albedo", channel));
   errors_ = view_errors(bound, [&](const Vec3<double>& wo) { return closures(wo); });
 }
 
 ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {
+  const std::array<double, 1> at = {wo.z};
   ClosureSum<double> sum;
   for (const TwinClosure& part : parts_) {
-    const Rgb<double> weight = between(part.weight, wo.z) * tint_.value_or(Rgb<double>(1.0));
+    const Rgb<double> weight = colour(part.weight, at) * tint_.value_or(Rgb<double>(1.0));
     if (!has_facets(part.kind)) {
       sum.emplace_back(part.kind, weight);
       continue;
     }
     for (const double side : {1, -1}) {
-      sum.push_back(facet(part.kind, between(part.lean, wo.z), between(part.roughness, wo.z),
-                          side * between(part.spread, wo.z), wo));
+      sum.push_back(
+          facet(part.kind, lookup(part.lean, at), lookup(part.roughness, at), side * lookup(part.spread, at), wo));
       sum.back().weight = weight / 2.0;
     }
   }

@@ -9,10 +9,12 @@
 // optimization without derivatives, Cambridge NA2009/06, from one view to the next.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/table.h"
 #include "represent/view.h"
 
 namespace brdfc {
@@ -21,13 +23,16 @@ namespace brdfc {
 /// values, linear between: every fifth is a knot.
 inline constexpr int kTwinKnots = 52;
 
-/// What a node takes, at each knot; linear between.
+/// Tables over the cosine of the view: of three channels, or of one that does for all.
+using Channels = std::vector<std::shared_ptr<const Table>>;
+
+/// What a node takes, over the cosine of the view.
 struct TwinClosure {
-  ClosureKind kind;                 ///< Ggx, Beckmann, Diffuse or Reflection
-  std::vector<double> lean;         ///< facets: along (1 - lean) N + lean wo
-  std::vector<double> roughness;    ///< facets: root of alpha
-  std::vector<double> spread;       ///< facets: how far the normals of a pair lean to the sides, by (N x wo) spread
-  std::vector<Rgb<double>> weight;  ///< without the tint
+  ClosureKind kind;                        ///< Ggx, Beckmann, Diffuse or Reflection
+  std::shared_ptr<const Table> lean;       ///< facets: along (1 - lean) N + lean wo
+  std::shared_ptr<const Table> roughness;  ///< facets: root of alpha
+  std::shared_ptr<const Table> spread;     ///< facets: how far a pair leans to the sides, by (N x wo) spread
+  Channels weight;                         ///< without the tint
 };
 
 class Twin {
@@ -39,8 +44,8 @@ class Twin {
   const std::vector<TwinClosure>& parts() const { return parts_; }
   /// One factor of all weights and of the albedo, where that is all that tells channels apart.
   const std::optional<Rgb<double>>& tint() const { return tint_; }
-  /// Directional albedo at the knots, without the tint.
-  const std::vector<Rgb<double>>& albedo() const { return albedo_; }
+  /// Directional albedo, without the tint.
+  const Channels& albedo() const { return albedo_; }
   /// What the nodes make of it for a view above the surface.
   ClosureSum<double> closures(const Vec3<double>& wo) const;
   const std::vector<ViewError>& errors() const { return errors_; }
@@ -48,7 +53,7 @@ class Twin {
  private:
   std::vector<TwinClosure> parts_;
   std::optional<Rgb<double>> tint_;
-  std::vector<Rgb<double>> albedo_;
+  Channels albedo_;
   std::vector<ViewError> errors_;
 };
 

@@ -18,53 +18,8 @@ using Eigen::VectorXd;
 
 constexpr int kErrorViews = 64, kPoints = 3000, kSteps = 14;
 
-MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<double>& wo) {
-  MatrixXd f(Eigen::Index(points.wi.size()), 3);
-  for (std::size_t i = 0; i < points.wi.size(); ++i) {
-    const Rgb<double> v = model.brdf->eval(points.wi[i], wo);
-    require_value(v, "f", model.label, points.wi[i], wo);
-    f.row(Eigen::Index(i)) << v.r * points.wi[i].z, v.g * points.wi[i].z, v.b * points.wi[i].z;
-  }
-  return f;
-}
-
-Moments moments(const BoundModel& model, const Vec3<double>& wo) {
-  Moments m;
-  for (int step = 0; step < 4; ++step) {
-    const Points points = spread_points(*model.brdf, wo, beside_mirror(wo, m.offset), m.narrow, kPoints);
-    const VectorXd f = scattering(model, points, wo).rowwise().maxCoeff();
-    Vec3<double> axis{0, 0, 0};
-    double total = 0;
-    for (std::size_t i = 0; i < points.wi.size(); ++i) {
-      const double q = points.weight[i] * sqr(f[Eigen::Index(i)]);
-      axis = axis + points.wi[i] * q;
-      total += q;
-    }
-    if (!(total > 0)) return {};
-    // What lies in the plane of incidence: x towards the mirror direction, z along the normal.
-    const double sinTheta = std::sqrt(sin2_theta(wo));
-    const Vec3<double> out =
-        sinTheta > 1e-6 ? Vec3<double>{-wo.x / sinTheta, -wo.y / sinTheta, 0} : Vec3<double>{1, 0, 0};
-    const double along = dot(axis, out), up = axis.z;
-    m.offset = std::atan2(sinTheta, wo.z) - std::atan2(along, up);
-    if (sinTheta <= 1e-6) m.offset = 0;
-    const Vec3<double> centre = beside_mirror(wo, m.offset), across = {-out.y, out.x, 0},
-                       inside = cross(across, centre);
-    double variance_in = 0, variance_across = 0;
-    for (std::size_t i = 0; i < points.wi.size(); ++i) {
-      const double q = points.weight[i] * sqr(f[Eigen::Index(i)]) / total;
-      variance_in += q * sqr(dot(points.wi[i], inside));
-      variance_across += q * sqr(dot(points.wi[i], across));
-    }
-    // (cos^e)^2 has the variance 1 / (2 e) in each direction.
-    m.narrow = 0.5 / std::max(std::min(variance_in, variance_across), 1e-12);
-    m.wide = 0.5 / std::max(std::max(variance_in, variance_across), 1e-12);
-  }
-  return m;
-}
-
-}  // namespace
-
+/// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
+/// down to the whole sphere, each direction counted by the density of all of them together.
 Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec3<double>& axis, double e, int count) {
   std::vector<double> exponents;
   for (double x = std::max(4 * e, 1.0); x > 0.5; x /= 5) exponents.push_back(x);
@@ -99,12 +54,65 @@ Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec
   return points;
 }
 
+MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<double>& wo) {
+  MatrixXd f(Eigen::Index(points.wi.size()), 3);
+  for (std::size_t i = 0; i < points.wi.size(); ++i) {
+    const Rgb<double> v = model.brdf->eval(points.wi[i], wo);
+    require_value(v, "f", model.label, points.wi[i], wo);
+    f.row(Eigen::Index(i)) << v.r * points.wi[i].z, v.g * points.wi[i].z, v.b * points.wi[i].z;
+  }
+  return f;
+}
+
+Moments moments(const BoundModel& model, const Vec3<double>& wo) {
+  Moments m;
+  for (int step = 0; step < 4; ++step) {
+    const Points points = spread_points(*model.brdf, wo, beside_mirror(wo, m.offset), m.narrow, kPoints);
+    const VectorXd f = brightest(scattering(model, points, wo));
+    Vec3<double> axis{0, 0, 0};
+    double total = 0;
+    for (std::size_t i = 0; i < points.wi.size(); ++i) {
+      const double q = points.weight[i] * sqr(f[Eigen::Index(i)]);
+      axis = axis + points.wi[i] * q;
+      total += q;
+    }
+    if (!(total > 0)) return {};
+    // What lies in the plane of incidence: x towards the mirror direction, z along the normal.
+    const double sinTheta = std::sqrt(sin2_theta(wo));
+    const Vec3<double> out =
+        sinTheta > 1e-6 ? Vec3<double>{-wo.x / sinTheta, -wo.y / sinTheta, 0} : Vec3<double>{1, 0, 0};
+    const double along = dot(axis, out), up = axis.z;
+    m.offset = std::atan2(sinTheta, wo.z) - std::atan2(along, up);
+    if (sinTheta <= 1e-6) m.offset = 0;
+    const Vec3<double> centre = beside_mirror(wo, m.offset), across = {-out.y, out.x, 0},
+                       inside = cross(across, centre);
+    double variance_in = 0, variance_across = 0;
+    for (std::size_t i = 0; i < points.wi.size(); ++i) {
+      const double q = points.weight[i] * sqr(f[Eigen::Index(i)]) / total;
+      variance_in += q * sqr(dot(points.wi[i], inside));
+      variance_across += q * sqr(dot(points.wi[i], across));
+    }
+    // (cos^e)^2 has the variance 1 / (2 e) in each direction.
+    m.narrow = 0.5 / std::max(std::min(variance_in, variance_across), 1e-12);
+    m.wide = 0.5 / std::max(std::max(variance_in, variance_across), 1e-12);
+  }
+  return m;
+}
+
+}  // namespace
+
 VectorXd weights_of(const Points& points) {
   return Eigen::Map<const VectorXd>(points.weight.data(), Eigen::Index(points.weight.size()));
 }
 
+VectorXd brightest(const MatrixXd& f) { return f.rowwise().maxCoeff(); }
+
 View seen(const BoundModel& bound, const Vec3<double>& wo, int points) {
-  View v{wo, moments(bound, wo), {}, {}};
+  return seen(bound, wo, points, moments(bound, wo));
+}
+
+View seen(const BoundModel& bound, const Vec3<double>& wo, int points, const Moments& lobe) {
+  View v{wo, lobe, {}, {}};
   v.points = spread_points(*bound.brdf, wo, beside_mirror(wo, v.lobe.offset), v.lobe.narrow, points);
   v.f = scattering(bound, v.points, wo);
   return v;
@@ -120,7 +128,7 @@ std::optional<Rgb<double>> make_grey(std::vector<View>& views) {
       for (int k = 0; k < 3; ++k)
         if (!(std::abs(v.f(i, k) - ratio[k] * grey) <= 1e-9 * grey)) return std::nullopt;
     }
-  for (View& v : views) v.f = MatrixXd(v.f.rowwise().maxCoeff());
+  for (View& v : views) v.f = brightest(v.f);
   return Rgb<double>{ratio[0], ratio[1], ratio[2]};
 }
 

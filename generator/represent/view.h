@@ -22,10 +22,6 @@ struct Points {
   std::vector<double> weight;
 };
 
-/// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
-/// down to the whole sphere, each direction counted by the density of all of them together.
-Points spread_points(const Brdf<double>&, const Vec3<double>& wo, const Vec3<double>& axis, double e, int count);
-
 Eigen::VectorXd weights_of(const Points&);
 
 /// Along the surface towards the mirror side; at normal incidence any direction will do.
@@ -59,6 +55,11 @@ struct View {
 };
 /// Throws ValueError where the model gives a value that is NaN, infinite or negative.
 View seen(const BoundModel&, const Vec3<double>& wo, int points);
+/// The same where the lobe is known.
+View seen(const BoundModel&, const Vec3<double>& wo, int points, const Moments& lobe);
+
+/// The largest channel of each point.
+Eigen::VectorXd brightest(const Eigen::MatrixXd& f);
 
 /// Where the channels of all views differ by a factor alone, leaves one column of each that serves them all, and
 /// returns the factors.

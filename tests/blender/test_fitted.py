@@ -6,6 +6,7 @@ import json
 import math
 
 import bpy
+import furnace
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
@@ -83,28 +84,6 @@ def test_a_sun_on_a_fitted_form(extension, tool, sources):
 def test_furnace_of_a_fitted_form(extension, tool, sources):
     """Sampling returns what evaluation says: the albedo of the model, off by what `brdfc fit`
     states for that view and by noise."""
-    materials = start(extension, sources)
-    per_cosine = 60
-    cosines = np.repeat(COSINES, per_cosine)
-    which = np.repeat(np.arange(len(MATERIALS)), len(cosines))
-    cosines = np.tile(cosines, len(MATERIALS))
-    turns = np.random.default_rng(4).uniform(0, 2 * math.pi, len(cosines))
-    meter = Goniometer(
-        bpy.context.scene, materials, tilted(cosines, turns), samples=256, which=which
-    )
-    meter.add_world()
-    picture = meter.measure()
-    for i, name in enumerate(MATERIALS):
-        values = arguments(MATERIALS[name])
-        stdin = "cos_theta_o\n" + "".join(f"{c}\n" for c in COSINES)
-        columns, rows = read_csv(tool("albedo", name, *values, stdin=stdin))
-        total = [columns.index(f"albedo_{c}") for c in "rgb"]
-        errors = read_csv(tool("fit", name, *values))[1]
-        for cosine, truth in zip(COSINES, rows[:, total], strict=True):
-            chosen = picture[(which == i) & (cosines == cosine)]
-            nearest = errors[np.argsort(np.abs(errors[:, 0] - cosine))[:2], 3].max()
-            noise = 5 * chosen.std(0, ddof=1).max() / math.sqrt(per_cosine)
-            error = np.abs(chosen.mean(0) - truth).max()
-            print(f"{name} at {cosine}: {error:.2g}, stated {nearest:.2g}, noise {noise:.2g}")
-            assert error <= nearest + noise + 1e-3, f"{name} at {cosine}"
-            assert noise < 0.03
+    made = start(extension, sources)
+    scene = bpy.context.scene
+    furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)

@@ -6,6 +6,7 @@ import json
 import math
 
 import bpy
+import furnace
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
@@ -81,27 +82,11 @@ def test_a_sun_on_a_twin(lean, tool):
 @pytest.mark.full
 def test_a_white_world_on_a_twin(lean, tool):
     """The furnace gives the model's albedo, off by what is stated and by noise."""
-    scene, materials = start(lean)
-    per_cosine, cosine_list = 40, (0.2, 0.6, 1.0)
-    cosines = np.tile(np.repeat(cosine_list, per_cosine), len(MATERIALS))
-    which = np.repeat(np.arange(len(MATERIALS)), len(cosine_list) * per_cosine)
-    turns = np.random.default_rng(4).uniform(0, 2 * math.pi, len(cosines))
-    meter = Goniometer(scene, materials, tilted(cosines, turns), samples=128, which=which)
-    meter.add_world()
-    picture = meter.measure()
-    for i, name in enumerate(MATERIALS):
-        values = arguments(MATERIALS[name])
-        stdin = "cos_theta_o\n" + "".join(f"{c}\n" for c in cosine_list)
-        columns, rows = read_csv(tool("albedo", name, *values, stdin=stdin))
-        total = [columns.index(f"albedo_{c}") for c in "rgb"]
-        errors = read_csv(tool("fit", name, *values, "--twin"))[1]
-        for cosine, truth in zip(cosine_list, rows[:, total], strict=True):
-            chosen = picture[(which == i) & (cosines == cosine)]
-            stated = errors[np.argsort(np.abs(errors[:, 0] - cosine))[:2], 3].max()
-            noise = 5 * chosen.std(0, ddof=1).max() / math.sqrt(per_cosine)
-            error = np.abs(chosen.mean(0) - truth).max()
-            print(f"{name} at {cosine}: {error:.2g}, stated {stated:.2g}, noise {noise:.2g}")
-            assert error <= stated + noise + 2e-3, f"{name} at {cosine}"
+    scene, made = start(lean)
+    cosines = (0.2, 0.6, 1.0)
+    furnace.check(
+        tool, scene, made, MATERIALS, cosines, "--twin", replicas=40, samples=128, slack=2e-3
+    )
 
 
 def test_a_twin_stands_beside_its_model(lean, empty):
