@@ -8,7 +8,9 @@ from functools import lru_cache
 from numbers import Real
 from pathlib import Path
 
-ROOT = Path(__file__).parent
+_INSTALLED = Path(__file__).parent
+#: Where models are read from; see use().
+root = _INSTALLED
 FORMAT = 1
 
 #: Sockets that every group has beside the model's parameters.
@@ -21,10 +23,18 @@ class PackError(RuntimeError):
     """The extension's own files are missing or damaged."""
 
 
+def use(folder=None):
+    """Takes the models of another folder that `brdfc build` wrote, one cut to a scene for instance;
+    None: those of the extension itself."""
+    global root
+    root = _INSTALLED if folder is None else Path(folder)
+    manifest.cache_clear()
+
+
 @lru_cache(maxsize=1)
 def manifest():
     """The manifest as a dict. Raises PackError when it is missing, damaged or of another format."""
-    path = ROOT / "manifest.json"
+    path = root / "manifest.json"
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -118,7 +128,7 @@ def socket_parameters(model_name, name):
 
 
 def _file(relative):
-    path = ROOT / relative
+    path = root / relative
     if not path.is_file():
         raise PackError(f"{path} is missing; reinstall the extension")
     return path

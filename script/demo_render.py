@@ -18,11 +18,20 @@ import sys
 import time
 import zipfile
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Samples a pixel, pictures of each, pixels along the longer side.
 CONVERGENCE_SPP, CONVERGENCE_SEEDS, CONVERGENCE_SIZE = (16, 256, 1024), 4, 64
 RENDER_SCENE = ROOT / "script" / "render_scene.py"
+
+
+class Form(NamedTuple):
+    """What a scene is rendered with."""
+
+    name: str
+    representation: str
+    pack: str | None = None  #: folder, beside the scene, of a pack cut to it
 
 
 def digest(*parts):
@@ -98,6 +107,27 @@ def forms_of(scene, models, native):
         forms.append("sampled")
     if any(m.get("representation", "auto") != "auto" for m in scene["materials"].values()):
         forms.append("scene")
+    return [Form(name, name) for name in forms]
+
+
+def build_plan(tool, folder, percent):
+    """A pack cut to the scene, in folder/plan; returns the command."""
+    command = [tool, "build", "--scene", folder / "scene.json", "--error", percent, "--twin"]
+    command += ["--out", folder / "plan"]
+    run(command, stdout=subprocess.DEVNULL)
+    return {"command": shown(map(str, command))}
+
+
+def planned_forms(folder, scene):
+    """Forms of the pack cut to the scene that the whole extension does not have."""
+    pack = "plan/brdfc_shaders"
+    models = read_json(folder / pack / "manifest.json")["models"]
+    used = [models[m["model"]]["representations"] for m in scene["materials"].values()]
+    forms = []
+    if any("fitted" in u for u in used):
+        forms.append(Form("planned", "auto", pack))
+    if all("twin" in u for u in used):
+        forms.append(Form("twin", "twin", pack))
     return forms
 
 
@@ -113,23 +143,32 @@ def render_reference(tool, folder, spp):
 def render_jobs(extension, folder, jobs):
     """Renders jobs in one process, in their order; returns command and records. Each is (name,
     scene, picture, form, samples, seed), files in `folder`."""
-    keys = ("name", "scene", "out", "representation", "spp", "seed")
-    listed = [dict(zip(keys, job, strict=True)) for job in jobs]
-    for job in listed:
-        job |= {key: str(folder / job[key]) for key in ("scene", "out")}
-        job["name"] = f"{folder.name} {job['name']}"
-        job["native"] = str(folder / "native.json")
+    listed = [
+        {
+            "name": f"{folder.name} {name}",
+            "scene": str(folder / scene),
+            "out": str(folder / picture),
+            "representation": form.representation,
+            "spp": spp,
+            "seed": seed,
+            "native": str(folder / "native.json"),
+            "pack": form.pack and str(folder / form.pack),
+        }
+        for name, scene, picture, form, spp, seed in jobs
+    ]
     file = folder / f"{Path(jobs[0][1]).stem}-jobs.json"
     write_json(file, listed)
     command = [sys.executable, RENDER_SCENE, "--extension", extension, "--jobs", file]
     records = json.loads(run(command, stdout=subprocess.PIPE).stdout)
+    for record, (_, _, _, form, _, _) in zip(records, jobs, strict=True):
+        record["form"] = form.name
     return {"command": shown(map(str, command)), "records": records}
 
 
 def render_blender(extension, folder, forms, spp, seeds):
     """Renders every form with every seed, in turns."""
     jobs = [
-        (f"{form} {seed}/{seeds}", "scene.json", f"{form}-{seed}.exr", form, spp, seed)
+        (f"{form.name} {seed}/{seeds}", "scene.json", f"{form.name}-{seed}.exr", form, spp, seed)
         for seed in range(1, seeds + 1)
         for form in forms
     ]
@@ -151,9 +190,9 @@ def render_convergence(extension, folder, scene, forms):
     write_json(folder / "convergence.json", smaller(scene, CONVERGENCE_SIZE))
     jobs = [
         (
-            f"{form}, {spp} samples, {seed}/{CONVERGENCE_SEEDS}",
+            f"{form.name}, {spp} samples, {seed}/{CONVERGENCE_SEEDS}",
             "convergence.json",
-            f"convergence/{form}-{spp}-{seed}.exr",
+            f"convergence/{form.name}-{spp}-{seed}.exr",
             form,
             spp,
             seed,
@@ -170,12 +209,10 @@ def convergence_runs(forms, records):
     out = []
     for form in forms:
         for spp in CONVERGENCE_SPP:
-            chosen = [
-                r for r in records if r["representation"] == form and r["settings"]["spp"] == spp
-            ]
+            chosen = [r for r in records if r["form"] == form.name and r["settings"]["spp"] == spp]
             out.append(
                 {
-                    "form": form,
+                    "form": form.name,
                     "spp": spp,
                     "images": [f"convergence/{Path(r['out']).name}" for r in chosen],
                     "cpu_seconds": [r["sampling_cpu_seconds"] for r in chosen],
@@ -188,7 +225,7 @@ def materials_of(record, native):
     """The materials of a record in the form of runs.json; of Blender's own nodes those that were
     fitted."""
     out = []
-    node = record["representation"]
+    node = record["form"]
     for name, nodes in native.items():
         if node in nodes:
             error = {"relative_l1": nodes[node]["relative_l1"], "albedo": None}
@@ -213,7 +250,7 @@ def materials_of(record, native):
 
 def form_run(form, records, native):
     return {
-        "form": form,
+        "form": form.name,
         "images": [Path(r["out"]).name for r in records],
         "spp": records[0]["settings"]["spp"],
         "cpu_seconds": [r["sampling_cpu_seconds"] for r in records],
@@ -256,6 +293,14 @@ def render_scene(source, options, models, versions):
 
     state_file = folder / "state.json"
     state = read_json(state_file) if state_file.exists() else {}
+    plan, kept_plan = cached(
+        state,
+        "plan",
+        digest(versions["tool"], inputs, options.plan),
+        [folder / "plan" / "brdfc_shaders" / "manifest.json"],
+        lambda: build_plan(options.tool, folder, options.plan),
+    )
+    forms += planned_forms(folder, scene)
     key = digest(versions["tool"], inputs, reference_spp)
     reference, kept_reference = cached(
         state,
@@ -270,11 +315,12 @@ def render_scene(source, options, models, versions):
         inputs,
         RENDER_SCENE,
         folder / "native.json",
+        plan["key"],
         forms,
         blender_spp,
         options.seeds,
     )
-    images = [folder / f"{f}-{s}.exr" for f in forms for s in range(1, options.seeds + 1)]
+    images = [folder / f"{f.name}-{s}.exr" for f in forms for s in range(1, options.seeds + 1)]
     blender, kept_blender = cached(
         state,
         "blender",
@@ -297,7 +343,7 @@ def render_scene(source, options, models, versions):
         write_json(state_file, state)
 
     records = blender["records"]
-    runs = [form_run(f, [r for r in records if r["representation"] == f], native) for f in forms]
+    runs = [form_run(f, [r for r in records if r["form"] == f.name], native) for f in forms]
     provenance = {
         "Blender": records[0]["blender"],
         "Extension": f"{options.extension.name}, sha256 {versions['extension']}",
@@ -326,19 +372,21 @@ def render_scene(source, options, models, versions):
             "commands": [
                 shown([str(options.tool), "scene", str(source), "--out", str(folder)]),
                 reference["command"],
+                plan["command"],
                 blender["command"],
                 *([convergence["command"]] if convergence else []),
             ],
         },
     )
     parts = {
+        "plan": kept_plan,
         "reference": kept_reference,
         "Blender": kept_blender,
         "convergence": kept_convergence,
     }
     kept = [name for name, was_kept in parts.items() if was_kept]
     note = f" (kept: {', '.join(kept)})" if kept else ""
-    print(f"    {source.stem}: {', '.join(forms)}{note}", flush=True)
+    print(f"    {source.stem}: {', '.join(f.name for f in forms)}{note}", flush=True)
 
 
 def main():
@@ -359,6 +407,12 @@ def main():
     )
     parser.add_argument(
         "--native", type=Path, help="output of native_nodes.py: also render Blender's own nodes"
+    )
+    parser.add_argument(
+        "--plan",
+        type=float,
+        default=10,
+        help="percent of the light that forms of a pack cut to the scene may be off (10)",
     )
     parser.add_argument("--size", type=int, help="at most so many pixels along the longer side")
     parser.add_argument(

@@ -9,8 +9,10 @@ whose repetitions take turns so that their run times can be compared:
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
-"repeat": ..., "native": ...}, ...]; all but scene and out are optional and default to the options
-of the command line. "native" names a file with a scene's materials of script/native_nodes.py.
+"repeat": ..., "native": ..., "pack": ...}, ...]; all but scene and out are optional and default to
+the options of the command line. "native" names a file with a scene's materials of
+script/native_nodes.py; "pack" a folder that `brdfc build` wrote, whose models the extension takes
+instead of its own.
 Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
 usage or input.
 """
@@ -93,6 +95,7 @@ def render_once(bpy, loader, job, repetition):
     with quiet():
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     start = time.perf_counter()
+    loader.pack.use(job["pack"])
     native = json.loads(Path(job["native"]).read_text("utf-8")) if job["native"] else None
     scene = loader.load_scene(job["scene"], job["representation"], native=native)
     load_wall = time.perf_counter() - start
@@ -167,6 +170,7 @@ def read_jobs(options):
         "seed": options.seed,
         "repeat": options.repeat,
         "native": None,
+        "pack": None,
     }
     if options.jobs:
         try:
@@ -217,7 +221,7 @@ def run(options):
                     continue
                 try:
                     taken, record = render_once(bpy, loader, job, repetition)
-                except ValueError as error:
+                except (ValueError, loader.pack.PackError) as error:
                     raise UsageError(str(error)) from error
                 times[index].append(taken)
                 records[index] = records[index] or record

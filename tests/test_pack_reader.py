@@ -18,16 +18,15 @@ def manifest(tmp_path_factory):
 
 
 @pytest.fixture
-def read(tmp_path, monkeypatch):
+def read(tmp_path):
     """Reads bytes as a manifest."""
     spec = importlib.util.spec_from_file_location("pack", ROOT / "blender_addon" / "pack.py")
     pack = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pack)
-    monkeypatch.setattr(pack, "ROOT", tmp_path)
 
     def reader(data):
         (tmp_path / "manifest.json").write_bytes(data)
-        pack.manifest.cache_clear()
+        pack.use(tmp_path)
         return pack.manifest()
 
     reader.refusal = pack.PackError

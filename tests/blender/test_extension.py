@@ -115,7 +115,7 @@ def test_every_choice_reaches_the_shader(extension, empty, subtests):
 
 
 def test_sockets_equal_the_manifest(extension, empty, subtests):
-    manifest = json.loads((extension.pack.ROOT / "manifest.json").read_text())
+    manifest = json.loads((extension.pack.root / "manifest.json").read_text())
     for model, representation in forms(extension):
         material = extension.api.new_material(model, representation)
         node = extension.nodes.group_nodes(material)[0]

@@ -29,9 +29,10 @@ def shaders_and_tables(extension_zip):
         )
 
 
-def render(extension_zip, scene, out, seed=0):
+def render(extension_zip, scene, out, seed=0, pack=None):
     jobs = out.with_suffix(".json")
-    jobs.write_text(json.dumps([{"scene": str(scene), "out": str(out), "seed": seed}]))
+    job = {"scene": str(scene), "out": str(out), "seed": seed, "pack": pack and str(pack)}
+    jobs.write_text(json.dumps([job]))
     command = [sys.executable, DRIVER, "--extension", extension_zip, "--jobs", jobs]
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=os.environ)
     return done
@@ -64,6 +65,11 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
             done = render(pack, scene, out, seed)
             assert done.returncode == 0, done.stderr
             pictures[-1].append(read_picture(out)[..., :3].mean(-1))
+    # The whole extension takes a pack for one picture, without being installed anew.
+    out = tmp_path / "used.exr"
+    done = render(extension_zip, scene, out, pack=tmp_path / "cut" / "brdfc_shaders")
+    assert done.returncode == 0, done.stderr
+    assert np.array_equal(read_picture(out)[..., :3].mean(-1), pictures[1][0])
     # Closures that are left out are no longer drawn from, so that the noise is another one: the
     # means of tiles agree within it, by a t-test with the spread of both.
     tiles = np.array(pictures).reshape(2, SEEDS, 6, 8, 6, 8).mean((3, 5)).reshape(2, SEEDS, -1)
@@ -79,6 +85,15 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
     assert abs(total[1].mean() - total[0].mean()) < 6 * error
     if len(used) == 1:
         assert shaders_and_tables(cut) <= shaders_and_tables(extension_zip) / 10
+
+
+def test_a_pack_that_is_none(empty, extension_zip, tool, tmp_path):
+    tool("scene", ROOT / "scenes" / "ra-vanish.json", "--out", tmp_path)
+    out = tmp_path / "a.exr"
+    done = render(extension_zip, tmp_path / "scene.json", out, pack=tmp_path / "absent")
+    assert done.returncode == 2
+    assert "absent/manifest.json" in done.stderr and "Traceback" not in done.stderr
+    assert not out.exists()
 
 
 def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):

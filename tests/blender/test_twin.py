@@ -33,13 +33,11 @@ def folder(tool, tmp_path_factory):
 
 
 @pytest.fixture
-def lean(extension, folder, monkeypatch):
+def lean(extension, folder):
     """The extension as it is with that pack."""
-    monkeypatch.setattr(extension.pack, "ROOT", folder)
-    extension.pack.manifest.cache_clear()
+    extension.pack.use(folder)
     yield extension
-    monkeypatch.undo()
-    extension.pack.manifest.cache_clear()
+    extension.pack.use()
 
 
 def start(lean):
