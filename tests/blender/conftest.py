@@ -1,8 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs in a Python that has the bpy module. BRDFC_EXTENSION_ZIP names the extension under test,
 BRDFC_TOOL the built brdfc. Blender's user folders are scratch, so nothing of the user's is touched.
+
+BRDFC_ANSWERS, if it is set, names a folder in which what the tool made is kept: runs in several
+versions of Blender ask it the same questions.
 """
 
+import contextlib
+import fcntl
+import hashlib
+import json
 import os
 import subprocess
 import tempfile
@@ -34,19 +41,79 @@ def extension_zip():
     return _path_from_environment("BRDFC_EXTENSION_ZIP", "brdfc_shaders-<version>.zip")
 
 
+#: Commands that write nothing but their output.
+PRINTING = {"albedo", "closure", "eval", "fit", "list", "probe", "sample"}
+
+
+class Answers:
+    """Files that were made once, by what they were made of."""
+
+    def __init__(self, folder, program):
+        self.folder = Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.program = hashlib.sha256(program.read_bytes()).hexdigest()
+
+    @contextlib.contextmanager
+    def of(self, *question):
+        """The path of the answer; while this is held nobody else makes it."""
+        text = json.dumps([self.program, *question])
+        path = self.folder / hashlib.sha256(text.encode()).hexdigest()
+        with path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield path
+
+
 @pytest.fixture(scope="session")
-def tool():
+def program():
+    return _path_from_environment("BRDFC_TOOL", "the built brdfc")
+
+
+@pytest.fixture(scope="session")
+def answers(program, tmp_path_factory):
+    folder = os.environ.get("BRDFC_ANSWERS") or tmp_path_factory.mktemp("answers")
+    return Answers(folder, program)
+
+
+@pytest.fixture(scope="session")
+def tool(program, answers):
     """Runs the generator's tool: tool("albedo", "lambert", stdin=...) returns stdout."""
-    program = _path_from_environment("BRDFC_TOOL", "the built brdfc")
 
     def run(*arguments, stdin=""):
-        done = subprocess.run(
-            [program, *map(str, arguments)], input=stdin, capture_output=True, text=True
-        )
+        arguments = [str(a) for a in arguments]
+        if arguments[0] not in PRINTING:
+            return ask(arguments, stdin)
+        with answers.of(arguments, stdin) as path:
+            if not path.exists():
+                answer = ask(arguments, stdin)
+                beside = path.with_suffix(".part")
+                beside.write_text(answer)
+                beside.replace(path)
+            return path.read_text()
+
+    def ask(arguments, stdin):
+        done = subprocess.run([program, *arguments], input=stdin, capture_output=True, text=True)
         assert done.returncode == 0, f"{arguments}: {done.stderr}"
         return done.stdout
 
     return run
+
+
+@pytest.fixture(scope="session")
+def lean_pack(tool, answers):
+    """lean_pack(materials, *options): the folder of a pack of these alone, as `brdfc build
+    --materials` makes it. To be read only."""
+
+    def make(materials, *options):
+        with answers.of("pack", materials, options) as path:
+            done = path / "brdfc_shaders"
+            if not done.exists():
+                path.mkdir(exist_ok=True)
+                file = path / "materials.json"
+                file.write_text(json.dumps({"materials": materials}))
+                tool("build", "--materials", file, *options, "--out", path)
+            return done
+
+    return make
 
 
 @pytest.fixture(scope="session")

@@ -40,17 +40,13 @@ LIT = tilted((1.0, 0.8, 0.5, 0.25), 0.0)
 
 
 @pytest.fixture(scope="module", params=MATERIALS, ids=lambda m: m[0])
-def material(request, tool, tmp_path_factory):
+def material(request, lean_pack):
     """Model, parameters, and by form the OSL and warnings, from a pack of this material alone."""
     model, values = request.param
-    folder = tmp_path_factory.mktemp("controlled")
     listed = {
         form: {"model": model, "parameters": values, "representation": form} for form in FORMS
     }
-    file = folder / "materials.json"
-    file.write_text(json.dumps({"materials": listed}))
-    tool("build", "--materials", file, "--out", folder)
-    pack = folder / "brdfc_shaders"
+    pack = lean_pack(listed)
     entries = json.loads((pack / "manifest.json").read_text())["models"][model]["representations"]
     return SimpleNamespace(
         model=model,

@@ -2,7 +2,6 @@
 """Fitted forms in Cycles are the sums of closures that `brdfc fit` judges, and return the model's
 light."""
 
-import json
 import math
 
 import bpy
@@ -25,17 +24,13 @@ FACETS = 96
 
 
 @pytest.fixture(scope="module")
-def sources(tool, tmp_path_factory):
+def sources(lean_pack):
     """OSL by model, from a pack of these materials alone."""
-    folder = tmp_path_factory.mktemp("fitted")
     listed = {
         name: {"model": name, "parameters": values, "representation": "fitted"}
         for name, values in MATERIALS.items()
     }
-    file = folder / "materials.json"
-    file.write_text(json.dumps({"materials": listed}))
-    tool("build", "--materials", file, "--out", folder)
-    shaders = folder / "brdfc_shaders" / "shaders"
+    shaders = lean_pack(listed) / "shaders"
     assert {p.stem for p in shaders.iterdir()} == {f"brdfc_{name}_fitted" for name in MATERIALS}
     return {name: (shaders / f"brdfc_{name}_fitted.osl").read_text() for name in MATERIALS}
 

@@ -2,7 +2,6 @@
 """Twins without Open Shading Language: Blender's own nodes make of the curves what the tool judges,
 and stand where the shader does."""
 
-import json
 import math
 
 import bpy
@@ -21,21 +20,11 @@ SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
 FACETS = 96
 
 
-@pytest.fixture(scope="module")
-def folder(tool, tmp_path_factory):
-    """A pack of these materials alone."""
-    folder = tmp_path_factory.mktemp("twin")
-    listed = {name: {"model": name, "parameters": values} for name, values in MATERIALS.items()}
-    file = folder / "materials.json"
-    file.write_text(json.dumps({"materials": listed}))
-    tool("build", "--materials", file, "--twin", "--out", folder)
-    return folder / "brdfc_shaders"
-
-
 @pytest.fixture
-def lean(extension, folder):
-    """The extension as it is with that pack."""
-    extension.pack.use(folder)
+def lean(extension, lean_pack):
+    """The extension with a pack of these materials alone."""
+    listed = {name: {"model": name, "parameters": values} for name, values in MATERIALS.items()}
+    extension.pack.use(lean_pack(listed, "--twin"))
     yield extension
     extension.pack.use()
 
