@@ -246,13 +246,21 @@ def _start_group(group):
     return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
 
 
-def _fill_native_group(group, source):
-    """A twin has the sockets of the other forms; what it looks like does not hang on a tangent."""
+def _fill_native_group(group, model_name, representation, source):
+    """A twin has the sockets of the other forms; what it looks like does not hang on a tangent.
+    What is left of its parameters are factors of all that the model scatters."""
     group_input, group_output = _start_group(group)
     group_input.location = (-300, 0)
-    sockets = {name: _vector_socket(group, name, text) for name, text in _VECTORS.items()}
+    sockets, factors = {}, []
+    for name, parameter in pack.socket_parameters(model_name, representation).items():
+        relay = group.nodes.new("NodeReroute")
+        relay.location = (-100, -40 * len(factors))
+        sockets[name] = _add_parameter(group, group_input, relay.inputs[0], parameter)
+        factors.append(relay.outputs[0])
+    sockets |= {name: _vector_socket(group, name, text) for name, text in _VECTORS.items()}
     normal = group_input.outputs[pack.NORMAL]
-    for name, output in zip(OUTPUTS, twin.wire(group, json.loads(source), normal), strict=True):
+    made = twin.wire(group, json.loads(source), normal, factors)
+    for name, output in zip(OUTPUTS, made, strict=True):
         group.links.new(output, group_output.inputs[name])
     group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
     group[TAG]["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
@@ -336,7 +344,7 @@ def ensure_group(model_name, representation="auto"):
             "choices": json.dumps(pack.form_choices(model_name, representation)),
         }
         if native:
-            _fill_native_group(group, source)
+            _fill_native_group(group, model_name, representation, source)
         else:
             text.write(source)
             text.cursor_set(0)

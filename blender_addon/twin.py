@@ -89,10 +89,11 @@ class _Wiring:
         return shaders[0]
 
 
-def wire(tree, data, normal):
+def wire(tree, data, normal, factors=()):
     """Builds the nodes of a twin; returns the outputs that are its BSDF and its albedo.
 
     `data` is what twins/*.json has; `normal` an output that is 0 where the surface's own is meant.
+    `factors`: outputs, colours of all but the mirror.
     """
     w = _Wiring(tree)
     geometry = w.node("ShaderNodeNewGeometry")
@@ -102,14 +103,23 @@ def wire(tree, data, normal):
     normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
     cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
     across = w.vector("CROSS_PRODUCT", normal, viewer)
-    tint = data["tint"]
+    tint, half_tint = data["tint"], [t / 2 for t in data["tint"]]
+    for factor in factors:
+        tint = w.vector("MULTIPLY", factor, tint)
+        half_tint = w.vector("MULTIPLY", factor, half_tint)
+    albedo = w.colour(cos_theta, data["albedo"], tint)
     shaders = []
     for closure in data["closures"]:
         kind = closure["kind"]
+        if kind == "mirror":
+            colour = w.colour(cos_theta, closure["weight"], (1, 1, 1))
+            albedo = w.vector("ADD", albedo, colour)
+            shaders.append(w.bsdf(kind, colour, normal))
+            continue
         if kind not in _DISTRIBUTIONS:
             shaders.append(w.bsdf(kind, w.colour(cos_theta, closure["weight"], tint), normal))
             continue
-        half = w.colour(cos_theta, closure["weight"], [t / 2 for t in tint])
+        half = w.colour(cos_theta, closure["weight"], half_tint)
         lean = w.curve(cos_theta, closure["lean"])
         roughness = w.curve(cos_theta, closure["roughness"])
         upright = w.vector("SCALE", normal, scale=w.math("SUBTRACT", 1.0, lean))
@@ -118,4 +128,4 @@ def wire(tree, data, normal):
         for operation in ("ADD", "SUBTRACT"):
             facet_normal = w.vector("NORMALIZE", w.vector(operation, middle, aside))
             shaders.append(w.bsdf(kind, half, facet_normal, roughness))
-    return w.sum(shaders), w.colour(cos_theta, data["albedo"], tint)
+    return w.sum(shaders), albedo

@@ -133,6 +133,35 @@ TEST(Fit, SaysWhyThereIsNone) {
   EXPECT_EQ(why("coupled"), "");
 }
 
+TEST(Fit, LeavesOutColoursThatMultiplyAll) {
+  const auto of = [](const char* name, const std::vector<std::string>& text = {}) {
+    const Model& m = find_model(name);
+    return factors(m, values_of(m, text));
+  };
+  using testing::ElementsAre;
+  EXPECT_THAT(of("phong"), ElementsAre("ks"));
+  EXPECT_THAT(of("radziszewski_alda"), ElementsAre("tint"));
+  EXPECT_THAT(of("coupled"), ElementsAre("rm")) << "but not of the mirror";
+  EXPECT_THAT(of("oren_nayar"), ElementsAre()) << "light goes to and fro in its grooves";
+  EXPECT_THAT(of("oren_nayar", {"form=qualitative"}), ElementsAre("rho"));
+  EXPECT_THAT(of("cook_torrance"), ElementsAre()) << "white at grazing angles";
+  EXPECT_THAT(of("ashikhmin_shirley"), ElementsAre());
+  EXPECT_THAT(of("phong_material"), ElementsAre()) << "each colour multiplies a part";
+
+  const Model& m = find_model("phong");
+  ParamValues fixed = values_of(m, {"e=20"});
+  fixed.erase("ks");
+  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
+    const Shader s = write_shader(m, kind, fold(tabulate_albedo(m), m, fixed), fixed);
+    EXPECT_THAT(s.source, HasSubstr("color ks = color("));
+    EXPECT_THAT(s.source, HasSubstr("weight_0 *= ks;"));
+    EXPECT_EQ(s.source.find("residual_weight *= brdfc_max_component(ks);") != std::string::npos,
+              kind == RepresentationKind::Controlled);
+  }
+  fixed.erase("e");
+  EXPECT_THROW(without_factors(m, fixed), std::logic_error);
+}
+
 TEST(Fit, ShadersStayWithinBounds) {
   for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
     const Model& m = find_model(name);

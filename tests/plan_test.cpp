@@ -82,8 +82,13 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   EXPECT_THAT(forms({need("a", "phong", {"e=20"}, "sampled")}, 0.5), sampled);
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "sampled")}, {0.5, true})[0].forms,
               ElementsAre(RepresentationKind::Sampled, RepresentationKind::Fitted));
-  auto textured = need("c", "phong", {"e=20"}, "fitted");
+  auto textured = need("c", "phong", {"e=20", "ks=0.1"});
   textured.textured.insert("ks");
+  const auto plan = plan_scene({need("a", "phong", {"e=20"}), textured}, {0.03, false, true});
+  EXPECT_THAT(plan[0].forms, ElementsAre(RepresentationKind::Fitted, RepresentationKind::Twin)) << "ks multiplies f";
+  EXPECT_EQ(plan[0].fixed.count("ks"), 0u);
+  textured.representation = "fitted";
+  textured.textured.insert("e");
   EXPECT_THROW(plan_scene({textured}), InputError);
 }
 

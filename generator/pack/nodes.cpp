@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "represent/fit.h"
 #include "represent/twin.h"
 
 namespace brdfc {
@@ -38,8 +39,8 @@ Json by_channel(const Channels& tables) {
 
 }  // namespace
 
-Shader write_nodes(const Model& model, const ParamValues& values) {
-  const Twin& twin = twin_of(model, values);
+Shader write_nodes(const Model& model, const ParamValues& fixed) {
+  const Twin& twin = twin_of(model, without_factors(model, fixed));
   Shader out;
   out.name = fmt::format("brdfc_{}_twin", model.info().name);
   Json closures = Json::array();

@@ -17,19 +17,34 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
 std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs) {
   const MaterialNeed& first = *needs.front();
   if (const auto reason = unfit(*first.model, first.values)) return reason;
+  const std::set<std::string> may_vary = factors(*first.model, first.values);
   for (const MaterialNeed* need : needs) {
-    if (!need->textured.empty()) return fmt::format("{} varies over {}", *need->textured.begin(), need->id);
-    if (need->values != first.values) return fmt::format("{} and {} have other parameters", first.id, need->id);
+    for (const std::string& name : need->textured)
+      if (!may_vary.count(name)) return fmt::format("{} varies over {}", name, need->id);
+    for (const auto& [name, value] : need->values)
+      if (!may_vary.count(name) && value != first.values.at(name))
+        return fmt::format("{} and {} have other parameters", first.id, need->id);
   }
   return std::nullopt;
 }
 
-double fitted_error(const MaterialNeed& need) {
-  return *measure_error(*need.model, RepresentationKind::Fitted, need.values).relative_l1;
+/// What all materials of a model set to the same constant.
+ParamValues constants(const std::vector<const MaterialNeed*>& needs) {
+  ParamValues fixed;
+  for (const auto& [name, value] : needs.front()->values)
+    if (std::all_of(needs.begin(), needs.end(), [&, &n = name, &v = value](const MaterialNeed* need) {
+          return need->values.at(n) == v && !need->textured.count(n);
+        }))
+      fixed[name] = value;
+  return fixed;
+}
+
+double fitted_error(const std::vector<const MaterialNeed*>& needs) {
+  return *measure_error(*needs.front()->model, RepresentationKind::Fitted, constants(needs)).relative_l1;
 }
 
 bool fits(const std::vector<const MaterialNeed*>& needs, const Budget& budget) {
-  return budget.error && !unfit(needs) && fitted_error(*needs.front()) <= *budget.error;
+  return budget.error && !unfit(needs) && fitted_error(needs) <= *budget.error;
 }
 
 RepresentationKind chosen_form(const MaterialNeed& need, const std::vector<const MaterialNeed*>& needs,
@@ -87,7 +102,7 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
                                               : fits(needs, budget)
                                                   ? std::string("the materials ask for another")
                                                   : fmt::format("off by {:.2g} of the light, and {:g} is allowed",
-                                                                fitted_error(*needs.front()), *budget.error)));
+                                                                fitted_error(needs), *budget.error)));
   }
   if (used.count(RepresentationKind::Controlled)) plan.forms.push_back(RepresentationKind::Controlled);
   if (used.count(RepresentationKind::Twin) || budget.twin) {
@@ -99,16 +114,10 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
   }
   if (used.count(RepresentationKind::Sampled) && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
-  for (const ParamInfo& p : info.params) {
-    const ParamValue& first = needs.front()->values.at(p.name);
-    const bool textured = std::any_of(needs.begin(), needs.end(),
-                                      [&](const MaterialNeed* need) { return need->textured.count(p.name) > 0; });
-    const bool same = std::all_of(needs.begin(), needs.end(),
-                                  [&](const MaterialNeed* need) { return need->values.at(p.name) == first; });
-    if (textured || !same) continue;
-    plan.fixed[p.name] = first;
-    plan.reasons.push_back(fmt::format("parameter {}: constant, {}", p.name, value_text(info, p.name, first)));
-  }
+  plan.fixed = constants(needs);
+  for (const ParamInfo& p : info.params)
+    if (const auto it = plan.fixed.find(p.name); it != plan.fixed.end())
+      plan.reasons.push_back(fmt::format("parameter {}: constant, {}", p.name, value_text(info, p.name, it->second)));
   return plan;
 }
 

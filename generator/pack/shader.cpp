@@ -5,6 +5,7 @@
 #include <set>
 
 #include "pack/osl_library.h"
+#include "represent/fit.h"
 
 namespace brdfc {
 namespace {
@@ -447,6 +448,18 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
             "normal_{0}_z);\n",
             c);
   }
+  if (is_fit(kind))
+    for (const std::string& name : factors(model, complete(info, fixed))) {
+      if (fixed.count(name)) continue;
+      for (std::size_t c = 0; c < kinds.size(); ++c)
+        if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
+      if (controlled)
+        body += fmt::format(
+            "    residual_weight *= brdfc_max_component({0});\n"
+            "    residual_colour *= {0} / max(brdfc_max_component({0}), 1e-20);\n",
+            name);
+      ++shader.operations;
+    }
   if (controlled && shader.operations > kMaxOperations)
     input_error(
         "{}: the controlled form has {} operations with these parameters, and may have {}: take fitted or sampled",

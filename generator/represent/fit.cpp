@@ -173,6 +173,34 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
 
 }  // namespace
 
+std::set<std::string> factors(const Model& model, const ParamValues& values) {
+  if (!model.has_scatter()) return {};
+  std::set<std::string> out;
+  for (const ParamInfo& p : model.info().params) {
+    if (p.kind != ParamKind::Color) continue;
+    const Rgb<double> colour{0.3, 0.6, 0.8};
+    ParamValues white = values, coloured = values;
+    white[p.name] = std::array<double, 3>{1, 1, 1};
+    coloured[p.name] = std::array<double, 3>{colour.r, colour.g, colour.b};
+    const auto of_white = model.make_double(white), of_coloured = model.make_double(coloured);
+    Random random(12);
+    bool proportional = true;
+    for (const auto& [wi, wo] : direction_pairs(*of_white, 256, random, model.two_sided()))
+      proportional = proportional && relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < 1e-9;
+    if (proportional) out.insert(p.name);
+  }
+  return out;
+}
+
+ParamValues without_factors(const Model& model, const ParamValues& known) {
+  ParamValues values = known;
+  for (const std::string& name : factors(model, complete(model.info(), known)))
+    values.emplace(name, std::array<double, 3>{1, 1, 1});
+  for (const ParamInfo& p : model.info().params)
+    if (!values.count(p.name)) throw std::logic_error(model.info().name + ": a fit without " + p.name);
+  return values;
+}
+
 std::optional<std::string> unfit(const Model& model, const ParamValues& values) {
   if (!model.has_scatter()) return "it only reflects and refracts ideally";
   const auto brdf = model.make_double(values);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A fitted form: a few closures of Cycles whose sum comes close to a BRDF for every view, so that Cycles can send light
-// to it from lamps. For a material whose parameters are all known.
+// to it from lamps. For a material whose parameters are all known, but for a colour that f is proportional to.
 //
 // The closures are phong_ramps about axes in the plane of incidence, and a diffuse_ramp. Both take eight colours that
 // may be negative, so each is a family that is linear in eight numbers, and a view is a linear problem: least absolute
@@ -11,6 +11,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,12 @@
 #include "represent/view.h"
 
 namespace brdfc {
+
+/// Colours that f is proportional to, the other parameters being as they are. Closures are fitted without them, and
+/// take them as factors of their weights, so they need not be known.
+std::set<std::string> factors(const Model&, const ParamValues& values);
+/// `known` with 1 for every factor that it lacks. Throws std::logic_error where it lacks another parameter.
+ParamValues without_factors(const Model&, const ParamValues& known);
 
 /// Why closures can't be fitted to a model with these parameters; nothing if they can.
 std::optional<std::string> unfit(const Model&, const ParamValues&);

@@ -53,8 +53,9 @@ ClosureSum<Expr> with_mirror(const Model& model, const Brdf<Expr>& brdf, Closure
   return sum;
 }
 
-ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& values) {
-  return with_mirror(model, brdf, fit_of(model, values).closures(recorded_wo(model, brdf), Expr(1), false));
+ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed) {
+  const Fit& fit = fit_of(model, without_factors(model, fixed));
+  return with_mirror(model, brdf, fit.closures(recorded_wo(model, brdf), Expr(1), false));
 }
 
 std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
@@ -79,9 +80,11 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
 
 Vec3<Expr> recorded_u() { return {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")}; }
 
-void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamValues& values, Program& program,
+void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed, Program& program,
                        std::vector<RecordedClosure>& recorded) {
-  const Controlled<Expr> c = controlled(brdf, fit_of(model, values), recorded_wo(model, brdf), recorded_u());
+  const ParamValues values = without_factors(model, fixed);
+  const std::unique_ptr<Brdf<Expr>> scatter = model.record(values);
+  const Controlled<Expr> c = controlled(*scatter, fit_of(model, values), recorded_wo(model, brdf), recorded_u());
   output_closures(with_mirror(model, brdf, c.closures), program, recorded, false);
   program.output("wi_x", c.wi.x);
   program.output("wi_y", c.wi.y);
@@ -151,8 +154,9 @@ RepresentationError fitted_error(const std::vector<ViewError>& errors, const std
 
 /// What single precision makes of the drawn residuals. The same numbers drive both, so that what differs is the
 /// arithmetic and not the noise.
-RepresentationError controlled_error(const Model& model, const ParamValues& values) {
+RepresentationError controlled_error(const Model& model, const ParamValues& fixed) {
   constexpr int kViews = 6, kPoints = 256;
+  const ParamValues values = without_factors(model, fixed);
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> recorded = model.record(values);
   Program program;
@@ -292,9 +296,11 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
-  if (kind == RepresentationKind::Fitted) return fitted_error(fit_of(model, fixed).errors(), "closures");
   if (kind == RepresentationKind::Controlled) return controlled_error(model, fixed);
-  if (kind == RepresentationKind::Twin) return fitted_error(twin_of(model, fixed).errors(), "Blender's nodes");
+  if (kind == RepresentationKind::Fitted)
+    return fitted_error(fit_of(model, without_factors(model, fixed)).errors(), "closures");
+  if (kind == RepresentationKind::Twin)
+    return fitted_error(twin_of(model, without_factors(model, fixed)).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);

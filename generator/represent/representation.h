@@ -54,8 +54,9 @@ struct Recording {
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
 /// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
-/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed`. Throws InputError if more
-/// closures than Cycles keeps would be needed.
+/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but factors(), which its
+/// weights still have to be multiplied by, the mirror's excepted. Throws InputError if more closures than Cycles keeps
+/// would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);

@@ -7,6 +7,7 @@
 #include <nlopt.hpp>
 
 #include "analysis/probes.h"
+#include "represent/fit.h"
 
 namespace brdfc {
 namespace {
@@ -160,7 +161,15 @@ Rgb<double> colour(const Channels& channels, const std::array<double, 1>& at) {
 }  // namespace
 
 Twin::Twin(const Model& model, const ParamValues& values) {
-  const BoundModel bound = bind_model(model, values);
+  // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
+  ParamValues white = values;
+  Rgb<double> factor(1.0);
+  for (const std::string& name : factors(model, values)) {
+    const auto& colour = std::get<std::array<double, 3>>(values.at(name));
+    factor = factor * Rgb<double>{colour[0], colour[1], colour[2]};
+    white[name] = std::array<double, 3>{1, 1, 1};
+  }
+  const BoundModel bound = bind_model(model, white);
   std::vector<View> views(kTwinKnots);
   tbb::parallel_for(0, kTwinKnots, [&](int k) { views[std::size_t(k)] = seen(bound, view_at(k), kPoints); });
   // A mirror has a colour of its own.
@@ -202,6 +211,15 @@ Twin::Twin(const Model& model, const ParamValues& values) {
     weights.row(row) = x.reshaped();
     light.row(row) = view.f.transpose() * weights_of(view.points);
   }
+  if (tint_) {
+    tint_ = *tint_ * factor;
+  } else {
+    const double of_channel[] = {factor.r, factor.g, factor.b};
+    for (Eigen::Index channel = 0; channel < channels; ++channel) {
+      weights.middleCols(channel * closures_count, closures_count) *= of_channel[channel];
+      light.col(channel) *= of_channel[channel];
+    }
+  }
   const auto table = [](const std::string& name, const auto& column) {
     return make_table(name, {kTwinKnots}, {column.begin(), column.end()});
   };
@@ -224,13 +242,12 @@ Twin::Twin(const Model& model, const ParamValues& values) {
       const Rgb<double> m = bound.brdf->mirror(view_at(k));
       mirror.row(k) << m.r, m.g, m.b;
     }
-    light += mirror;
     TwinClosure part{ClosureKind::Reflection, {}, {}, {}, {}};
     for (const auto& channel : mirror.colwise()) part.weight.push_back(table("weight_of_mirror", channel));
     parts_.push_back(std::move(part));
   }
   for (const auto& channel : light.colwise()) albedo_.push_back(table("albedo", channel));
-  errors_ = view_errors(bound, [&](const Vec3<double>& wo) { return closures(wo); });
+  errors_ = view_errors(bind_model(model, values), [&](const Vec3<double>& wo) { return closures(wo); });
 }
 
 ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {

@@ -44,7 +44,7 @@ class Twin {
   const std::vector<TwinClosure>& parts() const { return parts_; }
   /// One factor of all weights and of the albedo, where that is all that tells channels apart.
   const std::optional<Rgb<double>>& tint() const { return tint_; }
-  /// Directional albedo, without the tint.
+  /// Directional albedo of what the model scatters, without the tint.
   const Channels& albedo() const { return albedo_; }
   /// What the nodes make of it for a view above the surface.
   ClosureSum<double> closures(const Vec3<double>& wo) const;

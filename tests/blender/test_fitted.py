@@ -9,7 +9,7 @@ import furnace
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
-from helpers import arguments, pairs_csv, read_csv, script_material
+from helpers import arguments, pairs_csv, read_csv
 
 #: A model for each family of closures, one of three channels, one beside a mirror.
 MATERIALS = {
@@ -23,22 +23,27 @@ COSINES = (0.1, 0.4, 0.8, 1.0)
 FACETS = 96
 
 
-@pytest.fixture(scope="module")
-def sources(lean_pack):
-    """OSL by model, from a pack of these materials alone."""
+@pytest.fixture
+def lean(extension, lean_pack):
+    """The extension with a pack of these materials alone."""
     listed = {
         name: {"model": name, "parameters": values, "representation": "fitted"}
         for name, values in MATERIALS.items()
     }
-    shaders = lean_pack(listed) / "shaders"
-    assert {p.stem for p in shaders.iterdir()} == {f"brdfc_{name}_fitted" for name in MATERIALS}
-    return {name: (shaders / f"brdfc_{name}_fitted.osl").read_text() for name in MATERIALS}
+    # A second one, so that the first one's colour is a socket.
+    other = {"parameters": MATERIALS["phong"] | {"ks": 0.4}}
+    folder = lean_pack(listed | {"grey": listed["phong"] | other})
+    shaders = {p.stem for p in (folder / "shaders").iterdir()}
+    assert shaders == {f"brdfc_{name}_fitted" for name in MATERIALS}
+    extension.pack.use(folder)
+    yield extension
+    extension.pack.use()
 
 
-def start(extension, sources):
+def start(lean):
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    extension.scene_loader.apply_clean_settings(bpy.context.scene, max_bounces=0)
-    return [script_material(extension, name, sources[name]) for name in MATERIALS]
+    lean.scene_loader.apply_clean_settings(bpy.context.scene, max_bounces=0)
+    return [lean.api.new_material(name, "fitted", **v) for name, v in MATERIALS.items()]
 
 
 def fitted(tool, name, wi, wo):
@@ -46,13 +51,13 @@ def fitted(tool, name, wi, wo):
     return read_csv(tool("fit", name, *values, "--pairs", stdin=pairs_csv(wi, wo)))[1]
 
 
-def test_a_sun_on_a_fitted_form(extension, tool, sources):
+def test_a_sun_on_a_fitted_form(lean, tool):
     """Every pair is within 1e-3 of the largest value of what the tool says of the closures."""
     rng = np.random.default_rng(3)
     which = np.repeat(np.arange(len(MATERIALS)), FACETS)
     lit_pairs = {name: [] for name in MATERIALS}
     for towards in SUNS:
-        materials = start(extension, sources)
+        materials = start(lean)
         normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
         # Every other facet faces halfway between sun and camera, more or less: the highlight.
         half = unit(unit(towards) + (0, 0, 1))
@@ -76,9 +81,9 @@ def test_a_sun_on_a_fitted_form(extension, tool, sources):
 
 
 @pytest.mark.full
-def test_furnace_of_a_fitted_form(extension, tool, sources):
+def test_furnace_of_a_fitted_form(lean, tool):
     """Sampling returns what evaluation says: the albedo of the model, off by what `brdfc fit`
     states for that view and by noise."""
-    made = start(extension, sources)
+    made = start(lean)
     scene = bpy.context.scene
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)

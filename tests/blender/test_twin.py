@@ -24,6 +24,8 @@ FACETS = 96
 def lean(extension, lean_pack):
     """The extension with a pack of these materials alone."""
     listed = {name: {"model": name, "parameters": values} for name, values in MATERIALS.items()}
+    # A second one, so that the first one's colour is a socket.
+    listed["grey"] = {"model": "phong", "parameters": MATERIALS["phong"] | {"ks": 0.4}}
     extension.pack.use(lean_pack(listed, "--twin"))
     yield extension
     extension.pack.use()
@@ -34,7 +36,7 @@ def start(lean):
     scene = bpy.context.scene
     lean.scene_loader.apply_clean_settings(scene, max_bounces=0)
     scene.cycles.shading_system = False
-    return scene, [lean.api.new_material(name, "twin") for name in MATERIALS]
+    return scene, [lean.api.new_material(name, "twin", **v) for name, v in MATERIALS.items()]
 
 
 @pytest.mark.full
