@@ -94,8 +94,10 @@ TEST_F(ReportTest, SeparatesErrorFromNoise) {
   EXPECT_GT(glossy.difference.rel_mse, 2 * glossy.difference.noise);
   EXPECT_NEAR(exact.difference.bias, 0, 5 * exact.difference.bias_error);
   EXPECT_NEAR(exact.difference.rel_mse / exact.difference.noise, 1, 0.05);
-  // Four pictures, so the standard deviation of a pixel is half that of one; then the mean over all channels.
-  EXPECT_NEAR(exact.difference.bias_error, kNoise / 2 / std::sqrt(3.0 * kSize * kSize) / 0.5, 2e-5);
+  // Four pictures, so the standard deviation of a pixel is half that of one; then the mean over all pixels, whose
+  // channels are taken to err together: of the products of two channels' deviations there are twice as many as squares,
+  // and the deviation of four normal numbers is sqrt(8 / (3 pi)) of the true one on average.
+  EXPECT_NEAR(exact.difference.bias_error, kNoise / 2 / kSize / 0.5 * std::sqrt((1 + 2 * 8 / (3 * kPi)) / 3), 2e-5);
   EXPECT_EQ(exact.spp, 64);
 }
 
@@ -339,6 +341,11 @@ TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
   ASSERT_EQ(exact.equal_error.size(), 3u);
   for (const auto& cost : glossy.equal_error) EXPECT_NEAR(cost.value(), 1, 1e-9);
   for (const auto& cost : exact.equal_error) EXPECT_NEAR(cost.value(), 2, 0.1);
+  // A rare bright path can keep noise from falling where it was measured: that is not carried on for ever.
+  for (json& point : runs_["convergence"])
+    if (point["form"] == "exact" && point["spp"] == 1024)
+      for (json& image : point["images"]) image = "exact-256-" + image.get<std::string>().substr(11);
+  EXPECT_NEAR(load()[0].forms[1].equal_error[2].value(), 8, 0.4);
   runs_["convergence"][0]["form"] = "fitted";
   EXPECT_THAT(load_error(), HasSubstr("convergence[0].form"));
 }

@@ -136,11 +136,15 @@ ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view) 
   return point;
 }
 
-/// Samples a pixel to a noise, on straight lines between the points of a doubly logarithmic plot, extended at its ends.
+/// Samples a pixel to a noise, on straight lines between the points of a doubly logarithmic plot; beyond them, noise is
+/// taken to fall as it does for a mean, by half with twice the samples.
 std::optional<double> samples_for(const std::vector<ConvergencePoint>& points, double noise) {
   if (points.size() < 2 || !(noise > 0)) return std::nullopt;
   for (const ConvergencePoint& p : points)
     if (!(p.noise > 0)) return std::nullopt;
+  const auto as_of_a_mean = [&](const ConvergencePoint& p) { return p.spp * p.noise / noise; };
+  if (noise >= points.front().noise) return as_of_a_mean(points.front());
+  if (noise <= points.back().noise) return as_of_a_mean(points.back());
   std::size_t i = 1;
   while (i + 1 < points.size() && points[i].noise > noise) ++i;
   const double x0 = std::log(points[i - 1].spp), x1 = std::log(points[i].spp);

@@ -40,12 +40,18 @@ Difference measure_difference(const Rendering& picture, const Rendering& referen
   if (!(comparison.mean_b > 0)) input_error("{}: the picture is black", reference_name);
   const std::size_t count = reference.mean.rgb.size();
   double noise = 0, variance_a = 0, variance_b = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double va = picture.variance ? picture.variance->rgb[i] : 0;
-    const double vb = reference.variance ? reference.variance->rgb[i] : 0;
-    noise += (va + vb) / (sqr(double(reference.mean.rgb[i])) + kRelMseEpsilon);
-    variance_a += va;
-    variance_b += vb;
+  for (std::size_t i = 0; i < count; i += 3) {
+    double deviation_a = 0, deviation_b = 0;
+    for (std::size_t c = i; c < i + 3; ++c) {
+      const double va = picture.variance ? picture.variance->rgb[c] : 0;
+      const double vb = reference.variance ? reference.variance->rgb[c] : 0;
+      noise += (va + vb) / (sqr(double(reference.mean.rgb[c])) + kRelMseEpsilon);
+      deviation_a += std::sqrt(va);
+      deviation_b += std::sqrt(vb);
+    }
+    // The channels of a pixel come from the same paths, so they err together.
+    variance_a += sqr(deviation_a);
+    variance_b += sqr(deviation_b);
   }
   const double ratio = comparison.mean_a / comparison.mean_b;
   Difference d;
