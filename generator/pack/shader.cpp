@@ -404,7 +404,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         "        wi[lobe] = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n    }\n";
     if (model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
     for (int i = 0; i < max_lobes; ++i)
-      terms.push_back(model.has_through() ? fmt::format("weight_0[{}] * brdfc_ray_anywhere(wi[{}], I, frame_n)", i, i)
+      terms.push_back(model.has_through() ? fmt::format("brdfc_ray_anywhere(weight_0[{}], wi[{}], I, frame_n)", i, i)
                                           : fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
     shader.slots = max_lobes * slots(ClosureKind::PhongRamp);
     if (model.has_mirror()) {

@@ -388,6 +388,16 @@ def test_ashikhmin_shirley_loses_nothing_by_eq_12(extension, empty):
     assert reflected["paper"][2] < 0.47
 
 
+def test_lobes_that_are_not_drawn_cost_no_path(extension, empty):
+    """A lossless model in a white world is white whatever direction is drawn: at one sample, too."""
+    values = {"n": 4.0, "tint": 1.0}
+    scene, material = start(extension, "radziszewski_alda", "sampled", values, max_bounces=1)
+    normals = tilted(np.full(64, 0.6), np.linspace(0, 6, 64))
+    meter = Goniometer(scene, material, normals, samples=1, perspective=True)
+    meter.add_world()
+    assert meter.measure() == pytest.approx(1, abs=0.05)
+
+
 # The Albedo output of the shaders, the panel's numbers and the model must agree.
 
 TABLES = with_every_model(
