@@ -389,7 +389,7 @@ def test_ashikhmin_shirley_loses_nothing_by_eq_12(extension, empty):
 
 
 def test_lobes_that_are_not_drawn_cost_no_path(extension, empty):
-    """A lossless model in a white world is white whatever direction is drawn: at one sample, too."""
+    """A lossless model in a white world is white whatever is drawn: at one sample, too."""
     values = {"n": 4.0, "tint": 1.0}
     scene, material = start(extension, "radziszewski_alda", "sampled", values, max_bounces=1)
     normals = tilted(np.full(64, 0.6), np.linspace(0, 6, 64))
