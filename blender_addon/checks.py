@@ -301,6 +301,18 @@ def node_warnings(node, material, scene):
                         f"expected {parameter['min']:g} to {parameter['max']:g}",
                     )
                 )
+    if axis := form.get("axis"):
+        value = nodes.get_value(node, axis["name"])
+        slack = 1e-6 * axis["max"]
+        if value is not None and not axis["min"] - slack <= value <= axis["max"] + slack:
+            found.append(
+                Finding(
+                    "out_of_fit",
+                    "WARNING",
+                    f"{label}{schema[axis['name']]['label']} is {value:g}; this form was fitted "
+                    f"from {axis['min']:g} to {axis['max']:g} and shows the nearer end of that",
+                )
+            )
     # Measured: a sampled form comes out right, no less noisy, and half as slow again.
     if form.get("lobes") and "path_guiding" not in declared and scene.cycles.use_guiding:
         found.append(

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "analysis/albedo.h"
+#include "analysis/probes.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
 #include "support.h"
@@ -155,11 +156,75 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
     const Shader s = write_shader(m, kind, fold(tabulate_albedo(m), m, fixed), fixed);
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
     EXPECT_THAT(s.source, HasSubstr("weight_0 *= ks;"));
-    EXPECT_EQ(s.source.find("residual_weight *= brdfc_max_component(ks);") != std::string::npos,
+    EXPECT_EQ(s.source.find("residual_weight *= brdfc_max_component(color(ks));") != std::string::npos,
               kind == RepresentationKind::Controlled);
   }
-  fixed.erase("e");
-  EXPECT_THROW(without_factors(m, fixed), std::logic_error);
+  EXPECT_THAT(of("glossy_reflector"), ElementsAre("cr", "kr")) << "a number that multiplies all";
+}
+
+/// Between the knots of the axis a fit is about as close as one that is made there.
+TEST(Fit, RunsAlongANumber) {
+  const Model& m = find_model("coupled");
+  ParamValues values = values_of(m, {"fresnel=schlick"});
+  values.erase("r0");
+  const Fit& fit = fit_of(m, values);
+  ASSERT_TRUE(fit.axis());
+  EXPECT_EQ(fit.axis()->parameter, "r0");
+  EXPECT_EQ(fit.axis()->low, 0);
+  EXPECT_EQ(fit.axis()->high, 0.2);
+  std::vector<double> l1;
+  std::set<double> numbers;
+  for (const ViewError& e : fit.errors()) {
+    l1.push_back(e.relative_l1);
+    numbers.insert(e.number);
+  }
+  EXPECT_EQ(l1.size(), 64 * numbers.size());
+  EXPECT_GE(numbers.size(), 6u);
+  std::sort(l1.begin(), l1.end());
+  EXPECT_LE(l1[l1.size() / 2], 0.007);
+  EXPECT_LE(l1.back(), 0.06);
+  for (const double r0 : {0.0, 0.013, 0.117, 0.2}) {
+    const auto brdf = m.make_double(with_number(m, values, r0));
+    Random random(5);
+    double off = 0, sum = 0;
+    for (const auto& [wi, wo] : direction_pairs(*brdf, 400, random, false)) {
+      const double truth = brdf->eval(wi, wo).r * wi.z, found = evaluate(fit.closures(wo, r0), wi, wo).r;
+      EXPECT_NEAR(fit.f_cos(wi, wo, r0).r, found, 1e-9);
+      off += std::abs(found - truth);
+      sum += truth;
+    }
+    EXPECT_LE(off, 0.02 * sum) << r0;
+  }
+  // Beyond its ends a fit is what it is there.
+  const Vec3<double> wo = direction(0.6, 0), wi = direction(0.4, 2);
+  EXPECT_EQ(evaluate(fit.closures(wo, 0.5), wi, wo).r, evaluate(fit.closures(wo, 0.2), wi, wo).r);
+
+  ParamValues fixed = values;
+  fixed.erase("rm");
+  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, fixed), fixed);
+  EXPECT_THAT(s.source, HasSubstr("float r0 = "));
+  EXPECT_THAT(s.source, HasSubstr("color rm = color("));
+  EXPECT_LE(s.operations, 600);
+  EXPECT_LE(measure_error(m, RepresentationKind::Fitted, fixed).relative_l1.value_or(1), 0.02);
+
+  const Model& lafortune = find_model("lafortune");
+  ParamValues two = values_of(lafortune, {});
+  two.erase("cz");
+  two.erase("e");
+  EXPECT_THROW(fit_of(lafortune, two), std::logic_error);
+}
+
+/// An axis goes by factors where a number does.
+TEST(Fit, AxesAreSliders) {
+  for (const auto& [model, number, scale] : {std::tuple{"phong", "e", AxisScale::Log},
+                                             {"blinn", "e", AxisScale::Log1p},
+                                             {"oren_nayar", "sigma", AxisScale::Linear}}) {
+    const FitAxis axis = fit_axis(*find_model(model).info().param(number));
+    EXPECT_EQ(axis.scale, scale) << model;
+    for (const double x : {0.0, 0.21, 1.0}) EXPECT_NEAR(axis.place(axis.at(x)), x, 1e-12) << model;
+    EXPECT_EQ(axis.place(axis.low - 1), 0);
+    EXPECT_EQ(axis.place(2 * axis.high), 1);
+  }
 }
 
 TEST(Fit, ShadersStayWithinBounds) {

@@ -69,15 +69,23 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "fitted")})[0].forms, fitted);
   EXPECT_THAT(forms({need("a", "coupled", {})}, 0.5), ElementsAre(RepresentationKind::Exact));
 
-  const std::vector<MaterialNeed> two = {need("a", "phong", {"e=20"}), need("b", "phong", {"e=30"})};
+  const std::vector<MaterialNeed> two = {need("a", "lafortune", {"cz=0.5", "e=20"}),
+                                         need("b", "lafortune", {"cz=0.6", "e=30"})};
   EXPECT_THAT(forms(two, 0.5), sampled);
-  EXPECT_THAT(plan_scene(two, {0.5, false})[0].reasons, testing::Contains(HasSubstr("form fitted: a and b")));
+  EXPECT_THAT(plan_scene(two, {0.5, false})[0].reasons,
+              testing::Contains("form fitted: a and b have other values of cz; a and b have other values of e"));
   try {
-    plan_scene({two[0], need("b", "phong", {"e=30"}, "fitted")});
+    plan_scene({two[0], need("b", "lafortune", {"cz=0.6", "e=30"}, "fitted")});
     FAIL();
   } catch (const InputError& e) {
     EXPECT_THAT(e.what(), HasSubstr("material b"));
-    EXPECT_THAT(e.what(), HasSubstr("a and b have other parameters"));
+    EXPECT_THAT(e.what(), HasSubstr("a and b have other values of cz; a and b have other values of e"));
+  }
+  try {
+    plan_scene({need("a", "phong", {"e=20"}), need("b", "phong", {"e=3000"}, "fitted")});
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("is 3000 on b, where a fit runs from 1 to 1000"));
   }
   EXPECT_THAT(forms({need("a", "phong", {"e=20"}, "sampled")}, 0.5), sampled);
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "sampled")}, {0.5, true})[0].forms,
@@ -87,9 +95,20 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   const auto plan = plan_scene({need("a", "phong", {"e=20"}), textured}, {0.03, false, true});
   EXPECT_THAT(plan[0].forms, ElementsAre(RepresentationKind::Fitted, RepresentationKind::Twin)) << "ks multiplies f";
   EXPECT_EQ(plan[0].fixed.count("ks"), 0u);
-  textured.representation = "fitted";
-  textured.textured.insert("e");
-  EXPECT_THROW(plan_scene({textured}), InputError);
+}
+
+/// One number that varies is an axis of a fit's tables, and there is no twin then.
+TEST(Plan, FitsAlongANumber) {
+  auto textured = need("b", "coupled", {"r0=0.1"}, "fitted");
+  textured.textured.insert("r0");
+  const std::vector<MaterialNeed> needs = {need("a", "coupled", {"r0=0.05"}, "fitted"), textured};
+  const PlannedModel plan = plan_scene(needs, {{}, false, true})[0];
+  EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
+  EXPECT_EQ(plan.fixed.count("r0"), 0u);
+  EXPECT_THAT(plan.reasons, testing::Contains("form twin: r0 varies over b"));
+  EXPECT_THROW(plan_scene({need("a", "coupled", {"r0=0.05"}, "twin"), textured}), InputError);
+  textured.textured = {"fresnel"};
+  EXPECT_THROW(plan_scene({textured}), InputError) << "a choice is no axis";
 }
 
 TEST(Plan, FoldedTablesInterpolateToTheSame) {

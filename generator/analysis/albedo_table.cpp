@@ -38,13 +38,6 @@ constexpr std::size_t kCorners = 4;
 /// Averaged over the azimuth of the view direction.
 constexpr std::nullopt_t kAllAzimuths = std::nullopt;
 
-double to_scale(AxisScale s, double x) {
-  return s == AxisScale::Log ? std::log(x) : s == AxisScale::Log1p ? std::log1p(x) : x;
-}
-double from_scale(AxisScale s, double x) {
-  return s == AxisScale::Log ? std::exp(x) : s == AxisScale::Log1p ? std::expm1(x) : x;
-}
-
 /// A coordinate of the albedo: the view cosine or a Number parameter.
 struct Coordinate {
   std::string name;
@@ -685,6 +678,10 @@ class Tabulator {
 };
 
 }  // namespace
+
+double from_scale(AxisScale s, double x) {
+  return s == AxisScale::Log ? std::exp(x) : s == AxisScale::Log1p ? std::expm1(x) : x;
+}
 
 const char* name_of(AxisScale s) { return s == AxisScale::Linear ? "linear" : s == AxisScale::Log ? "log" : "log1p"; }
 

@@ -24,6 +24,10 @@ enum class AxisScale {
   Log,     ///< log(x), all knots > 0
   Log1p,   ///< log(1 + x), all knots >= 0
 };
+template <class T> T to_scale(AxisScale scale, const T& x) {
+  return scale == AxisScale::Log ? log(x) : scale == AxisScale::Log1p ? log(T(1) + x) : x;
+}
+double from_scale(AxisScale, double);
 /// "linear", "log" or "log1p".
 const char* name_of(AxisScale);
 

@@ -10,15 +10,20 @@
 namespace brdfc {
 namespace {
 
-void print_errors(const std::vector<ViewError>& errors, const std::string& label) {
+/// `axis`: the number that the fit runs over, or empty.
+void print_errors(const std::vector<ViewError>& errors, const std::string& axis, const std::string& label) {
   std::vector<double> l1;
   for (const ViewError& e : errors) l1.push_back(e.relative_l1);
   std::sort(l1.begin(), l1.end());
   const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
   fmt::print(stderr, "{}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
              label, quantile(0.5), quantile(0.95), quantile(1));
-  CsvWriter out("cos_theta_o,relative_l1,relative_l2,albedo,negative");
-  for (const ViewError& e : errors) out.row({e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative});
+  CsvWriter out((axis.empty() ? "" : axis + ",") + "cos_theta_o,relative_l1,relative_l2,albedo,negative");
+  for (const ViewError& e : errors) {
+    std::vector<double> row = {e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative};
+    if (!axis.empty()) row.insert(row.begin(), e.number);
+    out.row(row);
+  }
   out.finish();
 }
 
@@ -28,6 +33,7 @@ void add_fit_command(CLI::App& app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
+    std::string over;
     bool pairs = false, twin = false;
   };
   auto o = std::make_shared<Options>();
@@ -40,6 +46,9 @@ void add_fit_command(CLI::App& app) {
       "stderr: the middle, the 95th percentile and the largest of relative_l1");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "name=value; a colour is three numbers or one");
+  cmd->add_option("--over", o->over,
+                  "A number that the fit runs over, from one end of its slider to the other, instead of its value:\n"
+                  "another column, of its values at both ends and half way between any two knots of the tables");
   cmd->add_flag("--twin", o->twin, "Of the twin instead: Blender's own nodes with weights, roughness and tilt by view");
   cmd->add_flag("--pairs", o->pairs,
                 "f cos(theta_i) of the closures instead, for direction pairs.\n"
@@ -47,16 +56,30 @@ void add_fit_command(CLI::App& app) {
                 "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
-    const ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
+    ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
+    double number = 0;
+    if (!o->over.empty()) {
+      const ParamInfo* p = model.info().param(o->over);
+      if (!p || p->kind != ParamKind::Number)
+        input_error("fit: --over {}: expected a parameter of {} that is a number", o->over, o->model);
+      if (o->twin) input_error("fit: a twin is for one set of parameters: --over goes without --twin");
+      number = std::get<double>(values.at(o->over));
+      values.erase(o->over);
+    }
     if (const auto reason = unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
-    const auto print = [&](const auto& form) {
+    const auto print = [&](const auto& form, const auto& closures) {
       if (o->pairs)
-        print_f_cos(
-            [&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(form.closures(wo), wi, wo); });
+        print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(closures(wo), wi, wo); });
       else
-        print_errors(form.errors(), o->model + " " + format_values(model.info(), values));
+        print_errors(form.errors(), o->over, o->model + " " + format_values(model.info(), values));
     };
-    o->twin ? print(twin_of(model, values)) : print(fit_of(model, values));
+    if (o->twin) {
+      const Twin& twin = twin_of(model, values);
+      print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo); });
+    } else {
+      const Fit& fit = fit_of(model, values);
+      print(fit, [&](const Vec3<double>& wo) { return fit.closures(wo, number); });
+    }
   });
 }
 

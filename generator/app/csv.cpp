@@ -90,7 +90,7 @@ Vec3<double> CsvReader::unit_vector(const std::vector<double>& row, std::size_t 
   return v / len;
 }
 
-void CsvWriter::row(std::initializer_list<double> values) {
+void CsvWriter::row(const std::vector<double>& values) {
   const char* separator = "";
   for (const double v : values) {
     fmt::format_to(std::back_inserter(text_), "{}{:.17g}", separator, v);

@@ -46,7 +46,7 @@ class CsvWriter {
  public:
   explicit CsvWriter(const std::string& header) { text_ = header + "\n"; }
   /// Numbers with 17 significant digits.
-  void row(std::initializer_list<double> values);
+  void row(const std::vector<double>& values);
   /// Call at the end: writes what is left.
   void finish();
 

@@ -2,7 +2,9 @@
 // Tables that formulas may look up, over any scalar type.
 #pragma once
 
+#include <algorithm>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,28 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
 template <std::size_t D> Expr lookup(const std::shared_ptr<const Table>& table, const std::array<Expr, D>& x) {
   static_assert(D >= 1 && D <= 4);
   return detail::record_lookup(table, {x.begin(), x.end()});
+}
+
+/// The same where only the table says how many coordinates there are.
+template <Numeric T> T lookup(const std::shared_ptr<const Table>& table, const std::vector<T>& x) {
+  const auto of = [&]<std::size_t D>(std::array<T, D> at) {
+    std::copy_n(x.begin(), D, at.begin());
+    return lookup(table, at);
+  };
+  if (x.size() != table->sizes.size()) throw std::logic_error("table " + table->name + ": wrong number of coordinates");
+  switch (x.size()) {
+    case 1:
+      return of(std::array<T, 1>{});
+    case 2:
+      return of(std::array<T, 2>{});
+    case 3:
+      return of(std::array<T, 3>{});
+    default:
+      return of(std::array<T, 4>{});
+  }
+}
+inline Expr lookup(const std::shared_ptr<const Table>& table, const std::vector<Expr>& x) {
+  return detail::record_lookup(table, x);
 }
 
 }  // namespace brdfc

@@ -20,6 +20,7 @@
 #include "core/hash.h"
 #include "pack/nodes.h"
 #include "pack/shader.h"
+#include "represent/fit.h"
 
 namespace brdfc {
 namespace {
@@ -258,6 +259,13 @@ Json value_json(const ParamValue& value) {
   return std::visit([](const auto& v) { return Json(v); }, value);
 }
 
+/// The number that a fit runs over, and how far.
+Json axis_json(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
+  if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return {};
+  const auto& axis = fit_of(model, without_factors(model, fixed)).axis();
+  return axis ? Json{{"name", axis->parameter}, {"min", axis->low}, {"max", axis->high}} : Json();
+}
+
 BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::path& scratch) {
   const Model& model = *plan.model;
   const ModelInfo& info = model.info();
@@ -312,6 +320,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"cost", cost == costs.end() ? Json() : Json(cost->second)},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
+        {"axis", axis_json(kind, model, plan.fixed)},
         {"sha256", sha256(shader.source)}};
   }
   if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);

@@ -13,21 +13,6 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
   return format_values(info, {{name, value}});
 }
 
-/// Why the materials of a model have no common form made of a fit; nothing if they have one.
-std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs) {
-  const MaterialNeed& first = *needs.front();
-  if (const auto reason = unfit(*first.model, first.values)) return reason;
-  const std::set<std::string> may_vary = factors(*first.model, first.values);
-  for (const MaterialNeed* need : needs) {
-    for (const std::string& name : need->textured)
-      if (!may_vary.count(name)) return fmt::format("{} varies over {}", name, need->id);
-    for (const auto& [name, value] : need->values)
-      if (!may_vary.count(name) && value != first.values.at(name))
-        return fmt::format("{} and {} have other parameters", first.id, need->id);
-  }
-  return std::nullopt;
-}
-
 /// What all materials of a model set to the same constant.
 ParamValues constants(const std::vector<const MaterialNeed*>& needs) {
   ParamValues fixed;
@@ -39,12 +24,46 @@ ParamValues constants(const std::vector<const MaterialNeed*>& needs) {
   return fixed;
 }
 
+/// How a parameter differs between the materials of a model or over one of them.
+std::string how_it_varies(const std::string& name, const std::vector<const MaterialNeed*>& needs) {
+  for (const MaterialNeed* need : needs) {
+    if (need->textured.count(name)) return fmt::format("{} varies over {}", name, need->id);
+    if (need->values.at(name) != needs.front()->values.at(name))
+      return fmt::format("{} and {} have other values of {}", needs.front()->id, need->id, name);
+  }
+  throw std::logic_error(name + " does not vary");
+}
+
+/// Why the materials of a model have no common form made of a fit; nothing if they have one. A fit takes one number
+/// that varies along its slider; a twin takes none.
+std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs, RepresentationKind kind) {
+  const Model& model = *needs.front()->model;
+  const ParamValues fixed = constants(needs);
+  std::optional<std::string> axis;
+  const std::set<std::string> may_vary = factors(model, fixed);
+  for (const ParamInfo& p : model.info().params) {
+    if (fixed.count(p.name) || may_vary.count(p.name)) continue;
+    const std::string how = how_it_varies(p.name, needs);
+    if (p.kind != ParamKind::Number || kind == RepresentationKind::Twin) return how;
+    if (axis) return fmt::format("{}; {}", *axis, how);
+    axis = how;
+    const FitAxis range = fit_axis(p);
+    for (const MaterialNeed* need : needs) {
+      const double value = std::get<double>(need->values.at(p.name));
+      if (!need->textured.count(p.name) && (value < range.low || value > range.high))
+        return fmt::format("{}, and is {:g} on {}, where a fit runs from {:g} to {:g}", how, value, need->id, range.low,
+                           range.high);
+    }
+  }
+  return unfit(model, without_factors(model, fixed));
+}
+
 double fitted_error(const std::vector<const MaterialNeed*>& needs) {
   return *measure_error(*needs.front()->model, RepresentationKind::Fitted, constants(needs)).relative_l1;
 }
 
 bool fits(const std::vector<const MaterialNeed*>& needs, const Budget& budget) {
-  return budget.error && !unfit(needs) && fitted_error(needs) <= *budget.error;
+  return budget.error && !unfit(needs, RepresentationKind::Fitted) && fitted_error(needs) <= *budget.error;
 }
 
 RepresentationKind chosen_form(const MaterialNeed& need, const std::vector<const MaterialNeed*>& needs,
@@ -63,7 +82,7 @@ RepresentationKind chosen_form(const MaterialNeed& need, const std::vector<const
     }
   const RepresentationKind kind = representation_named(need.representation);
   if (is_fit(kind)) {
-    if (const auto reason = unfit(needs))
+    if (const auto reason = unfit(needs, kind))
       input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
                   *reason);
     return kind;
@@ -97,7 +116,7 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
   if (used.count(RepresentationKind::Fitted) || (budget.offer && drawn && fits(needs, budget))) {
     plan.forms.push_back(RepresentationKind::Fitted);
   } else if (budget.error && drawn) {
-    const auto reason = unfit(needs);
+    const auto reason = unfit(needs, RepresentationKind::Fitted);
     plan.reasons.push_back("form fitted: " + (reason ? *reason
                                               : fits(needs, budget)
                                                   ? std::string("the materials ask for another")
@@ -106,7 +125,7 @@ PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed
   }
   if (used.count(RepresentationKind::Controlled)) plan.forms.push_back(RepresentationKind::Controlled);
   if (used.count(RepresentationKind::Twin) || budget.twin) {
-    const auto reason = unfit(needs);
+    const auto reason = unfit(needs, RepresentationKind::Twin);
     if (reason)
       plan.reasons.push_back("form twin: " + *reason);
     else

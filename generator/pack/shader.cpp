@@ -449,14 +449,14 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
             c);
   }
   if (is_fit(kind))
-    for (const std::string& name : factors(model, complete(info, fixed))) {
+    for (const std::string& name : factors(model, fixed)) {
       if (fixed.count(name)) continue;
       for (std::size_t c = 0; c < kinds.size(); ++c)
         if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
       if (controlled)
         body += fmt::format(
-            "    residual_weight *= brdfc_max_component({0});\n"
-            "    residual_colour *= {0} / max(brdfc_max_component({0}), 1e-20);\n",
+            "    residual_weight *= brdfc_max_component(color({0}));\n"
+            "    residual_colour *= {0} / max(brdfc_max_component(color({0})), 1e-20);\n",
             name);
       ++shader.operations;
     }

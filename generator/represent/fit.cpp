@@ -25,6 +25,10 @@ constexpr std::size_t kTrialStride = 4;
 /// The height of the last view; below it the closures keep their shape.
 constexpr double kLastCosine = 2e-3;
 constexpr int kPoints = 3000;
+/// The axis has knots at its quarters, and more half way between two where the sum would be further off there than it
+/// is at the two, down to 1 / kSteps.
+constexpr int kFirstSteps = 4, kSteps = 32;
+constexpr double kWorseBetween = 1.25, kSlightlyOff = 0.005;
 /// Closure columns are scaled to unit integral, so that this is a share of the light: what the fit may not gain by
 /// larger colours of opposite signs.
 constexpr double kRidge = 1e-5;
@@ -117,8 +121,9 @@ Vec3<double> view(double x) {
   return {std::cos(height), 0, std::sin(height)};
 }
 
-/// A view and what was found for it.
-struct Cell : View {
+/// What was found for a view.
+struct Cell {
+  const View* view;
   std::vector<Placed> lobes;
   MatrixXd a;
   VectorXd scale;  ///< what the columns were divided by
@@ -135,22 +140,22 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
   Fitted out;
   const Moments& at_normal = views[0].lobe;
   out.facets = facets(family, at_normal);
-  for (std::size_t i = 0; i < views.size(); i += stride) out.cells.push_back({views[i], {}, {}, {}, {}});
+  for (std::size_t i = 0; i < views.size(); i += stride) out.cells.push_back({&views[i], {}, {}, {}, {}});
   tbb::parallel_for(std::size_t(0), out.cells.size(), [&](std::size_t i) {
     Cell& c = out.cells[i];
-    c.lobes = placed(family, c.lobe, at_normal, std::asin(c.wo.z));
-    c.a = dictionary(c.lobes, out.facets, c.points, c.wo);
+    c.lobes = placed(family, c.view->lobe, at_normal, std::asin(c.view->wo.z));
+    c.a = dictionary(c.lobes, out.facets, c.view->points, c.view->wo);
     // About the integral of a column over all directions: that over those above the surface may vanish.
     c.scale = VectorXd::Constant(c.a.cols(), 1.0 / kRampSize);
     for (std::size_t j = 0; j < c.lobes.size(); ++j) {
-      const Closure<double> l = lobe_closure(c.wo, c.lobes[j].offset, c.lobes[j].exponent);
-      c.scale.segment(Eigen::Index(j * kRampSize), kRampSize) *= dot(l.normal, c.wo);
+      const Closure<double> l = lobe_closure(c.view->wo, c.lobes[j].offset, c.lobes[j].exponent);
+      c.scale.segment(Eigen::Index(j * kRampSize), kRampSize) *= dot(l.normal, c.view->wo);
     }
     c.scale.tail(Eigen::Index(out.facets.size())).setOnes();
     c.a *= c.scale.cwiseInverse().asDiagonal();
   });
 
-  for (Cell& c : out.cells) c.x = MatrixXd::Zero(c.a.cols(), c.f.cols());
+  for (Cell& c : out.cells) c.x = MatrixXd::Zero(c.a.cols(), c.view->f.cols());
   const Eigen::Index channels = views[0].f.cols();
   // Cycles draws diffuse_ramp in proportion to a cosine that its colours need not have: with a first colour other than
   // 0 the variance would be infinite.
@@ -160,7 +165,7 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
     // From one view to the next, so that neighbours are alike and what lies between them is a fit too.
     VectorXd near = VectorXd::Zero(out.cells[0].a.cols());
     for (Cell& c : out.cells) {
-      const VectorXd weight = weights_of(c.points), f = c.f.col(channel);
+      const VectorXd weight = weights_of(c.view->points), f = c.view->f.col(channel);
       c.x.col(channel) = near = solve(c.a, weight, f, near, kRidge, Eigen::Index(out.facets.size()), first_of_diffuse);
       const double albedo = f.dot(weight);
       if (albedo > 0)
@@ -168,25 +173,84 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
     }
   });
   out.error = *std::max_element(error.begin(), error.end());
+  for (Cell& c : out.cells) c.a.resize(0, 0);
   return out;
+}
+
+/// The parameter that values lack; nothing if they are complete. Throws std::logic_error for more than one number.
+const ParamInfo* missing(const Model& model, const ParamValues& values) {
+  const ParamInfo* out = nullptr;
+  for (const ParamInfo& p : model.info().params) {
+    if (values.count(p.name)) continue;
+    if (out || p.kind != ParamKind::Number) throw std::logic_error(model.info().name + ": a fit without " + p.name);
+    out = &p;
+  }
+  return out;
+}
+
+/// Places to ask about a model: the number that `known` lacks at its default and both ends.
+std::vector<ParamValues> places(const Model& model, const ParamValues& known) {
+  std::vector<ParamValues> out = {complete(model.info(), known)};
+  for (const ParamInfo& p : model.info().params)
+    if (!known.count(p.name) && p.kind == ParamKind::Number)
+      for (const double end : {p.soft_min, p.soft_max}) {
+        out.push_back(out.front());
+        out.back()[p.name] = end;
+      }
+  return out;
+}
+
+/// The views of a fit, for one set of parameters.
+std::vector<View> views_of(const BoundModel& bound) {
+  std::vector<View> views(kViews);
+  tbb::parallel_for(0, kViews,
+                    [&](int i) { views[std::size_t(i)] = seen(bound, view(double(i) / (kViews - 1)), kPoints); });
+  return views;
 }
 
 }  // namespace
 
-std::set<std::string> factors(const Model& model, const ParamValues& values) {
+FitAxis fit_axis(const ParamInfo& p) {
+  FitAxis axis{p.name, p.soft_min, p.soft_max, AxisScale::Linear};
+  // What a factor of ten changes is looked at by factors.
+  if (axis.low > 0 && axis.high > 10 * axis.low)
+    axis.scale = AxisScale::Log;
+  else if (axis.low >= 0 && axis.high > 10)
+    axis.scale = AxisScale::Log1p;
+  return axis;
+}
+
+double FitAxis::at(double x) const {
+  if (x <= 0) return low;
+  if (x >= 1) return high;
+  return from_scale(scale, to_scale(scale, low) + x * (to_scale(scale, high) - to_scale(scale, low)));
+}
+
+template <class T> T FitAxis::place(const T& value) const {
+  const double first = to_scale(scale, low), span = to_scale(scale, high) - first;
+  return (to_scale(scale, minimum(maximum(value, T(low)), T(high))) - T(first)) * T(1 / span);
+}
+template double FitAxis::place(const double&) const;
+template Expr FitAxis::place(const Expr&) const;
+
+std::set<std::string> factors(const Model& model, const ParamValues& known) {
   if (!model.has_scatter()) return {};
   std::set<std::string> out;
   for (const ParamInfo& p : model.info().params) {
-    if (p.kind != ParamKind::Color) continue;
-    const Rgb<double> colour{0.3, 0.6, 0.8};
-    ParamValues white = values, coloured = values;
-    white[p.name] = std::array<double, 3>{1, 1, 1};
-    coloured[p.name] = std::array<double, 3>{colour.r, colour.g, colour.b};
-    const auto of_white = model.make_double(white), of_coloured = model.make_double(coloured);
-    Random random(12);
+    if (p.kind == ParamKind::Choice || (p.kind == ParamKind::Number && (p.min > 0 || p.max < 1))) continue;
+    const bool grey = p.kind == ParamKind::Number;
+    const Rgb<double> colour = grey ? Rgb<double>(0.3) : Rgb<double>{0.3, 0.6, 0.8};
+    const auto valued = [&](ParamValues values, const Rgb<double>& c) {
+      values[p.name] = grey ? ParamValue(c.r) : ParamValue(std::array<double, 3>{c.r, c.g, c.b});
+      return model.make_double(values);
+    };
     bool proportional = true;
-    for (const auto& [wi, wo] : direction_pairs(*of_white, 256, random, model.two_sided()))
-      proportional = proportional && relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < 1e-9;
+    for (const ParamValues& values : places(model, known)) {
+      const auto of_white = valued(values, Rgb<double>(1.0)), of_coloured = valued(values, colour);
+      Random random(12);
+      for (const auto& [wi, wo] : direction_pairs(*of_white, 256, random, model.two_sided()))
+        proportional = proportional && relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < 1e-9;
+    }
     if (proportional) out.insert(p.name);
   }
   return out;
@@ -194,49 +258,204 @@ std::set<std::string> factors(const Model& model, const ParamValues& values) {
 
 ParamValues without_factors(const Model& model, const ParamValues& known) {
   ParamValues values = known;
-  for (const std::string& name : factors(model, complete(model.info(), known)))
-    values.emplace(name, std::array<double, 3>{1, 1, 1});
-  for (const ParamInfo& p : model.info().params)
-    if (!values.count(p.name)) throw std::logic_error(model.info().name + ": a fit without " + p.name);
+  for (const std::string& name : factors(model, known)) {
+    const ParamInfo& p = *model.info().param(name);
+    values.emplace(name, p.kind == ParamKind::Number ? ParamValue(1.0) : ParamValue(std::array<double, 3>{1, 1, 1}));
+  }
+  missing(model, values);
   return values;
 }
 
-std::optional<std::string> unfit(const Model& model, const ParamValues& values) {
+ParamValues with_number(const Model& model, const ParamValues& values, double number) {
+  ParamValues out = values;
+  if (const ParamInfo* p = missing(model, values)) out[p->name] = number;
+  return out;
+}
+
+std::optional<std::string> unfit(const Model& model, const ParamValues& known) {
   if (!model.has_scatter()) return "it only reflects and refracts ideally";
-  const auto brdf = model.make_double(values);
-  if (model.has_transmit() || model.has_medium() || brdf->scatters_through()) return "it lets light through";
-  if (!model.info().properties.isotropic && turns(*brdf)) return "it is anisotropic";
+  for (const ParamValues& values : places(model, known)) {
+    const auto brdf = model.make_double(values);
+    if (model.has_transmit() || model.has_medium() || brdf->scatters_through()) return "it lets light through";
+    if (!model.info().properties.isotropic && turns(*brdf)) return "it is anisotropic";
+  }
   return std::nullopt;
 }
 
-Fit::Fit(const Model& model, const ParamValues& values) {
-  const BoundModel bound = bind_model(model, values);
-  std::vector<View> views(kViews);
-  tbb::parallel_for(0, kViews,
-                    [&](int i) { views[std::size_t(i)] = seen(bound, view(double(i) / (kViews - 1)), kPoints); });
-  // Where the channels differ by a factor alone, one fit serves them all.
-  const std::optional<Rgb<double>> tint = make_grey(views);
-  tint_ = tint.value_or(Rgb<double>(1.0));
-  // Few views tell which closures suit.
-  Family family = kFamilies[0];
-  double least = std::numeric_limits<double>::infinity();
-  for (const Family f : kFamilies) {
-    const double error = fit_views(views, kTrialStride, f).error;
-    if (error < least) least = error, family = f;
+namespace {
+
+/// A model at places of the axis: 0 without one.
+class Knots {
+ public:
+  /// `grey`: one column of f that serves all channels is sought.
+  Knots(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis, bool grey)
+      : model_(model), values_(values), axis_(axis), grey_(grey) {}
+
+  BoundModel bound(double x) const {
+    return bind_model(model_, axis_ ? with_number(model_, values_, axis_->at(x)) : values_);
   }
-  const Fitted fitted = fit_views(views, 1, family);
-  const std::vector<Cell>& cells = fitted.cells;
-  const int channels = tint ? 1 : 3;
-  facets_ = fitted.facets;
+
+  /// Sees the model at these places. False where it is not grey there, or of another tint than elsewhere.
+  bool see(const std::vector<double>& places) {
+    std::vector<View> fresh;
+    std::vector<double> at;
+    for (const double x : places) {
+      if (views_.count(x)) continue;
+      at.push_back(x);
+      std::ranges::move(views_of(bound(x)), std::back_inserter(fresh));
+    }
+    if (at.empty()) return true;
+    if (grey_) {
+      const std::optional<Rgb<double>> found = make_grey(fresh);
+      if (!found || (tint_ && !(relative(*found, *tint_) < 1e-6))) return false;
+      tint_ = found;
+    }
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const auto first = fresh.begin() + std::ptrdiff_t(i * kViews);
+      views_[at[i]].assign(std::make_move_iterator(first), std::make_move_iterator(first + kViews));
+    }
+    return true;
+  }
+
+  const std::optional<Rgb<double>>& tint() const { return tint_; }
+  const std::vector<View>& views(double x) const { return views_.at(x); }
+
+  /// What is fitted to every `stride`-th view.
+  std::vector<Fitted> fitted(const std::vector<double>& places, std::size_t stride, Family family) const {
+    std::vector<Fitted> out(places.size());
+    tbb::parallel_for(std::size_t(0), places.size(),
+                      [&](std::size_t i) { out[i] = fit_views(views_.at(places[i]), stride, family); });
+    return out;
+  }
+
+ private:
+  const Model& model_;
+  const ParamValues& values_;
+  const std::optional<FitAxis>& axis_;
+  bool grey_;
+  std::optional<Rgb<double>> tint_;
+  std::map<double, std::vector<View>> views_;
+};
+
+double mean_error(const std::vector<Fitted>& knots) {
+  double sum = 0;
+  for (const Fitted& f : knots) sum += f.error;
+  return sum / double(knots.size());
+}
+
+}  // namespace
+
+Fit::Fit(const Model& model, const ParamValues& values) {
+  if (const ParamInfo* p = missing(model, values)) axis_ = fit_axis(*p);
+  // Where the channels differ by a factor alone, one fit serves them all.
+  if (!make(model, values, true) && !make(model, values, false))
+    throw std::logic_error(model.info().name + ": a fit of colours that is not one");
+}
+
+bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
+  Knots at(model, values, axis_, grey);
+  std::vector<double> knots = {0};
+  for (int i = 1; axis_ && i <= kFirstSteps; ++i) knots.push_back(double(i) / kFirstSteps);
+  if (!at.see(knots)) return false;
+  // Few views tell which closures suit.
+  tint_ = Rgb<double>(1.0);
+  Family family = kFamilies[0];
+  std::vector<Fitted> trial;
+  for (const Family f : kFamilies) {
+    std::vector<Fitted> found = at.fitted(knots, kTrialStride, f);
+    if (trial.empty() || mean_error(found) < mean_error(trial)) trial = std::move(found), family = f;
+  }
+  std::set<double> settled;  // middles between knots that need no knot
+  while (axis_) {
+    tabulate(knots, trial);
+    std::vector<double> needed;
+    for (std::size_t k = 1; k < knots.size(); ++k) {
+      const double x = (knots[k - 1] + knots[k]) / 2;
+      if (knots[k] - knots[k - 1] < 1.5 / kSteps || settled.count(x)) continue;
+      if (!at.see({x})) return false;
+      // At views that are knots.
+      double error = 0;
+      for (std::size_t v = 0; v < kViews; v += kTrialStride)
+        error += l1_at(at.views(x)[v], axis_->at(x)) / double(trial[k].cells.size());
+      if (error > kWorseBetween * (trial[k - 1].error + trial[k].error) / 2 + kSlightlyOff)
+        needed.push_back(x);
+      else
+        settled.insert(x);
+    }
+    if (needed.empty()) break;
+    std::vector<Fitted> fresh = at.fitted(needed, kTrialStride, family);
+    for (std::size_t i = 0; i < needed.size(); ++i) {
+      const auto before = std::ranges::upper_bound(knots, needed[i]) - knots.begin();
+      knots.insert(knots.begin() + before, needed[i]);
+      trial.insert(trial.begin() + before, std::move(fresh[i]));
+    }
+  }
+  tint_ = at.tint().value_or(Rgb<double>(1.0));
+  tabulate(knots, at.fitted(knots, 1, family));
+  // With an axis at both ends, and half way between knots.
+  std::vector<double> proof = {0};
+  for (std::size_t k = 1; k < knots.size(); ++k) proof.push_back((knots[k - 1] + knots[k]) / 2);
+  if (axis_) proof.push_back(1);
+  for (const double x : proof) {
+    const double number = axis_ ? axis_->at(x) : 0;
+    for (ViewError e : view_errors(at.bound(x), [&](const Vec3<double>& wo) { return closures(wo, number); })) {
+      e.number = number;
+      errors_.push_back(e);
+    }
+  }
+  return true;
+}
+
+/// To six digits, which is what a sum of terms of opposite signs needs in single precision: shorter shaders.
+std::vector<double> rounded(std::vector<double> numbers) {
+  for (double& x : numbers) x = std::strtod(fmt::format("{:.6g}", x).c_str(), nullptr);
+  return numbers;
+}
+
+template <class Knot> void Fit::tabulate(const std::vector<double>& places, const std::vector<Knot>& knots) {
+  if (axis_) {
+    // Knots lie at multiples of 1 / kSteps, so that the way from a place to the number of its knot bends there alone.
+    std::vector<double> positions;
+    for (int i = 0; i <= kSteps; ++i) {
+      const double x = double(i) / kSteps;
+      const auto above = std::size_t(std::max(std::ranges::lower_bound(places, x) - places.begin(), std::ptrdiff_t(1)));
+      const double between = (x - places[above - 1]) / (places[above] - places[above - 1]);
+      positions.push_back((double(above - 1) + between) / double(places.size() - 1));
+    }
+    position_ = make_table("position_on_axis", {kSteps + 1}, std::move(positions));
+  }
+  lobes_.clear();
+  linear_.clear();
+  facets_.clear();
+  // Mean over channels of what the model reflects. Along an axis it may change by factors: closures' colours are
+  // tabulated in units of it.
+  const auto albedo_of = [](const Cell& c) {
+    return std::max((c.view->f.transpose() * weights_of(c.view->points)).mean(), 1e-30);
+  };
+  const auto unit = [&](const Cell& c) { return axis_ ? albedo_of(c) : 1.0; };
+  const std::vector<Cell>& first_cells = knots[0].cells;
+  const int count = int(knots.size()), views = int(first_cells.size()), channels = int(first_cells[0].x.cols());
   const auto table = [&](const std::string& name, const auto& value) {
     std::vector<double> numbers;
-    for (const Cell& c : cells) numbers.push_back(value(c));
-    return make_table(name, {kViews}, std::move(numbers));
+    for (const Knot& knot : knots)
+      for (const Cell& c : knot.cells) numbers.push_back(value(c));
+    return make_table(name, axis_ ? std::vector<int>{count, views} : std::vector<int>{views}, rounded(numbers));
   };
-  const std::size_t lobes = cells[0].lobes.size(), closures_count = lobes + 1 + facets_.size();
+  if (axis_) amplitude_ = table("amplitude", [&](const Cell& c) { return std::log(unit(c)); });
+  for (std::size_t i = 0; i < knots[0].facets.size(); ++i) {
+    const Closure<double>& facet = knots[0].facets[i];
+    Facets& f = facets_.emplace_back(Facets{facet.kind, facet.alpha, nullptr});
+    if (!axis_) continue;
+    std::vector<double> numbers;
+    for (const Knot& knot : knots) numbers.push_back(std::log(knot.facets[i].alpha));
+    f.log_alpha = make_table(fmt::format("alpha_of_{}", i), {count}, rounded(numbers));
+  }
+  const std::size_t lobes = first_cells[0].lobes.size(), closures_count = lobes + 1 + facets_.size();
   for (std::size_t j = 0; j < lobes; ++j)
-    lobes_.push_back({table(fmt::format("offset_of_{}", j), [&](const Cell& c) { return c.lobes[j].offset; }),
-                      table(fmt::format("power_of_{}", j), [&](const Cell& c) { return c.lobes[j].exponent; })});
+    lobes_.push_back(
+        {table(fmt::format("offset_of_{}", j),
+               [&](const Cell& c) { return c.lobes[j].offset * std::sqrt(c.lobes[j].exponent); }),
+         table(fmt::format("power_of_{}", j), [&](const Cell& c) { return std::log(c.lobes[j].exponent); })});
   for (std::size_t j = 0; j < closures_count; ++j) {
     const bool ramp = j <= lobes;
     const Eigen::Index first = Eigen::Index(ramp ? j * kRampSize : (lobes + 1) * kRampSize + (j - lobes - 1));
@@ -249,71 +468,119 @@ Fit::Fit(const Model& model, const ParamValues& values) {
         const Eigen::Index of_ramps = Eigen::Index((lobes + 1) * kRampSize);
         const double own = c.x.middleRows(first, entries).cwiseAbs().sum();
         const double all = std::max(c.x.topRows(of_ramps).cwiseAbs().sum(), 1e-300);
-        const double albedo = (c.f.transpose() * weights_of(c.points)).sum() / channels;
-        const double of_facets = c.x.bottomRows(c.x.rows() - of_ramps).sum() / channels;
-        return std::max(albedo - of_facets, 1e-2 * albedo) * (own / all + 1e-3) / (1 + 1e-3 * double(lobes + 1));
+        const double albedo = albedo_of(c), of_facets = c.x.bottomRows(c.x.rows() - of_ramps).sum() / channels;
+        return std::max(albedo - of_facets, 1e-2 * albedo) * (own / all + 1e-3) / (1 + 1e-3 * double(lobes + 1)) /
+               unit(c);
       });
     for (int channel = 0; channel < channels; ++channel) {
       std::vector<double> numbers;
-      for (const Cell& c : cells)
-        for (int k = 0; k < entries; ++k) numbers.push_back(c.x(first + k, channel) / c.scale[first + k]);
-      const std::vector<int> sizes = ramp ? std::vector<int>{kViews, kRampSize} : std::vector<int>{kViews};
-      l.colour.push_back(make_table(fmt::format("colour_of_{}_{}", j, channel), sizes, std::move(numbers)));
+      for (const Knot& knot : knots)
+        for (const Cell& c : knot.cells)
+          for (int k = 0; k < entries; ++k) numbers.push_back(c.x(first + k, channel) / c.scale[first + k] / unit(c));
+      std::vector<int> sizes = {views};
+      if (axis_) sizes.insert(sizes.begin(), count);
+      if (ramp) sizes.push_back(kRampSize);
+      l.colour.push_back(make_table(fmt::format("colour_of_{}_{}", j, channel), sizes, rounded(numbers)));
     }
     linear_.push_back(std::move(l));
   }
-
-  errors_ = view_errors(bound, [&](const Vec3<double>& wo) { return closures(wo); });
 }
 
-template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const T& place) const {
-  const std::array<T, 1> x = {place};
-  if (j < lobes_.size()) return lobe_closure(wo, lookup(lobes_[j].offset, x), lookup(lobes_[j].exponent, x));
+std::size_t Fit::size() const {
+  std::size_t sum = position_ ? position_->values.size() + amplitude_->values.size() : 0;
+  for (const Lobe& l : lobes_) sum += l.offset->values.size() + l.exponent->values.size();
+  for (const Facets& f : facets_) sum += f.log_alpha ? f.log_alpha->values.size() : 0;
+  for (const Linear& l : linear_) {
+    sum += l.weight ? l.weight->values.size() : 0;
+    for (const auto& channel : l.colour) sum += channel->values.size();
+  }
+  return sum;
+}
+
+double Fit::l1_at(const View& view, double number) const {
+  const VectorXd weight = weights_of(view.points);
+  const ClosureSum<double> sum = closures(view.wo, number);
+  MatrixXd off = view.f;
+  for (Eigen::Index i = 0; i < off.rows(); ++i) {
+    const Rgb<double> v = evaluate(sum, view.points.wi[std::size_t(i)], view.wo);
+    const double channels[] = {v.r, v.g, v.b};
+    for (Eigen::Index channel = 0; channel < off.cols(); ++channel) off(i, channel) -= channels[channel];
+  }
+  double worst = 0;
+  for (Eigen::Index channel = 0; channel < off.cols(); ++channel)
+    if (const double albedo = view.f.col(channel).dot(weight); albedo > 0)
+      worst = std::max(worst, off.col(channel).cwiseAbs().dot(weight) / albedo);
+  return worst;
+}
+
+template <class T> std::vector<T> Fit::place(const Vec3<T>& wo, const T& number) const {
+  std::vector<T> at;
+  if (axis_) at.push_back(named("place_on_axis", lookup(position_, std::vector<T>{axis_->place(number)})));
+  at.push_back(named("place", brdfc::place(wo)));
+  return at;
+}
+
+template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const std::vector<T>& at) const {
+  if (j < lobes_.size()) {
+    const T exponent = exp(lookup(lobes_[j].exponent, at));
+    return lobe_closure(wo, lookup(lobes_[j].offset, at) / sqrt(exponent), exponent);
+  }
   if (j == lobes_.size()) return Closure<T>(ClosureKind::DiffuseRamp, Rgb<T>(T(1)));
-  const Closure<double>& facet = facets_[j - lobes_.size() - 1];
+  const Facets& facet = facets_[j - lobes_.size() - 1];
   Closure<T> c(facet.kind, Rgb<T>(T(1)));
-  c.alpha = T(facet.alpha);
+  c.alpha = facet.log_alpha ? exp(lookup(facet.log_alpha, std::vector<T>{at[0]})) : T(facet.alpha);
   return c;
 }
 
-template <class T, std::size_t D> Rgb<T> Fit::colour(std::size_t j, const std::array<T, D>& at) const {
+template <class T> Rgb<T> Fit::colour(std::size_t j, const std::vector<T>& at) const {
   const auto& channels = linear_[j].colour;
   if (channels.size() == 1) return Rgb<T>(lookup(channels[0], at));
   return Rgb<T>(lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at));
 }
 
-template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const T& share, bool divided) const {
-  const T x = named("place", place(wo));
+template <class T> T Fit::amplitude(const std::vector<T>& at) const {
+  return amplitude_ ? named("amplitude", exp(lookup(amplitude_, at))) : T(1);
+}
+
+/// Coordinates of a ramp's table.
+template <class T> std::vector<T> on_ramp(std::vector<T> at, const T& position) {
+  at.push_back(position);
+  return at;
+}
+
+template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const T& number, const T& share, bool divided) const {
+  const std::vector<T> at = place(wo, number);
+  const T amplitude = this->amplitude(at);
   const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
   ClosureSum<T> sum;
   for (std::size_t j = 0; j < linear_.size(); ++j) {
-    Closure<T>& c = sum.emplace_back(shape(j, wo, x));
+    Closure<T>& c = sum.emplace_back(shape(j, wo, at));
     if (!has_ramp(c.kind)) {
-      c.weight = tint * colour(j, std::array<T, 1>{x});
+      c.weight = tint * amplitude * colour(j, at);
       continue;
     }
-    const T weight = maximum(lookup(linear_[j].weight, std::array<T, 1>{x}), T(1e-20)) * share;
+    const T weight = maximum(lookup(linear_[j].weight, at), T(1e-20)) * amplitude * share;
     c.weight = tint * weight;
     for (std::size_t k = 0; k < kRampSize; ++k)
-      c.ramp[k] = colour(j, std::array<T, 2>{x, T(double(k) / (kRampSize - 1))}) / (divided ? weight : T(1));
+      c.ramp[k] = colour(j, on_ramp(at, T(double(k) / (kRampSize - 1)))) * (divided ? amplitude / weight : amplitude);
   }
   return sum;
 }
-template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, bool) const;
-template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Expr&, bool) const;
+template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, const double&, bool) const;
+template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Expr&, const Expr&, bool) const;
 
-template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo) const {
-  const T x = named("place", place(wo));
+template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const T& number) const {
+  const std::vector<T> at = place(wo, number);
   Rgb<T> sum(T(0));
   for (std::size_t j = 0; j < linear_.size(); ++j) {
-    Closure<T> c = shape(j, wo, x);
-    if (!has_ramp(c.kind)) c.weight = colour(j, std::array<T, 1>{x});
-    sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, std::array<T, 2>{x, position}); });
+    Closure<T> c = shape(j, wo, at);
+    if (!has_ramp(c.kind)) c.weight = colour(j, at);
+    sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, on_ramp(at, position)); });
   }
-  return Rgb<T>(T(tint_.r), T(tint_.g), T(tint_.b)) * sum;
+  return Rgb<T>(T(tint_.r), T(tint_.g), T(tint_.b)) * amplitude(at) * sum;
 }
-template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&) const;
-template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&) const;
+template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const double&) const;
+template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Expr&) const;
 
 const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }
 

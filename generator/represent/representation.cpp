@@ -53,9 +53,12 @@ ClosureSum<Expr> with_mirror(const Model& model, const Brdf<Expr>& brdf, Closure
   return sum;
 }
 
+/// The value of a fit's axis.
+Expr recorded_number(const Fit& fit) { return fit.axis() ? Expr::input(fit.axis()->parameter) : Expr(0); }
+
 ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed) {
   const Fit& fit = fit_of(model, without_factors(model, fixed));
-  return with_mirror(model, brdf, fit.closures(recorded_wo(model, brdf), Expr(1), false));
+  return with_mirror(model, brdf, fit.closures(recorded_wo(model, brdf), recorded_number(fit), Expr(1), false));
 }
 
 std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
@@ -84,7 +87,8 @@ void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamVa
                        std::vector<RecordedClosure>& recorded) {
   const ParamValues values = without_factors(model, fixed);
   const std::unique_ptr<Brdf<Expr>> scatter = model.record(values);
-  const Controlled<Expr> c = controlled(*scatter, fit_of(model, values), recorded_wo(model, brdf), recorded_u());
+  const Fit& fit = fit_of(model, values);
+  const Controlled<Expr> c = controlled(*scatter, fit, recorded_wo(model, brdf), recorded_u(), recorded_number(fit));
   output_closures(with_mirror(model, brdf, c.closures), program, recorded, false);
   program.output("wi_x", c.wi.x);
   program.output("wi_y", c.wi.y);
@@ -135,7 +139,8 @@ void require_finite(const Model& model, const ParamValues& values, const Vec3<do
 }
 
 /// Fits are in double precision; what single precision adds is rounding.
-RepresentationError fitted_error(const std::vector<ViewError>& errors, const std::string& what) {
+RepresentationError fitted_error(const std::vector<ViewError>& errors, const std::string& what,
+                                 const std::optional<FitAxis>& axis = {}) {
   RepresentationError out;
   double sum1 = 0, sum2 = 0;
   ViewError worst;
@@ -147,8 +152,9 @@ RepresentationError fitted_error(const std::vector<ViewError>& errors, const std
   }
   out.relative_l1 = sum1;
   out.relative_l2 = sum2;
-  out.note = fmt::format("{} fitted to the model, at worst {:.2g} of the light off, seen at a cosine of {:.2g}", what,
-                         worst.relative_l1, worst.cos_theta_o);
+  out.note = fmt::format("{} fitted to the model, at worst {:.2g} of the light off, seen at a cosine of {:.2g}{}", what,
+                         worst.relative_l1, worst.cos_theta_o,
+                         axis ? fmt::format(", with {} = {:.3g}", axis->parameter, worst.number) : "");
   return out;
 }
 
@@ -162,14 +168,16 @@ RepresentationError controlled_error(const Model& model, const ParamValues& fixe
   Program program;
   std::vector<RecordedClosure> kinds;
   output_controlled(model, *recorded, values, program, kinds);
-  const BoundModel truth = bind_model(model, values);
   const Fit& fit = fit_of(model, values);
-  const RepresentationError of_fit = fitted_error(fit.errors(), "closures");
+  const RepresentationError of_fit = fitted_error(fit.errors(), "closures", fit.axis());
   RepresentationError out;
   Sequence3 points(1);
   for (int view = 0; view < kViews; ++view) {
     const Vec3<double> wo = direction((view + 0.5) / kViews, view);
-    FloatInputs inputs = float_inputs(values, wo);
+    // From the upper end of the axis down, so that it does not go with the height of the view.
+    const double number = fit.axis() ? fit.axis()->at(1 - double(view) / (kViews - 1)) : 0;
+    const BoundModel truth = bind_model(model, with_number(model, values, number));
+    FloatInputs inputs = float_inputs(with_number(model, values, number), wo);
     Rgb<double> difference(0.0);
     for (int i = 0; i < kPoints; ++i) {
       const Vec3<float> v = Vec3<float>::from(points.next());
@@ -181,7 +189,7 @@ RepresentationError controlled_error(const Model& model, const ParamValues& fixe
         require_finite(model, values, wo, name, value, !name.starts_with("weight_") && name != "residual_weight");
       const std::array<float, 3> colour = run.at("residual_colour");
       const double weight = run.at("residual_weight")[0] / double(kPoints);
-      const Residual<double> exact = sample_residual(*truth.brdf, fit, wo, Vec3<double>::from(v));
+      const Residual<double> exact = sample_residual(*truth.brdf, fit, wo, Vec3<double>::from(v), number);
       difference += Rgb<double>(colour[0], colour[1], colour[2]) * weight - exact.weight / double(kPoints);
     }
     out.albedo = std::max({out.albedo, std::abs(difference.r), std::abs(difference.g), std::abs(difference.b)});
@@ -297,8 +305,10 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
   if (kind == RepresentationKind::Controlled) return controlled_error(model, fixed);
-  if (kind == RepresentationKind::Fitted)
-    return fitted_error(fit_of(model, without_factors(model, fixed)).errors(), "closures");
+  if (kind == RepresentationKind::Fitted) {
+    const Fit& fit = fit_of(model, without_factors(model, fixed));
+    return fitted_error(fit.errors(), "closures", fit.axis());
+  }
   if (kind == RepresentationKind::Twin)
     return fitted_error(twin_of(model, without_factors(model, fixed)).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;

@@ -13,13 +13,13 @@ namespace brdfc {
 enum class RepresentationKind {
   Exact,       ///< closures that equal the model
   Sampled,     ///< the shader samples the model itself, one narrow lobe per sample
-  Fitted,      ///< closures that come close to the model, for one set of parameters (fit.h)
+  Fitted,      ///< closures that come close to the model, for one set of parameters or along a number (fit.h)
   Controlled,  ///< those and a sample of what they lack (controlled.h)
   Twin         ///< no shader but Blender's own nodes, close to the model for one set of parameters (twin.h)
 };
 
 const char* name_of(RepresentationKind);
-/// Made of a fit: for one set of parameters, which must all be known.
+/// Made of a fit: for parameters that must be known, but for factors() and one number (fit.h).
 inline bool is_fit(RepresentationKind kind) {
   return kind == RepresentationKind::Fitted || kind == RepresentationKind::Controlled ||
          kind == RepresentationKind::Twin;
@@ -54,9 +54,9 @@ struct Recording {
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
 /// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
-/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but factors(), which its
-/// weights still have to be multiplied by, the mirror's excepted. Throws InputError if more closures than Cycles keeps
-/// would be needed.
+/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number, which it reads,
+/// and factors(), which its weights still have to be multiplied by, the mirror's excepted. Throws InputError if more
+/// closures than Cycles keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
@@ -72,7 +72,7 @@ struct RepresentationError {
 /// Executes the recorded form in float at random parameters and directions (fixed seed). Throws ValueError naming
 /// model, parameters, directions and value for a result that is NaN, infinite or negative.
 /// Of a form of a fit, at the parameters in `fixed`, which the others do without: mean over views with cosines spread
-/// evenly, the worst in `note`.
+/// evenly and over the number that it runs along, the worst in `note`.
 RepresentationError measure_error(const Model&, RepresentationKind, const ParamValues& fixed = {});
 
 }  // namespace brdfc

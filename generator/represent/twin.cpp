@@ -165,9 +165,13 @@ Twin::Twin(const Model& model, const ParamValues& values) {
   ParamValues white = values;
   Rgb<double> factor(1.0);
   for (const std::string& name : factors(model, values)) {
-    const auto& colour = std::get<std::array<double, 3>>(values.at(name));
-    factor = factor * Rgb<double>{colour[0], colour[1], colour[2]};
-    white[name] = std::array<double, 3>{1, 1, 1};
+    if (const auto* colour = std::get_if<std::array<double, 3>>(&values.at(name))) {
+      factor = factor * Rgb<double>{(*colour)[0], (*colour)[1], (*colour)[2]};
+      white[name] = std::array<double, 3>{1, 1, 1};
+    } else {
+      factor = factor * std::get<double>(values.at(name));
+      white[name] = 1.0;
+    }
   }
   const BoundModel bound = bind_model(model, white);
   std::vector<View> views(kTwinKnots);

@@ -203,8 +203,12 @@ std::vector<ViewError> view_errors(const BoundModel& bound,
     const auto share = [](const Eigen::Array3d& a, const Eigen::Array3d& b) {
       return (b > 0).select(a / b.max(1e-300), 0 * a).maxCoeff();
     };
-    errors[i] = {wo.z, share(absolute, albedo), std::sqrt(share(square, squares)), signed_difference.abs().maxCoeff(),
-                 share(negative, albedo)};
+    errors[i] = {wo.z,
+                 share(absolute, albedo),
+                 std::sqrt(share(square, squares)),
+                 signed_difference.abs().maxCoeff(),
+                 share(negative, albedo),
+                 0};
   });
   return errors;
 }

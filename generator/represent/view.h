@@ -79,6 +79,7 @@ struct ViewError {
   double relative_l2 = 0;  ///< root of the integral of its square over that of the model's, largest channel
   double albedo = 0;       ///< largest difference
   double negative = 0;     ///< integral of what lies below 0, over the albedo
+  double number = 0;       ///< value of the axis, of a fit that has one
 };
 /// At cosines evenly spaced from 1 to 0.
 std::vector<ViewError> view_errors(const BoundModel&,

@@ -87,3 +87,66 @@ def test_furnace_of_a_fitted_form(lean, tool):
     made = start(lean)
     scene = bpy.context.scene
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)
+
+
+#: One model along a number: facets, exponents and amplitude all change with it.
+ALONG = {"low": 12.0, "high": 300.0}
+
+
+@pytest.fixture
+def along(extension, lean_pack):
+    folder = lean_pack(
+        {
+            name: {"model": "blinn", "parameters": {"e": e}, "representation": "fitted"}
+            for name, e in ALONG.items()
+        }
+    )
+    extension.pack.use(folder)
+    yield extension
+    extension.pack.use()
+
+
+@pytest.mark.full
+def test_a_number_along_its_slider(along, tool):
+    """A shader serves all values of one number: of two materials, and from an attribute that
+    varies over a third."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    along.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    made = [along.api.new_material("blinn", "fitted", e=e) for e in ALONG.values()]
+    varying = along.api.new_material("blinn", "fitted", e=1.0)
+    attribute = varying.node_tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = "shininess"
+    (node,) = along.nodes.group_nodes(varying)
+    varying.node_tree.links.new(attribute.outputs["Fac"], along.nodes.sockets(node)["e"])
+
+    rng = np.random.default_rng(5)
+    which = np.repeat(np.arange(3), FACETS)
+    towards = unit((0.3, -0.2, 0.9))
+    normals = unit(unit(towards + (0, 0, 1)) + 0.3 * rng.normal(size=(len(which), 3)))
+    number = np.tile(list(ALONG.values()), len(which) // 2)
+    number[: 2 * FACETS] = np.repeat(list(ALONG.values()), FACETS)
+    meter = Goniometer(
+        scene, [*made, varying], normals, 4, which=which, attributes={"shininess": number}
+    )
+    wi, wo = meter.local(meter.add_sun(towards)), meter.wo()
+    picture = meter.measure()
+    for e in ALONG.values():
+        lit = (number == e) & (wi[:, 2] > 1e-4) & (wo[:, 2] > 1e-4)
+        text = tool(
+            "fit", "blinn", f"e={e}", "--over", "e", "--pairs", stdin=pairs_csv(wi[lit], wo[lit])
+        )
+        expected = read_csv(text)[1]
+        off, largest = np.abs(picture[lit] - expected).max(), expected.max()
+        print(f"e = {e}: off by {off:.2g} of {largest:.2g}")
+        assert largest > 0.1
+        assert off <= 1e-3 * largest, e
+
+    # What the sliders can't reach a fit does not hold.
+    def codes(value):
+        (group,) = along.nodes.group_nodes(made[0])
+        along.nodes.set_value(group, "e", value)
+        return [f.code for f in along.checks.warnings(made[0], scene)]
+
+    assert "out_of_fit" not in codes(1000.0)
+    assert "out_of_fit" in codes(1500.0)
