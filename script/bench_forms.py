@@ -4,7 +4,8 @@
 
 Runs in a Python that has `bpy`. A sphere under a sky is rendered with each model's default
 parameters, all forms in turns in one process; the cost of a form is the median over the
-repetitions of its sampling time divided by that of the Glossy node. Prints CSV.
+repetitions of its sampling time divided by that of the Glossy node. Forms made of a fit come from
+a pack of these very materials. Prints CSV.
 """
 
 import argparse
@@ -43,6 +44,28 @@ def scene(model, options):
     }
 
 
+def fits(tool, models, folder):
+    """A pack with every form made of a fit that the models have with their default parameters: its
+    folder, and the forms by model."""
+    materials = {
+        name: {"model": name, "representation": "sampled" if "sampled" in forms else "auto"}
+        for name, forms in models.items()
+    }
+    file = folder / "materials.json"
+    file.write_text(json.dumps({"materials": materials}), encoding="utf-8")
+    # Any error will do: the fit comes beside the sampled form.
+    options = ("--error", "100", "--controlled", "--twin", "--out", folder)
+    subprocess.run(
+        [tool, "build", "--materials", file, *options], stdout=subprocess.DEVNULL, check=True
+    )
+    pack = folder / "brdfc_shaders"
+    made = json.loads((pack / "manifest.json").read_text(encoding="utf-8"))["models"]
+    return pack, {
+        name: [f for f in made[name]["representations"] if f not in forms]
+        for name, forms in models.items()
+    }
+
+
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -59,17 +82,20 @@ def main():
         if not path.is_file():
             parser.error(f"{path}: no such file")
     with zipfile.ZipFile(options.extension) as archive:
-        models = json.loads(archive.read("manifest.json"))["models"]
+        entries = json.loads(archive.read("manifest.json"))["models"]
+    models = {name: list(entry["representations"]) for name, entry in entries.items()}
+    options.tool = options.tool.resolve()
 
     with tempfile.TemporaryDirectory(prefix="brdfc-bench-") as scratch:
+        pack, fitted = fits(options.tool, models, Path(scratch))
         jobs = []
-        for model, entry in models.items():
+        for model, forms in models.items():
             folder = Path(scratch) / model
             folder.mkdir()
             source = folder / "source.json"
             source.write_text(json.dumps(scene(model, options)), encoding="utf-8")
-            subprocess.run([options.tool.resolve(), "scene", source, "--out", folder], check=True)
-            for form in ("glossy", *entry["representations"]):
+            subprocess.run([options.tool, "scene", source, "--out", folder], check=True)
+            for form in ("glossy", *forms, *fitted[model]):
                 jobs.append(
                     {
                         "name": f"{model} {form}",
@@ -77,6 +103,7 @@ def main():
                         "out": str(folder / f"{form}.exr"),
                         "representation": form,
                         "repeat": options.repeat,
+                        "pack": str(pack) if form in fitted[model] else None,
                     }
                 )
         job_file = Path(scratch) / "jobs.json"
@@ -90,9 +117,9 @@ def main():
     }
     print("model,form,cost,cost_min,cost_max,cpu_ns_per_sample")
     samples = options.size**2 * options.spp
-    for model, entry in models.items():
+    for model, forms in models.items():
         unit = times[f"{model} glossy"]
-        for form in ("glossy", *entry["representations"]):
+        for form in ("glossy", *forms, *fitted[model]):
             taken = times[f"{model} {form}"]
             costs = [t / u for t, u in zip(taken, unit, strict=True)]
             print(
