@@ -174,11 +174,12 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
   std::vector<FormChoice> choices;
   const auto consider = [&](RepresentationKind kind, const std::optional<std::string>& missing, bool beside) {
     FormChoice choice{kind, false, true, budget.costs.of(model, kind), ""};
+    std::map<std::string, std::vector<std::string>> users;  // by their reason
     for (std::size_t i = 0; i < needs.size(); ++i)
-      if (chosen[i].form == kind) {
-        choice.why += fmt::format("{}{}: {}", choice.taken ? "; " : "", needs[i]->id, chosen[i].why);
-        choice.taken = true;
-      }
+      if (chosen[i].form == kind) users[chosen[i].why].push_back(needs[i]->id);
+    for (const auto& [reason, ids] : users)
+      choice.why += fmt::format("{}{}: {}", choice.why.empty() ? "" : "; ", fmt::join(ids, ", "), reason);
+    choice.taken = !users.empty();
     if (!choice.taken && missing) {
       choice.exists = false;
       choice.why = *missing;
