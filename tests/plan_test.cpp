@@ -144,9 +144,23 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   const PlannedModel both = plan({need("a", "phong", {"e=20"}), need("b", "phong", {"e=20"}, "sampled")}, 1);
   EXPECT_THAT(both.forms, ElementsAre(kFitted, kSampled)) << "the first is what a form left open becomes in Blender";
 
+  budget.costs = costs("coupled,exact,1.3\ncoupled,sampled,1\ncoupled,fitted,1.2\n");
+  EXPECT_THAT(plan(coupled, 1.1, 0.1).forms, ElementsAre(kSampled));
+  EXPECT_EQ(why(plan(coupled, 1.1, 0.1), kExact), "costs 1.3x, and 1.1x is allowed");
+  EXPECT_EQ(why(plan(coupled, 1.1, 0.1), kFitted), "costs 1.2x, and 1.1x is allowed");
+  EXPECT_EQ(why(plan(coupled, 1.1), kFitted), "sampled comes first");
+  EXPECT_THAT(plan(coupled, 1.25, 0.1).forms, ElementsAre(kFitted));
+  EXPECT_EQ(why(plan(coupled, 1.25, 0.1), kSampled), "fitted comes first");
+  EXPECT_EQ(why(plan(coupled, 1.25, 0.001), kFitted), "off by 0.0043 of the light, and 0.001 is allowed");
+
+  budget.costs = costs("phong,sampled,1.1\nphong,fitted,0.9\n");
   budget.offer = true;
   EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 1).forms, ElementsAre(kSampled, kFitted));
   EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15).forms, ElementsAre(kSampled));
+  EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15), kFitted), "the materials ask for another");
+  EXPECT_THAT(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15, 0.001), kFitted), HasSubstr("off by"));
+  budget.costs = costs("phong,sampled,1.1\nphong,fitted,1.3\n");
+  EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.2, 0.1), kFitted), "costs 1.3x, and 1.2x is allowed");
 }
 
 TEST(Plan, SaysWhichCostIsNotKnown) {

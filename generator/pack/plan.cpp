@@ -151,20 +151,19 @@ std::string why_not(RepresentationKind kind, const Needs& needs, const std::vect
   const auto open = std::find_if(needs.begin(), needs.end(), [&](const MaterialNeed* need) {
     return need->representation == "auto" && lacking(*need, kind).empty();
   });
-  const auto off = [&] {
-    return fmt::format("off by {:.2g} of the light, and {:g} is allowed", fitted_error(needs), *budget.error);
-  };
-  if (open == needs.end()) {
-    const bool may_be_offered = fitted && budget.offer && budget.error;
-    return may_be_offered && !fits(needs, budget) ? off() : "the materials ask for another";
-  }
-  const RepresentationKind first = chosen[std::size_t(open - needs.begin())].form;
+  if (open == needs.end() && !(fitted && budget.offer)) return "the materials ask for another";
   // Of what comes after a form that keeps the budget nothing has to be known.
-  const bool before = first == RepresentationKind::Exact || fitted == !budget.error;
-  if (!before || !over_time(needs, first, budget).empty()) {
-    if (fitted && budget.error && !fits(needs, budget)) return off();
+  const auto rank = [&](RepresentationKind k) {
+    return k == RepresentationKind::Exact ? 0 : k == RepresentationKind::Sampled ? 2 : budget.error ? 1 : 3;
+  };
+  const RepresentationKind first =
+      open == needs.end() ? RepresentationKind::Sampled : chosen[std::size_t(open - needs.begin())].form;
+  if (rank(kind) < rank(first) || !over_time(needs, first, budget).empty()) {
+    if (fitted && budget.error && !fits(needs, budget))
+      return fmt::format("off by {:.2g} of the light, and {:g} is allowed", fitted_error(needs), *budget.error);
     if (const std::string over = over_time(needs, kind, budget); !over.empty()) return over;
   }
+  if (open == needs.end()) return "the materials ask for another";
   return fmt::format("{} comes first", name_of(first));
 }
 
