@@ -270,6 +270,18 @@ TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
   EXPECT_THAT(refusal(head + "lambert,exact,1\nlambert,exact,2\n"), HasSubstr("line 3: form: expected one row"));
 }
 
+TEST(Costs, ThoseOfTheExtensionAreMeasured) {
+  const Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
+  for (const auto& [model, kind] :
+       {std::pair("coupled", RepresentationKind::Exact), std::pair("ward", RepresentationKind::Sampled),
+        std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Controlled),
+        std::pair("phong", RepresentationKind::Twin)}) {
+    const std::optional<double> cost = costs.of(find_model(model), kind);
+    ASSERT_TRUE(cost) << model << " " << name_of(kind);
+    EXPECT_GT(*cost, 0.2);
+    EXPECT_LT(*cost, 10);
+  }
+}
 TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   const PackResult pack = build_pack(options(temp.path()));
   const std::string before = read(pack.zip);
