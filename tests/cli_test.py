@@ -493,9 +493,7 @@ def test_build_prints_every_form_with_cost_and_error(phong):
     assert "not taken: nothing is fitted unasked" in without
 
 
-@pytest.mark.parametrize(
-    "time", ["", "x", "fast", "0x", "-1", "1.2xx", "1,2", "inf", "nan", "1.2 x"]
-)
+@pytest.mark.parametrize("time", ["x", "fast", "0x", "-1", "1.2xx", "1,2", "inf", "nan", "1.2 x"])
 def test_a_time_that_is_none(phong, time):
     refused(phong(f"--time={time}"), "--time: expected a positive number, as 1.2 or 1.2x", time)
     assert not phong.out.exists()
