@@ -67,10 +67,14 @@ def error_text(entry):
     return ", ".join(parts) or "not measured"
 
 
-def cost_text(entry):
+def cost_text(model_name, representation):
     """Render time of a representation in units of Blender's Glossy node."""
-    cost = entry.get("cost")
-    return "not measured" if cost is None else f"{cost:.2f} x Glossy"
+    cost = pack.representation(model_name, representation)["cost"]
+    if cost is None:
+        return "not measured"
+    # A form of other parameters, which a pack cut to a scene holds, has another one.
+    where = ", at default parameters" if pack.fixed(model_name) else ""
+    return f"{cost:.2f} x Glossy{where}"
 
 
 #: View angles in degrees at which the panel shows energy.
@@ -116,7 +120,7 @@ def _draw_form(layout, node, editable):
     for refusal in refusals:
         _wrapped(column, refusal[0].upper() + refusal[1:])
     _wrapped(column, f"Error: {error_text(form)}")
-    _wrapped(column, f"Cost: {cost_text(form)}")
+    _wrapped(column, f"Cost: {cost_text(model_name, representation)}")
     if form.get("closures"):
         _wrapped(column, f"Closures: {form['closures']}")
     if entry.get("albedo"):

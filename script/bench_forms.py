@@ -3,8 +3,10 @@
 """CPU time of every form of every model, in units of Blender's own Glossy node.
 
 Runs in a Python that has `bpy`. A sphere under a sky is rendered with each model's default
-parameters, all forms in turns in one process; the cost of a form is the median over the
-repetitions of its sampling time divided by that of the Glossy node. Prints CSV.
+parameters, all forms of a model in turns in one process, so that what else the machine does meets
+them alike; the cost of a form is the median over the repetitions of its sampling time divided by
+that of the Glossy node. Forms made of a fit come from a pack of these very materials. Prints CSV,
+a model's rows as soon as they are measured.
 """
 
 import argparse
@@ -43,14 +45,60 @@ def scene(model, options):
     }
 
 
+def fits(options, model, forms, folder):
+    """A pack with every form made of a fit that the model has with its default parameters: its
+    folder, and these forms."""
+    material = {"model": model, "representation": "sampled" if "sampled" in forms else "auto"}
+    file = folder / "materials.json"
+    file.write_text(json.dumps({"materials": {"m": material}}), encoding="utf-8")
+    # Any error will do: the fit comes beside the sampled form.
+    command = [options.tool, "build", "--materials", file, "--error", "100", "--controlled"]
+    command += ["--twin", "--out", folder]
+    subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
+    pack = folder / "brdfc_shaders"
+    manifest = json.loads((pack / "manifest.json").read_text(encoding="utf-8"))
+    made = manifest["models"][model]["representations"]
+    return pack, [form for form in made if form not in forms]
+
+
+def measure(options, model, forms, folder):
+    """Sampling times of each form, by name, the Glossy node first."""
+    pack, fitted = fits(options, model, forms, folder)
+    source = folder / "source.json"
+    source.write_text(json.dumps(scene(model, options)), encoding="utf-8")
+    subprocess.run([options.tool, "scene", source, "--out", folder], check=True)
+    names = ("glossy", *forms, *fitted)
+    jobs = [
+        {
+            "name": f"{model} {form}",
+            "scene": str(folder / "scene.json"),
+            "out": str(folder / f"{form}.exr"),
+            "representation": form,
+            "repeat": options.repeat,
+            "pack": str(pack) if form in fitted else None,
+        }
+        for form in names
+    ]
+    file = folder / "jobs.json"
+    file.write_text(json.dumps(jobs), encoding="utf-8")
+    command = [sys.executable, RENDER_SCENE, "--extension", options.extension, "--jobs", file]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+    records = json.loads(done.stdout)
+    return {
+        name: [r["sampling_cpu_seconds"] for r in record["repeats"]]
+        for name, record in zip(names, records, strict=True)
+    }
+
+
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
     parser.add_argument("--extension", required=True, type=Path, help="brdfc_shaders-<version>.zip")
+    parser.add_argument("--model", action="append", help="only this model; may be repeated")
     parser.add_argument("--size", type=int, default=128, help="pixels along each side (128)")
-    parser.add_argument("--spp", type=int, default=64, help="samples a pixel (64)")
+    parser.add_argument("--spp", type=int, default=32, help="samples a pixel (32)")
     parser.add_argument("--repeat", type=int, default=3, help="renders a form (3)")
     options = parser.parse_args()
     if min(options.size, options.spp - 1, options.repeat) < 1:
@@ -58,46 +106,25 @@ def main():
     for path in (options.tool, options.extension):
         if not path.is_file():
             parser.error(f"{path}: no such file")
+    options.tool, options.extension = options.tool.resolve(), options.extension.resolve()
     with zipfile.ZipFile(options.extension) as archive:
-        models = json.loads(archive.read("manifest.json"))["models"]
+        entries = json.loads(archive.read("manifest.json"))["models"]
+    for name in options.model or []:
+        if name not in entries:
+            parser.error(f"--model: expected one of {', '.join(entries)}, got {name!r}")
 
-    with tempfile.TemporaryDirectory(prefix="brdfc-bench-") as scratch:
-        jobs = []
-        for model, entry in models.items():
-            folder = Path(scratch) / model
-            folder.mkdir()
-            source = folder / "source.json"
-            source.write_text(json.dumps(scene(model, options)), encoding="utf-8")
-            subprocess.run([options.tool.resolve(), "scene", source, "--out", folder], check=True)
-            for form in ("glossy", *entry["representations"]):
-                jobs.append(
-                    {
-                        "name": f"{model} {form}",
-                        "scene": str(folder / "scene.json"),
-                        "out": str(folder / f"{form}.exr"),
-                        "representation": form,
-                        "repeat": options.repeat,
-                    }
-                )
-        job_file = Path(scratch) / "jobs.json"
-        job_file.write_text(json.dumps(jobs), encoding="utf-8")
-        command = [sys.executable, RENDER_SCENE, "--extension", options.extension.resolve()]
-        done = subprocess.run([*command, "--jobs", job_file], stdout=subprocess.PIPE, check=True)
-
-    times = {
-        record["name"]: [r["sampling_cpu_seconds"] for r in record["repeats"]]
-        for record in json.loads(done.stdout)
-    }
-    print("model,form,cost,cost_min,cost_max,cpu_ns_per_sample")
+    print("model,form,cost,cost_min,cost_max,cpu_ns_per_sample", flush=True)
     samples = options.size**2 * options.spp
-    for model, entry in models.items():
-        unit = times[f"{model} glossy"]
-        for form in ("glossy", *entry["representations"]):
-            taken = times[f"{model} {form}"]
-            costs = [t / u for t, u in zip(taken, unit, strict=True)]
+    for model in options.model or entries:
+        with tempfile.TemporaryDirectory(prefix="brdfc-bench-") as scratch:
+            forms = list(entries[model]["representations"])
+            times = measure(options, model, forms, Path(scratch))
+        for form, taken in times.items():
+            costs = [t / u for t, u in zip(taken, times["glossy"], strict=True)]
             print(
                 f"{model},{form},{statistics.median(costs):.3f},{min(costs):.3f},{max(costs):.3f},"
-                f"{statistics.median(taken) / samples * 1e9:.1f}"
+                f"{statistics.median(taken) / samples * 1e9:.1f}",
+                flush=True,
             )
 
 

@@ -112,22 +112,22 @@ def forms_of(scene, models, native):
 
 def build_plan(tool, folder, percent):
     """A pack cut to the scene, in folder/plan; returns the command."""
-    command = [tool, "build", "--scene", folder / "scene.json", "--error", percent, "--twin"]
-    command += ["--out", folder / "plan"]
+    command = [tool, "build", "--scene", folder / "scene.json", "--error", percent]
+    command += ["--controlled", "--twin", "--out", folder / "plan"]
     run(command, stdout=subprocess.DEVNULL)
     return {"command": shown(map(str, command))}
 
 
 def planned_forms(folder, scene):
-    """Forms of the pack cut to the scene that the whole extension does not have."""
+    """Forms of the pack cut to the scene that the whole extension does not have: what it chooses,
+    and those that every material can have."""
     pack = "plan/brdfc_shaders"
     models = read_json(folder / pack / "manifest.json")["models"]
     used = [models[m["model"]]["representations"] for m in scene["materials"].values()]
     forms = []
     if any("fitted" in u for u in used):
         forms.append(Form("planned", "auto", pack))
-    if all("twin" in u for u in used):
-        forms.append(Form("twin", "twin", pack))
+    forms += [Form(f, f, pack) for f in ("controlled", "twin") if all(f in u for u in used)]
     return forms
 
 

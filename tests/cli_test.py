@@ -10,6 +10,7 @@ import csv
 import io
 import json
 import math
+import shutil
 import subprocess
 
 import pytest
@@ -421,7 +422,87 @@ def test_fit_prints_its_error_by_view_and_its_closures():
         (["fit", "ward", "ax=0.5", "--twin"], ["ward", "anisotropic"]),
         (["build", "--model", "phong", "--error", "2", "--out", "x"], ["--error", "--scene"]),
         (["build", "--model", "phong", "--twin", "--out", "x"], ["--twin", "--scene"]),
+        (["build", "--model", "phong", "--time", "1x", "--out", "x"], ["--time", "--scene"]),
+        (["build", "--model", "phong", "--controlled", "--out", "x"], ["--controlled", "--scene"]),
     ],
 )
 def test_what_can_not_be_fitted(args, words, tmp_path):
     refused(run(*args), *words)
+
+
+# ---- build within a budget ----------------------------------------------------------------------
+
+
+@pytest.fixture
+def phong(tmp_path):
+    """build(*options): the extension of one material of `phong`, whose forms have costs of their
+    own here."""
+    addon = tmp_path / "addon"
+    shutil.copytree(ROOT / "blender_addon", addon)
+    table = "model,form,cost\nphong,sampled,1.1\nphong,fitted,0.9\nphong,twin,0.7\n"
+    (addon / "costs.csv").write_text(table)
+    file = tmp_path / "m.json"
+    file.write_text(json.dumps({"materials": {"a": {"model": "phong", "parameters": {"e": 20}}}}))
+
+    def build(*options):
+        out = tmp_path / "out"
+        return run("build", "--materials", file, "--addon", addon, "--out", out, *options)
+
+    build.addon, build.out = addon, tmp_path / "out"
+    return build
+
+
+@pytest.mark.parametrize(
+    ("options", "form"),
+    [
+        (["--time", "1.15x"], "sampled"),
+        (["--time", "1"], "fitted"),
+        (["--time", "0.5x"], "fitted"),
+        (["--time", "1x", "--error", "0.1"], "sampled"),
+        (["--time", "1.15", "--error", "5"], "fitted"),
+    ],
+)
+def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
+    result = phong("--explain", *options)
+    assert result.returncode == 0, result.stderr
+    (model,) = json.loads(result.stdout)["models"]
+    choices = {c["form"]: c for c in model["choices"]}
+    assert list(choices) == ["sampled", "fitted", "controlled", "twin"]
+    assert [f for f, c in choices.items() if c["taken"]] == [form]
+    assert all(c["why"] for c in choices.values())
+    assert {f: c["cost"] for f, c in choices.items()} == {
+        "sampled": 1.1,
+        "fitted": 0.9,
+        "controlled": None,
+        "twin": 0.7,
+    }
+    assert choices["sampled"]["error"] == choices["controlled"]["error"] == "expectation"
+    assert 0.005 < choices["fitted"]["error"] < 0.03
+    manifest = json.loads((phong.out / "brdfc_shaders" / "manifest.json").read_text())
+    assert manifest["models"]["phong"]["auto"] == form
+    assert manifest["models"]["phong"]["representations"][form]["cost"] == choices[form]["cost"]
+
+
+def test_build_prints_every_form_with_cost_and_error(phong):
+    lines = phong("--time", "1x").stdout.splitlines()
+    assert "  sampled     1.10x expectation  not taken: costs 1.1x, and 1x is allowed" in lines
+    (fitted,) = [line.split() for line in lines if line.startswith("  fitted ")]
+    assert fitted[:2] == ["fitted", "0.90x"] and 0.005 < float(fitted[2]) < 0.03
+    assert " ".join(fitted[3:]) == "taken: a: the form is left open"
+    without = phong().stdout
+    assert "not taken: nothing is fitted unasked" in without
+
+
+@pytest.mark.parametrize("time", ["x", "fast", "0x", "-1", "1.2xx", "1,2", "inf", "nan", "1.2 x"])
+def test_a_time_that_is_none(phong, time):
+    refused(phong(f"--time={time}"), "--time: expected a positive number, as 1.2 or 1.2x", time)
+    assert not phong.out.exists()
+
+
+def test_costs_that_are_missing_or_wrong(phong):
+    table = phong.addon / "costs.csv"
+    table.write_text("model,form,cost\nphong,sampled,quick\n")
+    refused(phong(), "costs.csv: line 2: cost: expected a positive number, got 'quick'")
+    table.unlink()
+    refused(phong("--time", "1x"), "costs.csv: no such file, and --time needs what forms cost")
+    assert phong().returncode == 0, "the panel can do without"

@@ -211,7 +211,7 @@ TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
 class PackFiles : public ::testing::Test {
  protected:
   PackOptions options(const fs::path& out) const {
-    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan_models({"lambert"}), {}};
+    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan_models({"lambert"}), {}, {}};
   }
   TempFolder temp;
 };
@@ -235,27 +235,53 @@ TEST_F(PackFiles, ManifestAndFilesAgree) {
   for (const auto& entry : fs::recursive_directory_iterator(pack.folder)) EXPECT_NE(entry.path().extension(), ".oso");
 }
 
-TEST_F(PackFiles, CostsComeFromTheMeasuredTable) {
-  const fs::path addon = temp.path() / "addon";
-  fs::copy(BRDFC_SOURCE_DIR "/blender_addon", addon);
+TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {
+  const fs::path table = temp.path() / "costs.csv";
+  std::ofstream(table) << "model,form,cost,cost_min\nlambert,glossy,1,1\nlambert,exact,0.75,0.7\n";
   PackOptions o = options(temp.path() / "out");
-  o.addon = addon;
-  const auto cost = [&](const char* form) {
-    const auto manifest = nlohmann::json::parse(read(build_pack(o).folder / "manifest.json"));
-    return manifest.at("models").at("lambert").at("representations").at(form).at("cost");
-  };
-  std::ofstream(addon / "costs.csv") << "model,form,cost\nlambert,exact,0.75\n";
-  EXPECT_EQ(cost("exact"), 0.75);
-  EXPECT_TRUE(cost("sampled").is_null());
-  std::ofstream(addon / "costs.csv") << "model,form,cost\nlambert,exact,fast\n";
-  try {
-    build_pack(o);
-    FAIL() << "not refused";
-  } catch (const InputError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("costs.csv: line 2"));
-  }
+  o.costs = Costs(table);
+  const auto manifest = nlohmann::json::parse(read(build_pack(o).folder / "manifest.json"));
+  const auto& forms = manifest.at("models").at("lambert").at("representations");
+  EXPECT_EQ(forms.at("exact").at("cost"), 0.75);
+  EXPECT_TRUE(forms.at("sampled").at("cost").is_null());
 }
 
+TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
+  const fs::path table = temp.path() / "costs.csv";
+  EXPECT_EQ(Costs(table).of(find_model("lambert"), RepresentationKind::Exact), std::nullopt) << "there is no file";
+  const auto refusal = [&](const std::string& text) -> std::string {
+    std::ofstream(table) << text;
+    try {
+      const Costs costs(table);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "not refused";
+  };
+  const std::string head = "model,form,cost\n";
+  EXPECT_THAT(refusal(""), HasSubstr("costs.csv: line 1: expected the columns model,form,cost"));
+  EXPECT_THAT(refusal("lambert,exact,1\n"), HasSubstr("line 1: expected the columns model,form,cost"));
+  EXPECT_THAT(refusal(head + "lambert,exact,1\nlambert,sampled,fast\n"),
+              HasSubstr("line 3: cost: expected a positive number, got 'fast'"));
+  for (const char* cost : {"", "0", "-1", "nan", "inf", "1x"})
+    EXPECT_THAT(refusal(head + "lambert,exact," + cost), HasSubstr("line 2: cost: expected")) << cost;
+  EXPECT_THAT(refusal(head + "lambert,excat,1\n"), HasSubstr("line 2: form: unknown representation 'excat'"));
+  EXPECT_THAT(refusal(head + ",exact,1\n"), HasSubstr("line 2: model: expected a name"));
+  EXPECT_THAT(refusal(head + "lambert,exact,1\nlambert,exact,2\n"), HasSubstr("line 3: form: expected one row"));
+}
+
+TEST(Costs, ThoseOfTheExtensionAreMeasured) {
+  const Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
+  for (const auto& [model, kind] :
+       {std::pair("coupled", RepresentationKind::Exact), std::pair("ward", RepresentationKind::Sampled),
+        std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Controlled),
+        std::pair("phong", RepresentationKind::Twin)}) {
+    const std::optional<double> cost = costs.of(find_model(model), kind);
+    ASSERT_TRUE(cost) << model << " " << name_of(kind);
+    EXPECT_GT(*cost, 0.2);
+    EXPECT_LT(*cost, 10);
+  }
+}
 TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   const PackResult pack = build_pack(options(temp.path()));
   const std::string before = read(pack.zip);

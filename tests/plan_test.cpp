@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "pack/shader.h"
 
 namespace brdfc {
@@ -18,6 +21,18 @@ MaterialNeed need(const std::string& id, const std::string& model, const std::ve
                   const std::string& representation = "auto") {
   const Model& m = find_model(model);
   return {id, &m, parse_values(m.info(), values), {}, representation, kDefaultLobes};
+}
+
+Costs costs(const std::string& rows) {
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "brdfc-plan-costs.csv";
+  std::ofstream(file) << "model,form,cost\n" << rows;
+  return Costs(file);
+}
+
+std::string why(const PlannedModel& plan, RepresentationKind form) {
+  for (const FormChoice& c : plan.choices)
+    if (c.form == form) return c.why;
+  return "not considered";
 }
 
 TEST(Plan, EverythingIsEveryModelInEveryForm) {
@@ -72,8 +87,8 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   const std::vector<MaterialNeed> two = {need("a", "lafortune", {"cz=0.5", "e=20"}),
                                          need("b", "lafortune", {"cz=0.6", "e=30"})};
   EXPECT_THAT(forms(two, 0.5), sampled);
-  EXPECT_THAT(plan_scene(two, {0.5, false})[0].reasons,
-              testing::Contains("form fitted: a and b have other values of cz; a and b have other values of e"));
+  EXPECT_EQ(why(plan_scene(two, {0.5, false})[0], RepresentationKind::Fitted),
+            "a and b have other values of cz; a and b have other values of e");
   try {
     plan_scene({two[0], need("b", "lafortune", {"cz=0.6", "e=30"}, "fitted")});
     FAIL();
@@ -105,10 +120,102 @@ TEST(Plan, FitsAlongANumber) {
   const PlannedModel plan = plan_scene(needs, {{}, false, true})[0];
   EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
   EXPECT_EQ(plan.fixed.count("r0"), 0u);
-  EXPECT_THAT(plan.reasons, testing::Contains("form twin: r0 varies over b"));
+  EXPECT_EQ(why(plan, RepresentationKind::Twin), "r0 varies over b");
   EXPECT_THROW(plan_scene({need("a", "coupled", {"r0=0.05"}, "twin"), textured}), InputError);
   textured.textured = {"fresnel"};
   EXPECT_THROW(plan_scene({textured}), InputError) << "a choice is no axis";
+}
+
+constexpr RepresentationKind kExact = RepresentationKind::Exact, kSampled = RepresentationKind::Sampled,
+                             kFitted = RepresentationKind::Fitted, kControlled = RepresentationKind::Controlled;
+
+TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
+  const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})}, coupled = {need("a", "coupled", {})};
+  Budget budget;
+  budget.costs = costs(
+      "phong,sampled,1.1\nphong,fitted,0.9\ncoupled,exact,1.2\ncoupled,sampled,1.3\n"
+      "coupled,fitted,0.8\nphong,controlled,0.1\nphong,twin,0.1\n");
+  const auto plan = [&](const std::vector<MaterialNeed>& needs, double time, std::optional<double> error = {}) {
+    budget.time = time;
+    budget.error = error;
+    return plan_scene(needs, budget)[0];
+  };
+  EXPECT_THAT(plan(phong, 1.15).forms, ElementsAre(kSampled)) << "noise falls with time, what a fit is off by does not";
+  EXPECT_EQ(why(plan(phong, 1.15), kFitted), "sampled comes first");
+  EXPECT_THAT(plan(phong, 1.1).forms, ElementsAre(kSampled));
+  EXPECT_THAT(plan(phong, 1).forms, ElementsAre(kFitted));
+  EXPECT_EQ(why(plan(phong, 1), kSampled), "costs 1.1x, and 1x is allowed");
+  EXPECT_EQ(why(plan(phong, 1), kControlled), "only where it is asked for");
+  EXPECT_THAT(plan(coupled, 1.25).forms, ElementsAre(kExact));
+  EXPECT_THAT(plan(coupled, 1.1).forms, ElementsAre(kFitted));
+
+  // With an error, too, both hold.
+  EXPECT_THAT(plan(phong, 1.15, 0.03).forms, ElementsAre(kFitted));
+  EXPECT_THAT(plan(phong, 1, 0.03).forms, ElementsAre(kFitted));
+  EXPECT_THAT(plan(phong, 1.15, 0.001).forms, ElementsAre(kSampled));
+  EXPECT_THAT(plan(phong, 1, 0.001).forms, ElementsAre(kSampled));
+  EXPECT_THAT(why(plan(phong, 1, 0.001), kSampled), HasSubstr("no form is known to keep 1x, this is the cheapest"));
+  EXPECT_THAT(why(plan(phong, 1, 0.001), kFitted), HasSubstr("0.001 is allowed"));
+
+  EXPECT_THAT(plan(phong, 0.5).forms, ElementsAre(kFitted));
+  EXPECT_EQ(why(plan(phong, 0.5), kFitted), "a: no form is known to keep 0.5x, this is the cheapest");
+  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 0.5).forms, ElementsAre(kSampled)) << "asked for";
+  const PlannedModel both = plan({need("a", "phong", {"e=20"}), need("b", "phong", {"e=20"}, "sampled")}, 1);
+  EXPECT_THAT(both.forms, ElementsAre(kFitted, kSampled)) << "the first is what a form left open becomes in Blender";
+
+  budget.costs = costs("coupled,exact,1.3\ncoupled,sampled,1\ncoupled,fitted,1.2\n");
+  EXPECT_THAT(plan(coupled, 1.1, 0.1).forms, ElementsAre(kSampled));
+  EXPECT_EQ(why(plan(coupled, 1.1, 0.1), kExact), "costs 1.3x, and 1.1x is allowed");
+  EXPECT_EQ(why(plan(coupled, 1.1, 0.1), kFitted), "costs 1.2x, and 1.1x is allowed");
+  EXPECT_EQ(why(plan(coupled, 1.1), kFitted), "sampled comes first");
+  EXPECT_THAT(plan(coupled, 1.25, 0.1).forms, ElementsAre(kFitted));
+  EXPECT_EQ(why(plan(coupled, 1.25, 0.1), kSampled), "fitted comes first");
+  EXPECT_EQ(why(plan(coupled, 1.25, 0.001), kFitted), "off by 0.0043 of the light, and 0.001 is allowed");
+
+  budget.costs = costs("phong,sampled,1.1\nphong,fitted,0.9\n");
+  budget.offer = true;
+  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 1).forms, ElementsAre(kSampled, kFitted));
+  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15).forms, ElementsAre(kSampled));
+  EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15), kFitted), "the materials ask for another");
+  EXPECT_THAT(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15, 0.001), kFitted), HasSubstr("off by"));
+  budget.costs = costs("phong,sampled,1.1\nphong,fitted,1.3\n");
+  EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.2, 0.1), kFitted), "costs 1.3x, and 1.2x is allowed");
+}
+
+TEST(Plan, SaysWhichCostIsNotKnown) {
+  std::vector<MaterialNeed> needs = {need("a", "phong", {"e=20"})};
+  Budget budget;
+  budget.time = 1;
+  PlannedModel plan = plan_scene(needs, budget)[0];
+  EXPECT_THAT(plan.forms, ElementsAre(kSampled));
+  EXPECT_THAT(why(plan, kSampled), HasSubstr("no cost is known"));
+  EXPECT_EQ(why(plan, kFitted), "its cost was not measured");
+
+  budget.costs = costs("phong,fitted,3\n");
+  plan = plan_scene(needs, budget)[0];
+  EXPECT_THAT(plan.forms, ElementsAre(kFitted)) << "the cheapest that is known";
+  EXPECT_EQ(why(plan, kSampled), "its cost was not measured");
+
+  budget.costs = costs("phong,sampled,0.9\n");
+  EXPECT_THAT(plan_scene(needs, budget)[0].forms, ElementsAre(kSampled));
+  needs[0].lobes = 4;
+  EXPECT_EQ(why(plan_scene(needs, budget)[0], kSampled), "a: the form is left open, and no cost is known");
+  budget.costs = costs("phong,sampled,0.9\nphong,fitted,1\n");
+  plan = plan_scene(needs, budget)[0];
+  EXPECT_THAT(plan.forms, ElementsAre(kFitted));
+  EXPECT_EQ(why(plan, kSampled), "its cost was measured with one direction alone");
+}
+
+TEST(Plan, AddsControlledFormsWhereThereCanBeOne) {
+  Budget budget;
+  budget.controlled = true;
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})}, budget)[0].forms, ElementsAre(kSampled, kControlled));
+  const PlannedModel turned = plan_scene({need("a", "ward", {"ax=0.5"})}, budget)[0];
+  EXPECT_THAT(turned.forms, ElementsAre(kSampled));
+  EXPECT_EQ(why(turned, kControlled), "it is anisotropic");
+  const PlannedModel lengthy = plan_scene({need("a", "phong_material", {})}, budget)[0];
+  EXPECT_THAT(lengthy.forms, ElementsAre(kSampled));
+  EXPECT_THAT(why(lengthy, kControlled), HasSubstr("operations"));
 }
 
 TEST(Plan, FoldedTablesInterpolateToTheSame) {

@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,8 +19,9 @@ namespace brdfc {
 namespace {
 
 struct Options {
-  bool all = false, json = false, twin = false;
+  bool all = false, json = false, twin = false, controlled = false;
   std::optional<double> error;  // percent
+  std::optional<std::string> time;
   std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
 };
@@ -43,8 +47,31 @@ std::vector<MaterialNeed> needs_of(const std::vector<Material>& materials) {
   return needs;
 }
 
-nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& result) {
+/// Relative L1, or that a form equals the model in expectation. Nothing for a form that these materials can't have, nor
+/// for a fit that is neither in the pack nor asked for by a budget.
+nlohmann::ordered_json error_of(const Options& options, const PlannedModel& plan, const FormChoice& choice,
+                                const PackResult& result) {
+  constexpr const char* kExpectation = "expectation";
+  const bool fitted = choice.form == RepresentationKind::Fitted;
+  if (!choice.exists || (fitted && !choice.taken && !options.error && !options.time)) return nullptr;
+  for (const PackLine& l : result.lines)
+    if (l.model == plan.model->info().name && l.representation == name_of(choice.form))
+      return l.error.relative_l1 ? nlohmann::ordered_json(*l.error.relative_l1) : kExpectation;
+  if (choice.form == RepresentationKind::Twin) return nullptr;
+  if (choice.form == RepresentationKind::Exact || fitted)
+    return *measure_error(*plan.model, choice.form, plan.fixed).relative_l1;
+  return kExpectation;
+}
+
+nlohmann::ordered_json explanation(const Options& options, const PlannedModel& plan, const PackResult& result) {
   const ModelInfo& info = plan.model->info();
+  nlohmann::ordered_json choices = nlohmann::ordered_json::array();
+  for (const FormChoice& c : plan.choices)
+    choices.push_back({{"form", name_of(c.form)},
+                       {"taken", c.taken},
+                       {"cost", c.cost ? nlohmann::ordered_json(*c.cost) : nullptr},
+                       {"error", error_of(options, plan, c, result)},
+                       {"why", c.why}});
   nlohmann::ordered_json forms = nlohmann::ordered_json::array(), free = nlohmann::ordered_json::array();
   for (const PackLine& l : result.lines)
     if (l.model == info.name)
@@ -67,11 +94,11 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
     else
       std::visit([&](const auto& v) { fixed[p.name] = v; }, it->second);
   }
-  return {{"model", info.name}, {"materials", plan.materials}, {"forms", forms}, {"fixed", fixed},
+  return {{"model", info.name}, {"materials", plan.materials}, {"choices", choices}, {"forms", forms}, {"fixed", fixed},
           {"free", free},       {"left_out", plan.reasons}};
 }
 
-/// Why each thing is left out, and what that saves.
+/// What forms there are and which is taken, why each thing is left out, and what that saves.
 void explain(const Options& options, const std::vector<PlannedModel>& plan, const PackResult& result) {
   std::vector<std::string> unused;
   for (const auto& [name, model] : models())
@@ -80,13 +107,21 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
   if (options.json) {
     nlohmann::ordered_json out{{"scene", options.scene.empty() ? options.materials : options.scene},
                                {"models", nlohmann::ordered_json::array()}};
-    for (const PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
+    for (const PlannedModel& p : plan) out["models"].push_back(explanation(options, p, result));
     out["unused_models"] = unused;
     fmt::print("{}\n", out.dump(2));
     return;
   }
   for (const PlannedModel& p : plan) {
     fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
+    for (const FormChoice& c : p.choices) {
+      const nlohmann::ordered_json error = error_of(options, p, c, result);
+      fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", name_of(c.form), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
+                 error.is_number()   ? fmt::format("{:.2e}", error.get<double>())
+                 : error.is_string() ? error.get<std::string>()
+                                     : "-",
+                 c.taken ? "taken:" : "not taken:", c.why);
+    }
     for (const std::string& reason : p.reasons) fmt::print("  without {}\n", reason);
     for (const PackLine& l : result.lines)
       if (l.model == p.model->info().name)
@@ -94,27 +129,46 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
                    l.representation, l.whole_bytes, l.bytes, l.whole_operations, l.operations, l.whole_closures,
                    l.closures, l.whole_table_floats, l.table_floats);
   }
+  fmt::print("costs: CPU time with default parameters, in units of Blender's Glossy node at equal samples\n");
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
+}
+
+/// A budget of time in units of Blender's Glossy node.
+double parse_time(const std::string& text) {
+  const char *first = text.data(), *last = first + text.size();
+  double value = 0;
+  const auto [end, error] = std::from_chars(first, last, value);
+  const bool ends = end == last || (end + 1 == last && *end == 'x');
+  if (error != std::errc() || !ends || !std::isfinite(value) || value <= 0)
+    input_error("build: --time: expected a positive number, as 1.2 or 1.2x, got '{}'", text);
+  return value;
 }
 
 void run(const Options& options) {
   if (int(options.all) + int(!options.scene.empty()) + int(!options.materials.empty()) + int(!options.models.empty()) !=
       1)
     input_error("build: expected one of --all, --scene FILE, --materials FILE or --model NAME");
-  if (options.json && options.scene.empty() && options.materials.empty())
-    input_error("build: --explain goes with --scene FILE or --materials FILE");
-  if (options.error && options.scene.empty() && options.materials.empty())
-    input_error("build: --error goes with --scene FILE or --materials FILE");
-  if (options.twin && options.scene.empty() && options.materials.empty())
-    input_error("build: --twin goes with --scene FILE or --materials FILE");
+  if (options.scene.empty() && options.materials.empty())
+    for (const auto& [name, given] : {std::pair("--explain", options.json),
+                                      {"--error", options.error.has_value()},
+                                      {"--time", options.time.has_value()},
+                                      {"--controlled", options.controlled},
+                                      {"--twin", options.twin}})
+      if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
+  const std::filesystem::path costs = std::filesystem::path(options.addon) / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
-  Budget budget{{}, !options.materials.empty(), options.twin};
+  Budget budget{{}, !options.materials.empty(), options.twin, options.controlled, {}, Costs(costs)};
   if (options.error) budget.error = *options.error / 100;
+  if (options.time) {
+    budget.time = parse_time(*options.time);
+    if (!std::filesystem::exists(costs))
+      input_error("{}: no such file, and --time needs what forms cost", costs.string());
+  }
   const std::vector<PlannedModel> plan =
       !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials), budget)
       : !options.materials.empty() ? plan_scene(needs_of(load_materials(options.materials)), budget)
                                    : plan_models(options.models);
-  PackOptions pack{options.out, options.addon, plan, {}};
+  PackOptions pack{options.out, options.addon, plan, budget.costs, {}};
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -140,13 +194,18 @@ void add_build_command(CLI::App& app) {
   c->add_option("--materials", options->materials,
                 "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses");
   c->add_flag("--explain", options->json,
-              "With --scene or --materials: what is left out, why and what that saves, as JSON");
+              "With --scene or --materials: what forms there are, what is left out, why and what that saves, as JSON");
   c->add_option(
        "--error", options->error,
        "With --scene or --materials: percent of the light (relative L1 of f cos) that a fitted form may be off,\n"
        "where a material of a scene leaves its form open, or beside the sampled form of a .blend; without, no\n"
        "form is fitted unasked")
       ->check(CLI::Range(0.0, 100.0));
+  c->add_option("--time", options->time,
+                "With --scene or --materials: what a form may cost, as 1.2x, in CPU time of Blender's Glossy node at\n"
+                "equal samples, where a material leaves its form open; --explain prints what forms cost");
+  c->add_flag("--controlled", options->controlled,
+              "With --scene or --materials: also controlled forms, of every material that can have one");
   c->add_flag(
       "--twin", options->twin,
       "With --scene or --materials: also twins, Blender's own nodes for where Open Shading Language does not run,\n"

@@ -74,31 +74,6 @@ Json parameter_json(const ParamInfo& p) {
   return j;
 }
 
-/// CPU time of each "model,form" in units of Blender's Glossy node, from the table that script/bench prints.
-using Costs = std::map<std::string, double>;
-
-/// No file, no costs. Throws InputError naming file, line and what was expected.
-Costs read_costs(const fs::path& path) {
-  Costs costs;
-  if (!fs::exists(path)) return costs;
-  std::istringstream lines(read_text(path));
-  std::string line;
-  std::getline(lines, line);  // heading
-  for (int number = 2; std::getline(lines, line); ++number) {
-    std::istringstream fields(line);
-    std::string model, form, cost;
-    std::getline(fields, model, ',');
-    std::getline(fields, form, ',');
-    std::getline(fields, cost, ',');
-    double value = 0;
-    const auto [end, error] = std::from_chars(cost.data(), cost.data() + cost.size(), value);
-    if (error != std::errc() || end != cost.data() + cost.size() || !(value > 0))
-      input_error("{}: line {}: expected model,form,cost with a positive cost, got '{}'", path.string(), number, line);
-    costs[model + "," + form] = value;
-  }
-  return costs;
-}
-
 Json error_json(const RepresentationError& e) {
   return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
           {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
@@ -304,7 +279,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const bool cut = !is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
     const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
     const RepresentationError error = measure_error(model, kind, plan.fixed);
-    const auto cost = costs.find(info.name + "," + name_of(kind));
+    const std::optional<double> cost = costs.of(model, kind);
     const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
@@ -317,7 +292,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"slots", shader.slots},
         {"statements", shader.operations},
         {"error", error_json(error)},
-        {"cost", cost == costs.end() ? Json() : Json(cost->second)},
+        {"cost", cost ? Json(*cost) : Json()},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
         {"axis", axis_json(kind, model, plan.fixed)},
@@ -338,12 +313,11 @@ PackResult build_pack(const PackOptions& options) {
   if (error || !fs::is_directory(options.out))
     input_error("{}: expected a folder that can be written", options.out.string());
 
-  const Costs costs = read_costs(options.addon / "costs.csv");
   const Staging staging(options.out);
   std::vector<BuiltModel> built(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (options.progress) options.progress(chosen[i].model->info().name, int(i), int(chosen.size()));
-    built[i] = build_model(chosen[i], costs, staging.path());
+    built[i] = build_model(chosen[i], options.costs, staging.path());
   }
 
   PackResult result;

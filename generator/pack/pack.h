@@ -15,6 +15,7 @@ struct PackOptions {
   std::filesystem::path out;         ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
   std::filesystem::path addon;       ///< folder with the add-on's Python and blender_manifest.toml
   std::vector<PlannedModel> models;  ///< what of each model
+  Costs costs = {};                  ///< for the panel
   std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "pack/shader.h"
 #include "represent/fit.h"
 
 namespace brdfc {
@@ -13,8 +14,10 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
   return format_values(info, {{name, value}});
 }
 
+using Needs = std::vector<const MaterialNeed*>;  ///< of one model
+
 /// What all materials of a model set to the same constant.
-ParamValues constants(const std::vector<const MaterialNeed*>& needs) {
+ParamValues constants(const Needs& needs) {
   ParamValues fixed;
   for (const auto& [name, value] : needs.front()->values)
     if (std::all_of(needs.begin(), needs.end(), [&, &n = name, &v = value](const MaterialNeed* need) {
@@ -25,7 +28,7 @@ ParamValues constants(const std::vector<const MaterialNeed*>& needs) {
 }
 
 /// How a parameter differs between the materials of a model or over one of them.
-std::string how_it_varies(const std::string& name, const std::vector<const MaterialNeed*>& needs) {
+std::string how_it_varies(const std::string& name, const Needs& needs) {
   for (const MaterialNeed* need : needs) {
     if (need->textured.count(name)) return fmt::format("{} varies over {}", name, need->id);
     if (need->values.at(name) != needs.front()->values.at(name))
@@ -36,7 +39,7 @@ std::string how_it_varies(const std::string& name, const std::vector<const Mater
 
 /// Why the materials of a model have no common form made of a fit; nothing if they have one. A fit takes one number
 /// that varies along its slider; a twin takes none.
-std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs, RepresentationKind kind) {
+std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
   std::optional<std::string> axis;
@@ -58,80 +61,198 @@ std::optional<std::string> unfit(const std::vector<const MaterialNeed*>& needs, 
   return unfit(model, without_factors(model, fixed));
 }
 
-double fitted_error(const std::vector<const MaterialNeed*>& needs) {
+double fitted_error(const Needs& needs) {
   return *measure_error(*needs.front()->model, RepresentationKind::Fitted, constants(needs)).relative_l1;
 }
 
-bool fits(const std::vector<const MaterialNeed*>& needs, const Budget& budget) {
+bool fits(const Needs& needs, const Budget& budget) {
   return budget.error && !unfit(needs, RepresentationKind::Fitted) && fitted_error(needs) <= *budget.error;
 }
 
-RepresentationKind chosen_form(const MaterialNeed& need, const std::vector<const MaterialNeed*>& needs,
-                               const Budget& budget) {
+/// Why the materials of a model have no common controlled form; nothing if they have one.
+std::optional<std::string> not_controlled(const Needs& needs) {
+  if (const auto reason = unfit(needs, RepresentationKind::Controlled)) return reason;
+  const Model& model = *needs.front()->model;
+  AlbedoTable black;  // the albedo is not what a shader may be too long for
+  black.terms.resize(choice_combinations(model.info()).size());
+  try {
+    write_shader(model, RepresentationKind::Controlled, black, constants(needs));
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return std::nullopt;
+}
+
+/// A form may exist for some choices only: the one that a material would need; empty if it has all.
+std::string lacking(const MaterialNeed& need, RepresentationKind kind) {
+  for (const auto& [name, value] : form_choices(*need.model, kind))
+    if (need.values.at(name) != value) return fmt::format("{}={}", name, std::get<std::string>(value));
+  return {};
+}
+
+/// One cost for all materials of a model: the extension has one preferred form of it.
+std::optional<double> cost_of(const Needs& needs, RepresentationKind kind, const Budget& budget) {
+  const auto draws_more = [](const MaterialNeed* need) { return need->lobes > 1; };
+  // Measured with one direction; more cost more.
+  if (kind == RepresentationKind::Sampled && std::any_of(needs.begin(), needs.end(), draws_more)) return std::nullopt;
+  return budget.costs.of(*needs.front()->model, kind);
+}
+
+/// What keeps a form from a time that it may take; empty if it keeps it.
+std::string over_time(const Needs& needs, RepresentationKind kind, const Budget& budget) {
+  if (!budget.time) return {};
+  const auto cost = cost_of(needs, kind, budget);
+  if (cost) return *cost <= *budget.time ? "" : fmt::format("costs {:.3g}x, and {:g}x is allowed", *cost, *budget.time);
+  return budget.costs.of(*needs.front()->model, kind) ? "its cost was measured with one direction alone"
+                                                      : "its cost was not measured";
+}
+
+struct Chosen {
+  RepresentationKind form;
+  std::string why;
+};
+
+/// The first of these forms that keeps the time, else the cheapest.
+Chosen within_time(const Needs& needs, const std::vector<RepresentationKind>& order, const Budget& budget) {
+  std::optional<RepresentationKind> cheapest;
+  for (const RepresentationKind kind : order) {
+    if (over_time(needs, kind, budget).empty()) return {kind, "the form is left open"};
+    const auto cost = cost_of(needs, kind, budget);
+    if (cost && (!cheapest || *cost < *cost_of(needs, *cheapest, budget))) cheapest = kind;
+  }
+  if (!cheapest) return {order.front(), "the form is left open, and no cost is known"};
+  return {*cheapest, fmt::format("no form is known to keep {:g}x, this is the cheapest", *budget.time)};
+}
+
+/// In place of a form that samples the model: that one, and where the budget allows it the fitted one.
+std::vector<RepresentationKind> sampled_or_fitted(const Needs& needs, const Budget& budget) {
+  if (fits(needs, budget)) return {RepresentationKind::Fitted, RepresentationKind::Sampled};
+  if (budget.time && !budget.error && !unfit(needs, RepresentationKind::Fitted))
+    return {RepresentationKind::Sampled, RepresentationKind::Fitted};
+  return {RepresentationKind::Sampled};
+}
+
+Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& budget) {
   const std::vector<RepresentationKind> known = representations(*need.model);
-  // A form may exist for some choices only.
-  const auto lacking = [&](RepresentationKind kind) {
-    for (const auto& [name, value] : form_choices(*need.model, kind))
-      if (need.values.at(name) != value) return fmt::format("{}={}", name, std::get<std::string>(value));
-    return std::string();
-  };
-  if (need.representation == "auto")
+  if (need.representation == "auto") {
+    std::vector<RepresentationKind> order;
     for (RepresentationKind kind : known) {
-      if (!lacking(kind).empty()) continue;
-      return kind == RepresentationKind::Sampled && fits(needs, budget) ? RepresentationKind::Fitted : kind;
+      if (!lacking(need, kind).empty()) continue;
+      // Nothing has to be fitted for a material that has what comes first.
+      if (!order.empty() && over_time(needs, order.front(), budget).empty()) break;
+      if (kind == RepresentationKind::Sampled)
+        for (const RepresentationKind k : sampled_or_fitted(needs, budget)) order.push_back(k);
+      else
+        order.push_back(kind);
     }
+    return within_time(needs, order, budget);
+  }
   const RepresentationKind kind = representation_named(need.representation);
   if (is_fit(kind)) {
     if (const auto reason = unfit(needs, kind))
       input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
                   *reason);
-    return kind;
+    return {kind, "asked for"};
   }
   if (std::find(known.begin(), known.end(), kind) == known.end())
     input_error("material {}: {} has no form '{}'", need.id, need.model->info().name, need.representation);
-  if (const std::string choice = lacking(kind); !choice.empty())
+  if (const std::string choice = lacking(need, kind); !choice.empty())
     input_error("material {}: {} has the form '{}' only for {}", need.id, need.model->info().name, need.representation,
                 choice);
-  return kind;
+  return {kind, "asked for"};
 }
 
-PlannedModel plan_model(const Model& model, const std::vector<const MaterialNeed*>& needs, const Budget& budget) {
+/// Why no material has a form that exists for some: `chosen` by the others.
+std::string why_not(RepresentationKind kind, const Needs& needs, const std::vector<Chosen>& chosen,
+                    const Budget& budget) {
+  const bool fitted = kind == RepresentationKind::Fitted;
+  if (is_fit(kind) && !fitted) return "only where it is asked for";
+  if (fitted && !budget.error && !budget.time) return "nothing is fitted unasked";
+  const auto open = std::find_if(needs.begin(), needs.end(), [&](const MaterialNeed* need) {
+    return need->representation == "auto" && lacking(*need, kind).empty();
+  });
+  if (open == needs.end() && !(fitted && budget.offer)) return "the materials ask for another";
+  // Of what comes after a form that keeps the budget nothing has to be known.
+  const auto rank = [&](RepresentationKind k) {
+    return k == RepresentationKind::Exact ? 0 : k == RepresentationKind::Sampled ? 2 : budget.error ? 1 : 3;
+  };
+  const RepresentationKind first =
+      open == needs.end() ? RepresentationKind::Sampled : chosen[std::size_t(open - needs.begin())].form;
+  if (rank(kind) < rank(first) || !over_time(needs, first, budget).empty()) {
+    if (fitted && budget.error && !fits(needs, budget))
+      return fmt::format("off by {:.2g} of the light, and {:g} is allowed", fitted_error(needs), *budget.error);
+    if (const std::string over = over_time(needs, kind, budget); !over.empty()) return over;
+  }
+  if (open == needs.end()) return "the materials ask for another";
+  return fmt::format("{} comes first", name_of(first));
+}
+
+/// Every form, and why it is taken or not.
+std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chosen>& chosen, const Budget& budget) {
+  const Model& model = *needs.front()->model;
+  std::vector<FormChoice> choices;
+  const auto consider = [&](RepresentationKind kind, const std::optional<std::string>& missing, bool beside) {
+    FormChoice choice{kind, false, true, budget.costs.of(model, kind), ""};
+    std::map<std::string, std::vector<std::string>> users;  // by their reason
+    for (std::size_t i = 0; i < needs.size(); ++i)
+      if (chosen[i].form == kind) users[chosen[i].why].push_back(needs[i]->id);
+    for (const auto& [reason, ids] : users)
+      choice.why += fmt::format("{}{}: {}", choice.why.empty() ? "" : "; ", fmt::join(ids, ", "), reason);
+    choice.taken = !users.empty();
+    if (!choice.taken && missing) {
+      choice.exists = false;
+      choice.why = *missing;
+    } else if (!choice.taken && beside) {
+      choice.taken = true;
+      choice.why = "beside the others";
+    } else if (!choice.taken) {
+      choice.why = why_not(kind, needs, chosen, budget);
+    }
+    choices.push_back(std::move(choice));
+  };
+  for (const RepresentationKind kind : representations(model)) {
+    std::optional<std::string> missing;
+    if (std::all_of(needs.begin(), needs.end(), [&](const auto* need) { return !lacking(*need, kind).empty(); }))
+      missing = "only for " + lacking(*needs.front(), kind);
+    consider(kind, missing, false);
+  }
+  const std::optional<std::string> missing = unfit(needs, RepresentationKind::Fitted);
+  const bool drawn =
+      std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) { return c.form == RepresentationKind::Sampled; });
+  consider(RepresentationKind::Fitted, missing,
+           budget.offer && drawn &&
+               within_time(needs, sampled_or_fitted(needs, budget), budget).form == RepresentationKind::Fitted);
+  // Telling takes a fit.
+  const bool tell = budget.controlled || budget.error || budget.time;
+  consider(RepresentationKind::Controlled, tell ? not_controlled(needs) : missing, budget.controlled);
+  consider(RepresentationKind::Twin, unfit(needs, RepresentationKind::Twin), budget.twin);
+  return choices;
+}
+
+PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& budget) {
   const ModelInfo& info = model.info();
   PlannedModel plan;
   plan.model = &model;
   plan.max_lobes = 1;
-  std::set<RepresentationKind> used;
+  std::vector<Chosen> chosen;
   for (const MaterialNeed* need : needs) {
     plan.materials.push_back(need->id);
-    used.insert(chosen_form(*need, needs, budget));
+    chosen.push_back(chosen_form(*need, needs, budget));
     plan.max_lobes = std::max(plan.max_lobes, std::min(need->lobes, kMaxLobes));
   }
-  for (const RepresentationKind kind : representations(model)) {
-    if (used.count(kind))
-      plan.forms.push_back(kind);
-    else
-      plan.reasons.push_back(fmt::format("form {}: no material uses it", name_of(kind)));
+  plan.choices = choose_forms(needs, chosen, budget);
+  bool drawn = false;
+  for (const FormChoice& choice : plan.choices) {
+    if (choice.taken) plan.forms.push_back(choice.form);
+    drawn = drawn || (choice.taken && choice.form == RepresentationKind::Sampled);
   }
-  const bool drawn = used.count(RepresentationKind::Sampled) > 0;
-  if (used.count(RepresentationKind::Fitted) || (budget.offer && drawn && fits(needs, budget))) {
-    plan.forms.push_back(RepresentationKind::Fitted);
-  } else if (budget.error && drawn) {
-    const auto reason = unfit(needs, RepresentationKind::Fitted);
-    plan.reasons.push_back("form fitted: " + (reason ? *reason
-                                              : fits(needs, budget)
-                                                  ? std::string("the materials ask for another")
-                                                  : fmt::format("off by {:.2g} of the light, and {:g} is allowed",
-                                                                fitted_error(needs), *budget.error)));
-  }
-  if (used.count(RepresentationKind::Controlled)) plan.forms.push_back(RepresentationKind::Controlled);
-  if (used.count(RepresentationKind::Twin) || budget.twin) {
-    const auto reason = unfit(needs, RepresentationKind::Twin);
-    if (reason)
-      plan.reasons.push_back("form twin: " + *reason);
-    else
-      plan.forms.push_back(RepresentationKind::Twin);
-  }
-  if (used.count(RepresentationKind::Sampled) && plan.max_lobes < kMaxLobes)
+  // What "auto" is in Blender, too.
+  std::stable_partition(plan.forms.begin(), plan.forms.end(), [&](RepresentationKind kind) {
+    for (std::size_t i = 0; i < needs.size(); ++i)
+      if (needs[i]->representation == "auto" && chosen[i].form == kind) return true;
+    return false;
+  });
+  if (drawn && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
   plan.fixed = constants(needs);
   for (const ParamInfo& p : info.params)

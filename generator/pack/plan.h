@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/albedo_table.h"
+#include "pack/costs.h"
 #include "represent/representation.h"
 
 namespace brdfc {
@@ -22,6 +23,15 @@ struct MaterialNeed {
   int lobes = kDefaultLobes;  ///< directions a sampled form draws
 };
 
+/// Why a form of a model is in a pack, or is not.
+struct FormChoice {
+  RepresentationKind form;
+  bool taken = false;
+  bool exists = true;          ///< for these materials
+  std::optional<double> cost;  ///< as Costs has it
+  std::string why;
+};
+
 /// What a pack holds of one model.
 struct PlannedModel {
   const Model* model = nullptr;
@@ -29,7 +39,8 @@ struct PlannedModel {
   ParamValues fixed;                      ///< folded into shaders and tables: no sockets
   std::vector<RepresentationKind> forms;  ///< preferred first
   int max_lobes = kMaxLobes;              ///< of sampled forms
-  std::vector<std::string> reasons;       ///< why something is left out, a line each
+  std::vector<FormChoice> choices;        ///< every form, where materials were planned for
+  std::vector<std::string> reasons;       ///< why something else is left out, a line each
 };
 
 /// Whole models in every form. Throws InputError for an unknown name; no names: every model.
@@ -38,14 +49,19 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names);
 /// What a scene may cost.
 struct Budget {
   std::optional<double> error;  ///< relative L1 of f cos that a form may have where the material leaves the form open
-  bool offer = false;           ///< a fitted form that keeps the error comes beside a sampled one that is asked for
+  bool offer = false;           ///< a fitted form that would be taken then comes beside a sampled one that is asked for
   bool twin = false;            ///< a twin comes beside the other forms where there can be one
+  bool controlled = false;      ///< so does a controlled form
+  std::optional<double> time = {};  ///< cost that a form may have where the material leaves the form open
+  Costs costs = {};
 };
 
 /// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same
 /// constant is fixed, a form that none uses is left out. Throws InputError naming the material for a representation
-/// that its model does not have. A form that is left open is exact where there is one; else fitted, if the budget has
-/// an error and the fit keeps it; else sampled.
+/// that its model does not have.
+/// Where a material leaves its form open, forms stand in this order: exact; fitted, if the budget has an error and the
+/// fit keeps it; sampled; fitted, if the budget has a time and no error. The first is taken that keeps the time, or
+/// where none does the one of the least cost that is known.
 std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Budget& = {});
 
 /// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and

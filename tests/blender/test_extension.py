@@ -664,6 +664,30 @@ def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
             assert "operator brdfc.enable_osl" in text
 
 
+def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):
+    """They are measured at the model's default parameters, which a pack cut to a scene lacks."""
+    names = ("sampled", "fitted", "controlled", "twin")
+    listed = {
+        name: {"model": "phong", "representation": name, "parameters": {"e": 40}} for name in names
+    }
+    extension.pack.use(lean_pack(listed))
+    try:
+        entry = extension.pack.model("phong")
+        assert set(entry["representations"]) == set(names)
+        for name in names:
+            with subtests.test(representation=name):
+                layout = Layout()
+                material = extension.api.new_material("phong", name)
+                extension.ui.draw_material(layout, material, empty)
+                cost = entry["representations"][name]["cost"]
+                assert f"Cost: {cost:.2f} x Glossy, at default parameters" in layout.log
+    finally:
+        extension.pack.use()
+    layout = Layout()
+    extension.ui.draw_material(layout, extension.api.new_material("phong", "sampled"), empty)
+    assert any(line.startswith("Cost:") and line.endswith("x Glossy") for line in layout.log)
+
+
 def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension, empty):
     api, pack, nodes = extension.api, extension.pack, extension.nodes
     only = "'exact' only for fresnel='schlick', not for 'dielectric'"

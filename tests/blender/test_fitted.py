@@ -21,6 +21,9 @@ MATERIALS = {
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
 COSINES = (0.1, 0.4, 0.8, 1.0)
 FACETS = 96
+#: Pixels of a picture of linear colours, and the view at which sampling is tested with them.
+TEXELS = np.array([(0.9, 0.5, 0.1), (0.05, 0.4, 0.8), (1, 1, 1), (0.3, 0.02, 0.6)])
+TEXTURED_COSINE = 0.7
 
 
 @pytest.fixture
@@ -150,3 +153,90 @@ def test_a_number_along_its_slider(along, tool):
 
     assert "out_of_fit" not in codes(1000.0)
     assert "out_of_fit" in codes(1500.0)
+
+
+def textured(extension, lean_pack):
+    """A material whose colour is a picture's, in the fitted form of a pack that was made for it as
+    a person would; and one of the same model that is white."""
+    api, nodes = extension.api, extension.nodes
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    extension.scene_loader.apply_clean_settings(bpy.context.scene, max_bounces=0)
+    made = [api.new_material("phong", "sampled", e=40.0, ks=1.0) for _ in range(2)]
+    tree = made[0].node_tree
+    image = bpy.data.images.new("texels", len(TEXELS), 1, float_buffer=True, is_data=True)
+    image.pixels.foreach_set(np.insert(TEXELS, 3, 1, axis=1).astype(np.float32).ravel())
+    picture = tree.nodes.new("ShaderNodeTexImage")
+    picture.image, picture.interpolation = image, "Closest"
+    node = nodes.group_nodes(made[0])[0]
+    tree.links.new(picture.outputs["Color"], nodes.sockets(node)["ks"])
+    used = api.used_materials()
+    assert [m["parameters"]["ks"] for m in used.values()] == [{"varies": True}, [1, 1, 1]]
+    extension.pack.use(lean_pack(used, "--error", "10"))
+    for material in made:
+        api.switch_representation(material, "fitted")
+        assert nodes.identity(nodes.group_nodes(material)[0]) == ("phong", "fitted")
+    assert nodes.sockets(nodes.group_nodes(made[0])[0])["ks"].is_linked
+    return made
+
+
+def show(meter, texels):
+    """Every point of a facet shows one texel of the picture."""
+    u = np.repeat((texels + 0.5) / len(TEXELS), 4)
+    uv = np.stack([u, np.full_like(u, 0.5)], -1).astype(np.float32)
+    meter.mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv.ravel())
+
+
+def test_a_textured_colour_under_a_sun(extension, lean_pack, tool):
+    """The sum that the tool says for a white one, times the texel, to 1e-3 of its largest value."""
+    rng = np.random.default_rng(6)
+    try:
+        material, _ = textured(extension, lean_pack)
+        count = len(TEXELS) * FACETS
+        half = unit(unit(SUNS[1]) + (0, 0, 1))
+        normals = unit(half + 0.2 * rng.normal(size=(count, 3)))
+        meter = Goniometer(bpy.context.scene, material, normals, samples=4)
+        texels = np.arange(count) % len(TEXELS)
+        show(meter, texels)
+        wi = meter.local(meter.add_sun(unit(SUNS[1])))
+        wo, measured = meter.wo(), meter.measure()
+    finally:
+        extension.pack.use()
+    pairs = pairs_csv(wi, wo)
+    white = read_csv(tool("fit", "phong", "e=40", "ks=1", "--pairs", stdin=pairs))[1]
+    expected = white * TEXELS[texels]
+    off, largest = np.abs(measured - expected).max(), expected.max()
+    print(f"off by {off:.2g} of {largest:.2g}")
+    assert largest > 0.1
+    assert off <= 1e-3 * largest
+    # One colour for all would be far from that.
+    assert np.abs(white * TEXELS.mean(0) - expected).max() > 0.1 * largest
+
+
+def test_a_textured_colour_in_a_white_world(extension, lean_pack):
+    """What is sampled has the texel's colour: the mean of a white one's radiance times the texel
+    within 5 standard errors, 12 comparisons with a fixed seed, so one false alarm in some hundred
+    thousand seeds."""
+    replicas = 144
+    try:
+        made = textured(extension, lean_pack)
+        bpy.context.scene.cycles.seed = 5
+        texels = np.tile(np.arange(len(TEXELS)), 2 * replicas)
+        which = np.repeat((0, 1), len(TEXELS) * replicas)
+        turns = np.random.default_rng(7).uniform(0, 2 * math.pi, len(texels))
+        normals = tilted(np.full(len(texels), TEXTURED_COSINE), turns)
+        meter = Goniometer(bpy.context.scene, made, normals, samples=256, which=which)
+        show(meter, texels)
+        meter.add_world()
+        measured = meter.measure()
+    finally:
+        extension.pack.use()
+    white = measured[which == 1]
+    for texel, colour in enumerate(TEXELS):
+        seen = measured[(which == 0) & (texels == texel)]
+        spread = [seen.std(0, ddof=1) / math.sqrt(len(seen))]
+        spread.append(colour * white.std(0, ddof=1) / math.sqrt(len(white)))
+        error = np.hypot(np.hypot(*spread), 1e-5)
+        difference = seen.mean(0) - colour * white.mean(0)
+        print(f"texel {texel}: {seen.mean(0)}, off by {difference} +- {error}")
+        assert (error < 0.02 * white.mean(0)).all(), "too noisy to tell"
+        assert (np.abs(difference) < 5 * error).all()
