@@ -238,7 +238,11 @@ std::vector<Rect> Guides::cells(const Rect& whole, std::size_t most) const {
   if (edge_ > whole.x0 && edge_ < whole.x1)
     parts = {{whole.x0, edge_, whole.y0, whole.y1}, {edge_, whole.x1, whole.y0, whole.y1}};
   // Each lobe for itself: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
-  for (const std::vector<Point2>& points : lobes_) {
+  for (const std::vector<Point2>& all : lobes_) {
+    // What lies elsewhere would be passed over for every part anew.
+    std::vector<Point2> points;
+    for (const Point2& p : all)
+      if (p.x >= whole.x0 && p.x < whole.x1 && p.y >= whole.y0 && p.y < whole.y1) points.push_back(p);
     std::vector<Rect> finer;
     for (const Rect& part : parts) {
       const std::vector<Rect> more = partition(part, points, most);
