@@ -9,10 +9,11 @@ whose repetitions take turns so that their run times can be compared:
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
-"repeat": ..., "native": ..., "pack": ...}, ...]; all but scene and out are optional and default to
-the options of the command line. "native" names a file with a scene's materials of
+"repeat": ..., "native": ..., "pack": ..., "timed": ...}, ...]; all but scene and out are optional
+and default to the options of the command line. "native" names a file with a scene's materials of
 script/native_nodes.py; "pack" a folder that `brdfc build` wrote, whose models the extension takes
-instead of its own.
+instead of its own; "timed" false leaves out the render with one sample that tells sampling from
+compiling.
 Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
 usage or input.
 """
@@ -107,7 +108,7 @@ def render_once(bpy, loader, job, repetition):
     samples = job["spp"] or scene.cycles.samples
     if job["seed"] is not None:
         scene.cycles.seed = job["seed"]
-    one_cpu, one_wall = timed_render(bpy, 1)
+    one_cpu, one_wall = timed_render(bpy, 1) if job["timed"] else (None, None)
     out = Path(job["out"]).resolve()
     partial = out.with_name(f".{out.stem}.partial.exr")
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -116,11 +117,14 @@ def render_once(bpy, loader, job, repetition):
     times = {
         "cpu_seconds": cpu,
         "wall_seconds": wall,
-        "sampling_cpu_seconds": max(cpu - one_cpu, 0.0) * factor if samples > 1 else cpu,
-        "one_sample_cpu_seconds": one_cpu,
-        "one_sample_wall_seconds": one_wall,
         "load_wall_seconds": load_wall,
     }
+    if job["timed"]:
+        times |= {
+            "sampling_cpu_seconds": max(cpu - one_cpu, 0.0) * factor if samples > 1 else cpu,
+            "one_sample_cpu_seconds": one_cpu,
+            "one_sample_wall_seconds": one_wall,
+        }
     if repetition > 0:
         return times, None
     if not partial.exists():
@@ -176,6 +180,7 @@ def read_jobs(options):
         "repeat": options.repeat,
         "native": None,
         "pack": None,
+        "timed": True,
     }
     if options.jobs:
         try:
@@ -202,6 +207,8 @@ def read_jobs(options):
                 raise UsageError(
                     f"job {index}: {key}: expected a whole number from {least}, got {value!r}"
                 )
+        if not isinstance(merged["timed"], bool):
+            raise UsageError(f"job {index}: timed: expected true or false, got {merged['timed']!r}")
         if merged["representation"] == "scene":
             merged["representation"] = None
         complete.append(merged)

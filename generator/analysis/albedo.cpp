@@ -238,7 +238,11 @@ std::vector<Rect> Guides::cells(const Rect& whole, std::size_t most) const {
   if (edge_ > whole.x0 && edge_ < whole.x1)
     parts = {{whole.x0, edge_, whole.y0, whole.y1}, {edge_, whole.x1, whole.y0, whole.y1}};
   // Each lobe for itself: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
-  for (const std::vector<Point2>& points : lobes_) {
+  for (const std::vector<Point2>& all : lobes_) {
+    // What lies elsewhere would be passed over for every part anew.
+    std::vector<Point2> points;
+    for (const Point2& p : all)
+      if (p.x >= whole.x0 && p.x < whole.x1 && p.y >= whole.y0 && p.y < whole.y1) points.push_back(p);
     std::vector<Rect> finer;
     for (const Rect& part : parts) {
       const std::vector<Rect> more = partition(part, points, most);
@@ -526,6 +530,21 @@ MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<
   // A tent makes the integrand periodic, which the sequence rewards.
   const auto tent = [](double u) { return std::min(1 - std::abs(2 * u - 1), 1 - 1e-16); };
   std::vector<double> scratch(n);
+  const auto mirrors = [&](const Vec3<double>& wo) {
+    double* out = &scratch[3 * models.size()];
+    for (const Brdf<double>* model : models) {
+      const Rgb<double> mirror = model->mirror(wo) + model->transmit(wo);
+      require_value(mirror, "mirror", label, {-wo.x, -wo.y, wo.z}, wo);
+      *out++ = mirror.r;
+      *out++ = mirror.g;
+      *out++ = mirror.b;
+    }
+  };
+  Vec3<double> wo;
+  if (phi_o) {
+    wo = direction(cos_theta_o, *phi_o);
+    mirrors(wo);
+  }
   for (int k = 0; k < kCopies; ++k)
     for (std::size_t lobe = 0; lobe + 1 < borders.size(); ++lobe) {
       const double width = borders[lobe + 1] - borders[lobe];
@@ -534,17 +553,12 @@ MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<
       for (int i = 0; i < each; ++i) {
         const Vec3<double> p = sequence.next();
         const double choice = known ? 0.5 : double(random() >> 11) * 0x1p-53;
-        const Vec3<double> wo = direction(cos_theta_o, phi_o ? *phi_o : 2 * kPi * p.z);
+        if (!phi_o) {
+          wo = direction(cos_theta_o, 2 * kPi * p.z);
+          mirrors(wo);
+        }
         const AlbedoIntegrator integrator(guide, models, wo, label);
         integrator.evaluate_sample({borders[lobe] + choice * width, tent(p.x), tent(p.y)}, scratch.data());
-        for (std::size_t m = 0; m < models.size(); ++m) {
-          const Rgb<double> mirror = models[m]->mirror(wo) + models[m]->transmit(wo);
-          require_value(mirror, "mirror", label, {-wo.x, -wo.y, wo.z}, wo);
-          double* out = &scratch[3 * (models.size() + m)];
-          out[0] = mirror.r;
-          out[1] = mirror.g;
-          out[2] = mirror.b;
-        }
         for (std::size_t c = 0; c < n; ++c) means[std::size_t(k)][c] += scratch[c] * width / each;
       }
     }

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "analysis/albedo.h"
 #include "model/choices.h"
@@ -128,6 +129,7 @@ class Tabulator {
 
   AlbedoTable run() {
     study_degrees();
+    study_channels();
     study_azimuth();
     make_probes();
     std::vector<std::vector<AlbedoTerm>> terms;
@@ -153,14 +155,25 @@ class Tabulator {
 
   Coefficients coefficients(const ParamValues& combination, const Position& x, std::optional<double> phi,
                             int samples = kGridSamples, std::uint64_t seed = 0) const {
+    return coefficients(combination, x, phi, samples, seed, share_channels_);
+  }
+
+  /// With share_channels three nodes of the polynomial are red, green and blue of one model: a third of the work.
+  Coefficients coefficients(const ParamValues& combination, const Position& x, std::optional<double> phi, int samples,
+                            std::uint64_t seed, bool share_channels) const {
     ParamValues values = values_at(combination, x);
     for (const std::string& c : colors_) values[c] = 0.5;
     const auto guide = model_.make_double(values);
-    const std::size_t nodes = monomials();
+    const std::size_t nodes = monomials(), channels = share_channels ? 3 : 1;
     std::vector<std::unique_ptr<Brdf<double>>> models;
     std::vector<const Brdf<double>*> pointers;
-    for (std::size_t k = 0; k < nodes; ++k) {
-      for (std::size_t c = 0; c < colors_.size(); ++c) values[colors_[c]] = double(power(k, c)) / degrees_[c];
+    for (std::size_t first = 0; first < nodes; first += channels) {
+      for (std::size_t c = 0; c < colors_.size(); ++c) {
+        std::array<double, 3> color;
+        for (std::size_t i = 0; i < 3; ++i)
+          color[i] = double(power(std::min(first + i % channels, nodes - 1), c)) / degrees_[c];
+        values[colors_[c]] = color;
+      }
       models.push_back(model_.make_double(values));
       pointers.push_back(models.back().get());
     }
@@ -168,6 +181,14 @@ class Tabulator {
     if (!depends_on_azimuth_ && !phi) phi = 0;
     const MeanAlbedo mean = mean_albedos(*guide, pointers, x[0], phi, name, samples, seed);
     Coefficients out{mean.scattered, mean.mirror, mean.error * double(nodes)};
+    if (share_channels)
+      for (std::vector<Rgb<double>>* v : {&out.scattered, &out.mirror}) {
+        const std::vector<Rgb<double>> shared = std::exchange(*v, std::vector<Rgb<double>>(nodes));
+        for (std::size_t k = 0; k < nodes; ++k) {
+          const Rgb<double>& c = shared[k / 3];
+          (*v)[k] = Rgb<double>(k % 3 == 0 ? c.r : k % 3 == 1 ? c.g : c.b);
+        }
+      }
     // From values at the colours 0, 1 or 0, 1/2, 1 to coefficients of the monomials.
     for (std::size_t c = 0; c < colors_.size(); ++c)
       for (std::size_t k = 0; k < nodes; ++k) {
@@ -224,6 +245,22 @@ class Tabulator {
             if (max_abs(v[0] + v[2] - v[1] * 2.) > noise + 1e-9 * max_abs(v[0] + v[2])) degrees_[c] = 2;
         }
       }
+  }
+
+  /// Do channels know nothing of each other, and are they alike? Then sharing gives the same numbers to the last bit.
+  /// prove() holds the polynomial that follows against the model at random colours, which differ in every channel.
+  void study_channels() {
+    if (monomials() == 1) return;
+    std::mt19937_64 random(29);
+    for (const ParamValues& combination : combinations_)
+      for (int i = 0; i < 4; ++i) {
+        const Position x = random_position(random);
+        const double phi = 2 * kPi * double(i) / 4 + 0.3;
+        const Coefficients apart = coefficients(combination, x, phi, kGridSamples, 0, false),
+                           shared = coefficients(combination, x, phi, kGridSamples, 0, true);
+        if (distance(apart, shared) != 0 || apart.error != shared.error) return;
+      }
+    share_channels_ = true;
   }
 
   static double distance(const Coefficients& a, const Coefficients& b) {
@@ -669,6 +706,7 @@ class Tabulator {
   std::vector<int> degrees_;               // of the polynomial in each colour
   std::vector<ParamValues> combinations_;  // that differ
   std::vector<std::size_t> stands_for_;    // of each combination of choices, the one that is the same
+  bool share_channels_ = false;            // channels are alike and apart
   bool depends_on_azimuth_ = false;
   std::vector<char> turns_;       // per coordinate: does nothing but turn the model; empty if nothing does
   std::vector<Position> probes_;  // lines through these tell what a coefficient depends on

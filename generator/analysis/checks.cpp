@@ -143,20 +143,29 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
   };
   std::vector<double> expected;
   double total = 0, uncertain = 0;
+  ChiSquare result;
   for (const Cell& c : cells) {
     // Twice, because what one mesh misses another does not.
     const auto probability = [&](std::size_t most) {
       return integrate(density, 1, guides.cells(c.rect, most), {1e-7, 0, 1500});
     };
-    const CubatureResult coarse = probability(16), r = probability(4);
-    uncertain += std::abs(r.value[0] - coarse.value[0]);
+    // An error of the expected counts must stay small beside their fluctuation. It only grows.
+    const auto known = [&] { return uncertain * samples < 0.1 * std::sqrt(double(samples) / double(cells.size())); };
+    const CubatureResult r = probability(4);
+    uncertain += r.error[0];
+    if (known()) uncertain += std::abs(r.value[0] - probability(16).value[0]);
+    result.converged = known();
+    if (!result.converged) break;
     expected.push_back(r.value[0] * samples);
     total += r.value[0];
-    uncertain += r.error[0];
   }
-  ChiSquare result;
-  // Lost samples are the last cell. An error of the expected counts must stay small beside their fluctuation.
-  result.converged = uncertain * samples < 0.1 * std::sqrt(double(samples) / double(cells.size()));
+  if (!result.converged) {
+    // Nothing to compare with, but bad values show.
+    Point2 p;
+    for (int i = 0; i < samples; ++i) draw(random, p);
+    return result;
+  }
+  // Lost samples are the last cell.
   expected.push_back(std::max(0., 1 - total) * samples);
   std::vector<double> observed(expected.size(), 0.);
   for (int i = 0; i < samples; ++i) {

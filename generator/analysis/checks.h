@@ -27,7 +27,7 @@ struct ChiSquare {
   double p = 1;  ///< probability of a statistic at least as large
   double statistic = 0;
   int degrees = 0;        ///< cells after pooling, less one
-  bool converged = true;  ///< whether the expected counts are known well enough
+  bool converged = true;  ///< whether the expected counts are known well enough; if not, the rest is as it stands here
 };
 /// Compares a histogram of sample() with the integral of pdf() over the same cells, lost samples being one more cell.
 /// The cells are drawn around other samples, so that every lobe, however narrow, is cut into several. Cells with fewer

@@ -441,9 +441,13 @@ std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& ini
 
 }  // namespace detail
 
-std::vector<bool> Program::reachable() const {
+const std::vector<bool>& Program::reachable() const {
   const Recorder& r = Recorder::current();
-  std::vector<bool> seen(std::size_t(r.size()), false);
+  std::vector<bool>& seen = reachable_;
+  // Nodes and outputs are added, never changed.
+  if (seen.size() == std::size_t(r.size()) && outputs_seen_ == outputs_.size()) return seen;
+  seen.assign(std::size_t(r.size()), false);
+  outputs_seen_ = outputs_.size();
   std::vector<int> stack;
   for (const auto& [name, id] : outputs_) stack.push_back(id);
   while (!stack.empty()) {
@@ -457,7 +461,7 @@ std::vector<bool> Program::reachable() const {
 }
 
 int Program::operations() const {
-  const std::vector<bool> seen = reachable();
+  const std::vector<bool>& seen = reachable();
   int count = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const Op op = Recorder::current().node(int(i)).op;
@@ -467,7 +471,7 @@ int Program::operations() const {
 }
 
 std::vector<std::string> Program::inputs() const {
-  const std::vector<bool> seen = reachable();
+  const std::vector<bool>& seen = reachable();
   std::vector<std::string> names;
   for (std::size_t i = 0; i < seen.size(); ++i)
     if (seen[i] && Recorder::current().node(int(i)).op == Op::Input)
@@ -478,7 +482,7 @@ std::vector<std::string> Program::inputs() const {
 template <class T>
 std::map<std::string, std::array<T, 3>> Program::run(const std::map<std::string, std::array<T, 3>>& inputs) const {
   const Recorder& r = Recorder::current();
-  const std::vector<bool> seen = reachable();
+  const std::vector<bool>& seen = reachable();
   std::vector<std::array<T, 3>> value(std::size_t(r.size()));
   const auto compute = [&](int id) {
     const ExprNode& n = r.node(id);
@@ -522,6 +526,11 @@ std::map<std::string, std::array<T, 3>> Program::run(const std::map<std::string,
         break;
       default:
         for (std::size_t c = 0; c < 3; ++c) {
+          // A real is grey.
+          if (c > 0 && n.type != ExprType::Color) {
+            out[c] = out[0];
+            continue;
+          }
           T a[3] = {};
           for (std::size_t i = 0; i < n.args.size(); ++i) a[i] = arg(i)[c];
           out[c] = execute(n.op, a);
@@ -799,7 +808,7 @@ class OslPrinter {
 }  // namespace
 
 std::string Program::print_osl(int indent, const std::vector<std::string>& taken) const {
-  const std::vector<bool> seen = reachable();
+  const std::vector<bool>& seen = reachable();
   std::vector<std::string> reserved = taken;
   for (const std::string& name : inputs()) reserved.push_back(name);
   for (const auto& [name, id] : outputs_) reserved.push_back(name);

@@ -239,8 +239,10 @@ class Program {
   template <class T> std::map<std::string, std::array<T, 3>> run(const std::map<std::string, std::array<T, 3>>&) const;
 
  private:
-  std::vector<bool> reachable() const;
+  const std::vector<bool>& reachable() const;
   std::vector<std::pair<std::string, int>> outputs_;
+  mutable std::vector<bool> reachable_;  // of the first so many outputs
+  mutable std::size_t outputs_seen_ = 0;
 };
 
 }  // namespace brdfc

@@ -6,6 +6,8 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +15,7 @@
 #include <charconv>
 #include <fstream>
 #include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -315,10 +318,23 @@ PackResult build_pack(const PackOptions& options) {
 
   const Staging staging(options.out);
   std::vector<BuiltModel> built(chosen.size());
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (options.progress) options.progress(chosen[i].model->info().name, int(i), int(chosen.size()));
-    built[i] = build_model(chosen[i], options.costs, staging.path());
-  }
+  std::mutex mutex;
+  int begun = 0;
+  const auto build = [&](std::size_t i) {
+    {
+      const std::lock_guard lock(mutex);
+      if (options.progress) options.progress(chosen[i].model->info().name, begun++, int(chosen.size()));
+    }
+    // A thread that waits for parts of this model must not begin another one: recordings belong to their thread.
+    tbb::this_task_arena::isolate([&] { built[i] = build_model(chosen[i], options.costs, staging.path()); });
+  };
+  // Models side by side, so that what one does in line keeps no core waiting. Fits are made one at a time, by all
+  // cores.
+  if (std::any_of(chosen.begin(), chosen.end(),
+                  [](const PlannedModel& plan) { return std::any_of(plan.forms.begin(), plan.forms.end(), is_fit); }))
+    for (std::size_t i = 0; i < chosen.size(); ++i) build(i);
+  else
+    tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   PackResult result;
   std::map<std::string, std::string> members;

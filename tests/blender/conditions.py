@@ -16,10 +16,9 @@ from goniometer import DISTANCE, Goniometer, frame, tilted, unit
 from helpers import (
     add_camera,
     add_world,
-    albedo,
+    albedo_and_mirror,
     draw,
     empty_tree,
-    mirror_weight,
     render,
     render_passes,
 )
@@ -413,10 +412,9 @@ def passes(extension, tool, forms):
         if form in NATIVE:
             expected = scattered = np.full_like(wo, 0.8)
         else:
-            first = np.array([albedo(tool, form.model, form.values, [c])[0] for c in wo[:4, 2]])
+            first, mirrors = albedo_and_mirror(tool, form.model, form.values, wo[:4, 2])
             expected = np.tile(first, (64, 1))
             # Denoisers look through mirrors: their weight is not in this pass.
-            mirrors = np.array([mirror_weight(tool, form.model, form.values, c) for c in wo[:4, 2]])
             scattered = np.tile(first - mirrors, (64, 1))
         colours = (
             value("DiffCol", "Diffuse Color")
@@ -524,11 +522,13 @@ def _lit_from_above(tool, form, flat, bent):
     """Share of a white world's light that a model reflects about normals `bent`, seen from above,
     without the rays that end below `flat`."""
     result = []
-    for n, surface in zip(bent, flat, strict=True):
+    mirrors = np.zeros((len(bent), 3))
+    if form.mirror:
+        mirrors = albedo_and_mirror(tool, form.model, form.values, bent[:, 2])[1]
+    for n, surface, mirror in zip(bent, flat, mirrors, strict=True):
         axes = np.stack([*(a[0] for a in frame(n[None])), n])
         wi, weight = draw(tool, form.model, form.values, axes @ (0.0, 0.0, 1.0), 1 << 14)
         above = (wi @ axes) @ surface > 0
-        mirror = mirror_weight(tool, form.model, form.values, axes[2, 2])
         reflected = 2 * axes[2, 2] * n - np.array([0.0, 0.0, 1.0])
         result.append((weight[above].sum(0) + mirror * (reflected @ surface > 0)).mean())
     return np.array(result)

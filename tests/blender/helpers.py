@@ -210,9 +210,10 @@ def read_csv(text):
 
 
 def to_csv(names, rows):
-    lines = [",".join(names)]
-    lines += [",".join(f"{x:.17g}" for x in row) for row in rows]
-    return "\n".join(lines) + "\n"
+    # Of whole rows and Python's own numbers: formatting takes longer than what the tool computes.
+    line = ",".join(["%.17g"] * len(names))
+    lines = [line % tuple(row) for row in np.asarray(rows, np.float64).tolist()]
+    return "\n".join([",".join(names), *lines]) + "\n"
 
 
 def arguments(values):
@@ -235,18 +236,18 @@ def evaluate(tool, model, values, wi, wo):
     return read_csv(text)[1][:, :3]
 
 
-def albedo(tool, model, values, cosines, phi=0.0):
-    """Directional albedo of the model by quadrature, (n, 3)."""
+def albedo_and_mirror(tool, model, values, cosines, phi=0.0):
+    """Directional albedo of the model by quadrature, and the weight of its mirror term, which is
+    part of it; (n, 3) each."""
     stdin = to_csv(("cos_theta_o",), np.reshape(cosines, (-1, 1)))
     text = tool("albedo", model, *arguments(values), "--phi", repr(float(phi)), stdin=stdin)
-    return read_csv(text)[1][:, 1:4]
+    rows = read_csv(text)[1]
+    return rows[:, 1:4], rows[:, 4:7]
 
 
-def mirror_weight(tool, model, values, cosine):
-    """Weight of the model's mirror term, (3,)."""
-    stdin = to_csv(("cos_theta_o",), [[cosine]])
-    names, rows = read_csv(tool("albedo", model, *arguments(values), stdin=stdin))
-    return np.array([rows[0, names.index(f"mirror_{c}")] for c in "rgb"])
+def albedo(tool, model, values, cosines, phi=0.0):
+    """Directional albedo of the model by quadrature, (n, 3)."""
+    return albedo_and_mirror(tool, model, values, cosines, phi)[0]
 
 
 def draw(tool, model, values, wo, count):

@@ -82,18 +82,10 @@ def points_of(tool, model, choices, parameters, rng):
         wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
         wo, u = wo.astype(np.float32), rng.random((count, 3)).astype(np.float32)
         u = np.minimum(u, np.float32(1 - 2**-24))
-        # wi from the model, by other random numbers: nothing else meets a narrow lobe.
-        header = ("wo_x", "wo_y", "wo_z", "u1", "u2", "u3")
-        unit_wo = wo.astype(np.float64)
-        unit_wo /= np.linalg.norm(unit_wo, axis=-1, keepdims=True)
-        stdin = to_csv(header, np.hstack([unit_wo, rng.random((count, 3))]))
-        drawn = read_csv(tool("sample", model, *arguments(values | choices), stdin=stdin))[1]
-        kept = drawn[:, 6] > 0
-        wi = np.where(kept[:, None], drawn[:, :3], unit_wo).astype(np.float32)
-        rows = {
-            f"{v}_{a}": w[:, i] for v, w in (("wi", wi), ("wo", wo)) for i, a in enumerate("xyz")
-        }
+        rows = {f"wo_{a}": wo[:, i] for i, a in enumerate("xyz")}
         rows |= {f"u{i + 1}": u[:, i] for i in range(3)}
+        other_u = rng.random((count, 3))
+        rows |= {f"other_u{i + 1}": other_u[:, i] for i in range(3)}
         for p in numbers:
             v = np.float32(values[p["name"]])
             if p["kind"] == "color":
@@ -103,7 +95,23 @@ def points_of(tool, model, choices, parameters, rng):
         for key, column in rows.items():
             columns.setdefault(key, []).append(column.astype(np.float64))
         group += [index] * count
-    return {key: np.concatenate(parts) for key, parts in columns.items()}, np.array(group)
+    columns = {key: np.concatenate(parts) for key, parts in columns.items()}
+    # wi from the model, by other random numbers: nothing else meets a narrow lobe.
+    drawing = {f"u{i}": columns.pop(f"other_u{i}") for i in (1, 2, 3)}
+    drawing |= {f"wi_{a}": columns[f"wo_{a}"] for a in "xyz"}
+    drawn = run_probe(tool, model, choices, columns | drawing)
+    kept = drawn["double_sample_pdf"] > 0
+    for a in "xyz":
+        wi = np.where(kept, drawn[f"double_wi_{a}"], columns[f"wo_{a}"])
+        columns[f"wi_{a}"] = wi.astype(np.float32).astype(np.float64)
+    return columns, np.array(group)
+
+
+def run_probe(tool, model, choices, columns):
+    """What `brdfc probe --run` computes at points, as columns by name."""
+    stdin = to_csv(list(columns), np.stack(list(columns.values()), -1))
+    header, rows = read_csv(tool("probe", model, *arguments(choices), "--run", stdin=stdin))
+    return {name: rows[:, i] for i, name in enumerate(header)}
 
 
 def probe_material(extension, name, source):
@@ -131,10 +139,7 @@ def measured(extension, tool):
         for choices in variants(entry["parameters"]):
             source = tool("probe", model, *arguments(choices))
             columns, group = points_of(tool, model, choices, entry["parameters"], rng)
-            names = list(columns)
-            stdin = to_csv(names, np.stack(list(columns.values()), -1))
-            header, rows = read_csv(tool("probe", model, *arguments(choices), "--run", stdin=stdin))
-            runs = {name: rows[:, i] for i, name in enumerate(header)}
+            runs = run_probe(tool, model, choices, columns)
             jobs.append((model, choices, source, columns, group, runs, entry["parameters"]))
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

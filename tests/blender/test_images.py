@@ -89,6 +89,7 @@ def render_both(folder, extension_zip, tool, content, spp):
             "out": str(folder / f"{s}.exr"),
             "seed": s,
             "spp": spp,
+            "timed": False,
         }
         for s in range(1, SEEDS + 1)
     ]

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from goniometer import Goniometer, frame, tilted, unit
-from helpers import albedo, draw, evaluate, materials_of, mirror_weight, with_every_model
+from helpers import albedo, albedo_and_mirror, draw, evaluate, materials_of, with_every_model
 from worlds import coloured, gradient, half, spot, white
 
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (0.8, 0.1, 0.6), (-0.5, 0.8, 0.3), (0.2, 0.95, 0.1)]
@@ -188,12 +188,15 @@ def kernel(tool, model, values):
     """
     values = dict(values)
     wi, weights = hemisphere()
+    views = [local(normal, np.array([0.0, 0.0, 1.0])) for normal in KINDS]
+    # One question: the tool takes longer to start than to answer.
+    everywhere = np.tile(wi, (len(views), 1)), np.repeat(views, len(wi), 0)
+    values_of_f = evaluate(tool, model, values, *everywhere).reshape(len(views), len(wi), 3)
     lobes, mirrors = [], []
-    for normal in KINDS:
-        wo = local(normal, np.array([0.0, 0.0, 1.0]))
-        mirror = mirror_weight(tool, model, values, wo[2])
-        total = albedo(tool, model, values, [wo[2]], math.atan2(wo[1], wo[0]))[0] - mirror
-        f = evaluate(tool, model, values, wi, np.broadcast_to(wo, wi.shape))
+    for wo, f in zip(views, values_of_f, strict=True):
+        azimuth = math.atan2(wo[1], wo[0])
+        everything, (mirror,) = albedo_and_mirror(tool, model, values, [wo[2]], azimuth)
+        total = everything[0] - mirror
         nodes, f = wi, f * (wi[:, 2] * weights)[:, None]
         if np.abs(f.sum(0) - total).max() > 3e-4:
             nodes, f = draw(tool, model, values, wo, 1 << 15)

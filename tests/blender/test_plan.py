@@ -29,10 +29,12 @@ def shaders_and_tables(extension_zip):
         )
 
 
-def render(extension_zip, scene, out, seed=0, pack=None):
-    jobs = out.with_suffix(".json")
-    job = {"scene": str(scene), "out": str(out), "seed": seed, "pack": pack and str(pack)}
-    jobs.write_text(json.dumps([job]))
+def render(extension_zip, scene, *pictures):
+    """Renders a picture for each dictionary of `out`, `seed` and `pack`, in one Blender."""
+    jobs = Path(pictures[0]["out"]).with_suffix(".json")
+    jobs.write_text(
+        json.dumps([{"scene": str(scene), "timed": False} | picture for picture in pictures])
+    )
     command = [sys.executable, DRIVER, "--extension", extension_zip, "--jobs", jobs]
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=os.environ)
     return done
@@ -59,17 +61,19 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
     scene = tmp_path / "scene" / "scene.json"
     pictures = []
     for pack in (extension_zip, cut):
-        pictures.append([])
-        for seed in range(SEEDS):
-            out = tmp_path / f"{len(pictures)}-{seed}.exr"
-            done = render(pack, scene, out, seed)
-            assert done.returncode == 0, done.stderr
-            pictures[-1].append(read_picture(out)[..., :3].mean(-1))
-    # The whole extension takes a pack for one picture, without being installed anew.
-    out = tmp_path / "used.exr"
-    done = render(extension_zip, scene, out, pack=tmp_path / "cut" / "brdfc_shaders")
-    assert done.returncode == 0, done.stderr
-    assert np.array_equal(read_picture(out)[..., :3].mean(-1), pictures[1][0])
+        jobs = [
+            {"out": str(tmp_path / f"{len(pictures)}-{seed}.exr"), "seed": seed}
+            for seed in range(SEEDS)
+        ]
+        if pack == extension_zip:
+            # The whole extension takes a pack for one picture, without being installed anew.
+            folder = tmp_path / "cut" / "brdfc_shaders"
+            jobs.append({"out": str(tmp_path / "used.exr"), "seed": 0, "pack": str(folder)})
+        done = render(pack, scene, *jobs)
+        assert done.returncode == 0, done.stderr
+        pictures.append([read_picture(Path(job["out"]))[..., :3].mean(-1) for job in jobs])
+    used_pack = pictures[0].pop()
+    assert np.array_equal(used_pack, pictures[1][0])
     # Closures that are left out are no longer drawn from, so that the noise is another one: the
     # means of tiles agree within it, by a t-test with the spread of both.
     tiles = np.array(pictures).reshape(2, SEEDS, 6, 8, 6, 8).mean((3, 5)).reshape(2, SEEDS, -1)
@@ -90,7 +94,8 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
 def test_a_pack_that_is_none(empty, extension_zip, tool, tmp_path):
     tool("scene", ROOT / "scenes" / "ra-vanish.json", "--out", tmp_path)
     out = tmp_path / "a.exr"
-    done = render(extension_zip, tmp_path / "scene.json", out, pack=tmp_path / "absent")
+    job = {"out": str(out), "pack": str(tmp_path / "absent")}
+    done = render(extension_zip, tmp_path / "scene.json", job)
     assert done.returncode == 2
     assert "absent/manifest.json" in done.stderr and "Traceback" not in done.stderr
     assert not out.exists()
@@ -106,7 +111,7 @@ def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):
         material["parameters"] = material.get("parameters", {}) | {"n": 3}
     source.write_text(json.dumps(content))
     tool("scene", source, "--out", tmp_path / "scene")
-    done = render(cut, tmp_path / "scene" / "scene.json", tmp_path / "a.exr")
+    done = render(cut, tmp_path / "scene" / "scene.json", {"out": str(tmp_path / "a.exr")})
     assert done.returncode == 2
     assert "radziszewski_alda.n" in done.stderr and "built for one scene" in done.stderr
     assert not (tmp_path / "a.exr").exists()
