@@ -454,8 +454,9 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
   for (std::size_t j = 0; j < lobes; ++j)
     lobes_.push_back(
         {table(fmt::format("offset_of_{}", j),
-               [&](const Cell& c) { return c.lobes[j].offset * std::sqrt(c.lobes[j].exponent); }),
-         table(fmt::format("power_of_{}", j), [&](const Cell& c) { return std::log(c.lobes[j].exponent); })});
+               [&](const Cell& c) { return c.lobes[j].offset * (axis_ ? std::sqrt(c.lobes[j].exponent) : 1); }),
+         table(fmt::format("power_of_{}", j),
+               [&](const Cell& c) { return axis_ ? std::log(c.lobes[j].exponent) : c.lobes[j].exponent; })});
   for (std::size_t j = 0; j < closures_count; ++j) {
     const bool ramp = j <= lobes;
     const Eigen::Index first = Eigen::Index(ramp ? j * kRampSize : (lobes + 1) * kRampSize + (j - lobes - 1));
@@ -522,8 +523,9 @@ template <class T> std::vector<T> Fit::place(const Vec3<T>& wo, const T& number)
 
 template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const std::vector<T>& at) const {
   if (j < lobes_.size()) {
-    const T exponent = exp(lookup(lobes_[j].exponent, at));
-    return lobe_closure(wo, lookup(lobes_[j].offset, at) / sqrt(exponent), exponent);
+    const T offset = lookup(lobes_[j].offset, at), power = lookup(lobes_[j].exponent, at);
+    if (!axis_) return lobe_closure(wo, offset, power);
+    return lobe_closure(wo, offset * exp(power / T(-2)), exp(power));
   }
   if (j == lobes_.size()) return Closure<T>(ClosureKind::DiffuseRamp, Rgb<T>(T(1)));
   const Facets& facet = facets_[j - lobes_.size() - 1];

@@ -7,8 +7,7 @@
 // may be negative, so each is a family that is linear in eight numbers, and a view is a linear problem: least absolute
 // differences of f cos(theta_i), by iteratively reweighted least squares over directions drawn from the model and from
 // lobes of every width; the albedo is a constraint, and a sum below 0 is fined. Axes and exponents come from the
-// moments of the model's own lobe. All is tabulated over the number and the view angle, and linear between; exponents
-// and roughness by their logarithm.
+// moments of the model's own lobe. All is tabulated over the number and the view angle, and linear between.
 #pragma once
 
 #include <memory>
@@ -75,8 +74,9 @@ class Fit {
 
  private:
   struct Lobe {
-    /// Angle from the mirror direction, towards the normal, in units of 1 / sqrt(exponent), so that lobes of another
-    /// width keep their places beside each other; and the exponent's logarithm.
+    /// Angle from the mirror direction, towards the normal; and exponent. Along an axis lobes change by factors: then
+    /// the angle is in units of 1 / sqrt(exponent), so that they keep their places beside each other, and the exponent
+    /// is its logarithm.
     std::shared_ptr<const Table> offset, exponent;
   };
   struct Facets {
