@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
@@ -180,6 +182,14 @@ TEST(Fit, RunsAlongANumber) {
   }
   EXPECT_EQ(l1.size(), 64 * numbers.size());
   EXPECT_GE(numbers.size(), 6u);
+  // Of one value it says what is so beside it, of all the worst.
+  std::map<double, double> mean;
+  for (const ViewError& e : fit.errors()) mean[e.number] += e.relative_l1 / 64;
+  const auto next = std::next(mean.begin());
+  EXPECT_DOUBLE_EQ(fit.mean_l1((mean.begin()->first + next->first) / 2), std::max(mean.begin()->second, next->second));
+  EXPECT_DOUBLE_EQ(fit.mean_l1(0.0), mean.begin()->second);
+  EXPECT_DOUBLE_EQ(fit.mean_l1(0.2), std::max(mean.rbegin()->second, std::next(mean.rbegin())->second));
+  for (const auto& [number, l1_here] : mean) EXPECT_GE(fit.mean_l1({}), l1_here);
   std::sort(l1.begin(), l1.end());
   EXPECT_LE(l1[l1.size() / 2], 0.007);
   EXPECT_LE(l1.back(), 0.06);

@@ -61,8 +61,18 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   return unfit(model, without_factors(model, fixed));
 }
 
+/// Of the material that is off by most. The mean along an axis says little of a material at one end of it.
 double fitted_error(const Needs& needs) {
-  return *measure_error(*needs.front()->model, RepresentationKind::Fitted, constants(needs)).relative_l1;
+  const Model& model = *needs.front()->model;
+  const Fit& fit = fit_of(model, without_factors(model, constants(needs)));
+  double worst = 0;
+  for (const MaterialNeed* need : needs) {
+    std::optional<double> number;
+    if (fit.axis() && !need->textured.count(fit.axis()->parameter))
+      number = std::get<double>(need->values.at(fit.axis()->parameter));
+    worst = std::max(worst, fit.mean_l1(number));
+  }
+  return worst;
 }
 
 bool fits(const Needs& needs, const Budget& budget) {

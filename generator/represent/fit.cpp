@@ -6,7 +6,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <limits>
+#include <map>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
@@ -496,6 +496,23 @@ std::size_t Fit::size() const {
     for (const auto& channel : l.colour) sum += channel->values.size();
   }
   return sum;
+}
+
+double Fit::mean_l1(const std::optional<double>& number) const {
+  std::map<double, std::pair<double, double>> sums;  // by place: of L1, of views
+  for (const ViewError& e : errors_) {
+    sums[e.number].first += e.relative_l1;
+    sums[e.number].second += 1;
+  }
+  auto first = sums.begin(), last = sums.end();
+  if (axis_ && number) {
+    last = sums.lower_bound(*number);
+    first = last == sums.begin() ? last : std::prev(last);
+    if (last != sums.end()) ++last;
+  }
+  double worst = 0;
+  for (auto it = first; it != last; ++it) worst = std::max(worst, it->second.first / it->second.second);
+  return worst;
 }
 
 double Fit::l1_at(const View& view, double number) const {

@@ -68,6 +68,10 @@ class Fit {
   /// Of all tables.
   std::size_t size() const;
 
+  /// Relative L1, mean over views: with an axis at the worse of the two places of errors() beside `number`, or at the
+  /// worst of all where it may be anything.
+  double mean_l1(const std::optional<double>& number) const;
+
   /// At cosines evenly spaced from 1 to 0 whatever the tables' knots, and with an axis at both its ends and in the
   /// middle between any two knots.
   const std::vector<ViewError>& errors() const { return errors_; }
