@@ -487,17 +487,6 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
   }
 }
 
-std::size_t Fit::size() const {
-  std::size_t sum = position_ ? position_->values.size() + amplitude_->values.size() : 0;
-  for (const Lobe& l : lobes_) sum += l.offset->values.size() + l.exponent->values.size();
-  for (const Facets& f : facets_) sum += f.log_alpha ? f.log_alpha->values.size() : 0;
-  for (const Linear& l : linear_) {
-    sum += l.weight ? l.weight->values.size() : 0;
-    for (const auto& channel : l.colour) sum += channel->values.size();
-  }
-  return sum;
-}
-
 double Fit::mean_l1(const std::optional<double>& number) const {
   std::map<double, std::pair<double, double>> sums;  // by place: of L1, of views
   for (const ViewError& e : errors_) {

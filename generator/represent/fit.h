@@ -65,9 +65,6 @@ class Fit {
   /// f cos(theta_i) of their sum; directions above the surface.
   template <class T> Rgb<T> f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const T& number = T(0)) const;
 
-  /// Of all tables.
-  std::size_t size() const;
-
   /// Relative L1, mean over views: with an axis at the worse of the two places of errors() beside `number`, or at the
   /// worst of all where it may be anything.
   double mean_l1(const std::optional<double>& number) const;

@@ -150,3 +150,17 @@ def empty(extension):
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     return scene
+
+
+@pytest.fixture
+def use_pack(extension, lean_pack):
+    """use_pack(materials, *options): the extension takes a pack of these alone, until the test
+    ends. Returns the pack's folder."""
+
+    def use(materials, *options):
+        folder = lean_pack(materials, *options)
+        extension.pack.use(folder)
+        return folder
+
+    yield use
+    extension.pack.use()

@@ -27,7 +27,7 @@ TEXTURED_COSINE = 0.7
 
 
 @pytest.fixture
-def lean(extension, lean_pack):
+def lean(extension, use_pack):
     """The extension with a pack of these materials alone."""
     listed = {
         name: {"model": name, "parameters": values, "representation": "fitted"}
@@ -35,12 +35,10 @@ def lean(extension, lean_pack):
     }
     # A second one, so that the first one's colour is a socket.
     other = {"parameters": MATERIALS["phong"] | {"ks": 0.4}}
-    folder = lean_pack(listed | {"grey": listed["phong"] | other})
+    folder = use_pack(listed | {"grey": listed["phong"] | other})
     shaders = {p.stem for p in (folder / "shaders").iterdir()}
     assert shaders == {f"brdfc_{name}_fitted" for name in MATERIALS}
-    extension.pack.use(folder)
-    yield extension
-    extension.pack.use()
+    return extension
 
 
 def start(lean):
@@ -97,16 +95,14 @@ ALONG = {"low": 12.0, "high": 300.0}
 
 
 @pytest.fixture
-def along(extension, lean_pack):
-    folder = lean_pack(
+def along(extension, use_pack):
+    use_pack(
         {
             name: {"model": "blinn", "parameters": {"e": e}, "representation": "fitted"}
             for name, e in ALONG.items()
         }
     )
-    extension.pack.use(folder)
-    yield extension
-    extension.pack.use()
+    return extension
 
 
 @pytest.mark.full
@@ -155,7 +151,8 @@ def test_a_number_along_its_slider(along, tool):
     assert "out_of_fit" in codes(1500.0)
 
 
-def textured(extension, lean_pack):
+@pytest.fixture
+def textured(extension, use_pack):
     """A material whose colour is a picture's, in the fitted form of a pack that was made for it as
     a person would; and one of the same model that is white."""
     api, nodes = extension.api, extension.nodes
@@ -171,7 +168,7 @@ def textured(extension, lean_pack):
     tree.links.new(picture.outputs["Color"], nodes.sockets(node)["ks"])
     used = api.used_materials()
     assert [m["parameters"]["ks"] for m in used.values()] == [{"varies": True}, [1, 1, 1]]
-    extension.pack.use(lean_pack(used, "--error", "10"))
+    use_pack(used, "--error", "10")
     for material in made:
         api.switch_representation(material, "fitted")
         assert nodes.identity(nodes.group_nodes(material)[0]) == ("phong", "fitted")
@@ -186,21 +183,17 @@ def show(meter, texels):
     meter.mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv.ravel())
 
 
-def test_a_textured_colour_under_a_sun(extension, lean_pack, tool):
+def test_a_textured_colour_under_a_sun(textured, tool):
     """The sum that the tool says for a white one, times the texel, to 1e-3 of its largest value."""
     rng = np.random.default_rng(6)
-    try:
-        material, _ = textured(extension, lean_pack)
-        count = len(TEXELS) * FACETS
-        half = unit(unit(SUNS[1]) + (0, 0, 1))
-        normals = unit(half + 0.2 * rng.normal(size=(count, 3)))
-        meter = Goniometer(bpy.context.scene, material, normals, samples=4)
-        texels = np.arange(count) % len(TEXELS)
-        show(meter, texels)
-        wi = meter.local(meter.add_sun(unit(SUNS[1])))
-        wo, measured = meter.wo(), meter.measure()
-    finally:
-        extension.pack.use()
+    count = len(TEXELS) * FACETS
+    half = unit(unit(SUNS[1]) + (0, 0, 1))
+    normals = unit(half + 0.2 * rng.normal(size=(count, 3)))
+    meter = Goniometer(bpy.context.scene, textured[0], normals, samples=4)
+    texels = np.arange(count) % len(TEXELS)
+    show(meter, texels)
+    wi = meter.local(meter.add_sun(unit(SUNS[1])))
+    wo, measured = meter.wo(), meter.measure()
     pairs = pairs_csv(wi, wo)
     white = read_csv(tool("fit", "phong", "e=40", "ks=1", "--pairs", stdin=pairs))[1]
     expected = white * TEXELS[texels]
@@ -212,24 +205,20 @@ def test_a_textured_colour_under_a_sun(extension, lean_pack, tool):
     assert np.abs(white * TEXELS.mean(0) - expected).max() > 0.1 * largest
 
 
-def test_a_textured_colour_in_a_white_world(extension, lean_pack):
+def test_a_textured_colour_in_a_white_world(textured):
     """What is sampled has the texel's colour: the mean of a white one's radiance times the texel
     within 5 standard errors, 12 comparisons with a fixed seed, so one false alarm in some hundred
     thousand seeds."""
     replicas = 144
-    try:
-        made = textured(extension, lean_pack)
-        bpy.context.scene.cycles.seed = 5
-        texels = np.tile(np.arange(len(TEXELS)), 2 * replicas)
-        which = np.repeat((0, 1), len(TEXELS) * replicas)
-        turns = np.random.default_rng(7).uniform(0, 2 * math.pi, len(texels))
-        normals = tilted(np.full(len(texels), TEXTURED_COSINE), turns)
-        meter = Goniometer(bpy.context.scene, made, normals, samples=256, which=which)
-        show(meter, texels)
-        meter.add_world()
-        measured = meter.measure()
-    finally:
-        extension.pack.use()
+    bpy.context.scene.cycles.seed = 5
+    texels = np.tile(np.arange(len(TEXELS)), 2 * replicas)
+    which = np.repeat((0, 1), len(TEXELS) * replicas)
+    turns = np.random.default_rng(7).uniform(0, 2 * math.pi, len(texels))
+    normals = tilted(np.full(len(texels), TEXTURED_COSINE), turns)
+    meter = Goniometer(bpy.context.scene, textured, normals, samples=256, which=which)
+    show(meter, texels)
+    meter.add_world()
+    measured = meter.measure()
     white = measured[which == 1]
     for texel, colour in enumerate(TEXELS):
         seen = measured[(which == 0) & (texels == texel)]

@@ -21,14 +21,13 @@ FACETS = 96
 
 
 @pytest.fixture
-def lean(extension, lean_pack):
+def lean(extension, use_pack):
     """The extension with a pack of these materials alone."""
     listed = {name: {"model": name, "parameters": values} for name, values in MATERIALS.items()}
     # A second one, so that the first one's colour is a socket.
     listed["grey"] = {"model": "phong", "parameters": MATERIALS["phong"] | {"ks": 0.4}}
-    extension.pack.use(lean_pack(listed, "--twin"))
-    yield extension
-    extension.pack.use()
+    use_pack(listed, "--twin")
+    return extension
 
 
 def start(lean):
