@@ -342,6 +342,7 @@ def ensure_group(model_name, representation="auto"):
             "representation": representation,
             "digest": pack.digest(model_name, representation),
             "choices": json.dumps(pack.form_choices(model_name, representation)),
+            "only": json.dumps(pack.form_values(model_name, representation)),
         }
         if native:
             _fill_native_group(group, model_name, representation, source)
@@ -396,10 +397,16 @@ def _choices(node, name):
     return json.loads(node.node_tree[TAG]["choices"])[name]
 
 
+def _only(node):
+    """Values of the parameters that a form has one value of; files of older versions lack them."""
+    found = json.loads(node.node_tree[TAG].get("only", "{}"))
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
+
+
 def set_value(node, name, value):
     """Sets a socket to a value in the canonical form of pack.check_value."""
     socket = sockets(node).get(name)
-    if socket is None:  # a choice of one
+    if socket is None:  # there is one value
         return
     if socket.type == "RGBA":
         value = (*value, 1.0)
@@ -414,7 +421,8 @@ def get_value(node, name):
     """Value of an unlinked socket in the same form; None for a linked one or a vector."""
     socket = sockets(node).get(name)
     if socket is None:
-        return _choices(node, name)[0]
+        only = _only(node)
+        return only[name] if name in only else _choices(node, name)[0]
     if socket.is_linked or socket.type == "VECTOR":
         return None
     if socket.type == "RGBA":
@@ -452,7 +460,8 @@ def switch(node, representation):
     model_name, _ = identity(node)
     tree = node.id_data
     choices = json.loads(node.node_tree[TAG]["choices"])
-    values = {name: get_value(node, name) for name in (*choices, *sockets(node))}
+    names = dict.fromkeys((*choices, *_only(node), *sockets(node)))
+    values = {name: get_value(node, name) for name in names}
     group = ensure_group(model_name, pack.resolve(model_name, representation, values))
     if group == node.node_tree:
         return

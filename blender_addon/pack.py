@@ -59,11 +59,18 @@ def model(name):
     return models[name]
 
 
+def _same(value, only):
+    """Whether a socket, which is in single precision, holds a value."""
+    if isinstance(only, str) or value is None:
+        return value == only
+    pairs = zip(value, only, strict=True) if isinstance(only, tuple) else [(value, only)]
+    return all(math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-9) for a, b in pairs)
+
+
 def refusal(model_name, name, values):
-    """Why these values exclude a form, which may exist for some choices only; None if not."""
-    choices = model(model_name)["representations"][name]["choices"]
-    for key, only in choices.items():
-        if values.get(key, only) != only:
+    """Why these values exclude a form, which may exist for some values only; None if not."""
+    for key, only in form_values(model_name, name).items():
+        if key in values and not _same(values[key], only):
             got = "a linked value" if values[key] is None else repr(values[key])
             return (
                 f"model {model_name!r} has the representation {name!r} only for {key}={only!r}, "
@@ -75,13 +82,13 @@ def refusal(model_name, name, values):
 def resolve(model_name, representation, values=None):
     """Name of the representation. Raises ValueError.
 
-    "auto" becomes the model's preference, or another form where `values` have a choice that the
-    preferred one lacks.
+    "auto" becomes the model's preference, or the next form where `values` have one that the
+    preferred form lacks.
     """
     entry, values = model(model_name), values or {}
     name = representation
     if name == "auto":
-        others = sorted(set(entry["representations"]) - {entry["auto"]})
+        others = [n for n in entry["representations"] if n != entry["auto"]]
         fitting = [n for n in (entry["auto"], *others) if refusal(model_name, n, values) is None]
         name = fitting[0] if fitting else entry["auto"]
     if name not in entry["representations"]:
@@ -107,13 +114,21 @@ def parameters(model_name):
 
 def fixed(model_name):
     """Parameters that this pack was built without, and the values they have in it."""
-    found = model(model_name).get("fixed", {})
+    return _values(model(model_name).get("fixed", {}))
+
+
+def _values(found):
     return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
+
+
+def form_values(model_name, name):
+    """The only values that a form has of parameters of its model."""
+    return _values(model(model_name)["representations"][name]["only"])
 
 
 def form_choices(model_name, name):
     """Identifiers of every choice as a form has them: one where the form exists for that alone."""
-    only = representation(model_name, name)["choices"]
+    only = form_values(model_name, name)
     return {
         key: [only[key]] if key in only else p["choices"]
         for key, p in parameters(model_name).items()
@@ -122,9 +137,13 @@ def form_choices(model_name, name):
 
 
 def socket_parameters(model_name, name):
-    """The parameters that a form shows: a choice of one leaves nothing to choose."""
-    choices = form_choices(model_name, name)
-    return {key: p for key, p in parameters(model_name).items() if len(choices.get(key, "any")) > 1}
+    """The parameters that a form shows: those that leave something to choose."""
+    only = form_values(model_name, name)
+    return {
+        key: p
+        for key, p in parameters(model_name).items()
+        if key not in only and len(p.get("choices", "any")) > 1
+    }
 
 
 def _file(relative):
@@ -148,7 +167,8 @@ def source(model_name, name):
 
 def digest(model_name, name):
     """Changes whenever the shader or the sockets of its group would."""
-    schema = [model(model_name)["parameters"], representation(model_name, name).get("lobes")]
+    form = representation(model_name, name)
+    schema = [model(model_name)["parameters"], form.get("lobes"), form["only"]]
     text = source(model_name, name)[1] + json.dumps(schema, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -103,9 +103,7 @@ def _draw_form(layout, node, editable):
     entry = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = editable
-    values = {
-        key: nodes.get_value(node, key) for key in pack.form_choices(model_name, representation)
-    }
+    values = {key: nodes.get_value(node, key) for key in pack.parameters(model_name)}
     refusals = []
     for name in entry["representations"]:
         if refusal := pack.refusal(model_name, name, values):

@@ -50,6 +50,20 @@ def test_list_names_models_parameters_and_representations():
         assert name in out
 
 
+def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp_path):
+    assert run("build", "--model", "lafortune", "--out", tmp_path).returncode == 0
+    manifest = json.loads((tmp_path / "brdfc_shaders" / "manifest.json").read_text())
+    entry = manifest["models"]["lafortune"]
+    assert entry["auto"] == "sampled"
+    forms = entry["representations"]
+    assert list(forms) == ["sampled", "fitted"]
+    assert forms["sampled"]["only"] == {}
+    assert forms["fitted"]["only"] == {"cxy": -1, "cz": 0.8}
+    assert forms["fitted"]["axis"] == {"name": "e", "min": 1, "max": 100}
+    shader = (tmp_path / "brdfc_shaders" / forms["fitted"]["shader"]).read_text()
+    assert "float e = 10.0" in shader and "cxy" not in shader
+
+
 def test_list_json_is_the_schema():
     models = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
     assert set(MODELS) <= set(models)

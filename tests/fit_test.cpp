@@ -6,11 +6,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <set>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
+#include "analysis/table_file.h"
+#include "core/hash.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
 #include "support.h"
@@ -235,6 +238,81 @@ TEST(Fit, AxesAreSliders) {
     EXPECT_EQ(axis.place(axis.low - 1), 0);
     EXPECT_EQ(axis.place(2 * axis.high), 1);
   }
+}
+
+/// Models that declare a number to fit over, without it and its factors.
+std::vector<std::pair<const Model*, ParamValues>> stored() {
+  std::vector<std::pair<const Model*, ParamValues>> out;
+  for (const auto& [name, model] : models()) {
+    if (model->info().properties.fit_axis.empty()) continue;
+    ParamValues values = complete(model->info(), {});
+    values.erase(model->info().properties.fit_axis);
+    out.emplace_back(model.get(), split_factors(*model, values).first);
+  }
+  return out;
+}
+
+/// script/fits makes them anew.
+TEST(StoredFits, BelongToTheFormulas) {
+  std::set<std::filesystem::path> expected, found;
+  for (const auto& [model, values] : stored()) expected.insert(stored_fit(*model, values));
+  for (const auto& entry : std::filesystem::directory_iterator(expected.begin()->parent_path()))
+    found.insert(entry.path());
+  EXPECT_EQ(found, expected);
+}
+
+/// They are offered for any value of their number.
+TEST(StoredFits, AreCloseAlongTheWholeSlider) {
+  for (const auto& [model, values] : stored())
+    EXPECT_LE(fit_of(*model, values).mean_l1({}), 0.15) << model->info().name;
+}
+
+/// One cell, of a model and a knot that change with what is stored.
+TEST(StoredFits, AreWhatIsMadeAnew) {
+  const auto all = stored();
+  std::string names;
+  for (const auto& [model, values] : all) names += stored_fit(*model, values).filename();
+  const std::uint64_t random = std::stoull(sha256(names).substr(0, 15), nullptr, 16);
+  const auto& [model, values] = all[random % all.size()];
+  const Fit& fit = fit_of(*model, values);
+  const double x = fit.knots()[random / all.size() % fit.knots().size()], number = fit.axis()->at(x);
+  const Fit cell = fit.knot(*model, values, x);
+  const auto brdf = model->make_double(with_number(*model, values, number));
+  Random numbers(3);
+  double largest = 0, off = 0;
+  for (const auto& [wi, wo] : direction_pairs(*brdf, 300, numbers, false)) {
+    const Rgb<double> a = evaluate(fit.closures(wo, number), wi, wo), b = evaluate(cell.closures(wo, number), wi, wo);
+    largest = std::max(largest, max_component(b));
+    off = std::max(off, max_component(Rgb<double>(std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b))));
+  }
+  EXPECT_GT(largest, 0) << model->info().name;
+  EXPECT_LE(off, 1e-3 * largest) << model->info().name << " at " << number;
+}
+
+TEST(StoredFits, ServeFactorsThatAreKnown) {
+  const auto [model, values] = stored().front();
+  ParamValues half = values;
+  const std::string name = *factors(*model, values).begin();
+  half[name] = std::array<double, 3>{0.5, 0.25, 0.1};
+  const Fit &white = fit_of(*model, values), &coloured = fit_of(*model, half);
+  const Vec3<double> wo = direction(0.7, 0), wi = direction(0.6, 3);
+  const double number = white.axis()->at(0.4);
+  const Rgb<double> a = evaluate(white.closures(wo, number), wi, wo),
+                    b = evaluate(coloured.closures(wo, number), wi, wo);
+  EXPECT_NEAR(b.r, 0.5 * a.r, 1e-9 * a.r);
+  EXPECT_NEAR(b.b, 0.1 * a.b, 1e-9 * a.b);
+  EXPECT_NEAR(coloured.f_cos(wi, wo, number).g, b.g, 1e-9 * a.g);
+}
+
+TEST(StoredFits, AreWholeOrRefused) {
+  const TempFolder folder;
+  const std::filesystem::path path = folder.path() / "a.exr";
+  EXPECT_THROW(read_table_image(path), InputError);
+  write_table_image({1, 1, 1, {0.5f}, ""}, path);
+  EXPECT_THROW(read_table_image(path), InputError) << "an image like any other";
+  write_table_image({2, 1, 1, {0.5f, 0.25f}, "{}"}, path);
+  EXPECT_THAT(read_table_image(path).pixels, testing::ElementsAre(0.5f, 0.25f));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST(Fit, ShadersStayWithinBounds) {

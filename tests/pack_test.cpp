@@ -3,7 +3,6 @@
 #include "pack/pack.h"
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -13,6 +12,7 @@
 #include "model/sampling.h"
 #include "pack/osl_library.h"
 #include "pack/shader.h"
+#include "support.h"
 
 namespace brdfc {
 namespace {
@@ -43,19 +43,6 @@ std::string read(const fs::path& p) {
   text << in.rdbuf();
   return text.str();
 }
-
-class TempFolder {
- public:
-  TempFolder() {
-    std::string name = (fs::temp_directory_path() / "brdfc-test-XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~TempFolder() { fs::remove_all(path_); }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 }  // namespace
 
@@ -193,10 +180,10 @@ TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
 
 TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
   const Model& m = find_model("coupled");
-  const ParamValues only = form_choices(m, RepresentationKind::Exact);
+  const ParamValues only = form_values(m, RepresentationKind::Exact);
   ASSERT_EQ(only.size(), 1u);
   EXPECT_EQ(std::get<std::string>(only.at("fresnel")), "schlick");
-  EXPECT_TRUE(form_choices(m, RepresentationKind::Sampled).empty());
+  EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
   const AlbedoTable t = empty_table(m);
   EXPECT_THAT(write_shader(m, RepresentationKind::Exact, t).source, Not(HasSubstr("int fresnel")));
   EXPECT_THAT(write_shader(m, RepresentationKind::Sampled, t).source, HasSubstr("int fresnel"));
@@ -206,6 +193,22 @@ TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
   } catch (const InputError& e) {
     EXPECT_STREQ(e.what(), "coupled: the exact form exists only for fresnel=schlick");
   }
+}
+
+TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
+  const Model& m = find_model("lafortune");
+  const ParamValues only = form_values(m, RepresentationKind::Fitted);
+  EXPECT_EQ(only, (ParamValues{{"cxy", -1.0}, {"cz", 0.8}}));
+  ParamValues others = complete(m.info(), {});
+  others.erase("e");
+  EXPECT_TRUE(form_values(m, RepresentationKind::Fitted, others).empty()) << "one number is open, any may be";
+  others["e"] = 4.0;
+  others.erase("cz");
+  EXPECT_TRUE(form_values(m, RepresentationKind::Fitted, others).empty());
+  EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
+  const std::string source = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, only), {}).source;
+  for (const char* socket : {"    float e = ", "    color ks = "}) EXPECT_THAT(source, HasSubstr(socket));
+  for (const char* gone : {"float cxy", "float cz"}) EXPECT_THAT(source, Not(HasSubstr(gone)));
 }
 
 class PackFiles : public ::testing::Test {

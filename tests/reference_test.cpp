@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <memory>
 
 #include "reference/lights.h"
 #include "reference/procedural.h"
@@ -499,10 +500,10 @@ TEST(Reference, AnisotropyFollowsTheTangent) {
 }
 
 TEST(Reference, BadValueNamesModelAndDirections) {
-  const detail::ModelOf<reference_test::Broken> model;
+  const auto model = std::make_unique<detail::ModelOf<reference_test::Broken>>();
   Material m;
-  m.model = &model;
-  m.values = complete(model.info(), {});
+  m.model = model.get();
+  m.values = complete(model->info(), {});
   Scene s = plane(m);
   s.lights = {point_light({1, 0, 1}, 1, 0)};
   EXPECT_NO_THROW(render(s, options(2, 2)));

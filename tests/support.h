@@ -2,6 +2,8 @@
 // What several tests need.
 #pragma once
 
+#include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -13,5 +15,19 @@ namespace brdfc {
 inline ParamValues values_of(const Model& m, const std::vector<std::string>& text) {
   return complete(m.info(), parse_values(m.info(), text));
 }
+
+/// A new folder that goes with it.
+class TempFolder {
+ public:
+  TempFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "brdfc-test-XXXXXX").string();
+    path_ = mkdtemp(name.data());
+  }
+  ~TempFolder() { std::filesystem::remove_all(path_); }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
 
 }  // namespace brdfc

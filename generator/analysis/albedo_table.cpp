@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "analysis/albedo_table.h"
 
-#include <OpenImageIO/imageio.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -15,7 +14,9 @@
 #include <utility>
 
 #include "analysis/albedo.h"
+#include "analysis/table_file.h"
 #include "model/choices.h"
+#include "model/formula.h"
 
 namespace brdfc {
 namespace {
@@ -63,29 +64,6 @@ Coordinate coordinate(const ParamInfo& p) {
   else if (p.min >= 0 && p.max > 100)
     c.scale = AxisScale::Log1p;
   return c;
-}
-
-/// The text of all that the model computes with these choices: equal texts are equal models.
-std::string formula(const Model& model, const ParamValues& combination) {
-  Recorder recorder;
-  const auto direction = [](const char* x, const char* y, const char* z) {
-    return Vec3<Expr>{Expr::input(x), Expr::input(y), Expr::input(z)};
-  };
-  const Vec3<Expr> wi = direction("wi_x", "wi_y", "wi_z"), wo = direction("wo_x", "wo_y", "wo_z");
-  const auto brdf = model.record(combination);
-  const Sample<Expr> sample = brdf->sample(wo, direction("u1", "u2", "u3"));
-  Program program;
-  program.output("f", brdf->eval(wi, wo));
-  program.output("pdf", brdf->pdf(wi, wo));
-  program.output("sample_x", sample.wi.x);
-  program.output("sample_y", sample.wi.y);
-  program.output("sample_z", sample.wi.z);
-  program.output("sample_weight", sample.weight);
-  program.output("sample_pdf", sample.pdf);
-  program.output("mirror", brdf->mirror(wo));
-  program.output("transmit", brdf->transmit(wo));
-  program.output("ior", brdf->ior());
-  return program.print_osl(0, {});
 }
 
 /// Coefficients of the polynomial in the colours, by monomial: index = powers of the colours as digits, the first
@@ -829,23 +807,7 @@ void write_albedo_exr(const AlbedoTable& table, const std::string& path) {
                   {"terms", terms},
                   {"grids", grids}};
 
-  OIIO::ImageSpec spec(int(width), int(height), channels, OIIO::TypeDesc::FLOAT);
-  spec.attribute("brdfc:table", meta.dump());
-  spec.attribute("compression", "zip");
-  // OpenImageIO stamps the present time unless one is given: the same table gives the same bytes.
-  spec.attribute("DateTime", "1980:01:01 00:00:00");
-  const std::string beside = path + ".part.exr";
-  const auto out = OIIO::ImageOutput::create(beside);
-  if (!out) input_error("{}: cannot be written: {}", path, OIIO::geterror());
-  if (!out->open(beside, spec) || !out->write_image(OIIO::TypeDesc::FLOAT, pixels.data()) || !out->close()) {
-    const std::string reason = out->geterror();
-    std::error_code ignored;
-    std::filesystem::remove(beside, ignored);
-    input_error("{}: cannot be written: {}", path, reason);
-  }
-  std::error_code error;
-  std::filesystem::rename(beside, path, error);
-  if (error) input_error("{}: cannot be written: {}", path, error.message());
+  write_table_image({int(width), int(height), channels, std::move(pixels), meta.dump()}, path);
 }
 
 }  // namespace brdfc

@@ -49,28 +49,27 @@ std::vector<MaterialNeed> needs_of(const std::vector<Material>& materials) {
 
 /// Relative L1, or that a form equals the model in expectation. Nothing for a form that these materials can't have, nor
 /// for a fit that is neither in the pack nor asked for by a budget.
-nlohmann::ordered_json error_of(const Options& options, const PlannedModel& plan, const FormChoice& choice,
-                                const PackResult& result) {
+nlohmann::ordered_json error_of(const PlannedModel& plan, const FormChoice& choice, const PackResult& result) {
   constexpr const char* kExpectation = "expectation";
-  const bool fitted = choice.form == RepresentationKind::Fitted;
-  if (!choice.exists || (fitted && !choice.taken && !options.error && !options.time)) return nullptr;
+  if (!choice.exists) return nullptr;
+  if (choice.form == RepresentationKind::Fitted)
+    return choice.error ? nlohmann::ordered_json(*choice.error) : nlohmann::ordered_json(nullptr);
   for (const PackLine& l : result.lines)
     if (l.model == plan.model->info().name && l.representation == name_of(choice.form))
       return l.error.relative_l1 ? nlohmann::ordered_json(*l.error.relative_l1) : kExpectation;
   if (choice.form == RepresentationKind::Twin) return nullptr;
-  if (choice.form == RepresentationKind::Exact || fitted)
-    return *measure_error(*plan.model, choice.form, plan.fixed).relative_l1;
+  if (choice.form == RepresentationKind::Exact) return *measure_error(*plan.model, choice.form, plan.fixed).relative_l1;
   return kExpectation;
 }
 
-nlohmann::ordered_json explanation(const Options& options, const PlannedModel& plan, const PackResult& result) {
+nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& result) {
   const ModelInfo& info = plan.model->info();
   nlohmann::ordered_json choices = nlohmann::ordered_json::array();
   for (const FormChoice& c : plan.choices)
     choices.push_back({{"form", name_of(c.form)},
                        {"taken", c.taken},
                        {"cost", c.cost ? nlohmann::ordered_json(*c.cost) : nullptr},
-                       {"error", error_of(options, plan, c, result)},
+                       {"error", error_of(plan, c, result)},
                        {"why", c.why}});
   nlohmann::ordered_json forms = nlohmann::ordered_json::array(), free = nlohmann::ordered_json::array();
   for (const PackLine& l : result.lines)
@@ -107,7 +106,7 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
   if (options.json) {
     nlohmann::ordered_json out{{"scene", options.scene.empty() ? options.materials : options.scene},
                                {"models", nlohmann::ordered_json::array()}};
-    for (const PlannedModel& p : plan) out["models"].push_back(explanation(options, p, result));
+    for (const PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
     out["unused_models"] = unused;
     fmt::print("{}\n", out.dump(2));
     return;
@@ -115,7 +114,7 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
   for (const PlannedModel& p : plan) {
     fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
     for (const FormChoice& c : p.choices) {
-      const nlohmann::ordered_json error = error_of(options, p, c, result);
+      const nlohmann::ordered_json error = error_of(p, c, result);
       fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", name_of(c.form), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
                  error.is_number()   ? fmt::format("{:.2e}", error.get<double>())
                  : error.is_string() ? error.get<std::string>()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc fit: how close a few closures of Cycles come to a model.
 #include <algorithm>
+#include <filesystem>
 
 #include "app/commands.h"
 #include "app/csv.h"
@@ -27,6 +28,21 @@ void print_errors(const std::vector<ViewError>& errors, const std::string& axis,
   out.finish();
 }
 
+void replace_stored(const Fit& fit, const Model& model, const ParamValues& values) {
+  const std::filesystem::path path = stored_fit(model, values), folder = path.parent_path();
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) input_error("{}: cannot be created: {}", folder.string(), error.message());
+  fit.store(model, values, path);
+  const std::string prefix = model.info().name + "_";
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().stem().string();
+    // Names of models may begin alike: what follows is a hash of 16 digits and no more.
+    if (name.starts_with(prefix) && name.size() == prefix.size() + 16 && entry.path() != path)
+      std::filesystem::remove(entry.path());
+  }
+}
+
 }  // namespace
 
 void add_fit_command(CLI::App& app) {
@@ -34,7 +50,7 @@ void add_fit_command(CLI::App& app) {
     std::string model;
     std::vector<std::string> values;
     std::string over;
-    bool pairs = false, twin = false;
+    bool pairs = false, twin = false, store = false;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
@@ -54,6 +70,10 @@ void add_fit_command(CLI::App& app) {
                 "f cos(theta_i) of the closures instead, for direction pairs.\n"
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
                 "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
+  cmd->add_flag("--store", o->store,
+                "With --over: makes the fit anew and keeps it in generator/fits, in place of what is kept of the model")
+      ->needs("--over")
+      ->excludes("--pairs", "--twin");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
@@ -73,7 +93,12 @@ void add_fit_command(CLI::App& app) {
       else
         print_errors(form.errors(), o->over, o->model + " " + format_values(model.info(), values));
     };
-    if (o->twin) {
+    if (o->store) {
+      values = split_factors(model, values).first;
+      const Fit fit(model, values, Fit::From::Scratch);
+      replace_stored(fit, model, values);
+      print_errors(fit.errors(), o->over, o->model + " " + format_values(model.info(), values));
+    } else if (o->twin) {
       const Twin& twin = twin_of(model, values);
       print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo); });
     } else {

@@ -58,7 +58,8 @@ Json describe(const Model& m) {
             {"smooth", q.smooth},
             {"exact_sampling", q.exact_sampling},
             {"diffuse_limit", q.diffuse_limit},
-            {"specular_limit", q.specular_limit}}},
+            {"specular_limit", q.specular_limit},
+            {"fit_axis", q.fit_axis}}},
           {"scatter", m.has_scatter()},
           {"mirror", m.has_mirror()},
           {"representations", names_of_forms(m)},
@@ -71,8 +72,8 @@ void print_text(const Model& m) {
   std::string forms;
   for (RepresentationKind kind : representations(m)) {
     forms += (forms.empty() ? "" : ", ") + std::string(name_of(kind));
-    for (const auto& [name, value] : form_choices(m, kind))
-      forms += fmt::format(" (only {}={})", name, std::get<std::string>(value));
+    if (const ParamValues only = form_values(m, kind); !only.empty())
+      forms += fmt::format(" (only {})", format_values(info, only));
   }
   fmt::print("  representations: {}\n", forms);
   for (const ParamInfo& p : info.params) {

@@ -24,7 +24,8 @@ template <class T> struct Blinn {
             .doc = "Microfacets in V-shaped cavities with a cosine-power distribution of normals.",
             .properties = {.smooth = false,  // min() in the geometry term
                            .exact_sampling = false,
-                           .specular_limit = "e=1e8"},
+                           .specular_limit = "e=1e8",
+                           .fit_axis = "e"},
             .params = {}};
   }
 

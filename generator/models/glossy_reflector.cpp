@@ -29,7 +29,8 @@ template <class T> struct GlossyReflector {
             .paper = "K. Suffern: Ray Tracing from the Ground Up, chapter 25, 2007",
             .equations = "eqs. 25.1, 25.7, 25.8",
             .doc = "Blurred mirror: rays spread about the mirror direction, all of the same weight.",
-            .properties = {.reciprocal = false, .positive = false, .smooth = false, .specular_limit = "e=1e7"},
+            .properties =
+                {.reciprocal = false, .positive = false, .smooth = false, .specular_limit = "e=1e7", .fit_axis = "e"},
             .params = {}};
   }
 

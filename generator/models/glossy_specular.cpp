@@ -30,7 +30,8 @@ template <class T> struct GlossySpecular {
                            .positive = false,
                            .smooth = false,  // at e = 1 the lobe ends in an edge
                            .exact_sampling = false,
-                           .specular_limit = "e=1e7"},
+                           .specular_limit = "e=1e7",
+                           .fit_axis = "e"},
             .params = {}};
   }
 

@@ -30,7 +30,8 @@ template <class T> struct Lafortune {
             .properties = {.positive = false,  // black where the bracket is negative
                            .smooth = false,    // with e <= 1 the rim of the lobe is an edge
                            .exact_sampling = false,
-                           .diffuse_limit = "cxy=0 cz=1 e=0"},
+                           .diffuse_limit = "cxy=0 cz=1 e=0",
+                           .fit_axis = "e"},
             .params = {}};
   }
 

@@ -27,7 +27,8 @@ template <class T> struct MaxPhong {
             .properties = {.positive = false,  // black beyond 90 degrees from the mirror direction
                            .smooth = false,    // max(): an edge where both cosines are equal
                            .exact_sampling = false,
-                           .specular_limit = "e=1e8"},
+                           .specular_limit = "e=1e8",
+                           .fit_axis = "e"},
             .params = {}};
   }
 

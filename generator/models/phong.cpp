@@ -27,7 +27,8 @@ template <class T> struct Phong {
                            .conserving = false,
                            .positive = false,  // black beyond 90 degrees from the mirror direction
                            .smooth = false,    // with e <= 1 the rim of the lobe is an edge
-                           .specular_limit = "e=1e8"},
+                           .specular_limit = "e=1e8",
+                           .fit_axis = "e"},
             .params = {}};
   }
 

@@ -44,7 +44,7 @@ template <class T> struct RadziszewskiAlda {
             .paper = "M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008",
             .equations = "eqs. 17-19; factor 2 and nbar mended",
             .doc = "Glossy reflection or transmission that loses no light at any angle, from matte (0) to mirror.",
-            .properties = {.lossless = true, .diffuse_limit = "n=0", .specular_limit = "n=1e8"},
+            .properties = {.lossless = true, .diffuse_limit = "n=0", .specular_limit = "n=1e8", .fit_axis = "n"},
             .params = {}};
   }
 

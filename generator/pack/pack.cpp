@@ -24,6 +24,7 @@
 #include "pack/nodes.h"
 #include "pack/shader.h"
 #include "represent/fit.h"
+#include "represent/twin.h"
 
 namespace brdfc {
 namespace {
@@ -84,9 +85,9 @@ Json error_json(const RepresentationError& e) {
           {"note", e.note}};
 }
 
-Json choices_json(const ParamValues& choices) {
+Json values_json(const ParamValues& values) {
   Json j = Json::object();
-  for (const auto& [name, value] : choices) j[name] = std::get<std::string>(value);
+  for (const auto& [name, value] : values) j[name] = std::visit([](const auto& v) { return Json(v); }, value);
   return j;
 }
 
@@ -233,15 +234,33 @@ bool has_table(const Model& model) {
          std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;
 }
 
-Json value_json(const ParamValue& value) {
-  return std::visit([](const auto& v) { return Json(v); }, value);
-}
-
 /// The number that a fit runs over, and how far.
 Json axis_json(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
   if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return {};
   const auto& axis = fit_of(model, without_factors(model, fixed)).axis();
   return axis ? Json{{"name", axis->parameter}, {"min", axis->low}, {"max", axis->high}} : Json();
+}
+
+/// What a form of a plan has no parameters for.
+ParamValues fixed_in(const PlannedModel& plan, RepresentationKind kind) {
+  ParamValues fixed = plan.fixed;
+  fixed.merge(form_values(*plan.model, kind, plan.fixed));
+  return fixed;
+}
+
+/// Makes or reads what a form is made of, so that asking for it takes no time afterwards.
+void prepare_fit(const PlannedModel& plan, RepresentationKind kind) {
+  const ParamValues values = without_factors(*plan.model, fixed_in(plan, kind));
+  if (kind == RepresentationKind::Twin)
+    twin_of(*plan.model, values);
+  else
+    fit_of(*plan.model, values);
+}
+
+/// Numbers of the tables that a fit's closures are looked up in; a twin's are in its nodes.
+std::size_t fit_floats(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
+  if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return 0;
+  return fit_of(model, without_factors(model, fixed)).size();
 }
 
 BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::path& scratch) {
@@ -258,8 +277,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   j["parameters"] = Json::array();
   for (const ParamInfo& p : info.params)
     if (!plan.fixed.count(p.name)) j["parameters"].push_back(parameter_json(p));
-  j["fixed"] = Json::object();
-  for (const auto& [name, value] : plan.fixed) j["fixed"][name] = value_json(value);
+  j["fixed"] = values_json(plan.fixed);
 
   AlbedoTable table, whole_table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
@@ -275,22 +293,24 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   j["auto"] = name_of(plan.forms.front());
   for (RepresentationKind kind : plan.forms) {
     const bool twin = kind == RepresentationKind::Twin;
-    const Shader shader =
-        twin ? write_nodes(model, plan.fixed) : write_shader(model, kind, table, plan.fixed, plan.max_lobes);
+    const ParamValues fixed = fixed_in(plan, kind);
+    const std::size_t of_fit = fit_floats(kind, model, fixed);
+    const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed);
+    const Shader shader = twin ? write_nodes(model, fixed) : write_shader(model, kind, of_form, fixed, plan.max_lobes);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
     const bool cut = !is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
     const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
-    const RepresentationError error = measure_error(model, kind, plan.fixed);
+    const RepresentationError error = measure_error(model, kind, fixed);
     const std::optional<double> cost = costs.of(model, kind);
     const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
-                           table.size(), table.error, shader.source.size(), whole.closures, whole.operations,
-                           whole_table.size(), whole.source.size()});
+                           of_form.size() + of_fit, table.error, shader.source.size(), whole.closures, whole.operations,
+                           whole_table.size() + of_fit, whole.source.size()});
     j["representations"][name_of(kind)] = {
         {twin ? "nodes" : "shader", file},
-        {"choices", choices_json(form_choices(model, kind))},
+        {"only", values_json(form_values(model, kind, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
         {"statements", shader.operations},
@@ -298,7 +318,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"cost", cost ? Json(*cost) : Json()},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
-        {"axis", axis_json(kind, model, plan.fixed)},
+        {"axis", axis_json(kind, model, fixed)},
         {"sha256", sha256(shader.source)}};
   }
   if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
@@ -328,13 +348,12 @@ PackResult build_pack(const PackOptions& options) {
     // A thread that waits for parts of this model must not begin another one: recordings belong to their thread.
     tbb::this_task_arena::isolate([&] { built[i] = build_model(chosen[i], options.costs, staging.path()); });
   };
-  // Models side by side, so that what one does in line keeps no core waiting. Fits are made one at a time, by all
-  // cores.
-  if (std::any_of(chosen.begin(), chosen.end(),
-                  [](const PlannedModel& plan) { return std::any_of(plan.forms.begin(), plan.forms.end(), is_fit); }))
-    for (std::size_t i = 0; i < chosen.size(); ++i) build(i);
-  else
-    tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
+  // Fits that are not stored are made one at a time, by all cores; then models side by side, so that what one does in
+  // line keeps no core waiting.
+  for (const PlannedModel& plan : chosen)
+    for (const RepresentationKind kind : plan.forms)
+      if (is_fit(kind)) prepare_fit(plan, kind);
+  tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   PackResult result;
   std::map<std::string, std::string> members;

@@ -95,8 +95,8 @@ std::optional<std::string> not_controlled(const Needs& needs) {
 
 /// A form may exist for some choices only: the one that a material would need; empty if it has all.
 std::string lacking(const MaterialNeed& need, RepresentationKind kind) {
-  for (const auto& [name, value] : form_choices(*need.model, kind))
-    if (need.values.at(name) != value) return fmt::format("{}={}", name, std::get<std::string>(value));
+  for (const auto& [name, value] : form_values(*need.model, kind))
+    if (need.values.at(name) != value) return value_text(need.model->info(), name, value);
   return {};
 }
 
@@ -147,7 +147,7 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
   if (need.representation == "auto") {
     std::vector<RepresentationKind> order;
     for (RepresentationKind kind : known) {
-      if (!lacking(need, kind).empty()) continue;
+      if (is_fit(kind) || !lacking(need, kind).empty()) continue;
       // Nothing has to be fitted for a material that has what comes first.
       if (!order.empty() && over_time(needs, order.front(), budget).empty()) break;
       if (kind == RepresentationKind::Sampled)
@@ -202,7 +202,7 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
   const Model& model = *needs.front()->model;
   std::vector<FormChoice> choices;
   const auto consider = [&](RepresentationKind kind, const std::optional<std::string>& missing, bool beside) {
-    FormChoice choice{kind, false, true, budget.costs.of(model, kind), ""};
+    FormChoice choice{kind, false, true, budget.costs.of(model, kind), "", {}};
     std::map<std::string, std::vector<std::string>> users;  // by their reason
     for (std::size_t i = 0; i < needs.size(); ++i)
       if (chosen[i].form == kind) users[chosen[i].why].push_back(needs[i]->id);
@@ -218,9 +218,12 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
     } else if (!choice.taken) {
       choice.why = why_not(kind, needs, chosen, budget);
     }
+    if (kind == RepresentationKind::Fitted && choice.exists && (choice.taken || budget.error || budget.time))
+      choice.error = fitted_error(needs);
     choices.push_back(std::move(choice));
   };
   for (const RepresentationKind kind : representations(model)) {
+    if (is_fit(kind)) continue;
     std::optional<std::string> missing;
     if (std::all_of(needs.begin(), needs.end(), [&](const auto* need) { return !lacking(*need, kind).empty(); }))
       missing = "only for " + lacking(*needs.front(), kind);

@@ -30,6 +30,8 @@ struct FormChoice {
   bool exists = true;          ///< for these materials
   std::optional<double> cost;  ///< as Costs has it
   std::string why;
+  /// Of a fitted form that is taken, or that a budget asks about: relative L1 of the material that is off by most.
+  std::optional<double> error = {};
 };
 
 /// What a pack holds of one model.

@@ -345,10 +345,9 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
                     int max_lobes) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
-  for (const auto& [name, value] : form_choices(model, kind))
+  for (const auto& [name, value] : form_values(model, kind, given))
     if (fixed.emplace(name, value).first->second != value)
-      input_error("{}: the {} form exists only for {}={}", info.name, name_of(kind), name,
-                  std::get<std::string>(value));
+      input_error("{}: the {} form exists only for {}", info.name, name_of(kind), format_values(info, {{name, value}}));
   const bool sampled = kind == RepresentationKind::Sampled, controlled = kind == RepresentationKind::Controlled;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));

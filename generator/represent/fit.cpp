@@ -6,10 +6,16 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cstdlib>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
+#include "analysis/table_file.h"
+#include "core/hash.h"
+#include "model/formula.h"
 #include "model/horizon.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -266,6 +272,21 @@ ParamValues without_factors(const Model& model, const ParamValues& known) {
   return values;
 }
 
+std::pair<ParamValues, Rgb<double>> split_factors(const Model& model, ParamValues values) {
+  Rgb<double> factor(1.0);
+  for (const std::string& name : factors(model, values)) {
+    ParamValue& value = values.at(name);
+    if (auto* colour = std::get_if<std::array<double, 3>>(&value)) {
+      factor = factor * Rgb<double>{(*colour)[0], (*colour)[1], (*colour)[2]};
+      *colour = {1, 1, 1};
+    } else {
+      factor = factor * std::get<double>(value);
+      value = 1.0;
+    }
+  }
+  return {std::move(values), factor};
+}
+
 ParamValues with_number(const Model& model, const ParamValues& values, double number) {
   ParamValues out = values;
   if (const ParamInfo* p = missing(model, values)) out[p->name] = number;
@@ -283,6 +304,10 @@ std::optional<std::string> unfit(const Model& model, const ParamValues& known) {
 }
 
 namespace {
+
+std::array<double*, 6> numbers_of(ViewError& e) {
+  return {&e.cos_theta_o, &e.relative_l1, &e.relative_l2, &e.albedo, &e.negative, &e.number};
+}
 
 /// A model at places of the axis: 0 without one.
 class Knots {
@@ -337,6 +362,25 @@ class Knots {
   std::map<double, std::vector<View>> views_;
 };
 
+/// To six digits and single precision: more the shader does not keep, and shorter texts have no more digits.
+double rounded(double x) { return double(std::strtof(fmt::format("{:.6g}", x).c_str(), nullptr)); }
+std::vector<double> rounded(std::vector<double> numbers) {
+  for (double& x : numbers) x = rounded(x);
+  return numbers;
+}
+
+/// All that a fit depends on but the code; a change of the code that changes fits changes the first number.
+std::string settings() {
+  return fmt::format("1 {} {} {} {} {} {} {} {}", kViews, kTrialStride, kPoints, kRidge, kFirstSteps, kSteps,
+                     kWorseBetween, kSlightlyOff);
+}
+std::string hash_of(const Model& model, const ParamValues& values) {
+  const FitAxis axis = fit_axis(*missing(model, values));
+  return sha256(fmt::format("{}\n{}\n{} {} {} {}\n{}\n{}", model.info().name, format_values(model.info(), values),
+                            axis.parameter, axis.low, axis.high, name_of(axis.scale), settings(),
+                            formula(model, values)));
+}
+
 double mean_error(const std::vector<Fitted>& knots) {
   double sum = 0;
   for (const Fitted& f : knots) sum += f.error;
@@ -345,11 +389,31 @@ double mean_error(const std::vector<Fitted>& knots) {
 
 }  // namespace
 
-Fit::Fit(const Model& model, const ParamValues& values) {
-  if (const ParamInfo* p = missing(model, values)) axis_ = fit_axis(*p);
+Fit::Fit(const Model& model, const ParamValues& given, From from) {
+  ParamValues values = given;
+  Rgb<double> factor(1.0);
+  if (const ParamInfo* p = missing(model, given)) {
+    axis_ = fit_axis(*p);
+    // The same fit whether factors are known or sockets.
+    std::tie(values, factor) = split_factors(model, given);
+    const std::filesystem::path path = stored_fit(model, values);
+    if (from == From::Store && std::filesystem::exists(path)) {
+      read(path, hash_of(model, values));
+      apply(factor);
+      return;
+    }
+  }
   // Where the channels differ by a factor alone, one fit serves them all.
   if (!make(model, values, true) && !make(model, values, false))
     throw std::logic_error(model.info().name + ": a fit of colours that is not one");
+  apply(factor);
+}
+
+void Fit::apply(const Rgb<double>& factor) {
+  if (!axis_) return;
+  const Rgb<double> all = tint_ * factor;
+  scale_ = std::max(max_component(all), 1e-30);
+  tint_ = all / scale_;
 }
 
 bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
@@ -391,6 +455,8 @@ bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
     }
   }
   tint_ = at.tint().value_or(Rgb<double>(1.0));
+  tint_ = {rounded(tint_.r), rounded(tint_.g), rounded(tint_.b)};
+  knots_ = knots, family_ = int(family), grey_ = grey;
   tabulate(knots, at.fitted(knots, 1, family));
   // With an axis at both ends, and half way between knots.
   std::vector<double> proof = {0};
@@ -400,16 +466,11 @@ bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
     const double number = axis_ ? axis_->at(x) : 0;
     for (ViewError e : view_errors(at.bound(x), [&](const Vec3<double>& wo) { return closures(wo, number); })) {
       e.number = number;
+      for (double* x : numbers_of(e)) *x = rounded(*x);
       errors_.push_back(e);
     }
   }
   return true;
-}
-
-/// To six digits, which is what a sum of terms of opposite signs needs in single precision: shorter shaders.
-std::vector<double> rounded(std::vector<double> numbers) {
-  for (double& x : numbers) x = std::strtod(fmt::format("{:.6g}", x).c_str(), nullptr);
-  return numbers;
 }
 
 template <class Knot> void Fit::tabulate(const std::vector<double>& places, const std::vector<Knot>& knots) {
@@ -487,6 +548,28 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
   }
 }
 
+std::vector<std::shared_ptr<const Table>> Fit::tables() const {
+  std::vector<std::shared_ptr<const Table>> out;
+  const auto add = [&](const std::shared_ptr<const Table>& table) {
+    if (table) out.push_back(table);
+  };
+  add(position_);
+  add(amplitude_);
+  for (const Facets& f : facets_) add(f.log_alpha);
+  for (const Lobe& l : lobes_) add(l.offset), add(l.exponent);
+  for (const Linear& l : linear_) {
+    add(l.weight);
+    for (const auto& channel : l.colour) add(channel);
+  }
+  return out;
+}
+
+std::size_t Fit::size() const {
+  std::size_t sum = 0;
+  for (const auto& table : tables()) sum += table->values.size();
+  return sum;
+}
+
 double Fit::mean_l1(const std::optional<double>& number) const {
   std::map<double, std::pair<double, double>> sums;  // by place: of L1, of views
   for (const ViewError& e : errors_) {
@@ -502,6 +585,106 @@ double Fit::mean_l1(const std::optional<double>& number) const {
   double worst = 0;
   for (auto it = first; it != last; ++it) worst = std::max(worst, it->second.first / it->second.second);
   return worst;
+}
+
+Fit Fit::knot(const Model& model, const ParamValues& values, double place) const {
+  Knots at(model, values, axis_, grey_);
+  if (!at.see({place})) throw std::logic_error(model.info().name + ": a fit of another tint");
+  const Fitted cell = std::move(at.fitted({place}, 1, Family(family_)).front());
+  Fit out;
+  out.axis_ = axis_;
+  out.tint_ = tint_;
+  // Between two knots that are the same, views lie as they do in the whole.
+  out.tabulate({0, 1}, std::vector<Fitted>{cell, cell});
+  return out;
+}
+
+void Fit::store(const Model& model, const ParamValues& values, const std::filesystem::path& path) const {
+  using Json = nlohmann::ordered_json;
+  const FitAxis& axis = axis_.value();
+  std::vector<double> errors;
+  for (ViewError e : errors_)
+    for (const double* x : numbers_of(e)) errors.push_back(*x);
+  const std::vector<int> errors_sizes = {int(errors_.size()), int(errors.size() / errors_.size())};
+  std::vector<std::shared_ptr<const Table>> rows = tables();
+  rows.push_back(make_table("errors", errors_sizes, std::move(errors)));
+  TableImage image;
+  image.height = int(rows.size());
+  for (const auto& table : rows) image.width = std::max(image.width, int(table->values.size()));
+  Json facets = Json::array(), tables = Json::array();
+  for (const Facets& f : facets_) facets.push_back(f.kind == ClosureKind::Ggx ? "ggx" : "beckmann");
+  for (const auto& table : rows) {
+    image.pixels.insert(image.pixels.end(), table->values.begin(), table->values.end());
+    image.pixels.resize(std::size_t(image.width) * (tables.size() + 1), 0.f);
+    tables.push_back({{"row", tables.size()}, {"name", table->name}, {"sizes", table->sizes}});
+  }
+  image.meta = Json{
+      {"model", model.info().name},
+      {"quantity", "closures fitted to a model, over a number and the view"},
+      {"values", format_values(model.info(), values)},
+      {"axis", {{"parameter", axis.parameter}, {"low", axis.low}, {"high", axis.high}, {"scale", name_of(axis.scale)}}},
+      {"hash", hash_of(model, values)},
+      {"knots", knots_},
+      {"family", family_},
+      {"grey", grey_},
+      {"tint", {tint_.r, tint_.g, tint_.b}},
+      {"lobes", lobes_.size()},
+      {"facets", facets},
+      {"channels", linear_.front().colour.size()},
+      {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
+      {"tables",
+       tables}}.dump();
+  write_table_image(image, path);
+}
+
+void Fit::read(const std::filesystem::path& path, const std::string& hash) {
+  const TableImage image = read_table_image(path);
+  try {
+    const auto meta = nlohmann::json::parse(image.meta);
+    if (meta.at("hash") != hash)
+      input_error("{}: hash: expected {}, got {}", path.string(), hash, meta.at("hash").dump());
+    std::map<std::string, std::shared_ptr<const Table>> tables;
+    for (const auto& t : meta.at("tables")) {
+      const auto sizes = t.at("sizes").get<std::vector<int>>();
+      std::size_t count = 1;
+      for (const int n : sizes) count *= std::size_t(n);
+      const auto first = image.pixels.begin() + t.at("row").get<std::ptrdiff_t>() * image.width;
+      if (count > std::size_t(image.width) || t.at("row").get<int>() >= image.height)
+        input_error("{}: tables: {} has more numbers than there are", path.string(), t.at("name").dump());
+      const std::string name = t.at("name");
+      tables[name] = make_table(name, sizes, {first, first + std::ptrdiff_t(count)});
+    }
+    knots_ = meta.at("knots").get<std::vector<double>>();
+    family_ = meta.at("family");
+    grey_ = meta.at("grey");
+    tint_ = {meta.at("tint").at(0), meta.at("tint").at(1), meta.at("tint").at(2)};
+    position_ = tables.at("position_on_axis");
+    amplitude_ = tables.at("amplitude");
+    const auto& facets = meta.at("facets");
+    for (std::size_t i = 0; i < facets.size(); ++i)
+      facets_.push_back(
+          {facets[i] == "ggx" ? ClosureKind::Ggx : ClosureKind::Beckmann, 1, tables.at(fmt::format("alpha_of_{}", i))});
+    const std::size_t lobes = meta.at("lobes"), channels = meta.at("channels");
+    for (std::size_t j = 0; j < lobes; ++j)
+      lobes_.push_back({tables.at(fmt::format("offset_of_{}", j)), tables.at(fmt::format("power_of_{}", j))});
+    for (std::size_t j = 0; j < lobes + 1 + facets_.size(); ++j) {
+      Linear l;
+      if (j <= lobes) l.weight = tables.at(fmt::format("share_of_{}", j));
+      for (std::size_t channel = 0; channel < channels; ++channel)
+        l.colour.push_back(tables.at(fmt::format("colour_of_{}_{}", j, channel)));
+      linear_.push_back(std::move(l));
+    }
+    const auto& errors = tables.at("errors");
+    for (std::size_t i = 0; i < errors->values.size();) {
+      ViewError e;
+      for (double* x : numbers_of(e)) *x = errors->values.at(i++);
+      errors_.push_back(e);
+    }
+  } catch (const nlohmann::json::exception& e) {
+    input_error("{}: expected a stored fit: {}", path.string(), e.what());
+  } catch (const std::out_of_range&) {
+    input_error("{}: expected a stored fit, a table is missing", path.string());
+  }
 }
 
 double Fit::l1_at(const View& view, double number) const {
@@ -547,7 +730,7 @@ template <class T> Rgb<T> Fit::colour(std::size_t j, const std::vector<T>& at) c
 }
 
 template <class T> T Fit::amplitude(const std::vector<T>& at) const {
-  return amplitude_ ? named("amplitude", exp(lookup(amplitude_, at))) : T(1);
+  return amplitude_ ? named("amplitude", T(scale_) * exp(lookup(amplitude_, at))) : T(1);
 }
 
 /// Coordinates of a ramp's table.
@@ -589,6 +772,12 @@ template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const
 }
 template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const double&) const;
 template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Expr&) const;
+
+std::filesystem::path stored_fit(const Model& model, const ParamValues& values) {
+  const std::string hash = hash_of(model, split_factors(model, values).first);
+  return std::filesystem::path(BRDFC_SOURCE_DIR) / "generator" / "fits" /
+         fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
+}
 
 const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }
 

@@ -10,10 +10,12 @@
 // moments of the model's own lobe. All is tabulated over the number and the view angle, and linear between.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/albedo_table.h"
@@ -43,6 +45,8 @@ FitAxis fit_axis(const ParamInfo&);
 std::set<std::string> factors(const Model&, const ParamValues& known);
 /// `known` with 1 for every factor that it lacks. Throws std::logic_error where it then lacks more than one number.
 ParamValues without_factors(const Model&, const ParamValues& known);
+/// `values`, in which factors are, with 1 for each, and their product.
+std::pair<ParamValues, Rgb<double>> split_factors(const Model&, ParamValues values);
 /// Complete values, `number` being that which `values` may lack.
 ParamValues with_number(const Model&, const ParamValues& values, double number);
 
@@ -51,9 +55,18 @@ std::optional<std::string> unfit(const Model&, const ParamValues&);
 
 class Fit {
  public:
-  /// `values` may lack one number, which becomes the axis. Throws ValueError where the model gives a value that is NaN,
-  /// infinite or negative.
-  Fit(const Model&, const ParamValues& values);
+  enum class From { Store, Scratch };
+  /// `values` may lack one number, which becomes the axis; then a fit that is stored is read, unless it has to be made
+  /// from scratch. Throws ValueError where the model gives a value that is NaN, infinite or negative.
+  Fit(const Model&, const ParamValues& values, From from = From::Store);
+
+  /// Keeps a fit along an axis, made with factors of 1, as a float EXR with a row a table. Throws InputError naming the
+  /// path.
+  void store(const Model&, const ParamValues& values, const std::filesystem::path&) const;
+  /// What is fitted at the knot at this place: the same closures for every value of the axis.
+  Fit knot(const Model&, const ParamValues& values, double place) const;
+  /// Places of the knots on the axis.
+  const std::vector<double>& knots() const { return knots_; }
 
   const std::optional<FitAxis>& axis() const { return axis_; }
 
@@ -68,6 +81,9 @@ class Fit {
   /// Relative L1, mean over views: with an axis at the worse of the two places of errors() beside `number`, or at the
   /// worst of all where it may be anything.
   double mean_l1(const std::optional<double>& number) const;
+
+  /// How many numbers its tables hold.
+  std::size_t size() const;
 
   /// At cosines evenly spaced from 1 to 0 whatever the tables' knots, and with an axis at both its ends and in the
   /// middle between any two knots.
@@ -91,6 +107,11 @@ class Fit {
     std::shared_ptr<const Table> weight;
     std::vector<std::shared_ptr<const Table>> colour;
   };
+  Fit() = default;
+  /// Multiplies a fit along an axis.
+  void apply(const Rgb<double>& factor);
+  void read(const std::filesystem::path&, const std::string& hash);
+  std::vector<std::shared_ptr<const Table>> tables() const;
   /// False where `grey` and the channels do not differ by a factor alone.
   bool make(const Model&, const ParamValues& values, bool grey);
   /// Makes the tables of what was fitted at the knots of the axis, which are at these places of [0, 1]; without an axis
@@ -107,6 +128,10 @@ class Fit {
   template <class T> T amplitude(const std::vector<T>& at) const;
 
   std::optional<FitAxis> axis_;
+  std::vector<double> knots_;
+  int family_ = 0;                          ///< which closures
+  bool grey_ = false;                       ///< whether one channel serves all, with a tint
+  double scale_ = 1;                        ///< of all closures along an axis, whose fit is made without factors
   std::shared_ptr<const Table> position_;   ///< from the place on the axis to the coordinate that tables take for it
   std::shared_ptr<const Table> amplitude_;  ///< with an axis, the logarithm of what the model reflects; else 1
   std::vector<Lobe> lobes_;
@@ -116,7 +141,11 @@ class Fit {
   std::vector<ViewError> errors_;
 };
 
-/// The fit for these values, made at first use and kept while the program runs.
+/// Where a fit along the number that `values` lack is kept, by the hash of all that it depends on but the code:
+/// formula, values, slider, settings.
+std::filesystem::path stored_fit(const Model&, const ParamValues& values);
+
+/// The fit for these values, made or read at first use and kept while the program runs.
 const Fit& fit_of(const Model&, const ParamValues& values);
 
 extern template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, const double&, bool) const;

@@ -216,6 +216,24 @@ ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt
   return values;
 }
 
+/// Where more than the declared number is open, that one alone stays so.
+ParamValues fit_values(const Model& model, const ParamValues& fixed) {
+  const ModelInfo& info = model.info();
+  const ParamValues defaults = complete(info, {});
+  ParamValues known = fixed;
+  for (const ParamInfo& p : info.params)
+    if (p.kind == ParamKind::Choice) known.insert(*defaults.find(p.name));
+  const std::set<std::string> free = factors(model, known);
+  std::vector<const ParamInfo*> open;
+  for (const ParamInfo& p : info.params)
+    if (!known.count(p.name) && !free.count(p.name)) open.push_back(&p);
+  const bool axis = open.size() == 1 && open.front()->kind == ParamKind::Number;
+  for (const ParamInfo* p : open)
+    if (!axis && p->name != info.properties.fit_axis) known.insert(*defaults.find(p->name));
+  for (const auto& [name, value] : fixed) known.erase(name);
+  return known;
+}
+
 }  // namespace
 
 const char* name_of(RepresentationKind kind) {
@@ -243,31 +261,34 @@ RepresentationKind representation_named(const std::string& name) {
 
 std::vector<RepresentationKind> representations(const Model& model) {
   if (!model.has_scatter()) return {RepresentationKind::Exact};
-  if (model.has_exact()) return {RepresentationKind::Exact, RepresentationKind::Sampled};
-  return {RepresentationKind::Sampled};
+  std::vector<RepresentationKind> kinds = {RepresentationKind::Sampled};
+  if (model.has_exact()) kinds.insert(kinds.begin(), RepresentationKind::Exact);
+  if (!model.info().properties.fit_axis.empty()) kinds.push_back(RepresentationKind::Fitted);
+  return kinds;
 }
 
-ParamValues form_choices(const Model& model, RepresentationKind kind) {
+ParamValues form_values(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
+  if (is_fit(kind)) return fit_values(model, fixed);
   if (kind != RepresentationKind::Exact) return {};
   const ModelInfo& info = model.info();
   std::vector<Choices> known;
   for (const Choices& c : choice_combinations(info))
     if (model.make_double(with_choices(info, c))->exact({0, 0, 1})) known.push_back(c);
-  ParamValues fixed;
+  ParamValues only;
   std::size_t k = 0, combinations = 1;
   for (const ParamInfo& p : info.params) {
     if (p.kind != ParamKind::Choice) continue;
     std::set<int> used;
     for (const Choices& c : known) used.insert(c[k]);
     if (used.size() == 1 && p.choices.size() > 1)
-      fixed[p.name] = p.choices[std::size_t(*used.begin())];
+      only[p.name] = p.choices[std::size_t(*used.begin())];
     else
       combinations *= p.choices.size();
     ++k;
   }
   if (known.size() != combinations)
     throw std::logic_error(info.name + ": exact() must be decided by choices that each have one value for it");
-  return fixed;
+  return only;
 }
 
 Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent) {
@@ -315,7 +336,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);
   double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;
-  const ParamValues confined = form_choices(model, kind);
+  const ParamValues confined = form_values(model, kind);
   for (const Choices& choices : choice_combinations(model.info())) {
     if (!admits(model.info(), choices, confined)) continue;
     // The recording does not depend on the values, so one serves all parameter sets.

@@ -27,15 +27,17 @@ inline bool is_fit(RepresentationKind kind) {
 /// Throws InputError that lists the known names.
 RepresentationKind representation_named(const std::string&);
 
-/// The forms a model has whatever its parameters are, preferred first.
+/// The forms of a model that need nothing known of its materials, preferred first: a fitted one where the model
+/// declares what it runs over (ModelProperties::fit_axis).
 std::vector<RepresentationKind> representations(const Model&);
 
 /// How many lobes a sampled shader may trace per shading point.
 inline constexpr int kMaxLobes = 8;
 inline constexpr int kDefaultLobes = 1;
 
-/// The choices that a form is confined to, because the closures of an exact one are known for some choices only.
-ParamValues form_choices(const Model&, RepresentationKind);
+/// The values that a form is confined to, beside those that are `fixed`: choices, where the closures of an exact one
+/// are known for some alone; of a fit the defaults of all but factors() and the number that it runs over.
+ParamValues form_values(const Model&, RepresentationKind, const ParamValues& fixed = {});
 
 struct RecordedClosure {
   ClosureKind kind;

@@ -162,17 +162,7 @@ Rgb<double> colour(const Channels& channels, const std::array<double, 1>& at) {
 
 Twin::Twin(const Model& model, const ParamValues& values) {
   // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
-  ParamValues white = values;
-  Rgb<double> factor(1.0);
-  for (const std::string& name : factors(model, values)) {
-    if (const auto* colour = std::get_if<std::array<double, 3>>(&values.at(name))) {
-      factor = factor * Rgb<double>{(*colour)[0], (*colour)[1], (*colour)[2]};
-      white[name] = std::array<double, 3>{1, 1, 1};
-    } else {
-      factor = factor * std::get<double>(values.at(name));
-      white[name] = 1.0;
-    }
-  }
+  const auto [white, factor] = split_factors(model, values);
   const BoundModel bound = bind_model(model, white);
   std::vector<View> views(kTwinKnots);
   tbb::parallel_for(0, kTwinKnots, [&](int k) { views[std::size_t(k)] = seen(bound, view_at(k), kPoints); });

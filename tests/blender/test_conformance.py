@@ -59,22 +59,30 @@ def test_the_fault_of_ashikhmin_shirley_is_large(rows):
     assert rows["ashikhmin_shirley 0.4 0.4"]["sampling_share"] > 0.3
 
 
+def calls(source):
+    """What tells one closure from another in OSL: the function, its first argument if that is a
+    text, and whether microfacets refract."""
+    found = re.findall(r"\b(\w+)\((?=(\"\w+\")?((?:[^()]|\([^()]*\))*))", source)
+    return [
+        (function, first, function == "microfacet" and rest.rstrip().endswith("1"))
+        for function, first, rest in found
+    ]
+
+
 def test_forms_use_only_closures_that_conform(rows, extension):
     """Every closure that the pack's shaders call has a row, and that row has no fault."""
     sound = {}
     for case in conformance.CASES:
-        name = re.match(r"\w+\([^,)]*", case.osl)[0]
-        function, first = name.split("(")
-        key = (function, first if first.startswith('"') else "")
+        key = calls(case.osl)[0]
         if "tilted" not in case.name:
             sound[key] = sound.get(key, True) and rows[case.name]["verdict"] != "fault"
     called = set()
     for model, entry in extension.api.models().items():
         for form in entry["representations"]:
             _, source = extension.pack.source(model, form)
-            for function, first in re.findall(r"\b(\w+)\((\"\w+\")?", source):
-                if function in {f for f, _ in sound} or function.endswith("_bsdf"):
-                    called.add((model, form, (function, first)))
+            for key in calls(source):
+                if key[0] in {f for f, *_ in sound} or key[0].endswith("_bsdf"):
+                    called.add((model, form, key))
     assert called
     # A portal only turns a ray, and transparency does not even that.
     called = {c for c in called if c[2][0] not in ("ray_portal_bsdf", "transparent")}

@@ -90,65 +90,109 @@ def test_furnace_of_a_fitted_form(lean, tool):
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)
 
 
-#: One model along a number: facets, exponents and amplitude all change with it.
-ALONG = {"low": 12.0, "high": 300.0}
+#: Where along the slider of its number, by factors, each fitted form of the extension is looked at.
+SHARES = (0.2, 0.5)
 
 
-@pytest.fixture
-def along(extension, use_pack):
-    use_pack(
-        {
-            name: {"model": "blinn", "parameters": {"e": e}, "representation": "fitted"}
-            for name, e in ALONG.items()
-        }
-    )
-    return extension
+def along_sliders(extension):
+    """(model, number, value) of every fitted form that the extension comes with, twice."""
+    axes = [
+        (model, entry["representations"]["fitted"]["axis"])
+        for model, entry in extension.api.models().items()
+        if "fitted" in entry["representations"]
+    ]
+    assert len(axes) >= 5
+    return [
+        (model, axis["name"], (axis["min"] + 1) * ((axis["max"] + 1) / (axis["min"] + 1)) ** s - 1)
+        for model, axis in axes
+        for s in SHARES
+    ]
 
 
-@pytest.mark.full
-def test_a_number_along_its_slider(along, tool):
+def test_forms_of_the_extension_along_their_sliders(extension, tool):
     """A shader serves all values of one number: of two materials, and from an attribute that
-    varies over a third."""
+    varies over a third. Every pair is within 1e-3 of the largest value of what the tool says."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
-    along.scene_loader.apply_clean_settings(scene, max_bounces=0)
-    made = [along.api.new_material("blinn", "fitted", e=e) for e in ALONG.values()]
-    varying = along.api.new_material("blinn", "fitted", e=1.0)
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    cases = along_sliders(extension)
+    made = [extension.api.new_material(m, "fitted", **{name: v}) for m, name, v in cases]
+    varying = extension.api.new_material("blinn", "fitted", e=1.0)
     attribute = varying.node_tree.nodes.new("ShaderNodeAttribute")
     attribute.attribute_name = "shininess"
-    (node,) = along.nodes.group_nodes(varying)
-    varying.node_tree.links.new(attribute.outputs["Fac"], along.nodes.sockets(node)["e"])
+    (node,) = extension.nodes.group_nodes(varying)
+    varying.node_tree.links.new(attribute.outputs["Fac"], extension.nodes.sockets(node)["e"])
 
     rng = np.random.default_rng(5)
-    which = np.repeat(np.arange(3), FACETS)
+    of_blinn = [case for case in cases if case[0] == "blinn"]
+    what = [case for case in cases for _ in range(FACETS)] + of_blinn * (FACETS // 2)
+    which = np.minimum(np.arange(len(what)) // FACETS, len(cases))
     towards = unit((0.3, -0.2, 0.9))
-    normals = unit(unit(towards + (0, 0, 1)) + 0.3 * rng.normal(size=(len(which), 3)))
-    number = np.tile(list(ALONG.values()), len(which) // 2)
-    number[: 2 * FACETS] = np.repeat(list(ALONG.values()), FACETS)
+    # Near and far from the highlight.
+    spread = np.where(np.arange(len(what)) % 2, 0.3, 0.03)[:, None]
+    normals = unit(unit(towards + (0, 0, 1)) + spread * rng.normal(size=(len(what), 3)))
+    values = np.array([value for _, _, value in what])
     meter = Goniometer(
-        scene, [*made, varying], normals, 4, which=which, attributes={"shininess": number}
+        scene, [*made, varying], normals, 4, which=which, attributes={"shininess": values}
     )
     wi, wo = meter.local(meter.add_sun(towards)), meter.wo()
     picture = meter.measure()
-    for e in ALONG.values():
-        lit = (number == e) & (wi[:, 2] > 1e-4) & (wo[:, 2] > 1e-4)
-        text = tool(
-            "fit", "blinn", f"e={e}", "--over", "e", "--pairs", stdin=pairs_csv(wi[lit], wo[lit])
-        )
+    for case in cases:
+        model, name, value = case
+        lit = np.array([w == case for w in what]) & (wi[:, 2] > 1e-4) & (wo[:, 2] > 1e-4)
+        assert lit.sum() > FACETS * (1 if model == "blinn" else 0.6), "facets are in the dark"
+        pairs = pairs_csv(wi[lit], wo[lit])
+        text = tool("fit", model, f"{name}={value!r}", "--over", name, "--pairs", stdin=pairs)
         expected = read_csv(text)[1]
         off, largest = np.abs(picture[lit] - expected).max(), expected.max()
-        print(f"e = {e}: off by {off:.2g} of {largest:.2g}")
-        assert largest > 0.1
-        assert off <= 1e-3 * largest, e
+        print(f"{model} {name} = {value:g}: off by {off:.2g} of {largest:.2g}")
+        assert largest > 0.05
+        assert off <= 1e-3 * largest, case
 
-    # What the sliders can't reach a fit does not hold.
+
+def test_a_number_beyond_its_slider_is_warned_of(extension, empty):
+    material = extension.api.new_material("blinn", "fitted")
+    (node,) = extension.nodes.group_nodes(material)
+    end = extension.pack.representation("blinn", "fitted")["axis"]["max"]
+
     def codes(value):
-        (group,) = along.nodes.group_nodes(made[0])
-        along.nodes.set_value(group, "e", value)
-        return [f.code for f in along.checks.warnings(made[0], scene)]
+        extension.nodes.set_value(node, "e", value)
+        return [f.code for f in extension.checks.warnings(material, empty)]
 
-    assert "out_of_fit" not in codes(1000.0)
-    assert "out_of_fit" in codes(1500.0)
+    assert "out_of_fit" not in codes(end)
+    assert "out_of_fit" in codes(1.5 * end)
+
+
+def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
+    """Other values are refused with the reason, and nothing changes."""
+    api, pack, nodes = extension.api, extension.pack, extension.nodes
+    only = pack.form_values("lafortune", "fitted")
+    assert only == {"cxy": -1, "cz": 0.8}
+    material = api.new_material("lafortune", "fitted", e=8.0, ks=(0.5, 0.25, 1.0))
+    (node,) = nodes.group_nodes(material)
+    assert set(nodes.sockets(node)) == {"e", "ks", "Normal", "Tangent"}
+    values = api.get_parameters(material)
+    assert {name: values[name] for name in only} == only
+    with pytest.raises(ValueError, match="'fitted' only for cz=0.8, not for 0.5"):
+        api.set_parameters(material, cz=0.5)
+    with pytest.raises(ValueError, match="'fitted' only for below='mirror', not for 'lose'"):
+        api.new_material("glossy_reflector", "fitted", below="lose")
+
+    api.switch_representation(material, "sampled")
+    for name, value in api.get_parameters(material).items():
+        assert value == pytest.approx(values[name], rel=1e-6)
+    api.switch_representation(material, "fitted")  # 0.8 is another number in a socket
+    api.switch_representation(material, "sampled")
+    api.set_parameters(material, cz=0.5)
+    with pytest.raises(ValueError, match="only for cz=0.8, not for 0.5"):
+        api.switch_representation(material, "fitted")
+    assert nodes.identity(node) == ("lafortune", "sampled")
+    api.set_parameters(material, cz=0.8)
+    value = material.node_tree.nodes.new("ShaderNodeValue")
+    material.node_tree.links.new(value.outputs[0], nodes.sockets(node)["cz"])
+    with pytest.raises(ValueError, match="only for cz=0.8, not for a linked value"):
+        api.switch_representation(material, "fitted")
+    assert nodes.sockets(node)["cz"].is_linked
 
 
 @pytest.fixture
