@@ -16,21 +16,25 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, nodes, pack
+from . import checks, lean, nodes, pack
 from .checks import Finding, enable_osl, warnings
+from .lean import PlanError
 from .nodes import CompileError
 from .pack import PackError
 
 __all__ = [
     "CompileError",
     "PackError",
+    "PlanError",
     "Finding",
     "add_twin",
     "albedo",
+    "bake",
     "enable_osl",
     "get_parameters",
     "models",
     "new_material",
+    "plan",
     "prepare_material",
     "set_kernel",
     "set_parameters",
@@ -39,6 +43,9 @@ __all__ = [
     "warnings",
     "write_materials",
 ]
+
+
+_NO_MATERIAL = "no material of this file has a reflection model of brdfc"
 
 
 def models():
@@ -63,8 +70,8 @@ def prepare_material(material):
     """Gives a material the settings that its models need; returns a sentence for each change."""
     declared = set()
     for node in nodes.group_nodes(material):
-        if nodes.is_current(node):
-            declared |= set(pack.representation(*nodes.identity(node)).get("warnings", []))
+        if entry := nodes.manifest_entry(node):
+            declared |= set(entry[0].get("warnings", []))
     if "bump_correction" in declared and material.cycles.use_bump_map_correction:
         material.cycles.use_bump_map_correction = False
         return ["Bump Map Correction turned off for this material"]
@@ -119,9 +126,16 @@ def set_parameters(material, **parameters):
 
 
 def _set(node, what, parameters):
-    _, values = _checked(*nodes.identity(node), parameters)
+    model, representation = nodes.identity(node)
+    lean_node = nodes.is_baked(node)
+    _, values = _checked(model, "auto" if lean_node else representation, parameters)
     present = nodes.sockets(node)
-    for name in values:
+    for name, value in values.items():
+        if lean_node and name not in present and not pack.same(value, nodes.get_value(node, name)):
+            raise ValueError(
+                f"{name!r} of {what} is {nodes.get_value(node, name)!r}, the only value of a lean "
+                f"material; switch_representation() brings the others back; got {value!r}"
+            )
         if name in present and present[name].is_linked:
             raise ValueError(f"{name!r} of {what} is controlled by a link")
     for name, value in values.items():
@@ -232,13 +246,9 @@ def _as_typed(value):
     return float(str(np.float32(value))) if isinstance(value, float) else value
 
 
-def used_materials():
-    """How the open file uses the models, by material: as `materials` of a scene file has it.
-
-    A parameter that a link controls is {"varies": True}. A material with several model nodes
-    has an entry for each, MATERIAL/NODE.
-    """
-    found = {}
+def _used():
+    """[(id, material, node, entry)]; see used_materials()."""
+    found = []
     for material in bpy.data.materials:
         ours = nodes.group_nodes(material)
         for node in ours:
@@ -248,12 +258,23 @@ def used_materials():
                 value = nodes.get_value(node, name)
                 parameters[name] = {"varies": True} if value is None else _as_typed(value)
             entry = {"model": model_name, "representation": representation}
-            if lobes := pack.representation(model_name, representation).get("lobes"):
+            form = nodes.manifest_entry(node)
+            if lobes := form and form[0].get("lobes"):
                 value = nodes.get_value(node, pack.LOBES)
                 entry["lobes"] = lobes["max"] if value is None else value
             entry["parameters"] = parameters
-            found[material.name if len(ours) == 1 else f"{material.name}/{node.name}"] = entry
+            name = material.name if len(ours) == 1 else f"{material.name}/{node.name}"
+            found.append((name, material, node, entry))
     return found
+
+
+def used_materials():
+    """How the open file uses the models, by material: as `materials` of a scene file has it.
+
+    A parameter that a link controls is {"varies": True}. A material with several model nodes
+    has an entry for each, MATERIAL/NODE.
+    """
+    return {name: entry for name, _, _, entry in _used()}
 
 
 def write_materials(path):
@@ -264,7 +285,7 @@ def write_materials(path):
     """
     materials = used_materials()
     if not materials:
-        raise ValueError("no material of this file has a reflection model of brdfc")
+        raise ValueError(_NO_MATERIAL)
     path = Path(path)
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -273,6 +294,38 @@ def write_materials(path):
     finally:
         beside.unlink(missing_ok=True)
     return len(materials)
+
+
+def plan(error=None, time=None):
+    """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
+    lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
+
+    `error` in percent and `time` in units of Blender's Glossy node let it choose the forms.
+    Nothing is changed. Raises ValueError where no material has a model, PlanError without the
+    program or where it refuses.
+    """
+    used = [
+        (name, node, entry)
+        for name, material, node, entry in _used()
+        if material.library is None and node.id_data.library is None
+    ]
+    if not used:
+        raise ValueError(_NO_MATERIAL)
+    return lean.Plan(used, error, time)
+
+
+def bake(made):
+    """Gives every material groups that hold what the open file needs and no more: as plan() made.
+
+    Returns how many nodes have one now; switch_representation() goes back to the extension's own.
+    Raises CompileError, and PlanError where brdfc is of another version than the extension; the
+    file is then as it was.
+    """
+    count = made.bake()
+    for material in bpy.data.materials:
+        if material.library is None:
+            prepare_material(material)
+    return count
 
 
 def scene_warnings(scene):

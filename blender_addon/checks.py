@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import nodes, pack
+from . import nodes
 
 BLENDER_MIN = (4, 5, 0)
 #: Devices other than the CPU whose kernels can run OSL.
@@ -271,11 +271,8 @@ def node_warnings(node, material, scene):
     found = []
     if problem := nodes.script_problem(node.node_tree):
         found.append(Finding("script_failed", "ERROR", f"{label}the shader {problem}"))
-    form, schema = {}, {}
-    if nodes.is_current(node):
-        form = pack.representation(model_name, representation)
-        schema = pack.parameters(model_name)
-    else:
+    form, schema = nodes.manifest_entry(node) or ({}, {})
+    if not form:
         found.append(
             Finding(
                 "outdated",

@@ -320,10 +320,11 @@ def find_group(model_name, representation):
     return None
 
 
-def ensure_group(model_name, representation="auto"):
+def ensure_group(model_name, representation="auto", baked=None):
     """Node group of a model, made if the file has none. Raises ValueError, CompileError.
 
-    Nothing is left in the file when it fails.
+    Nothing is left in the file when it fails. `baked`: hash of the extension that a pack of the
+    open file alone, which pack.use() has taken, stands in for.
     """
     representation = pack.resolve(model_name, representation)
     if group := find_group(model_name, representation):
@@ -342,8 +343,18 @@ def ensure_group(model_name, representation="auto"):
             "representation": representation,
             "digest": pack.digest(model_name, representation),
             "choices": json.dumps(pack.form_choices(model_name, representation)),
-            "only": json.dumps(pack.form_values(model_name, representation)),
+            "only": json.dumps(
+                pack.fixed(model_name) | pack.form_values(model_name, representation)
+            ),
         }
+        if baked:
+            # The pack will be gone.
+            entry = {
+                "of": baked,
+                "form": pack.representation(model_name, representation),
+                "parameters": pack.parameters(model_name),
+            }
+            group[TAG]["baked"] = json.dumps(entry)
         if native:
             _fill_native_group(group, model_name, representation, source)
         else:
@@ -374,13 +385,26 @@ def identity(node):
     return tag["model"], tag["representation"]
 
 
-def is_current(node):
-    """Whether the group is of the installed version of its shader."""
+def is_baked(node):
+    """Whether the group was made for the open file alone; see lean.py."""
+    return "baked" in node.node_tree[TAG]
+
+
+def manifest_entry(node):
+    """What the manifest says of a node's form, and its parameters by name; None where the group is
+    of another version of the extension."""
     model_name, representation = identity(node)
+    tag = node.node_tree[TAG]
+    if is_baked(node):
+        entry = json.loads(tag["baked"])
+        same = entry["of"] == pack.manifest()["hash"]
+        return (entry["form"], entry["parameters"]) if same else None
     try:
-        return node.node_tree[TAG]["digest"] == pack.digest(model_name, representation)
+        if tag["digest"] != pack.digest(model_name, representation):
+            return None
     except ValueError:  # a model or form that the installed version does not have
-        return False
+        return None
+    return pack.representation(model_name, representation), pack.parameters(model_name)
 
 
 def sockets(node):
@@ -452,19 +476,46 @@ def group_nodes(material):
     return [node for tree in trees for node in tree.nodes if is_ours(node)]
 
 
+def _all_values(node):
+    choices = json.loads(node.node_tree[TAG]["choices"])
+    names = dict.fromkeys((*choices, *_only(node), *sockets(node)))
+    return {name: get_value(node, name) for name in names}
+
+
+def remove_group(group):
+    """Takes a group out of the file, and the text of its script, if nothing else has it."""
+    texts = [n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script]
+    bpy.data.node_groups.remove(group)
+    trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
+    used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
+    for text in texts:
+        if text not in used:
+            bpy.data.texts.remove(text)
+
+
+def remove_unused_groups():
+    """Takes every group of this extension that no node has out of the file."""
+    for group in list(bpy.data.node_groups):
+        if TAG in group and group.library is None and group.users == 0:
+            remove_group(group)
+
+
 def switch(node, representation):
     """Puts another representation of the same model into a group node; values and links stay.
 
     Raises ValueError, CompileError; the node is then as it was.
     """
     model_name, _ = identity(node)
-    tree = node.id_data
-    choices = json.loads(node.node_tree[TAG]["choices"])
-    names = dict.fromkeys((*choices, *_only(node), *sockets(node)))
-    values = {name: get_value(node, name) for name in names}
-    group = ensure_group(model_name, pack.resolve(model_name, representation, values))
+    values = _all_values(node)
+    replace_group(node, ensure_group(model_name, pack.resolve(model_name, representation, values)))
+
+
+def replace_group(node, group):
+    """Puts another group of the same model into a group node; values and links stay."""
     if group == node.node_tree:
         return
+    tree = node.id_data
+    values = _all_values(node)
     incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
     outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
     for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:

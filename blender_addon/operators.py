@@ -2,8 +2,8 @@
 """Operators: add a group, make a material, turn OSL on, switch the form, mend settings."""
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
-from bpy.types import Operator
+from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.types import AddonPreferences, Operator
 
 from . import api, checks, nodes, pack
 
@@ -284,7 +284,68 @@ class BRDFC_OT_write_materials(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_bake(Operator):
+    """Give the materials shaders that hold no more than this file needs; brdfc makes them"""
+
+    bl_idname = "brdfc.bake"
+    bl_label = "Bake Lean Materials"
+    bl_options = {"REGISTER", "UNDO"}
+
+    error: FloatProperty(
+        name="Error in Percent",
+        description="Part of the light that a fitted form may be off, which is then taken in place "
+        "of a sampled one; 0: every material keeps its form",
+        min=0,
+        max=100,
+        default=0,
+    )
+
+    def _planned(self):
+        return api.plan(error=self.error or None)
+
+    def invoke(self, context, event):
+        try:
+            self._plan, self._plan_error = self._planned(), self.error
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return context.window_manager.invoke_props_dialog(self, width=800)
+
+    def draw(self, context):
+        self.layout.prop(self, "error")
+        column = self.layout.column(align=True)
+        for line in self._plan.lines():
+            column.label(text=line)
+
+    def execute(self, context):
+        try:
+            plan = getattr(self, "_plan", None)
+            if plan is None or self._plan_error != self.error:
+                plan = self._planned()
+            count = api.bake(plan)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Nodes that are lean now: {count}")
+        return {"FINISHED"}
+
+
+class BrdfcPreferences(AddonPreferences):
+    bl_idname = __package__
+
+    program: StringProperty(
+        name="Program brdfc",
+        description="The generator, which Bake Lean Materials runs; empty: found on the PATH",
+        subtype="FILE_PATH",
+    )
+
+    def draw(self, context):
+        self.layout.prop(self, "program")
+
+
 _CLASSES = (
+    BrdfcPreferences,
+    BRDFC_OT_bake,
     BRDFC_OT_add_twin,
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,

@@ -59,7 +59,7 @@ def model(name):
     return models[name]
 
 
-def _same(value, only):
+def same(value, only):
     """Whether a socket, which is in single precision, holds a value."""
     if isinstance(only, str) or value is None:
         return value == only
@@ -70,7 +70,7 @@ def _same(value, only):
 def refusal(model_name, name, values):
     """Why these values exclude a form, which may exist for some values only; None if not."""
     for key, only in form_values(model_name, name).items():
-        if key in values and not _same(values[key], only):
+        if key in values and not same(values[key], only):
             got = "a linked value" if values[key] is None else repr(values[key])
             return (
                 f"model {model_name!r} has the representation {name!r} only for {key}={only!r}, "

@@ -67,14 +67,13 @@ def error_text(entry):
     return ", ".join(parts) or "not measured"
 
 
-def cost_text(model_name, representation):
-    """Render time of a representation in units of Blender's Glossy node."""
-    cost = pack.representation(model_name, representation)["cost"]
-    if cost is None:
+def cost_text(node, form):
+    """Render time of a node's form in units of Blender's Glossy node."""
+    if form["cost"] is None:
         return "not measured"
     # A form of other parameters, which a pack cut to a scene holds, has another one.
-    where = ", at default parameters" if pack.fixed(model_name) else ""
-    return f"{cost:.2f} x Glossy{where}"
+    cut = nodes.is_baked(node) or pack.fixed(nodes.identity(node)[0])
+    return f"{form['cost']:.2f} x Glossy{', at default parameters' if cut else ''}"
 
 
 #: View angles in degrees at which the panel shows energy.
@@ -98,8 +97,10 @@ def energy_text(node):
     return "   ".join(numbers)
 
 
-def _draw_form(layout, node, editable):
+def _draw_form(layout, node, form, editable):
     model_name, representation = nodes.identity(node)
+    if lean := nodes.is_baked(node):
+        _wrapped(layout, "Lean: only what this file needs. A form brings the whole one back")
     entry = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = editable
@@ -110,15 +111,16 @@ def _draw_form(layout, node, editable):
             refusals.append(refusal)
             continue
         button = row.operator(
-            "brdfc.switch", text=name.capitalize(), depress=name == representation
+            "brdfc.switch",
+            text=name.capitalize(),
+            depress=name == representation and not lean,
         )
         button.node, button.representation = node.name, name
-    form = entry["representations"][representation]
     column = layout.column(align=True)
     for refusal in refusals:
         _wrapped(column, refusal[0].upper() + refusal[1:])
     _wrapped(column, f"Error: {error_text(form)}")
-    _wrapped(column, f"Cost: {cost_text(model_name, representation)}")
+    _wrapped(column, f"Cost: {cost_text(node, form)}")
     if form.get("closures"):
         _wrapped(column, f"Closures: {form['closures']}")
     if entry.get("albedo"):
@@ -140,13 +142,14 @@ def draw_node(layout, node, material, editable=True):
     model_name, representation = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL")
     entry = {"representations": {}}
-    if nodes.is_current(node):
+    if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
-        _draw_form(layout, node, editable)
+        _draw_form(layout, node, made[0], editable)
     else:
         button = layout.operator("brdfc.switch", text="Update", icon="FILE_REFRESH")
-        button.node, button.representation = node.name, representation
+        button.node = node.name
+        button.representation = "auto" if nodes.is_baked(node) else representation
     _draw_values(layout, node)
     if api.TWIN in entry["representations"] and representation != api.TWIN:
         row = layout.row()
@@ -179,6 +182,7 @@ def draw_material(layout, material, scene):
     for node in nodes.group_nodes(material):
         draw_node(layout.box(), node, material)
     layout.operator("brdfc.write_materials", icon="EXPORT")
+    layout.operator("brdfc.bake", icon="MOD_DECIM")
 
 
 class _BrdfcPanel:

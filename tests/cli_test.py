@@ -447,6 +447,21 @@ def test_what_can_not_be_fitted(args, words, tmp_path):
 # ---- build within a budget ----------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("radius", "said"), [(0, True), (0.3, False)])
+def test_a_lamp_without_a_size_is_named_beside_drawn_forms(tmp_path, radius, said):
+    scene = json.loads((ROOT / "scenes" / "small-lamp.json").read_text())
+    scene["lights"][0]["radius"] = radius
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(scene))
+    done = run("build", "--scene", file, "--explain", "--out", tmp_path / "out")
+    models = json.loads(done.stdout)["models"]
+    reasons = [c["why"] for m in models for c in m["choices"] if c["form"] == "sampled"]
+    drawn = [r for r in reasons if "the form is left open" in r]
+    assert drawn
+    for reason in drawn:
+        assert ("lights[0] without a size" in reason) == said
+
+
 @pytest.fixture
 def phong(tmp_path):
     """build(*options): the extension of one material of `phong`, whose forms have costs of their

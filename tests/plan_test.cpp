@@ -46,6 +46,16 @@ TEST(Plan, EverythingIsEveryModelInEveryForm) {
   EXPECT_THROW(plan_models({"nonesuch"}), InputError);
 }
 
+TEST(Plan, SaysWhichLampsADrawnDirectionDoesNotMeet) {
+  Budget budget;
+  const std::vector<MaterialNeed> drawn = {need("a", "phong", {"e=20"})}, exact = {need("a", "lambert", {})};
+  EXPECT_EQ(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled), "a: the form is left open");
+  budget.sizeless = {"lights[1]", "lights[4]"};
+  EXPECT_THAT(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled),
+              HasSubstr("lights[1], lights[4] without a size"));
+  for (const FormChoice& c : plan_scene(exact, budget)[0].choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
+}
+
 TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {
   auto textured = need("c", "coupled", {"r0=0.1", "rm=0.5"});
   textured.textured.insert("rm");

@@ -163,10 +163,18 @@ void run(const Options& options) {
     if (!std::filesystem::exists(costs))
       input_error("{}: no such file, and --time needs what forms cost", costs.string());
   }
-  const std::vector<PlannedModel> plan =
-      !options.scene.empty()       ? plan_scene(needs_of(load_scene(options.scene).materials), budget)
-      : !options.materials.empty() ? plan_scene(needs_of(load_materials(options.materials)), budget)
-                                   : plan_models(options.models);
+  std::vector<PlannedModel> plan;
+  if (!options.scene.empty()) {
+    const Scene scene = load_scene(options.scene);
+    for (const Light& l : scene.lights)
+      if ((l.kind == Light::Kind::Point || l.kind == Light::Kind::Sun) && l.radius == 0)
+        budget.sizeless.push_back(l.key);
+    plan = plan_scene(needs_of(scene.materials), budget);
+  } else if (!options.materials.empty()) {
+    plan = plan_scene(needs_of(load_materials(options.materials)), budget);
+  } else {
+    plan = plan_models(options.models);
+  }
   PackOptions pack{options.out, options.addon, plan, budget.costs, {}};
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {

@@ -220,6 +220,12 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
     }
     if (kind == RepresentationKind::Fitted && choice.exists && (choice.taken || budget.error || budget.time))
       choice.error = fitted_error(needs);
+    // As script/conditions measured it.
+    if (kind == RepresentationKind::Sampled && choice.taken && !budget.sizeless.empty())
+      choice.why += fmt::format(
+          "; {} without a size shines on drawn directions as rare bright dots, on a fitted form as "
+          "on Blender's own nodes",
+          fmt::join(budget.sizeless, ", "));
     choices.push_back(std::move(choice));
   };
   for (const RepresentationKind kind : representations(model)) {

@@ -56,6 +56,8 @@ struct Budget {
   bool controlled = false;      ///< so does a controlled form
   std::optional<double> time = {};  ///< cost that a form may have where the material leaves the form open
   Costs costs = {};
+  /// Lamps that no drawn direction meets, for they have no size: their places in the file.
+  std::vector<std::string> sizeless = {};
 };
 
 /// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same

@@ -8,6 +8,7 @@ import os
 import tempfile
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -259,3 +260,40 @@ def draw(tool, model, values, wo, count):
     stdin = to_csv(header, np.hstack([np.broadcast_to(wo, (count, 3)), u]))
     rows = read_csv(tool("sample", model, *arguments(values), stdin=stdin))[1]
     return rows[:, :3], rows[:, 3:6] / count
+
+
+def counts():
+    """How many data-blocks of the kinds that this extension makes there are."""
+    return {
+        kind: len(getattr(bpy.data, kind))
+        for kind in ("materials", "node_groups", "texts", "images")
+    }
+
+
+class Layout:
+    """Stands in for a UILayout and keeps what is drawn."""
+
+    def __init__(self, log=None):
+        self.log = log if log is not None else []
+        self.alert = self.enabled = self.use_property_split = False
+
+    def label(self, text="", **_):
+        self.log.append(text)
+
+    def _sub(self, **_):
+        return Layout(self.log)
+
+    row = column = box = _sub
+
+    def separator(self, **_):
+        pass
+
+    def menu(self, name, **_):
+        self.log.append(f"menu {name}")
+
+    def operator(self, name, text="", **_):
+        self.log.append(f"operator {name} {text}")
+        return SimpleNamespace()
+
+    def prop(self, data, name, text="", **_):
+        self.log.append(f"value {text}: {getattr(data, name)}")

@@ -29,13 +29,6 @@ def sampled_forms(extension):
     return [p for p in pairs if extension.pack.representation(*p)["lobes"]]
 
 
-def counts():
-    return {
-        kind: len(getattr(bpy.data, kind))
-        for kind in ("materials", "node_groups", "texts", "images")
-    }
-
-
 def test_official_validator_accepts_the_zip(extension_zip):
     command = [
         sys.executable,
@@ -223,10 +216,10 @@ def test_values_round_trip(extension, empty, subtests):
     ],
 )
 def test_bad_arguments(extension, empty, arguments, message):
-    before = counts()
+    before = helpers.counts()
     with pytest.raises(ValueError, match=message):
         extension.api.new_material(*arguments[0], **arguments[1])
-    assert counts() == before
+    assert helpers.counts() == before
 
 
 def test_set_parameters_is_all_or_nothing(extension, empty):
@@ -265,10 +258,10 @@ BROKEN = {
 def test_broken_shader_is_an_error(extension, empty, monkeypatch, case):
     source, message = BROKEN[case]
     monkeypatch.setattr(extension.pack, "source", lambda model, form: ("broken", source))
-    before = counts()
+    before = helpers.counts()
     with pytest.raises(extension.api.CompileError, match=message):
         extension.api.new_material("lambert")
-    assert counts() == before
+    assert helpers.counts() == before
 
 
 def test_broken_shader_under_another_engine(extension, empty, monkeypatch):
@@ -591,37 +584,6 @@ def test_saved_file_renders_without_the_extension(extension, empty, tmp_path):
 # Menus, panels, operators
 
 
-class Layout:
-    """Stands in for a UILayout and keeps what is drawn."""
-
-    def __init__(self, log=None):
-        self.log = log if log is not None else []
-        self.alert = self.enabled = self.use_property_split = False
-
-    def label(self, text="", **_):
-        self.log.append(text)
-
-    def _sub(self, **_):
-        return Layout(self.log)
-
-    row = column = box = _sub
-
-    def separator(self, **_):
-        pass
-
-    def menu(self, name, **_):
-        self.log.append(f"menu {name}")
-
-    def operator(self, name, text="", **_):
-        from types import SimpleNamespace
-
-        self.log.append(f"operator {name} {text}")
-        return SimpleNamespace()
-
-    def prop(self, data, name, text="", **_):
-        self.log.append(f"value {text}: {getattr(data, name)}")
-
-
 def draw_functions(menu):
     return [f.__name__ for f in getattr(bpy.types, menu)._dyn_ui_initialize()]
 
@@ -630,14 +592,14 @@ def test_add_menu_lists_every_model(extension, empty):
     from types import SimpleNamespace
 
     assert draw_functions("NODE_MT_category_shader_shader").count("draw_add_menu") == 1
-    layout = Layout()
+    layout = helpers.Layout()
     extension.ui.draw_add_menu(SimpleNamespace(layout=layout), bpy.context)
     assert layout.log == ["menu NODE_MT_brdfc"]
-    layout = Layout()
+    layout = helpers.Layout()
     bpy.types.NODE_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
     labels = [e["label"] for e in extension.api.models().values()]
     assert layout.log == [f"operator brdfc.add_node {label}" for label in labels]
-    layout = Layout()
+    layout = helpers.Layout()
     bpy.types.MATERIAL_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
     assert layout.log == [f"operator brdfc.new_material {label}" for label in labels]
 
@@ -647,7 +609,7 @@ def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
         with subtests.test(model=model, representation=representation):
             material = extension.api.new_material(model, representation)
             empty.cycles.shading_system = False
-            layout = Layout()
+            layout = helpers.Layout()
             extension.ui.draw_material(layout, material, empty)
             text = "\n".join(layout.log)
             entry = extension.pack.model(model)
@@ -676,14 +638,14 @@ def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, s
         assert set(entry["representations"]) == set(names)
         for name in names:
             with subtests.test(representation=name):
-                layout = Layout()
+                layout = helpers.Layout()
                 material = extension.api.new_material("phong", name)
                 extension.ui.draw_material(layout, material, empty)
                 cost = entry["representations"][name]["cost"]
                 assert f"Cost: {cost:.2f} x Glossy, at default parameters" in layout.log
     finally:
         extension.pack.use()
-    layout = Layout()
+    layout = helpers.Layout()
     extension.ui.draw_material(layout, extension.api.new_material("phong", "sampled"), empty)
     assert any(line.startswith("Cost:") and line.endswith("x Glossy") for line in layout.log)
 
@@ -698,7 +660,7 @@ def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension,
     with pytest.raises(ValueError, match=only):
         api.switch_representation(material, "exact")
     assert api.get_parameters(material)["fresnel"] == "dielectric"
-    layout = Layout()
+    layout = helpers.Layout()
     extension.ui.draw_material(layout, material, empty)
     text = "\n".join(layout.log)
     assert "operator brdfc.switch Exact" not in text
@@ -739,7 +701,7 @@ def test_operator_new_material(extension, empty):
     assert bpy.ops.brdfc.fix_material() == {"FINISHED"}
     assert material.cycles.use_bump_map_correction is False
     empty.cycles.use_guiding = True
-    layout = Layout()
+    layout = helpers.Layout()
     extension.ui.draw_material(layout, material, empty)
     assert "operator brdfc.no_guiding" in "\n".join(layout.log)
     assert bpy.ops.brdfc.no_guiding() == {"FINISHED"}
@@ -882,31 +844,31 @@ def test_operator_add_node(extension, empty):
 
 
 def test_disable_leaves_nothing_behind(extension, empty):
-    names = [
-        name
+    classes = [c for module in (extension.ui, extension.operators) for c in module._CLASSES]
+    defined = {
+        value
         for module in (extension.ui, extension.operators)
-        for name in dir(module)
-        if isinstance(getattr(module, name), type) and "brdfc" in name.lower() and name[0] != "_"
-    ]
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and issubclass(value, bpy.types.bpy_struct)
+        and value.__module__ == module.__name__
+    }
+    assert defined == set(classes) and len(classes) > 10
     handlers = {
         name: list(getattr(bpy.app.handlers, name))
         for name in dir(bpy.app.handlers)
         if isinstance(getattr(bpy.app.handlers, name), list)
     }
-    # None is left out here for its name.
-    assert len(names) == len(extension.ui._CLASSES) + len(extension.operators._CLASSES) > 10
     menus = ("NODE_MT_category_shader_shader", "MATERIAL_MT_context_menu")
     with_extension = [draw_functions(menu) for menu in menus]
     try:
         bpy.ops.preferences.addon_disable(module=extension.package)
         for menu in menus:
             assert not {"draw_add_menu", "draw_material_menu"} & set(draw_functions(menu))
-        for name in names:
-            assert not hasattr(bpy.types, name)
+        assert not any(c.is_registered for c in classes)
         assert not hasattr(bpy.types, "BRDFC_OT_add_node")
         assert handlers == {name: list(getattr(bpy.app.handlers, name)) for name in handlers}
     finally:
         bpy.ops.preferences.addon_enable(module=extension.package)
     assert [draw_functions(menu) for menu in menus] == with_extension
-    for name in names:
-        assert hasattr(bpy.types, name)
+    assert all(c.is_registered for c in classes)

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lean materials: baked from inside Blender, with the program brdfc."""
+
+import bpy
+import helpers
+import numpy as np
+import pytest
+from helpers import Layout, counts
+
+
+@pytest.fixture
+def used(extension, empty, program, monkeypatch):
+    """Materials of three models, one with a link; by model."""
+    monkeypatch.setenv("BRDFC_TOOL", str(program))
+    api = extension.api
+    made = {
+        "radziszewski_alda": api.new_material("radziszewski_alda", n=7.0, tint=(0.9, 0.5, 0.25)),
+        "ward": api.new_material("ward", ax=0.25, normalisation="duer"),
+        "coupled": api.new_material("coupled", r0=0.1, rm=(0.75, 0.5, 0.25)),
+    }
+    node = the_node(extension, made["ward"])
+    value = made["ward"].node_tree.nodes.new("ShaderNodeValue")
+    value.outputs[0].default_value = 0.5
+    made["ward"].node_tree.links.new(value.outputs[0], extension.nodes.sockets(node)["ay"])
+    return made
+
+
+def the_node(extension, material):
+    (node,) = extension.nodes.group_nodes(material)
+    return node
+
+
+def source(extension, material):
+    tree = the_node(extension, material).node_tree
+    script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
+    return script.script.as_string()
+
+
+def picture(extension, material):
+    scene = bpy.data.scenes.new("Picture")
+    scene.render.engine = "CYCLES"
+    extension.api.enable_osl(scene)
+    helpers.sphere_scene(scene, material, size=24, samples=64)
+    found = helpers.render(scene)[..., :3]
+    bpy.data.scenes.remove(scene)
+    return found
+
+
+def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
+    api, nodes = extension.api, extension.nodes
+    values = {model: api.get_parameters(m) for model, m in used.items()}
+    listed = api.used_materials()
+    pictures = {model: picture(extension, m) for model, m in used.items()}
+    sizes = {model: len(source(extension, m)) for model, m in used.items()}
+    before = counts()
+
+    plan = api.plan()
+    lines = "\n".join(plan.lines())
+    for words in ("ward, for Ward", "without parameter n: constant, n=7", "lambert", "bytes"):
+        assert words in lines
+    assert counts() == before, "a plan changes nothing"
+    assert api.bake(plan) == 3
+    assert counts() == before, "groups and texts that nothing uses are left"
+    assert extension.pack.root == extension.pack._INSTALLED
+
+    free = {"radziszewski_alda": set(), "ward": {"ay"}, "coupled": set()}
+    for model, material in used.items():
+        node = the_node(extension, material)
+        assert nodes.is_baked(node)
+        assert set(nodes.sockets(node)) == free[model] | {"Normal", "Tangent"}
+        # In coupled's short text a table of three colours takes the place of a colour.
+        part = 1.1 if model == "coupled" else 0.5
+        assert len(source(extension, material)) < part * sizes[model]
+        found = api.get_parameters(material)
+        assert found.keys() == values[model].keys()
+        for name, value in found.items():
+            same = value if isinstance(value, str) else pytest.approx(value, rel=1e-6)
+            assert values[model][name] == same
+        # What is left out is what no ray meets; the noise is another one.
+        after = picture(extension, material)
+        centre = (slice(8, 16), slice(8, 16))
+        assert after[centre].mean() == pytest.approx(pictures[model][centre].mean(), rel=0.05)
+    assert nodes.sockets(the_node(extension, used["ward"]))["ay"].is_linked
+    assert api.used_materials().keys() == listed.keys()
+    for name, entry in api.used_materials().items():
+        assert entry["parameters"] == listed[name]["parameters"]
+
+    # The file keeps them where the pack is gone.
+    path = tmp_path / "lean.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    material = bpy.data.materials["Coupled Matte/Specular"]
+    assert nodes.is_baked(the_node(extension, material))
+    assert picture(extension, material)[8:16, 8:16].mean() == pytest.approx(
+        pictures["coupled"][8:16, 8:16].mean(), rel=0.05
+    )
+
+
+def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
+    api, nodes = extension.api, extension.nodes
+    material = used["coupled"]
+    before = api.get_parameters(material)
+    extension.api.enable_osl(empty)
+    codes = [w.code for w in api.warnings(material, empty)]
+    assert bpy.ops.brdfc.bake() == {"FINISHED"}
+    assert [w.code for w in api.warnings(material, empty)] == codes
+    layout = Layout()
+    extension.ui.draw_material(layout, material, empty)
+    text = "\n".join(layout.log)
+    for part in ("Lean:", "Error:", "Cost:", "Closures:", "Albedo: 0", "operator brdfc.switch"):
+        assert part in text
+    with pytest.raises(ValueError, match="'r0' of .* the only value of a lean material"):
+        api.set_parameters(material, r0=0.2)
+    api.set_parameters(material, r0=0.1)
+    api.switch_representation(material, "sampled")
+    assert not nodes.is_baked(the_node(extension, material))
+    assert nodes.identity(the_node(extension, material)) == ("coupled", "sampled")
+    for name, value in api.get_parameters(material).items():
+        same = value if isinstance(value, str) else pytest.approx(value, rel=1e-6)
+        assert before[name] == same
+    api.set_parameters(material, r0=0.2)
+
+
+def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, program):
+    api, nodes = extension.api, extension.nodes
+    preferences = bpy.context.preferences.addons[extension.package].preferences
+    preferences.program = str(program)
+    try:
+        material = api.new_material("phong", e=40.0)
+        assert bpy.ops.brdfc.bake(error=5) == {"FINISHED"}
+    finally:
+        preferences.program = ""
+    node = the_node(extension, material)
+    assert nodes.identity(node) == ("phong", "fitted")
+    assert nodes.is_baked(node)
+    assert api.get_parameters(material)["e"] == pytest.approx(40)
+    assert np.isfinite(picture(extension, material)).all()
+
+
+def refused_and_unchanged(extension, material, match):
+    before, group = counts(), the_node(extension, material).node_tree
+    with pytest.raises(RuntimeError, match=match):
+        bpy.ops.brdfc.bake()
+    assert counts() == before
+    assert the_node(extension, material).node_tree == group
+    assert extension.pack.root == extension.pack._INSTALLED
+
+
+def test_without_the_program_nothing_changes(extension, used, tmp_path, monkeypatch):
+    material = used["coupled"]
+    monkeypatch.delenv("BRDFC_TOOL")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    refused_and_unchanged(extension, material, "the program brdfc was not found: give its path")
+    monkeypatch.setenv("BRDFC_TOOL", str(tmp_path / "absent"))
+    refused_and_unchanged(extension, material, "absent: expected the program brdfc, which BRDFC_T")
+    fake = tmp_path / "brdfc"
+    for script, match in (
+        ("echo 'brdfc: no such thing' >&2; exit 2", "no such thing"),
+        ("exit 3", "exit status 3"),
+        ("echo no explanation", "expected an explanation"),
+        ('echo \'{"models": [], "unused_models": []}\'', "manifest.json"),
+    ):
+        fake.write_text(f"#!/bin/sh\n{script}\n")
+        fake.chmod(0o755)
+        monkeypatch.setenv("BRDFC_TOOL", str(fake))
+        refused_and_unchanged(extension, material, match)
+
+
+def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeypatch):
+    compile_ = extension.nodes._compile
+    calls = []
+
+    def fail_second(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise extension.nodes.CompileError("as if it could not")
+        compile_(*arguments)
+
+    monkeypatch.setattr(extension.nodes, "_compile", fail_second)
+    refused_and_unchanged(extension, used["coupled"], "as if it could not")
+    assert len(calls) == 2
+
+
+def test_a_file_without_models_has_nothing_to_bake(extension, empty):
+    with pytest.raises(RuntimeError, match="no material of this file has a reflection model"):
+        bpy.ops.brdfc.bake()
