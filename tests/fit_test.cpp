@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "analysis/albedo.h"
@@ -302,6 +303,29 @@ TEST(StoredFits, ServeFactorsThatAreKnown) {
   EXPECT_NEAR(b.r, 0.5 * a.r, 1e-9 * a.r);
   EXPECT_NEAR(b.b, 0.1 * a.b, 1e-9 * a.b);
   EXPECT_NEAR(coloured.f_cos(wi, wo, number).g, b.g, 1e-9 * a.g);
+}
+
+TEST(Fit, TablesCanBeLookedAt) {
+  const Model& m = find_model("oren_nayar");
+  const ParamValues values = values_of(m, {"sigma=0.5"});
+  const Fit& fit = fit_of(m, values);
+  const TempFolder folder;
+  const std::filesystem::path path = folder.path() / "fit.exr";
+  fit.store(m, values, path);
+  const TableImage image = read_table_image(path);
+  const auto meta = nlohmann::json::parse(image.meta);
+  EXPECT_TRUE(meta.at("axis").is_null());
+  std::size_t numbers = 0;
+  for (const auto& table : meta.at("tables")) {
+    std::size_t count = 1;
+    for (const std::size_t n : table.at("sizes")) count *= n;
+    if (table.at("name") != "errors") numbers += count;
+    const std::size_t row = table.at("row").get<std::size_t>() * std::size_t(image.width);
+    for (std::size_t i = count; i < std::size_t(image.width); ++i) EXPECT_EQ(image.pixels[row + i], 0);
+  }
+  EXPECT_EQ(numbers, fit.size());
+  EXPECT_EQ(meta.at("tables").size(), std::size_t(image.height));
+  EXPECT_THROW(fit.store(m, values, folder.path() / "absent" / "fit.exr"), InputError);
 }
 
 TEST(StoredFits, AreWholeOrRefused) {

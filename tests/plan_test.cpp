@@ -53,7 +53,8 @@ TEST(Plan, SaysWhichLampsADrawnDirectionDoesNotMeet) {
   budget.sizeless = {"lights[1]", "lights[4]"};
   EXPECT_THAT(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled),
               HasSubstr("lights[1], lights[4] without a size"));
-  for (const FormChoice& c : plan_scene(exact, budget)[0].choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
+  const PlannedModel matte = plan_scene(exact, budget)[0];
+  for (const FormChoice& c : matte.choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
 }
 
 TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {

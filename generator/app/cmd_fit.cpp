@@ -49,7 +49,7 @@ void add_fit_command(CLI::App& app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
-    std::string over;
+    std::string over, exr;
     bool pairs = false, twin = false, store = false;
   };
   auto o = std::make_shared<Options>();
@@ -74,6 +74,11 @@ void add_fit_command(CLI::App& app) {
                 "With --over: makes the fit anew and keeps it in generator/fits, in place of what is kept of the model")
       ->needs("--over")
       ->excludes("--pairs", "--twin");
+  cmd->add_option(
+         "--exr", o->exr,
+         "Also writes the tables that the closures are looked up in as a float EXR, a row a table; what each is\n"
+         "stands in the attribute brdfc:table")
+      ->excludes("--twin");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
@@ -103,6 +108,7 @@ void add_fit_command(CLI::App& app) {
       print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo); });
     } else {
       const Fit& fit = fit_of(model, values);
+      if (!o->exr.empty()) fit.store(model, values, o->exr);
       print(fit, [&](const Vec3<double>& wo) { return fit.closures(wo, number); });
     }
   });

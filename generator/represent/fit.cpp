@@ -601,7 +601,6 @@ Fit Fit::knot(const Model& model, const ParamValues& values, double place) const
 
 void Fit::store(const Model& model, const ParamValues& values, const std::filesystem::path& path) const {
   using Json = nlohmann::ordered_json;
-  const FitAxis& axis = axis_.value();
   std::vector<double> errors;
   for (ViewError e : errors_)
     for (const double* x : numbers_of(e)) errors.push_back(*x);
@@ -618,22 +617,29 @@ void Fit::store(const Model& model, const ParamValues& values, const std::filesy
     image.pixels.resize(std::size_t(image.width) * (tables.size() + 1), 0.f);
     tables.push_back({{"row", tables.size()}, {"name", table->name}, {"sizes", table->sizes}});
   }
-  image.meta = Json{
-      {"model", model.info().name},
-      {"quantity", "closures fitted to a model, over a number and the view"},
-      {"values", format_values(model.info(), values)},
-      {"axis", {{"parameter", axis.parameter}, {"low", axis.low}, {"high", axis.high}, {"scale", name_of(axis.scale)}}},
-      {"hash", hash_of(model, values)},
-      {"knots", knots_},
-      {"family", family_},
-      {"grey", grey_},
-      {"tint", {tint_.r, tint_.g, tint_.b}},
-      {"lobes", lobes_.size()},
-      {"facets", facets},
-      {"channels", linear_.front().colour.size()},
-      {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
-      {"tables",
-       tables}}.dump();
+  const Json axis = axis_ ? Json{{"parameter", axis_->parameter},
+                                 {"low", axis_->low},
+                                 {"high", axis_->high},
+                                 {"scale", name_of(axis_->scale)}}
+                          : Json();
+  Json meta = {{"model", model.info().name},
+               {"quantity", axis_ ? "closures fitted to a model, over a number and the view"
+                                  : "closures fitted to a model, over the view"},
+               {"values", format_values(model.info(), values)},
+               {"axis", axis},
+               {"hash", axis_ ? Json(hash_of(model, values)) : Json()},
+               {"knots", knots_},
+               {"family", family_},
+               {"grey", grey_},
+               {"tint", {tint_.r, tint_.g, tint_.b}},
+               {"lobes", lobes_.size()},
+               {"facets", facets},
+               {"channels", linear_.front().colour.size()},
+               {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
+               {"tables", tables}};
+  // Other than 1 only with factors that are known.
+  if (scale_ != 1) meta["scale"] = scale_;
+  image.meta = meta.dump();
   write_table_image(image, path);
 }
 

@@ -60,8 +60,8 @@ class Fit {
   /// from scratch. Throws ValueError where the model gives a value that is NaN, infinite or negative.
   Fit(const Model&, const ParamValues& values, From from = From::Store);
 
-  /// Keeps a fit along an axis, made with factors of 1, as a float EXR with a row a table. Throws InputError naming the
-  /// path.
+  /// Writes the tables as a float EXR with a row a table, what they are in its attribute brdfc:table. One along an axis
+  /// that was made with factors of 1 can be read again. Throws InputError naming the path.
   void store(const Model&, const ParamValues& values, const std::filesystem::path&) const;
   /// What is fitted at the knot at this place: the same closures for every value of the axis.
   Fit knot(const Model&, const ParamValues& values, double place) const;

@@ -81,7 +81,7 @@ def representatives(extension, listed):
     pick(
         "drawn alone",
         "sampled",
-        lambda m, e: not m["mirror"] and len(e["representations"]) == 1 and e["isotropic"],
+        lambda m, e: not m["mirror"] and "exact" not in e["representations"] and e["isotropic"],
     )
     return list(dict.fromkeys(forms.values()))
 
