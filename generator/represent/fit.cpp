@@ -15,7 +15,6 @@
 #include "analysis/probes.h"
 #include "analysis/table_file.h"
 #include "core/hash.h"
-#include "model/formula.h"
 #include "model/horizon.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -374,11 +373,29 @@ std::string settings() {
   return fmt::format("1 {} {} {} {} {} {} {} {}", kViews, kTrialStride, kPoints, kRidge, kFirstSteps, kSteps,
                      kWorseBetween, kSlightlyOff);
 }
+/// What a model computes along an axis, to five digits. The text of its formula would not do: the order of statements
+/// in it is that in which a compiler evaluates arguments.
+std::string samples_of(const Model& model, const ParamValues& values, const FitAxis& axis) {
+  constexpr int kPairs = 64;
+  std::string text;
+  for (const double x : {0.0, 0.2, 0.5, 0.8, 1.0}) {
+    const auto brdf = model.make_double(with_number(model, values, axis.at(x)));
+    Sequence3 points(1);
+    for (int i = 0; i < kPairs; ++i) {
+      const Vec3<double> a = points.next(), b = points.next();
+      const Vec3<double> wo = direction(0.02 + 0.98 * a.x, 2 * kPi * a.y);
+      const Vec3<double> drawn = brdf->sample(wo, b).wi;
+      const Rgb<double> f = brdf->eval(i % 2 == 0 && drawn.z > 0 ? drawn : direction(b.x, 2 * kPi * b.y), wo);
+      text += fmt::format("{:.5g} {:.5g} {:.5g}\n", f.r, f.g, f.b);
+    }
+  }
+  return text;
+}
 std::string hash_of(const Model& model, const ParamValues& values) {
   const FitAxis axis = fit_axis(*missing(model, values));
   return sha256(fmt::format("{}\n{}\n{} {} {} {}\n{}\n{}", model.info().name, format_values(model.info(), values),
                             axis.parameter, axis.low, axis.high, name_of(axis.scale), settings(),
-                            formula(model, values)));
+                            samples_of(model, values, axis)));
 }
 
 double mean_error(const std::vector<Fitted>& knots) {
