@@ -170,14 +170,14 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
 
 /// Between the knots of the axis a fit is about as close as one that is made there.
 TEST(Fit, RunsAlongANumber) {
-  const Model& m = find_model("coupled");
-  ParamValues values = values_of(m, {"fresnel=schlick"});
-  values.erase("r0");
+  const Model& m = find_model("oren_nayar");
+  ParamValues values = values_of(m, {"form=qualitative"});
+  values.erase("sigma");
   const Fit& fit = fit_of(m, values);
   ASSERT_TRUE(fit.axis());
-  EXPECT_EQ(fit.axis()->parameter, "r0");
+  EXPECT_EQ(fit.axis()->parameter, "sigma");
   EXPECT_EQ(fit.axis()->low, 0);
-  EXPECT_EQ(fit.axis()->high, 0.2);
+  EXPECT_EQ(fit.axis()->high, 0.66);
   std::vector<double> l1;
   std::set<double> numbers;
   for (const ViewError& e : fit.errors()) {
@@ -192,32 +192,32 @@ TEST(Fit, RunsAlongANumber) {
   const auto next = std::next(mean.begin());
   EXPECT_DOUBLE_EQ(fit.mean_l1((mean.begin()->first + next->first) / 2), std::max(mean.begin()->second, next->second));
   EXPECT_DOUBLE_EQ(fit.mean_l1(0.0), mean.begin()->second);
-  EXPECT_DOUBLE_EQ(fit.mean_l1(0.2), std::max(mean.rbegin()->second, std::next(mean.rbegin())->second));
+  EXPECT_DOUBLE_EQ(fit.mean_l1(0.66), std::max(mean.rbegin()->second, std::next(mean.rbegin())->second));
   for (const auto& [number, l1_here] : mean) EXPECT_GE(fit.mean_l1({}), l1_here);
   std::sort(l1.begin(), l1.end());
   EXPECT_LE(l1[l1.size() / 2], 0.007);
-  EXPECT_LE(l1.back(), 0.06);
-  for (const double r0 : {0.0, 0.013, 0.117, 0.2}) {
-    const auto brdf = m.make_double(with_number(m, values, r0));
+  EXPECT_LE(l1.back(), 0.03);
+  for (const double sigma : {0.0, 0.013, 0.35, 0.66}) {
+    const auto brdf = m.make_double(with_number(m, values, sigma));
     Random random(5);
     double off = 0, sum = 0;
     for (const auto& [wi, wo] : direction_pairs(*brdf, 400, random, false)) {
-      const double truth = brdf->eval(wi, wo).r * wi.z, found = evaluate(fit.closures(wo, r0), wi, wo).r;
-      EXPECT_NEAR(fit.f_cos(wi, wo, r0).r, found, 1e-9);
+      const double truth = brdf->eval(wi, wo).r * wi.z, found = evaluate(fit.closures(wo, sigma), wi, wo).r;
+      EXPECT_NEAR(fit.f_cos(wi, wo, sigma).r, found, 1e-9);
       off += std::abs(found - truth);
       sum += truth;
     }
-    EXPECT_LE(off, 0.02 * sum) << r0;
+    EXPECT_LE(off, 0.02 * sum) << sigma;
   }
   // Beyond its ends a fit is what it is there.
   const Vec3<double> wo = direction(0.6, 0), wi = direction(0.4, 2);
-  EXPECT_EQ(evaluate(fit.closures(wo, 0.5), wi, wo).r, evaluate(fit.closures(wo, 0.2), wi, wo).r);
+  EXPECT_EQ(evaluate(fit.closures(wo, 0.9), wi, wo).r, evaluate(fit.closures(wo, 0.66), wi, wo).r);
 
   ParamValues fixed = values;
-  fixed.erase("rm");
+  fixed.erase("rho");
   const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, fixed), fixed);
-  EXPECT_THAT(s.source, HasSubstr("float r0 = "));
-  EXPECT_THAT(s.source, HasSubstr("color rm = color("));
+  EXPECT_THAT(s.source, HasSubstr("float sigma = "));
+  EXPECT_THAT(s.source, HasSubstr("color rho = color("));
   EXPECT_LE(s.operations, 600);
   EXPECT_LE(measure_error(m, RepresentationKind::Fitted, fixed).relative_l1.value_or(1), 0.02);
 
@@ -226,6 +226,83 @@ TEST(Fit, RunsAlongANumber) {
   two.erase("cz");
   two.erase("e");
   EXPECT_THROW(fit_of(lafortune, two), std::logic_error);
+}
+
+/// A reflectance at normal incidence whatever it is: closures of the same shapes, coloured by it.
+TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
+  for (const auto& [model, open] : {std::pair{"cook_torrance", "f0"}, {"oren_nayar", "rho"}}) {
+    const Model& m = find_model(model);
+    ParamValues values = values_of(m, {});
+    values.erase(open);
+    const Fit& fit = fit_of(m, values);
+    EXPECT_FALSE(fit.axis());
+    ASSERT_TRUE(fit.terms().has(open)) << model;
+    Random random(6);
+    const auto magnitude = [](const Rgb<double>& v) {
+      return Rgb<double>(std::abs(v.r), std::abs(v.g), std::abs(v.b));
+    };
+    for (const Rgb<double>& c : {Rgb<double>(0.9, 0.5, 0.04), Rgb<double>(0.02, 1, 0.1)}) {
+      ParamValues whole = values;
+      whole[open] = std::array<double, 3>{c.r, c.g, c.b};
+      const auto brdf = m.make_double(whole);
+      const Varied<double> varied = fit.varied(whole);
+      const Fit& of_known = fit_of(m, whole);
+      Rgb<double> off(0.0), off_known(0.0), sum(0.0);
+      for (const auto& [wi, wo] : direction_pairs(*brdf, 400, random, false)) {
+        const Rgb<double> truth = brdf->eval(wi, wo) * wi.z, found = evaluate(fit.closures(wo, varied), wi, wo);
+        const Rgb<double> again = fit.f_cos(wi, wo, varied);
+        EXPECT_NEAR(again.r, found.r, 1e-9 * (1 + truth.r));
+        EXPECT_NEAR(again.b, found.b, 1e-9 * (1 + truth.b));
+        off += magnitude(found - truth);
+        off_known += magnitude(evaluate(of_known.closures(wo), wi, wo) - truth);
+        sum += truth;
+      }
+      // Nearly as close as closures for this colour alone.
+      EXPECT_LE(max_component(off / sum), 1.3 * max_component(off_known / sum) + 0.002) << model;
+      EXPECT_LE(max_component(off / sum), 0.3) << model;
+    }
+    // A weight by channel is the albedo.
+    const Vec3<double> wo = direction(0.7, 0);
+    ParamValues whole = values;
+    whole[open] = std::array<double, 3>{1, 0.5, 0.1};
+    const auto albedo = brdfc::albedo(*m.make_double(whole), 0.7).total();
+    Rgb<double> weights(0.0);
+    for (const auto& closure : fit.closures(wo, fit.varied(whole))) weights += closure.weight;
+    EXPECT_NEAR(weights.r, albedo.r, 0.07 * albedo.r) << model;
+    EXPECT_NEAR(weights.b, albedo.b, 0.07 * albedo.b) << model;
+    // No share of nothing.
+    whole[open] = std::array<double, 3>{0, 0, 0};
+    const Rgb<double> none = evaluate(fit.closures(wo, fit.varied(whole)), {0, 0, 1}, wo);
+    EXPECT_LE(max_component(magnitude(none)), 1e-4) << model;
+
+    ParamValues fixed = values_of(m, {});
+    fixed.erase(open);
+    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, fixed), fixed);
+    EXPECT_THAT(s.source, HasSubstr(fmt::format("color {} = color(", open)));
+    EXPECT_THAT(s.source, HasSubstr("ramp_0[k] /= weight_0;"));
+    EXPECT_LE(s.operations, 600) << model;
+  }
+}
+
+/// A known colour takes the fit for all of them.
+TEST(StoredFits, ServeColoursThatAreKnown) {
+  const Model& m = find_model("cook_torrance");
+  ParamValues known = values_of(m, {"f0=0.9,0.5,0.1"}), open = known;
+  known.erase("m");
+  open.erase("m");
+  open.erase("f0");
+  EXPECT_EQ(stored_fit(m, known), stored_fit(m, open));
+  const Fit &of_known = fit_of(m, known), &of_open = fit_of(m, open);
+  ParamValues whole = known;
+  whole["m"] = 0.4;
+  const Vec3<double> wo = direction(0.7, 0), wi = direction(0.6, 3);
+  const Rgb<double> a = evaluate(of_known.closures(wo, of_known.varied(whole)), wi, wo),
+                    b = evaluate(of_open.closures(wo, of_open.varied(whole)), wi, wo);
+  EXPECT_EQ(a.r, b.r);
+  EXPECT_EQ(a.b, b.b);
+  EXPECT_GT(a.r, 2 * a.b);
+  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, known), known);
+  EXPECT_THAT(s.source, testing::Not(HasSubstr("f0")));
 }
 
 /// An axis goes by factors where a number does.
@@ -241,14 +318,14 @@ TEST(Fit, AxesAreSliders) {
   }
 }
 
-/// Models that declare a number to fit over, without it and its factors.
+/// Models that declare a number to fit over, without it, their factors and what there are terms by.
 std::vector<std::pair<const Model*, ParamValues>> stored() {
   std::vector<std::pair<const Model*, ParamValues>> out;
   for (const auto& [name, model] : models()) {
     if (model->info().properties.fit_axis.empty()) continue;
     ParamValues values = complete(model->info(), {});
     values.erase(model->info().properties.fit_axis);
-    out.emplace_back(model.get(), split_factors(*model, values).first);
+    out.emplace_back(model.get(), along_axis(*model, values));
   }
   return out;
 }
@@ -278,11 +355,13 @@ TEST(StoredFits, AreWhatIsMadeAnew) {
   const Fit& fit = fit_of(*model, values);
   const double x = fit.knots()[random / all.size() % fit.knots().size()], number = fit.axis()->at(x);
   const Fit cell = fit.knot(*model, values, x);
-  const auto brdf = model->make_double(with_number(*model, values, number));
+  const ParamValues whole = complete(model->info(), with_number(*model, values, number));
+  const Varied<double> varied = fit.varied(whole);
+  const auto brdf = model->make_double(whole);
   Random numbers(3);
   double largest = 0, off = 0;
   for (const auto& [wi, wo] : direction_pairs(*brdf, 300, numbers, false)) {
-    const Rgb<double> a = evaluate(fit.closures(wo, number), wi, wo), b = evaluate(cell.closures(wo, number), wi, wo);
+    const Rgb<double> a = evaluate(fit.closures(wo, varied), wi, wo), b = evaluate(cell.closures(wo, varied), wi, wo);
     largest = std::max(largest, max_component(b));
     off = std::max(off, max_component(Rgb<double>(std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b))));
   }

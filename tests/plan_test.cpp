@@ -125,16 +125,34 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
 
 /// One number that varies is an axis of a fit's tables, and there is no twin then.
 TEST(Plan, FitsAlongANumber) {
-  auto textured = need("b", "coupled", {"r0=0.1"}, "fitted");
-  textured.textured.insert("r0");
-  const std::vector<MaterialNeed> needs = {need("a", "coupled", {"r0=0.05"}, "fitted"), textured};
+  auto textured = need("b", "oren_nayar", {"sigma=0.1"}, "fitted");
+  textured.textured.insert("sigma");
+  const std::vector<MaterialNeed> needs = {need("a", "oren_nayar", {"sigma=0.05"}, "fitted"), textured};
   const PlannedModel plan = plan_scene(needs, {{}, false, true})[0];
   EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
-  EXPECT_EQ(plan.fixed.count("r0"), 0u);
-  EXPECT_EQ(why(plan, RepresentationKind::Twin), "r0 varies over b");
-  EXPECT_THROW(plan_scene({need("a", "coupled", {"r0=0.05"}, "twin"), textured}), InputError);
-  textured.textured = {"fresnel"};
+  EXPECT_EQ(plan.fixed.count("sigma"), 0u);
+  EXPECT_EQ(why(plan, RepresentationKind::Twin), "sigma varies over b");
+  EXPECT_THROW(plan_scene({need("a", "oren_nayar", {"sigma=0.05"}, "twin"), textured}), InputError);
+  textured.textured = {"form"};
   EXPECT_THROW(plan_scene({textured}), InputError) << "a choice is no axis";
+}
+
+/// What f is a polynomial of may vary beside a number, in fits but not in twins.
+TEST(Plan, FitsWhatThereAreTermsBy) {
+  auto textured = need("b", "cook_torrance", {"m=0.4"});
+  textured.textured.insert("f0");
+  const std::vector<MaterialNeed> needs = {need("a", "cook_torrance", {"f0=0.04", "m=0.2"}), textured};
+  const PlannedModel plan = plan_scene(needs, {0.2, false, true})[0];
+  EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
+  EXPECT_TRUE(plan.fixed.empty());
+  EXPECT_EQ(why(plan, RepresentationKind::Twin), "f0 varies over b");
+  EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(RepresentationKind::Sampled));
+
+  // Its shares add up, whatever they are; its exponents are two numbers.
+  const auto phong = [](const char* id, const char* value) { return need(id, "phong_material", {value}, "fitted"); };
+  EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms,
+              ElementsAre(RepresentationKind::Fitted));
+  EXPECT_THROW(plan_scene({phong("a", "es=10"), phong("b", "e=20")}), InputError);
 }
 
 constexpr RepresentationKind kExact = RepresentationKind::Exact, kSampled = RepresentationKind::Sampled,

@@ -49,6 +49,7 @@ void add_fit_command(CLI::App& app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
+    std::vector<std::string> any;
     std::string over, exr;
     bool pairs = false, twin = false, store = false;
   };
@@ -65,6 +66,9 @@ void add_fit_command(CLI::App& app) {
   cmd->add_option("--over", o->over,
                   "A number that the fit runs over, from one end of its slider to the other, instead of its value:\n"
                   "another column, of its values at both ends and half way between any two knots of the tables");
+  cmd->add_option("--any", o->any,
+                  "Parameters that f is a polynomial of (a colour of second degree, a number of first), whatever they\n"
+                  "are: closures are fitted to f at a few values of them, and the worst of these is printed");
   cmd->add_flag("--twin", o->twin, "Of the twin instead: Blender's own nodes with weights, roughness and tilt by view");
   cmd->add_flag("--pairs", o->pairs,
                 "f cos(theta_i) of the closures instead, for direction pairs.\n"
@@ -82,34 +86,54 @@ void add_fit_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
-    double number = 0;
+    const ParamValues asked = values;
     if (!o->over.empty()) {
       const ParamInfo* p = model.info().param(o->over);
       if (!p || p->kind != ParamKind::Number)
         input_error("fit: --over {}: expected a parameter of {} that is a number", o->over, o->model);
       if (o->twin) input_error("fit: a twin is for one set of parameters: --over goes without --twin");
-      number = std::get<double>(values.at(o->over));
       values.erase(o->over);
     }
+    for (const std::string& name : o->any) {
+      if (!model.info().param(name)) input_error("fit: --any {}: {} has no such parameter", name, o->model);
+      if (o->twin) input_error("fit: a twin is for one set of parameters: --any goes without --twin");
+      values.erase(name);
+    }
+    if (!o->any.empty() || !o->over.empty()) {
+      const Terms terms = terms_of(model, values);
+      for (const std::string& name : o->any)
+        if (!terms.has(name) && !factors(model, values).count(name))
+          input_error("fit: --any {}: expected a parameter that f of {} is a polynomial of, with at most {} terms",
+                      name, o->model, kMaxTerms);
+      if (terms.has(o->over))
+        input_error("fit: --over {0}: f of {1} is proportional to it or a sum with it: take --any {0}", o->over,
+                    o->model);
+      values = without_factors(model, values);
+    }
+    // What the fit is for, as it says of itself.
+    const auto label = [&] {
+      return o->model + " " + format_values(model.info(), o->over.empty() ? values : along_axis(model, values));
+    };
     if (const auto reason = unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
     const auto print = [&](const auto& form, const auto& closures) {
       if (o->pairs)
         print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(closures(wo), wi, wo); });
       else
-        print_errors(form.errors(), o->over, o->model + " " + format_values(model.info(), values));
+        print_errors(form.errors(), o->over, label());
     };
     if (o->store) {
-      values = split_factors(model, values).first;
+      values = along_axis(model, values);
       const Fit fit(model, values, Fit::From::Scratch);
       replace_stored(fit, model, values);
-      print_errors(fit.errors(), o->over, o->model + " " + format_values(model.info(), values));
+      print_errors(fit.errors(), o->over, label());
     } else if (o->twin) {
       const Twin& twin = twin_of(model, values);
       print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo); });
     } else {
       const Fit& fit = fit_of(model, values);
+      const Varied<double> varied = fit.varied(asked);
       if (!o->exr.empty()) fit.store(model, values, o->exr);
-      print(fit, [&](const Vec3<double>& wo) { return fit.closures(wo, number); });
+      print(fit, [&](const Vec3<double>& wo) { return fit.closures(wo, varied); });
     }
   });
 }

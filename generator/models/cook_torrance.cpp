@@ -27,7 +27,8 @@ template <class T> struct CookTorrance {
             .doc = "Microfacets in V-shaped cavities with Beckmann's distribution of slopes and Fresnel reflection.",
             .properties = {.smooth = false,  // min() in the geometry term
                            .exact_sampling = false,
-                           .specular_limit = "m=1e-4"},
+                           .specular_limit = "m=1e-4",
+                           .fit_axis = "m"},
             .params = {}};
   }
 

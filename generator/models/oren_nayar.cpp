@@ -37,7 +37,8 @@ template <class T> struct OrenNayar {
             .properties = {.conserving = false,
                            .smooth = false,  // kinks where the angles are equal and in |c| or max(c, 0)
                            .exact_sampling = false,
-                           .diffuse_limit = "sigma=0"},
+                           .diffuse_limit = "sigma=0",
+                           .fit_axis = "sigma"},
             .params = {}};
   }
 

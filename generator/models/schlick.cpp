@@ -36,7 +36,8 @@ template <class T> struct Schlick {
             .properties = {.isotropic = false,
                            .exact_sampling = false,
                            .diffuse_limit = "r=1 rough=1",
-                           .specular_limit = "rough=0"},
+                           .specular_limit = "rough=0",
+                           .fit_axis = "rough"},
             .params = {}};
   }
 

@@ -38,14 +38,15 @@ std::string how_it_varies(const std::string& name, const Needs& needs) {
 }
 
 /// Why the materials of a model have no common form made of a fit; nothing if they have one. A fit takes one number
-/// that varies along its slider; a twin takes none.
+/// that varies along its slider and what it has terms by; a twin takes neither.
 std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
   std::optional<std::string> axis;
   const std::set<std::string> may_vary = factors(model, fixed);
+  const Terms terms = kind == RepresentationKind::Twin ? Terms{} : terms_of(model, fixed);
   for (const ParamInfo& p : model.info().params) {
-    if (fixed.count(p.name) || may_vary.count(p.name)) continue;
+    if (fixed.count(p.name) || may_vary.count(p.name) || terms.has(p.name)) continue;
     const std::string how = how_it_varies(p.name, needs);
     if (p.kind != ParamKind::Number || kind == RepresentationKind::Twin) return how;
     if (axis) return fmt::format("{}; {}", *axis, how);

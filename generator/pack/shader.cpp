@@ -435,9 +435,11 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       shader.slots += slots(ClosureKind::PhongRamp);
     }
     for (std::size_t c = 0; c < kinds.size(); ++c)
-      if (kinds[c].undivided) {
-        body += fmt::format("    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= brdfc_max_component(weight_{});\n",
-                            kRampSize, c, c);
+      if (kinds[c].division != Division::Done) {
+        const std::string weight = fmt::format("weight_{}", c);
+        body += fmt::format(
+            "    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= {};\n", kRampSize, c,
+            kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
     for (std::size_t c = 0; c < kinds.size(); ++c)

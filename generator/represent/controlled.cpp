@@ -21,25 +21,25 @@ template <class T> T largest(const Rgb<T>& c) { return maximum(max_component(c),
 
 }  // namespace
 
-template <class T>
-Residual<T> sample_residual(const Brdf<T>& brdf, const Fit& fit, const Vec3<T>& wo, const Vec3<T>& u, const T& number) {
+template <class T> Residual<T> sample_residual(const Brdf<T>& brdf, const Fit& fit, const Vec3<T>& wo, const Vec3<T>& u,
+                                               const std::type_identity_t<Varied<T>>& varied) {
   const T share = T(kShareOfModel);
   const auto of_model = u.x < share;
   // The number that chooses serves again, stretched.
   const Sample<T> s = brdf.sample(wo, {minimum(u.x / share, T(1 - 1e-7)), u.y, u.z});
   const Vec3<T> wi = select(of_model, s.wi, sample_uniform(u.y, u.z));
   const T density = share * brdf.pdf(wi, wo) + T((1 - kShareOfModel) * kInvPi / 2);
-  const Rgb<T> lack = brdf.eval(wi, wo) * wi.z - fit.f_cos(wi, wo, number);
+  const Rgb<T> lack = brdf.eval(wi, wo) * wi.z - fit.f_cos(wi, wo, varied);
   // What the model has lost lies below the surface; its density, which says the same, would have to be worked out
   // twice.
   return {wi, select(wi.z > T(0), lack / density, Rgb<T>(T(0)))};
 }
 
-template <class T>
-Controlled<T> controlled(const Brdf<T>& brdf, const Fit& fit, const Vec3<T>& wo, const Vec3<T>& u, const T& number) {
-  const Residual<T> residual = sample_residual(brdf, fit, wo, u, number);
+template <class T> Controlled<T> controlled(const Brdf<T>& brdf, const Fit& fit, const Vec3<T>& wo, const Vec3<T>& u,
+                                            const std::type_identity_t<Varied<T>>& varied) {
+  const Residual<T> residual = sample_residual(brdf, fit, wo, u, varied);
   T all(0), of_ramps(0);
-  for (const Closure<T>& c : fit.closures(wo, number)) {
+  for (const Closure<T>& c : fit.closures(wo, varied)) {
     const T weight = max_component(c.weight);
     all = all + weight;
     if (has_ramp(c.kind)) of_ramps = of_ramps + weight;
@@ -50,14 +50,15 @@ Controlled<T> controlled(const Brdf<T>& brdf, const Fit& fit, const Vec3<T>& wo,
   out.weight = named("share_of_residual", worth * all / (worth + all));
   out.colour = residual.weight / maximum(out.weight, tiny<T>());
   const T share = named("share_of_ramps", maximum(T(1) - out.weight / of_ramps, T(kLeastShare)));
-  out.closures = fit.closures(wo, number, share, false);
+  out.closures = fit.closures(wo, varied, share, false);
   return out;
 }
 
 template Residual<double> sample_residual(const Brdf<double>&, const Fit&, const Vec3<double>&, const Vec3<double>&,
-                                          const double&);
+                                          const Varied<double>&);
 template Controlled<double> controlled(const Brdf<double>&, const Fit&, const Vec3<double>&, const Vec3<double>&,
-                                       const double&);
-template Controlled<Expr> controlled(const Brdf<Expr>&, const Fit&, const Vec3<Expr>&, const Vec3<Expr>&, const Expr&);
+                                       const Varied<double>&);
+template Controlled<Expr> controlled(const Brdf<Expr>&, const Fit&, const Vec3<Expr>&, const Vec3<Expr>&,
+                                     const Varied<Expr>&);
 
 }  // namespace brdfc

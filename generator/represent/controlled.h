@@ -13,11 +13,11 @@ template <class T> struct Residual {
   Rgb<T> weight;
 };
 
-/// u: three numbers in [0, 1); number: the value of the fit's axis, if it has one. The directions come from the model,
-/// and some from everywhere: closures give light where the model draws nothing. Everywhere is uniform and not by the
-/// cosine, because closures on tilted normals do not vanish at the horizon.
-template <class T>
-Residual<T> sample_residual(const Brdf<T>&, const Fit&, const Vec3<T>& wo, const Vec3<T>& u, const T& number = T(0));
+/// u: three numbers in [0, 1). The directions come from the model, and some from everywhere: closures give light where
+/// the model draws nothing. Everywhere is uniform and not by the cosine, because closures on tilted normals do not
+/// vanish at the horizon.
+template <class T> Residual<T> sample_residual(const Brdf<T>&, const Fit&, const Vec3<T>& wo, const Vec3<T>& u,
+                                               const std::type_identity_t<Varied<T>>& varied = {});
 
 /// What a controlled form hands to Cycles. Cycles follows closures in proportion to their weights, so the drawn
 /// direction has for weight what it is worth without its sign, and the closures give that up; sign and colour are in
@@ -28,14 +28,14 @@ template <class T> struct Controlled {
   T weight;
   Rgb<T> colour;  ///< of the lobe about wi: `weight` times this is the residual
 };
-template <class T>
-Controlled<T> controlled(const Brdf<T>&, const Fit&, const Vec3<T>& wo, const Vec3<T>& u, const T& number = T(0));
+template <class T> Controlled<T> controlled(const Brdf<T>&, const Fit&, const Vec3<T>& wo, const Vec3<T>& u,
+                                            const std::type_identity_t<Varied<T>>& varied = {});
 
 extern template Residual<double> sample_residual(const Brdf<double>&, const Fit&, const Vec3<double>&,
-                                                 const Vec3<double>&, const double&);
+                                                 const Vec3<double>&, const Varied<double>&);
 extern template Controlled<double> controlled(const Brdf<double>&, const Fit&, const Vec3<double>&, const Vec3<double>&,
-                                              const double&);
+                                              const Varied<double>&);
 extern template Controlled<Expr> controlled(const Brdf<Expr>&, const Fit&, const Vec3<Expr>&, const Vec3<Expr>&,
-                                            const Expr&);
+                                            const Varied<Expr>&);
 
 }  // namespace brdfc

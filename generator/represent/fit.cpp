@@ -34,6 +34,9 @@ constexpr int kPoints = 3000;
 /// is at the two, down to 1 / kSteps.
 constexpr int kFirstSteps = 4, kSteps = 32;
 constexpr double kWorseBetween = 1.25, kSlightlyOff = 0.005;
+/// What there are terms by, where closures are placed: little, because with much of a reflectance at normal incidence
+/// they all follow the lobe that it multiplies, and what is left for it to be dark gets none.
+constexpr double kSome = 0.05;
 /// Closure columns are scaled to unit integral, so that this is a share of the light: what the fit may not gain by
 /// larger colours of opposite signs.
 constexpr double kRidge = 1e-5;
@@ -140,8 +143,29 @@ struct Fitted {
   double error = 0;  ///< relative L1, mean over the views
 };
 
-/// Fits every `stride`-th view, from that along the normal on.
-Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family family) {
+std::map<std::string, Rgb<double>> shares(const ParamValues& values) {
+  std::map<std::string, Rgb<double>> out;
+  for (const auto& [name, value] : values) {
+    const auto* c = std::get_if<std::array<double, 3>>(&value);
+    out[name] = c ? Rgb<double>{(*c)[0], (*c)[1], (*c)[2]} : Rgb<double>(std::get<double>(value));
+  }
+  return out;
+}
+
+/// How much of each term, a column each, is in each of the mixtures that a fit is judged by.
+MatrixXd judged(const Terms& terms) {
+  const auto n = Eigen::Index(terms.terms.size());
+  if (terms.parameters.empty()) return MatrixXd::Identity(n, n);
+  MatrixXd out(n, n);
+  for (Eigen::Index row = 0; row < n; ++row) {
+    const auto weights = terms.weights(shares(terms.terms[std::size_t(row)].judged));
+    for (Eigen::Index t = 0; t < n; ++t) out(row, t) = weights[std::size_t(t)].r;
+  }
+  return out;
+}
+
+/// Fits every `stride`-th view, from that along the normal on, to the terms that its columns are.
+Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family family, const Terms& terms) {
   Fitted out;
   const Moments& at_normal = views[0].lobe;
   out.facets = facets(family, at_normal);
@@ -165,51 +189,58 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
   // Cycles draws diffuse_ramp in proportion to a cosine that its colours need not have: with a first colour other than
   // 0 the variance would be infinite.
   const Eigen::Index first_of_diffuse = Eigen::Index(out.cells[0].lobes.size() * kRampSize);
-  std::vector<double> error(std::size_t(channels), 0.0);
+  // Differences of columns and their light, by cell.
+  MatrixXd off(channels, Eigen::Index(out.cells.size())), light = off;
   tbb::parallel_for(Eigen::Index(0), channels, [&](Eigen::Index channel) {
     // From one view to the next, so that neighbours are alike and what lies between them is a fit too.
     VectorXd near = VectorXd::Zero(out.cells[0].a.cols());
-    for (Cell& c : out.cells) {
+    for (std::size_t i = 0; i < out.cells.size(); ++i) {
+      Cell& c = out.cells[i];
       const VectorXd weight = weights_of(c.view->points), f = c.view->f.col(channel);
       c.x.col(channel) = near = solve(c.a, weight, f, near, kRidge, Eigen::Index(out.facets.size()), first_of_diffuse);
-      const double albedo = f.dot(weight);
-      if (albedo > 0)
-        error[std::size_t(channel)] += (c.a * near - f).cwiseAbs().dot(weight) / albedo / double(out.cells.size());
+      off(channel, Eigen::Index(i)) = (c.a * near - f).cwiseAbs().dot(weight);
+      light(channel, Eigen::Index(i)) = f.dot(weight);
     }
   });
-  out.error = *std::max_element(error.begin(), error.end());
+  const MatrixXd mixtures = judged(terms);
+  const Eigen::Index of_term = channels / mixtures.cols();
+  for (Eigen::Index k = 0; k < of_term; ++k) {
+    const auto rows = Eigen::seqN(k, mixtures.cols(), of_term);
+    const MatrixXd off_here = off(rows, Eigen::all), light_here = light(rows, Eigen::all);
+    const Eigen::ArrayXXd all_off = mixtures * off_here, all = mixtures * light_here;
+    const Eigen::ArrayXd error = (all > 0).select(all_off / all.max(1e-300), 0 * all).rowwise().mean();
+    out.error = std::max(out.error, error.maxCoeff());
+  }
   for (Cell& c : out.cells) c.a.resize(0, 0);
   return out;
 }
 
-/// The parameter that values lack; nothing if they are complete. Throws std::logic_error for more than one number.
+/// The number that values lack besides what there are terms by, or nothing. Throws std::logic_error for more.
 const ParamInfo* missing(const Model& model, const ParamValues& values) {
+  const Terms terms = terms_of(model, values);
   const ParamInfo* out = nullptr;
   for (const ParamInfo& p : model.info().params) {
-    if (values.count(p.name)) continue;
+    if (values.count(p.name) || terms.has(p.name)) continue;
     if (out || p.kind != ParamKind::Number) throw std::logic_error(model.info().name + ": a fit without " + p.name);
     out = &p;
   }
   return out;
 }
 
-/// Places to ask about a model: the number that `known` lacks at its default and both ends.
-std::vector<ParamValues> places(const Model& model, const ParamValues& known) {
-  std::vector<ParamValues> out = {complete(model.info(), known)};
-  for (const ParamInfo& p : model.info().params)
-    if (!known.count(p.name) && p.kind == ParamKind::Number)
-      for (const double end : {p.soft_min, p.soft_max}) {
-        out.push_back(out.front());
-        out.back()[p.name] = end;
-      }
-  return out;
-}
-
-/// The views of a fit, for one set of parameters.
-std::vector<View> views_of(const BoundModel& bound) {
+struct ScaledModel {
+  BoundModel model;
+  double scale;  ///< what its f has to be divided by
+};
+/// The views of a fit, for one set of parameters: f of each of `terms`, at points where `some` of all is seen.
+std::vector<View> views_of(const BoundModel& some, const std::vector<ScaledModel>& terms) {
   std::vector<View> views(kViews);
-  tbb::parallel_for(0, kViews,
-                    [&](int i) { views[std::size_t(i)] = seen(bound, view(double(i) / (kViews - 1)), kPoints); });
+  tbb::parallel_for(0, kViews, [&](int i) {
+    View& v = views[std::size_t(i)] = seen(some, view(double(i) / (kViews - 1)), kPoints);
+    if (terms.empty()) return;
+    v.f.resize(v.f.rows(), Eigen::Index(3 * terms.size()));
+    for (std::size_t t = 0; t < terms.size(); ++t)
+      v.f.middleCols(Eigen::Index(3 * t), 3) = scattering(terms[t].model, v.points, v.wo) / terms[t].scale;
+  });
   return views;
 }
 
@@ -238,29 +269,6 @@ template <class T> T FitAxis::place(const T& value) const {
 template double FitAxis::place(const double&) const;
 template Expr FitAxis::place(const Expr&) const;
 
-std::set<std::string> factors(const Model& model, const ParamValues& known) {
-  if (!model.has_scatter()) return {};
-  std::set<std::string> out;
-  for (const ParamInfo& p : model.info().params) {
-    if (p.kind == ParamKind::Choice || (p.kind == ParamKind::Number && (p.min > 0 || p.max < 1))) continue;
-    const bool grey = p.kind == ParamKind::Number;
-    const Rgb<double> colour = grey ? Rgb<double>(0.3) : Rgb<double>{0.3, 0.6, 0.8};
-    const auto valued = [&](ParamValues values, const Rgb<double>& c) {
-      values[p.name] = grey ? ParamValue(c.r) : ParamValue(std::array<double, 3>{c.r, c.g, c.b});
-      return model.make_double(values);
-    };
-    bool proportional = true;
-    for (const ParamValues& values : places(model, known)) {
-      const auto of_white = valued(values, Rgb<double>(1.0)), of_coloured = valued(values, colour);
-      Random random(12);
-      for (const auto& [wi, wo] : direction_pairs(*of_white, 256, random, model.two_sided()))
-        proportional = proportional && relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < 1e-9;
-    }
-    if (proportional) out.insert(p.name);
-  }
-  return out;
-}
-
 ParamValues without_factors(const Model& model, const ParamValues& known) {
   ParamValues values = known;
   for (const std::string& name : factors(model, known)) {
@@ -286,9 +294,36 @@ std::pair<ParamValues, Rgb<double>> split_factors(const Model& model, ParamValue
   return {std::move(values), factor};
 }
 
+namespace {
+
+/// along_axis(), and the product of the factors.
+std::pair<ParamValues, Rgb<double>> split_along_axis(const Model& model, const ParamValues& values) {
+  ParamValues unknown = values, out = values;
+  for (const ParamInfo& p : model.info().params)
+    if (p.kind != ParamKind::Choice) unknown.erase(p.name);
+  for (const std::string& name : terms_of(model, unknown).parameters) out.erase(name);
+  // What is a factor only here, where others are known.
+  for (const std::string& name : factors(model, out))
+    if (const auto it = values.find(name); it != values.end()) out.insert(*it);
+  return split_factors(model, std::move(out));
+}
+
+}  // namespace
+
+ParamValues along_axis(const Model& model, const ParamValues& values) { return split_along_axis(model, values).first; }
+
 ParamValues with_number(const Model& model, const ParamValues& values, double number) {
   ParamValues out = values;
   if (const ParamInfo* p = missing(model, values)) out[p->name] = number;
+  return out;
+}
+
+Varied<double> Fit::varied(const ParamValues& values) const {
+  Varied<double> out;
+  if (axis_) out.number = std::get<double>(values.at(axis_->parameter));
+  ParamValues of_terms;
+  for (const std::string& name : terms_.parameters) of_terms[name] = values.at(name);
+  out.parameters = shares(of_terms);
   return out;
 }
 
@@ -312,11 +347,15 @@ std::array<double*, 6> numbers_of(ViewError& e) {
 class Knots {
  public:
   /// `grey`: one column of f that serves all channels is sought.
-  Knots(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis, bool grey)
-      : model_(model), values_(values), axis_(axis), grey_(grey) {}
+  Knots(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis, const Terms& terms,
+        bool grey)
+      : model_(model), values_(values), axis_(axis), terms_(terms), grey_(grey) {}
 
-  BoundModel bound(double x) const {
-    return bind_model(model_, axis_ ? with_number(model_, values_, axis_->at(x)) : values_);
+  /// With these values of what there are terms by.
+  BoundModel bound(double x, const ParamValues& of_terms) const {
+    ParamValues values = axis_ ? with_number(model_, values_, axis_->at(x)) : values_;
+    for (const auto& [name, value] : of_terms) values[name] = value;
+    return bind_model(model_, values);
   }
 
   /// Sees the model at these places. False where it is not grey there, or of another tint than elsewhere.
@@ -326,7 +365,7 @@ class Knots {
     for (const double x : places) {
       if (views_.count(x)) continue;
       at.push_back(x);
-      std::ranges::move(views_of(bound(x)), std::back_inserter(fresh));
+      std::ranges::move(views_at(x), std::back_inserter(fresh));
     }
     if (at.empty()) return true;
     if (grey_) {
@@ -348,14 +387,28 @@ class Knots {
   std::vector<Fitted> fitted(const std::vector<double>& places, std::size_t stride, Family family) const {
     std::vector<Fitted> out(places.size());
     tbb::parallel_for(std::size_t(0), places.size(),
-                      [&](std::size_t i) { out[i] = fit_views(views_.at(places[i]), stride, family); });
+                      [&](std::size_t i) { out[i] = fit_views(views_.at(places[i]), stride, family, terms_); });
     return out;
   }
 
  private:
+  std::vector<View> views_at(double x) const {
+    if (terms_.parameters.empty()) return views_of(bound(x, {}), {});
+    ParamValues some;
+    std::vector<ScaledModel> terms;
+    for (const Terms::Term& term : terms_.terms) {
+      terms.push_back({bound(x, term.values), term.scale});
+      for (const auto& [name, value] : term.values)
+        some[name] = std::holds_alternative<double>(value) ? ParamValue(kSome)
+                                                           : ParamValue(std::array<double, 3>{kSome, kSome, kSome});
+    }
+    return views_of(bound(x, some), terms);
+  }
+
   const Model& model_;
   const ParamValues& values_;
   const std::optional<FitAxis>& axis_;
+  const Terms& terms_;
   bool grey_;
   std::optional<Rgb<double>> tint_;
   std::map<double, std::vector<View>> views_;
@@ -398,6 +451,20 @@ std::string hash_of(const Model& model, const ParamValues& values) {
                             samples_of(model, values, axis)));
 }
 
+std::filesystem::path path_of(const Model& model, const std::string& hash) {
+  return std::filesystem::path(BRDFC_SOURCE_DIR) / "generator" / "fits" /
+         fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
+}
+
+ViewError worse(const ViewError& a, const ViewError& b) {
+  return {a.cos_theta_o,
+          std::max(a.relative_l1, b.relative_l1),
+          std::max(a.relative_l2, b.relative_l2),
+          std::max(a.albedo, b.albedo),
+          std::max(a.negative, b.negative),
+          a.number};
+}
+
 double mean_error(const std::vector<Fitted>& knots) {
   double sum = 0;
   for (const Fitted& f : knots) sum += f.error;
@@ -409,13 +476,16 @@ double mean_error(const std::vector<Fitted>& knots) {
 Fit::Fit(const Model& model, const ParamValues& given, From from) {
   ParamValues values = given;
   Rgb<double> factor(1.0);
-  if (const ParamInfo* p = missing(model, given)) {
+  const ParamInfo* p = missing(model, given);
+  // The same fit whether factors, and what there are terms by, are known or sockets.
+  if (p) std::tie(values, factor) = split_along_axis(model, given);
+  terms_ = terms_of(model, values);
+  if (p) {
     axis_ = fit_axis(*p);
-    // The same fit whether factors are known or sockets.
-    std::tie(values, factor) = split_factors(model, given);
-    const std::filesystem::path path = stored_fit(model, values);
+    const std::string hash = hash_of(model, values);
+    const std::filesystem::path path = path_of(model, hash);
     if (from == From::Store && std::filesystem::exists(path)) {
-      read(path, hash_of(model, values));
+      read(path, hash);
       apply(factor);
       return;
     }
@@ -434,7 +504,7 @@ void Fit::apply(const Rgb<double>& factor) {
 }
 
 bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
-  Knots at(model, values, axis_, grey);
+  Knots at(model, values, axis_, terms_, grey);
   std::vector<double> knots = {0};
   for (int i = 1; axis_ && i <= kFirstSteps; ++i) knots.push_back(double(i) / kFirstSteps);
   if (!at.see(knots)) return false;
@@ -481,7 +551,16 @@ bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
   if (axis_) proof.push_back(1);
   for (const double x : proof) {
     const double number = axis_ ? axis_->at(x) : 0;
-    for (ViewError e : view_errors(at.bound(x), [&](const Vec3<double>& wo) { return closures(wo, number); })) {
+    std::vector<ViewError> worst;
+    for (const Terms::Term& term : terms_.terms) {
+      Varied<double> varied(number);
+      varied.parameters = shares(term.judged);
+      const auto errors =
+          view_errors(at.bound(x, term.judged), [&](const Vec3<double>& wo) { return closures(wo, varied); });
+      if (worst.empty()) worst = errors;
+      for (std::size_t i = 0; i < errors.size(); ++i) worst[i] = worse(worst[i], errors[i]);
+    }
+    for (ViewError e : worst) {
       e.number = number;
       for (double* x : numbers_of(e)) *x = rounded(*x);
       errors_.push_back(e);
@@ -505,21 +584,31 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
   lobes_.clear();
   linear_.clear();
   facets_.clear();
-  // Mean over channels of what the model reflects. Along an axis it may change by factors: closures' colours are
-  // tabulated in units of it.
-  const auto albedo_of = [](const Cell& c) {
-    return std::max((c.view->f.transpose() * weights_of(c.view->points)).mean(), 1e-30);
-  };
-  const auto unit = [&](const Cell& c) { return axis_ ? albedo_of(c) : 1.0; };
   const std::vector<Cell>& first_cells = knots[0].cells;
-  const int count = int(knots.size()), views = int(first_cells.size()), channels = int(first_cells[0].x.cols());
+  const std::size_t terms = terms_.terms.size();
+  const int count = int(knots.size()), views = int(first_cells.size()),
+            channels = int(first_cells[0].x.cols()) / int(terms);
+  const auto columns_of = [&](std::size_t term, const auto& m) {
+    return m.middleCols(Eigen::Index(term) * channels, channels);
+  };
+  // Mean over channels of what a term reflects. Along an axis it may change by factors: closures' colours are tabulated
+  // in units of it.
+  const auto albedo_of = [&](const Cell& c, std::size_t term) {
+    return std::max((columns_of(term, c.view->f).transpose() * weights_of(c.view->points)).mean(), 1e-30);
+  };
+  const auto unit = [&](const Cell& c, std::size_t term) { return axis_ ? albedo_of(c, term) : 1.0; };
+  const auto name_of_term = [&](const std::string& name, std::size_t term) {
+    return terms == 1 ? name : fmt::format("{}_{}", name, term);
+  };
   const auto table = [&](const std::string& name, const auto& value) {
     std::vector<double> numbers;
     for (const Knot& knot : knots)
       for (const Cell& c : knot.cells) numbers.push_back(value(c));
     return make_table(name, axis_ ? std::vector<int>{count, views} : std::vector<int>{views}, rounded(numbers));
   };
-  if (axis_) amplitude_ = table("amplitude", [&](const Cell& c) { return std::log(unit(c)); });
+  amplitude_.clear();
+  for (std::size_t t = 0; axis_ && t < terms; ++t)
+    amplitude_.push_back(table(name_of_term("amplitude", t), [&](const Cell& c) { return std::log(unit(c, t)); }));
   for (std::size_t i = 0; i < knots[0].facets.size(); ++i) {
     const Closure<double>& facet = knots[0].facets[i];
     Facets& f = facets_.emplace_back(Facets{facet.kind, facet.alpha, nullptr});
@@ -540,26 +629,32 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
     const Eigen::Index first = Eigen::Index(ramp ? j * kRampSize : (lobes + 1) * kRampSize + (j - lobes - 1));
     const int entries = ramp ? kRampSize : 1;
     Linear l;
-    // What the facets leave of the albedo, by what each ramp's colours add up to without their signs: so the weights
-    // add up to the albedo, which is what passes and the denoiser see.
-    if (ramp)
-      l.weight = table(fmt::format("share_of_{}", j), [&](const Cell& c) {
-        const Eigen::Index of_ramps = Eigen::Index((lobes + 1) * kRampSize);
-        const double own = c.x.middleRows(first, entries).cwiseAbs().sum();
-        const double all = std::max(c.x.topRows(of_ramps).cwiseAbs().sum(), 1e-300);
-        const double albedo = albedo_of(c), of_facets = c.x.bottomRows(c.x.rows() - of_ramps).sum() / channels;
-        return std::max(albedo - of_facets, 1e-2 * albedo) * (own / all + 1e-3) / (1 + 1e-3 * double(lobes + 1)) /
-               unit(c);
-      });
-    for (int channel = 0; channel < channels; ++channel) {
-      std::vector<double> numbers;
-      for (const Knot& knot : knots)
-        for (const Cell& c : knot.cells)
-          for (int k = 0; k < entries; ++k) numbers.push_back(c.x(first + k, channel) / c.scale[first + k] / unit(c));
-      std::vector<int> sizes = {views};
-      if (axis_) sizes.insert(sizes.begin(), count);
-      if (ramp) sizes.push_back(kRampSize);
-      l.colour.push_back(make_table(fmt::format("colour_of_{}_{}", j, channel), sizes, rounded(numbers)));
+    for (std::size_t t = 0; t < terms; ++t) {
+      // What the facets leave of the albedo, by what each ramp's colours add up to without their signs: so the weights
+      // add up to the albedo, which is what passes and the denoiser see.
+      if (ramp)
+        l.weight.push_back(table(name_of_term(fmt::format("share_of_{}", j), t), [&](const Cell& c) {
+          const MatrixXd x = columns_of(t, c.x);
+          const Eigen::Index of_ramps = Eigen::Index((lobes + 1) * kRampSize);
+          const double own = x.middleRows(first, entries).cwiseAbs().sum();
+          const double all = std::max(x.topRows(of_ramps).cwiseAbs().sum(), 1e-300);
+          const double albedo = albedo_of(c, t), of_facets = x.bottomRows(x.rows() - of_ramps).sum() / channels;
+          return std::max(albedo - of_facets, 1e-2 * albedo) * (own / all + 1e-3) / (1 + 1e-3 * double(lobes + 1)) /
+                 unit(c, t);
+        }));
+      l.colour.emplace_back();
+      for (int channel = 0; channel < channels; ++channel) {
+        const int column = int(t) * channels + channel;
+        std::vector<double> numbers;
+        for (const Knot& knot : knots)
+          for (const Cell& c : knot.cells)
+            for (int k = 0; k < entries; ++k)
+              numbers.push_back(c.x(first + k, column) / c.scale[first + k] / unit(c, t));
+        std::vector<int> sizes = {views};
+        if (axis_) sizes.insert(sizes.begin(), count);
+        if (ramp) sizes.push_back(kRampSize);
+        l.colour[t].push_back(make_table(fmt::format("colour_of_{}_{}", j, column), sizes, rounded(numbers)));
+      }
     }
     linear_.push_back(std::move(l));
   }
@@ -571,12 +666,13 @@ std::vector<std::shared_ptr<const Table>> Fit::tables() const {
     if (table) out.push_back(table);
   };
   add(position_);
-  add(amplitude_);
+  for (const auto& table : amplitude_) add(table);
   for (const Facets& f : facets_) add(f.log_alpha);
   for (const Lobe& l : lobes_) add(l.offset), add(l.exponent);
   for (const Linear& l : linear_) {
-    add(l.weight);
-    for (const auto& channel : l.colour) add(channel);
+    for (const auto& table : l.weight) add(table);
+    for (const auto& term : l.colour)
+      for (const auto& channel : term) add(channel);
   }
   return out;
 }
@@ -605,11 +701,12 @@ double Fit::mean_l1(const std::optional<double>& number) const {
 }
 
 Fit Fit::knot(const Model& model, const ParamValues& values, double place) const {
-  Knots at(model, values, axis_, grey_);
+  Knots at(model, values, axis_, terms_, grey_);
   if (!at.see({place})) throw std::logic_error(model.info().name + ": a fit of another tint");
   const Fitted cell = std::move(at.fitted({place}, 1, Family(family_)).front());
   Fit out;
   out.axis_ = axis_;
+  out.terms_ = terms_;
   out.tint_ = tint_;
   // Between two knots that are the same, views lie as they do in the whole.
   out.tabulate({0, 1}, std::vector<Fitted>{cell, cell});
@@ -634,6 +731,10 @@ void Fit::store(const Model& model, const ParamValues& values, const std::filesy
     image.pixels.resize(std::size_t(image.width) * (tables.size() + 1), 0.f);
     tables.push_back({{"row", tables.size()}, {"name", table->name}, {"sizes", table->sizes}});
   }
+  // Each by what its parameters are where f is this term over `scale`.
+  Json terms = Json::array();
+  for (const Terms::Term& term : terms_.terms)
+    terms.push_back({{"values", format_values(model.info(), term.values)}, {"scale", term.scale}});
   const Json axis = axis_ ? Json{{"parameter", axis_->parameter},
                                  {"low", axis_->low},
                                  {"high", axis_->high},
@@ -651,7 +752,8 @@ void Fit::store(const Model& model, const ParamValues& values, const std::filesy
                {"tint", {tint_.r, tint_.g, tint_.b}},
                {"lobes", lobes_.size()},
                {"facets", facets},
-               {"channels", linear_.front().colour.size()},
+               {"terms", terms},
+               {"channels", linear_.front().colour.front().size()},
                {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
                {"tables", tables}};
   // Other than 1 only with factors that are known.
@@ -682,7 +784,11 @@ void Fit::read(const std::filesystem::path& path, const std::string& hash) {
     grey_ = meta.at("grey");
     tint_ = {meta.at("tint").at(0), meta.at("tint").at(1), meta.at("tint").at(2)};
     position_ = tables.at("position_on_axis");
-    amplitude_ = tables.at("amplitude");
+    const std::size_t terms = terms_.terms.size();
+    const auto term = [&](const std::string& name, std::size_t t) {
+      return tables.at(terms == 1 ? name : fmt::format("{}_{}", name, t));
+    };
+    for (std::size_t t = 0; t < terms; ++t) amplitude_.push_back(term("amplitude", t));
     const auto& facets = meta.at("facets");
     for (std::size_t i = 0; i < facets.size(); ++i)
       facets_.push_back(
@@ -692,9 +798,12 @@ void Fit::read(const std::filesystem::path& path, const std::string& hash) {
       lobes_.push_back({tables.at(fmt::format("offset_of_{}", j)), tables.at(fmt::format("power_of_{}", j))});
     for (std::size_t j = 0; j < lobes + 1 + facets_.size(); ++j) {
       Linear l;
-      if (j <= lobes) l.weight = tables.at(fmt::format("share_of_{}", j));
-      for (std::size_t channel = 0; channel < channels; ++channel)
-        l.colour.push_back(tables.at(fmt::format("colour_of_{}_{}", j, channel)));
+      for (std::size_t t = 0; t < terms; ++t) {
+        if (j <= lobes) l.weight.push_back(term(fmt::format("share_of_{}", j), t));
+        l.colour.emplace_back();
+        for (std::size_t channel = 0; channel < channels; ++channel)
+          l.colour[t].push_back(tables.at(fmt::format("colour_of_{}_{}", j, t * channels + channel)));
+      }
       linear_.push_back(std::move(l));
     }
     const auto& errors = tables.at("errors");
@@ -712,17 +821,27 @@ void Fit::read(const std::filesystem::path& path, const std::string& hash) {
 
 double Fit::l1_at(const View& view, double number) const {
   const VectorXd weight = weights_of(view.points);
-  const ClosureSum<double> sum = closures(view.wo, number);
-  MatrixXd off = view.f;
-  for (Eigen::Index i = 0; i < off.rows(); ++i) {
-    const Rgb<double> v = evaluate(sum, view.points.wi[std::size_t(i)], view.wo);
-    const double channels[] = {v.r, v.g, v.b};
-    for (Eigen::Index channel = 0; channel < off.cols(); ++channel) off(i, channel) -= channels[channel];
-  }
+  const MatrixXd mixtures = judged(terms_);
+  const Eigen::Index terms = mixtures.cols(), channels = view.f.cols() / terms;
   double worst = 0;
-  for (Eigen::Index channel = 0; channel < off.cols(); ++channel)
-    if (const double albedo = view.f.col(channel).dot(weight); albedo > 0)
-      worst = std::max(worst, off.col(channel).cwiseAbs().dot(weight) / albedo);
+  for (Eigen::Index mixture = 0; mixture < terms; ++mixture) {
+    std::vector<Rgb<double>> weights;
+    MatrixXd f = MatrixXd::Zero(view.f.rows(), channels);
+    for (Eigen::Index t = 0; t < terms; ++t) {
+      weights.emplace_back(mixtures(mixture, t));
+      f += mixtures(mixture, t) * view.f.middleCols(t * channels, channels);
+    }
+    const ClosureSum<double> sum = weighted(view.wo, number, weights, 1.0, true);
+    MatrixXd off = f;
+    for (Eigen::Index i = 0; i < off.rows(); ++i) {
+      const Rgb<double> v = evaluate(sum, view.points.wi[std::size_t(i)], view.wo);
+      const double of_sum[] = {v.r, v.g, v.b};
+      for (Eigen::Index channel = 0; channel < channels; ++channel) off(i, channel) -= of_sum[channel];
+    }
+    for (Eigen::Index channel = 0; channel < channels; ++channel)
+      if (const double albedo = f.col(channel).dot(weight); albedo > 0)
+        worst = std::max(worst, off.col(channel).cwiseAbs().dot(weight) / albedo);
+  }
   return worst;
 }
 
@@ -746,14 +865,33 @@ template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const
   return c;
 }
 
-template <class T> Rgb<T> Fit::colour(std::size_t j, const std::vector<T>& at) const {
-  const auto& channels = linear_[j].colour;
-  if (channels.size() == 1) return Rgb<T>(lookup(channels[0], at));
-  return Rgb<T>(lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at));
+template <class T> T Fit::amplitude(std::size_t term, const std::vector<T>& at) const {
+  return axis_ ? named("amplitude", T(scale_) * exp(lookup(amplitude_[term], at))) : T(1);
 }
 
-template <class T> T Fit::amplitude(const std::vector<T>& at) const {
-  return amplitude_ ? named("amplitude", T(scale_) * exp(lookup(amplitude_, at))) : T(1);
+template <class T> std::vector<Rgb<T>> Fit::counts(const std::vector<T>& at, const std::vector<Rgb<T>>& weights) const {
+  std::vector<Rgb<T>> out;
+  for (std::size_t t = 0; t < terms_.terms.size() && !terms_.parameters.empty(); ++t)
+    out.push_back(named("count_of_term", weights[t] * amplitude(t, at)));
+  return out;
+}
+
+template <class T> std::vector<Rgb<T>> Fit::weights(const Varied<T>& varied) const {
+  if (terms_.parameters.empty()) return {Rgb<T>(T(1))};
+  return terms_.weights(varied.parameters);
+}
+
+template <class T>
+Rgb<T> Fit::colour(std::size_t j, const std::vector<T>& at, const std::vector<Rgb<T>>& counts) const {
+  const auto term = [&](std::size_t t) {
+    const auto& channels = linear_[j].colour[t];
+    if (channels.size() == 1) return Rgb<T>(lookup(channels[0], at));
+    return Rgb<T>(lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at));
+  };
+  if (counts.empty()) return term(0);
+  Rgb<T> sum = counts[0] * term(0);
+  for (std::size_t t = 1; t < counts.size(); ++t) sum += counts[t] * term(t);
+  return sum;
 }
 
 /// Coordinates of a ramp's table.
@@ -762,44 +900,67 @@ template <class T> std::vector<T> on_ramp(std::vector<T> at, const T& position) 
   return at;
 }
 
-template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const T& number, const T& share, bool divided) const {
+template <class T> ClosureSum<T> Fit::weighted(const Vec3<T>& wo, const T& number, const std::vector<Rgb<T>>& weights,
+                                               const T& share, bool divided) const {
   const std::vector<T> at = place(wo, number);
-  const T amplitude = this->amplitude(at);
+  const std::vector<Rgb<T>> counts = this->counts(at, weights);
+  // With terms it is in their counts.
+  const T amplitude = counts.empty() ? this->amplitude(0, at) : T(1);
   const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
   ClosureSum<T> sum;
   for (std::size_t j = 0; j < linear_.size(); ++j) {
     Closure<T>& c = sum.emplace_back(shape(j, wo, at));
     if (!has_ramp(c.kind)) {
-      c.weight = tint * amplitude * colour(j, at);
+      c.weight = tint * amplitude * colour(j, at, counts);
       continue;
     }
-    const T weight = maximum(lookup(linear_[j].weight, at), T(1e-20)) * amplitude * share;
+    const auto on = [&](std::size_t k) { return on_ramp(at, T(double(k) / (kRampSize - 1))); };
+    const auto share_of = [&](std::size_t t) { return maximum(lookup(linear_[j].weight[t], at), T(1e-20)); };
+    if (counts.empty()) {
+      const T weight = share_of(0) * amplitude * share;
+      c.weight = tint * weight;
+      for (std::size_t k = 0; k < kRampSize; ++k)
+        c.ramp[k] = colour(j, on(k), counts) * (divided ? amplitude / weight : amplitude);
+      continue;
+    }
+    // Of colours that may be black.
+    Rgb<T> weight(T(1e-20));
+    for (std::size_t t = 0; t < counts.size(); ++t) weight += counts[t] * share_of(t);
+    weight = weight * share;
     c.weight = tint * weight;
-    for (std::size_t k = 0; k < kRampSize; ++k)
-      c.ramp[k] = colour(j, on_ramp(at, T(double(k) / (kRampSize - 1)))) * (divided ? amplitude / weight : amplitude);
+    for (std::size_t k = 0; k < kRampSize; ++k) {
+      c.ramp[k] = colour(j, on(k), counts);
+      if (divided) c.ramp[k] = c.ramp[k] / weight;
+    }
   }
   return sum;
 }
-template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, const double&, bool) const;
-template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Expr&, const Expr&, bool) const;
 
-template <class T> Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const T& number) const {
-  const std::vector<T> at = place(wo, number);
+template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied,
+                                               const T& share, bool divided) const {
+  return weighted(wo, varied.number, weights(varied), share, divided);
+}
+template ClosureSum<double> Fit::closures(const Vec3<double>&, const Varied<double>&, const double&, bool) const;
+template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Varied<Expr>&, const Expr&, bool) const;
+
+template <class T>
+Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied) const {
+  const std::vector<T> at = place(wo, varied.number);
+  const std::vector<Rgb<T>> counts = this->counts(at, weights(varied));
   Rgb<T> sum(T(0));
   for (std::size_t j = 0; j < linear_.size(); ++j) {
     Closure<T> c = shape(j, wo, at);
-    if (!has_ramp(c.kind)) c.weight = colour(j, at);
-    sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, on_ramp(at, position)); });
+    if (!has_ramp(c.kind)) c.weight = colour(j, at, counts);
+    sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, on_ramp(at, position), counts); });
   }
-  return Rgb<T>(T(tint_.r), T(tint_.g), T(tint_.b)) * amplitude(at) * sum;
+  const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
+  return counts.empty() ? tint * amplitude(0, at) * sum : tint * sum;
 }
-template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const double&) const;
-template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Expr&) const;
+template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const Varied<double>&) const;
+template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Varied<Expr>&) const;
 
 std::filesystem::path stored_fit(const Model& model, const ParamValues& values) {
-  const std::string hash = hash_of(model, split_factors(model, values).first);
-  return std::filesystem::path(BRDFC_SOURCE_DIR) / "generator" / "fits" /
-         fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
+  return path_of(model, hash_of(model, along_axis(model, values)));
 }
 
 const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }

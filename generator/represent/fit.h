@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A fitted form: a few closures of Cycles whose sum comes close to a BRDF for every view, so that Cycles can send light
-// to it from lamps. For a material whose parameters are known, but for those that f is proportional to and one number,
-// which the tables run over.
+// to it from lamps. For a material whose parameters are known, but for those that f is proportional to or a polynomial
+// of (terms.h) and one number, which the tables run over.
 //
 // The closures are phong_ramps about axes in the plane of incidence, and a diffuse_ramp. Both take eight colours that
 // may be negative, so each is a family that is linear in eight numbers, and a view is a linear problem: least absolute
@@ -15,6 +15,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include "core/table.h"
 #include "model/model.h"
 #include "represent/closure.h"
+#include "represent/terms.h"
 #include "represent/view.h"
 
 namespace brdfc {
@@ -39,25 +41,35 @@ struct FitAxis {
 /// The axis that a number of the schema would have.
 FitAxis fit_axis(const ParamInfo&);
 
-/// Parameters that f is proportional to, the other parameters being as they are: colours, and numbers that may be 1.
-/// Closures are fitted without them, and take them as factors of their weights, so they need not be known. Those that
-/// `known` lacks have their defaults, and numbers the ends of their sliders, too.
-std::set<std::string> factors(const Model&, const ParamValues& known);
-/// `known` with 1 for every factor that it lacks. Throws std::logic_error where it then lacks more than one number.
+/// `known` with 1 for every factor that it lacks. Throws std::logic_error where it then lacks more than one number and
+/// what there are terms by.
 ParamValues without_factors(const Model&, const ParamValues& known);
 /// `values`, in which factors are, with 1 for each, and their product.
 std::pair<ParamValues, Rgb<double>> split_factors(const Model&, ParamValues values);
-/// Complete values, `number` being that which `values` may lack.
+/// What a fit along a number is kept by: `values` with 1 for each factor and without what there are terms by.
+ParamValues along_axis(const Model&, const ParamValues& values);
+/// Values with `number` for that which they may lack; what there are terms by stays away.
 ParamValues with_number(const Model&, const ParamValues& values, double number);
 
-/// Why closures can't be fitted to a model with these parameters; nothing if they can. They may lack one number.
+/// What closures of a fit depend on besides the view: the value of its axis, if it has one, and of the parameters that
+/// it has terms by.
+template <class T> struct Varied {
+  T number = T(0);
+  std::map<std::string, Rgb<T>> parameters = {};
+  Varied() = default;
+  Varied(const T& n) : number(n) {}  // NOLINT: all that most fits need
+};
+
+/// Why closures can't be fitted to a model with these parameters; nothing if they can. They may lack one number and
+/// what there are terms by.
 std::optional<std::string> unfit(const Model&, const ParamValues&);
 
 class Fit {
  public:
   enum class From { Store, Scratch };
-  /// `values` may lack one number, which becomes the axis; then a fit that is stored is read, unless it has to be made
-  /// from scratch. Throws ValueError where the model gives a value that is NaN, infinite or negative.
+  /// `values` may lack what there are terms by, and one number, which becomes the axis; then what there are terms by
+  /// stays open even where it is known, and a fit that is stored is read, unless it has to be made from scratch. Throws
+  /// ValueError where the model gives a value that is NaN, infinite or negative.
   Fit(const Model&, const ParamValues& values, From from = From::Store);
 
   /// Writes the tables as a float EXR with a row a table, what they are in its attribute brdfc:table. One along an axis
@@ -69,14 +81,18 @@ class Fit {
   const std::vector<double>& knots() const { return knots_; }
 
   const std::optional<FitAxis>& axis() const { return axis_; }
+  const Terms& terms() const { return terms_; }
+  /// What closures() takes, from complete values.
+  Varied<double> varied(const ParamValues& values) const;
 
-  /// The closures for a view above the surface and a value of the axis, if there is one. Their weights add up to the
-  /// albedo, or where facets shadow each other to a little more. Those with ramps have `share` of theirs and colours
-  /// that make up for it; not `divided`, the colours still have to be divided by the weight's largest channel.
-  template <class T>
-  ClosureSum<T> closures(const Vec3<T>& wo, const T& number = T(0), const T& share = T(1), bool divided = true) const;
+  /// The closures for a view above the surface. Their weights add up to the albedo, or where facets shadow each other
+  /// to a little more. Those with ramps have `share` of theirs and colours that make up for it; not `divided`, the
+  /// colours still have to be divided by the weight: by its largest channel, with terms by each.
+  template <class T> ClosureSum<T> closures(const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied = {},
+                                            const T& share = T(1), bool divided = true) const;
   /// f cos(theta_i) of their sum; directions above the surface.
-  template <class T> Rgb<T> f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const T& number = T(0)) const;
+  template <class T>
+  Rgb<T> f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied = {}) const;
 
   /// Relative L1, mean over views: with an axis at the worse of the two places of errors() beside `number`, or at the
   /// worst of all where it may be anything.
@@ -101,11 +117,12 @@ class Fit {
     double alpha;
     std::shared_ptr<const Table> log_alpha;  ///< over the axis, if there is one
   };
-  /// A closure's weight, and the colours of its ramp times that weight, by channel, over the view and the position in
-  /// the ramp; one channel if `tint_` does. Without a ramp, one colour over the view. In units of the amplitude.
+  /// A closure's weight, and the colours of its ramp times that weight, by term and channel, over the view and the
+  /// position in the ramp; one channel if `tint_` does. Without a ramp, colours over the view and no weight. In units
+  /// of the amplitude.
   struct Linear {
-    std::shared_ptr<const Table> weight;
-    std::vector<std::shared_ptr<const Table>> colour;
+    std::vector<std::shared_ptr<const Table>> weight;
+    std::vector<std::vector<std::shared_ptr<const Table>>> colour;
   };
   Fit() = default;
   /// Multiplies a fit along an axis.
@@ -117,23 +134,31 @@ class Fit {
   /// Makes the tables of what was fitted at the knots of the axis, which are at these places of [0, 1]; without an axis
   /// of the only one.
   template <class Knot> void tabulate(const std::vector<double>& places, const std::vector<Knot>& knots);
-  /// Relative L1 of one view.
+  /// Relative L1 of one view, of the term that is off by most.
   double l1_at(const View&, double number) const;
   /// Coordinates of all tables that run over the view.
   template <class T> std::vector<T> place(const Vec3<T>& wo, const T& number) const;
+  /// What each term counts, in the closures' units. Empty without parameters that there are terms by: then all but the
+  /// amplitude is in the tables.
+  template <class T> std::vector<Rgb<T>> counts(const std::vector<T>& at, const std::vector<Rgb<T>>& weights) const;
+  /// closures() by the weights of terms.
+  template <class T> ClosureSum<T> weighted(const Vec3<T>& wo, const T& number, const std::vector<Rgb<T>>& weights,
+                                            const T& share, bool divided) const;
+  template <class T> std::vector<Rgb<T>> weights(const Varied<T>&) const;
   /// Closure j without weight and colours.
   template <class T> Closure<T> shape(std::size_t j, const Vec3<T>& wo, const std::vector<T>& place) const;
-  /// Colour of closure j without tint and amplitude; `at` is what its tables run over.
-  template <class T> Rgb<T> colour(std::size_t j, const std::vector<T>& at) const;
-  template <class T> T amplitude(const std::vector<T>& at) const;
+  /// Colour of closure j without tint, and without amplitude unless there are counts; `at` is what its tables run over.
+  template <class T> Rgb<T> colour(std::size_t j, const std::vector<T>& at, const std::vector<Rgb<T>>& counts) const;
+  template <class T> T amplitude(std::size_t term, const std::vector<T>& at) const;
 
   std::optional<FitAxis> axis_;
+  Terms terms_;
   std::vector<double> knots_;
-  int family_ = 0;                          ///< which closures
-  bool grey_ = false;                       ///< whether one channel serves all, with a tint
-  double scale_ = 1;                        ///< of all closures along an axis, whose fit is made without factors
-  std::shared_ptr<const Table> position_;   ///< from the place on the axis to the coordinate that tables take for it
-  std::shared_ptr<const Table> amplitude_;  ///< with an axis, the logarithm of what the model reflects; else 1
+  int family_ = 0;                         ///< which closures
+  bool grey_ = false;                      ///< whether one channel serves all, with a tint
+  double scale_ = 1;                       ///< of all closures along an axis, whose fit is made without factors
+  std::shared_ptr<const Table> position_;  ///< from the place on the axis to the coordinate that tables take for it
+  std::vector<std::shared_ptr<const Table>> amplitude_;  ///< of terms along an axis: the logarithm of what they reflect
   std::vector<Lobe> lobes_;
   std::vector<Linear> linear_;  ///< of the lobes, of the diffuse_ramp, of the facets
   std::vector<Facets> facets_;
@@ -148,9 +173,9 @@ std::filesystem::path stored_fit(const Model&, const ParamValues& values);
 /// The fit for these values, made or read at first use and kept while the program runs.
 const Fit& fit_of(const Model&, const ParamValues& values);
 
-extern template ClosureSum<double> Fit::closures(const Vec3<double>&, const double&, const double&, bool) const;
-extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Expr&, const Expr&, bool) const;
-extern template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const double&) const;
-extern template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Expr&) const;
+extern template ClosureSum<double> Fit::closures(const Vec3<double>&, const Varied<double>&, const double&, bool) const;
+extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Varied<Expr>&, const Expr&, bool) const;
+extern template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const Varied<double>&) const;
+extern template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Varied<Expr>&) const;
 
 }  // namespace brdfc

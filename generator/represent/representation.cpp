@@ -53,20 +53,39 @@ ClosureSum<Expr> with_mirror(const Model& model, const Brdf<Expr>& brdf, Closure
   return sum;
 }
 
-/// The value of a fit's axis.
-Expr recorded_number(const Fit& fit) { return fit.axis() ? Expr::input(fit.axis()->parameter) : Expr(0); }
+/// What the closures of a fit vary by: inputs, but for what is fixed.
+Varied<Expr> recorded_varied(const Model& model, const Fit& fit, const ParamValues& fixed) {
+  Varied<Expr> out;
+  if (fit.axis()) out.number = Expr::input(fit.axis()->parameter);
+  for (const std::string& name : fit.terms().parameters) {
+    const auto it = fixed.find(name);
+    if (it == fixed.end()) {
+      const bool grey = model.info().param(name)->kind == ParamKind::Number;
+      out.parameters[name] = grey ? Rgb<Expr>(Expr::input(name)) : Rgb<Expr>::input(name);
+    } else if (const auto* c = std::get_if<std::array<double, 3>>(&it->second)) {
+      out.parameters[name] = {(*c)[0], (*c)[1], (*c)[2]};
+    } else {
+      out.parameters[name] = Rgb<Expr>(Expr(std::get<double>(it->second)));
+    }
+  }
+  return out;
+}
 
-ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed) {
-  const Fit& fit = fit_of(model, without_factors(model, fixed));
-  return with_mirror(model, brdf, fit.closures(recorded_wo(model, brdf), recorded_number(fit), Expr(1), false));
+Division division_of(const Fit& fit) {
+  return fit.terms().parameters.empty() ? Division::ByLargest : Division::ByChannel;
+}
+
+ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const Fit& fit, const ParamValues& fixed) {
+  const Varied<Expr> varied = recorded_varied(model, fit, fixed);
+  return with_mirror(model, brdf, fit.closures(recorded_wo(model, brdf), varied, Expr(1), false));
 }
 
 std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
 
 void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<RecordedClosure>& recorded,
-                     bool divided = true) {
+                     Division division = Division::Done) {
   for (std::size_t c = 0; c < sum.size(); ++c) {
-    recorded.push_back({sum[c].kind, sum[c].turned, has_ramp(sum[c].kind) && !divided});
+    recorded.push_back({sum[c].kind, sum[c].turned, has_ramp(sum[c].kind) ? division : Division::Done});
     program.output(fmt::format("weight_{}", c), sum[c].weight);
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
@@ -88,8 +107,9 @@ void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamVa
   const ParamValues values = without_factors(model, fixed);
   const std::unique_ptr<Brdf<Expr>> scatter = model.record(values);
   const Fit& fit = fit_of(model, values);
-  const Controlled<Expr> c = controlled(*scatter, fit, recorded_wo(model, brdf), recorded_u(), recorded_number(fit));
-  output_closures(with_mirror(model, brdf, c.closures), program, recorded, false);
+  const Controlled<Expr> c =
+      controlled(*scatter, fit, recorded_wo(model, brdf), recorded_u(), recorded_varied(model, fit, fixed));
+  output_closures(with_mirror(model, brdf, c.closures), program, recorded, division_of(fit));
   program.output("wi_x", c.wi.x);
   program.output("wi_y", c.wi.y);
   program.output("wi_z", c.wi.z);
@@ -176,8 +196,10 @@ RepresentationError controlled_error(const Model& model, const ParamValues& fixe
     const Vec3<double> wo = direction((view + 0.5) / kViews, view);
     // From the upper end of the axis down, so that it does not go with the height of the view.
     const double number = fit.axis() ? fit.axis()->at(1 - double(view) / (kViews - 1)) : 0;
-    const BoundModel truth = bind_model(model, with_number(model, values, number));
-    FloatInputs inputs = float_inputs(with_number(model, values, number), wo);
+    const ParamValues here = complete(model.info(), with_number(model, values, number));
+    const BoundModel truth = bind_model(model, here);
+    const Varied<double> varied = fit.varied(here);
+    FloatInputs inputs = float_inputs(here, wo);
     Rgb<double> difference(0.0);
     for (int i = 0; i < kPoints; ++i) {
       const Vec3<float> v = Vec3<float>::from(points.next());
@@ -189,7 +211,7 @@ RepresentationError controlled_error(const Model& model, const ParamValues& fixe
         require_finite(model, values, wo, name, value, !name.starts_with("weight_") && name != "residual_weight");
       const std::array<float, 3> colour = run.at("residual_colour");
       const double weight = run.at("residual_weight")[0] / double(kPoints);
-      const Residual<double> exact = sample_residual(*truth.brdf, fit, wo, Vec3<double>::from(v), number);
+      const Residual<double> exact = sample_residual(*truth.brdf, fit, wo, Vec3<double>::from(v), varied);
       difference += Rgb<double>(colour[0], colour[1], colour[2]) * weight - exact.weight / double(kPoints);
     }
     out.albedo = std::max({out.albedo, std::abs(difference.r), std::abs(difference.g), std::abs(difference.b)});
@@ -224,9 +246,10 @@ ParamValues fit_values(const Model& model, const ParamValues& fixed) {
   for (const ParamInfo& p : info.params)
     if (p.kind == ParamKind::Choice) known.insert(*defaults.find(p.name));
   const std::set<std::string> free = factors(model, known);
+  const Terms terms = terms_of(model, known);
   std::vector<const ParamInfo*> open;
   for (const ParamInfo& p : info.params)
-    if (!known.count(p.name) && !free.count(p.name)) open.push_back(&p);
+    if (!known.count(p.name) && !free.count(p.name) && !terms.has(p.name)) open.push_back(&p);
   const bool axis = open.size() == 1 && open.front()->kind == ParamKind::Number;
   for (const ParamInfo* p : open)
     if (!axis && p->name != info.properties.fit_axis) known.insert(*defaults.find(p->name));
@@ -302,7 +325,8 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
     if (!sum) input_error("{}: has no exact representation", model.info().name);
     output_closures(*sum, program, closures);
   } else if (kind == RepresentationKind::Fitted) {
-    output_closures(recorded_fit(model, *brdf, fixed), program, closures, false);
+    const Fit& fit = fit_of(model, without_factors(model, fixed));
+    output_closures(recorded_fit(model, *brdf, fit, fixed), program, closures, division_of(fit));
   } else if (kind == RepresentationKind::Controlled) {
     output_controlled(model, *brdf, fixed, program, closures);
   } else {
@@ -321,7 +345,7 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false, false}});
+  return finish(program, indent, {{ClosureKind::Reflection, false, Division::Done}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {

@@ -19,7 +19,8 @@ enum class RepresentationKind {
 };
 
 const char* name_of(RepresentationKind);
-/// Made of a fit: for parameters that must be known, but for factors() and one number (fit.h).
+/// Made of a fit: for parameters that must be known, but for factors(), those that it has terms by (terms.h), and one
+/// number.
 inline bool is_fit(RepresentationKind kind) {
   return kind == RepresentationKind::Fitted || kind == RepresentationKind::Controlled ||
          kind == RepresentationKind::Twin;
@@ -36,13 +37,17 @@ inline constexpr int kMaxLobes = 8;
 inline constexpr int kDefaultLobes = 1;
 
 /// The values that a form is confined to, beside those that are `fixed`: choices, where the closures of an exact one
-/// are known for some alone; of a fit the defaults of all but factors() and the number that it runs over.
+/// are known for some alone; of a fit the defaults of all but factors(), what there are terms by and the number that it
+/// runs over.
 ParamValues form_values(const Model&, RepresentationKind, const ParamValues& fixed = {});
 
+/// What the colours of a ramp still have to be divided by: nothing, their closure's weight by its largest channel or by
+/// each.
+enum class Division { Done, ByLargest, ByChannel };
 struct RecordedClosure {
   ClosureKind kind;
-  bool turned;     ///< has a normal of its own
-  bool undivided;  ///< the colours of its ramp have to be divided by its weight's largest channel
+  bool turned;  ///< has a normal of its own
+  Division division;
   bool operator==(const RecordedClosure&) const = default;
 };
 /// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
@@ -56,9 +61,9 @@ struct Recording {
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
 /// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
-/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number, which it reads,
-/// and factors(), which its weights still have to be multiplied by, the mirror's excepted. Throws InputError if more
-/// closures than Cycles keeps would be needed.
+/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number and what it has
+/// terms by, which it reads, and factors(), which its weights still have to be multiplied by, the mirror's excepted.
+/// Throws InputError if more closures than Cycles keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);

@@ -54,16 +54,6 @@ Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec
   return points;
 }
 
-MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<double>& wo) {
-  MatrixXd f(Eigen::Index(points.wi.size()), 3);
-  for (std::size_t i = 0; i < points.wi.size(); ++i) {
-    const Rgb<double> v = model.brdf->eval(points.wi[i], wo);
-    require_value(v, "f", model.label, points.wi[i], wo);
-    f.row(Eigen::Index(i)) << v.r * points.wi[i].z, v.g * points.wi[i].z, v.b * points.wi[i].z;
-  }
-  return f;
-}
-
 Moments moments(const BoundModel& model, const Vec3<double>& wo) {
   Moments m;
   for (int step = 0; step < 4; ++step) {
@@ -105,6 +95,16 @@ VectorXd weights_of(const Points& points) {
   return Eigen::Map<const VectorXd>(points.weight.data(), Eigen::Index(points.weight.size()));
 }
 
+MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<double>& wo) {
+  MatrixXd f(Eigen::Index(points.wi.size()), 3);
+  for (std::size_t i = 0; i < points.wi.size(); ++i) {
+    const Rgb<double> v = model.brdf->eval(points.wi[i], wo);
+    require_value(v, "f", model.label, points.wi[i], wo);
+    f.row(Eigen::Index(i)) << v.r * points.wi[i].z, v.g * points.wi[i].z, v.b * points.wi[i].z;
+  }
+  return f;
+}
+
 VectorXd brightest(const MatrixXd& f) { return f.rowwise().maxCoeff(); }
 
 View seen(const BoundModel& bound, const Vec3<double>& wo, int points) {
@@ -120,15 +120,23 @@ View seen(const BoundModel& bound, const Vec3<double>& wo, int points, const Mom
 
 std::optional<Rgb<double>> make_grey(std::vector<View>& views) {
   Eigen::Array3d ratio = Eigen::Array3d::Zero();
-  for (const View& v : views) ratio += (v.f.transpose() * weights_of(v.points)).array();
+  for (const View& v : views)
+    for (Eigen::Index first = 0; first < v.f.cols(); first += 3)
+      ratio += (v.f.middleCols(first, 3).transpose() * weights_of(v.points)).array();
   ratio /= std::max(ratio.maxCoeff(), 1e-300);
   for (const View& v : views)
-    for (Eigen::Index i = 0; i < v.f.rows(); ++i) {
-      const double grey = v.f.row(i).maxCoeff();
-      for (int k = 0; k < 3; ++k)
-        if (!(std::abs(v.f(i, k) - ratio[k] * grey) <= 1e-9 * grey)) return std::nullopt;
-    }
-  for (View& v : views) v.f = brightest(v.f);
+    for (Eigen::Index i = 0; i < v.f.rows(); ++i)
+      for (Eigen::Index first = 0; first < v.f.cols(); first += 3) {
+        const double grey = v.f.row(i).segment(first, 3).maxCoeff();
+        for (int k = 0; k < 3; ++k)
+          if (!(std::abs(v.f(i, first + k) - ratio[k] * grey) <= 1e-9 * grey)) return std::nullopt;
+      }
+  for (View& v : views) {
+    MatrixXd grey(v.f.rows(), v.f.cols() / 3);
+    for (Eigen::Index model = 0; model < grey.cols(); ++model)
+      grey.col(model) = brightest(v.f.middleCols(3 * model, 3));
+    v.f = std::move(grey);
+  }
   return Rgb<double>{ratio[0], ratio[1], ratio[2]};
 }
 

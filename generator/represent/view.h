@@ -51,7 +51,7 @@ struct View {
   Vec3<double> wo;
   Moments lobe;
   Points points;
-  Eigen::MatrixXd f;  ///< f cos(theta_i) of the points, a column a channel
+  Eigen::MatrixXd f;  ///< f cos(theta_i) of the points, a column a channel; of several models one after the other
 };
 /// Throws ValueError where the model gives a value that is NaN, infinite or negative.
 View seen(const BoundModel&, const Vec3<double>& wo, int points);
@@ -61,8 +61,11 @@ View seen(const BoundModel&, const Vec3<double>& wo, int points, const Moments& 
 /// The largest channel of each point.
 Eigen::VectorXd brightest(const Eigen::MatrixXd& f);
 
-/// Where the channels of all views differ by a factor alone, leaves one column of each that serves them all, and
-/// returns the factors.
+/// f cos(theta_i), three columns. Throws ValueError where the model gives a value that is NaN, infinite or negative.
+Eigen::MatrixXd scattering(const BoundModel&, const Points&, const Vec3<double>& wo);
+
+/// Where the channels of all views, and of all models in each, differ by a factor alone, leaves one column of a model
+/// that serves them all, and returns the factors.
 std::optional<Rgb<double>> make_grey(std::vector<View>&);
 
 /// Least absolute differences over the columns of `a`, whose integrals are about 1, with the integral of f kept, and
