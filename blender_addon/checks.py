@@ -266,7 +266,6 @@ def scene_warnings(scene):
 
 def node_warnings(node, material, scene):
     """What is wrong with one group node of a material."""
-    model_name, representation = nodes.identity(node)
     label = f"{node.label or node.name}: "
     found = []
     if problem := nodes.script_problem(node.node_tree):

@@ -51,11 +51,11 @@ class Plan:
     def __init__(self, used, error=None, time=None):
         """`used`: [(id, group node, entry)], entries as `materials` of a scene file has them.
         Budgets leave the form open; without one each keeps its own. Raises PlanError."""
-        self.used = [(node, entry) for _, node, entry in used]
         self._budget = error is not None or time is not None
+        self.used = [(node, self._open(entry)) for _, node, entry in used]
         options = [] if error is None else ["--error", f"{error:.17g}"]
         options += [] if time is None else ["--time", f"{time:.17g}x"]
-        materials = {name: self._open(entry) for name, _, entry in used}
+        materials = {name: entry for (name, _, _), (_, entry) in zip(used, self.used, strict=True)}
         self._folder = tempfile.TemporaryDirectory(prefix="brdfc-lean-")
         folder = Path(self._folder.name)
         file = folder / "materials.json"
@@ -118,11 +118,12 @@ class Plan:
                     f"{before['generator']}"
                 )
             for node, entry in self.used:
-                model, values = entry["model"], entry["parameters"]
-                given = {k: v for k, v in values.items() if not isinstance(v, dict)}
+                model = entry["model"]
                 # A linked value is None to pack.refusal().
-                given |= {k: None for k, v in values.items() if isinstance(v, dict)}
-                form = pack.resolve(model, self._open(entry)["representation"], given)
+                given = {
+                    k: None if isinstance(v, dict) else v for k, v in entry["parameters"].items()
+                }
+                form = pack.resolve(model, entry["representation"], given)
                 swaps.append((node, nodes.ensure_group(model, form, baked=before["hash"])))
         except BaseException:
             for group in set(bpy.data.node_groups) - known:

@@ -423,8 +423,7 @@ def _choices(node, name):
 
 def _only(node):
     """Values of the parameters that a form has one value of; files of older versions lack them."""
-    found = json.loads(node.node_tree[TAG].get("only", "{}"))
-    return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
+    return pack.canonical(json.loads(node.node_tree[TAG].get("only", "{}")))
 
 
 def set_value(node, name, value):

@@ -114,16 +114,17 @@ def parameters(model_name):
 
 def fixed(model_name):
     """Parameters that this pack was built without, and the values they have in it."""
-    return _values(model(model_name).get("fixed", {}))
+    return canonical(model(model_name).get("fixed", {}))
 
 
-def _values(found):
+def canonical(found):
+    """Values of parameters as JSON has them, in the form of check_value()."""
     return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
 
 
 def form_values(model_name, name):
     """The only values that a form has of parameters of its model."""
-    return _values(model(model_name)["representations"][name]["only"])
+    return canonical(model(model_name)["representations"][name]["only"])
 
 
 def form_choices(model_name, name):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Closures, error and cost of every form of every model with its default parameters, as a table in
-Markdown between two marks of a file."""
+Markdown."""
 
 import argparse
 import json
@@ -10,7 +10,6 @@ import tempfile
 from pathlib import Path
 
 FORMS = ("exact", "sampled", "fitted", "controlled", "twin")
-BEGIN, END = "<!-- forms -->\n", "<!-- end of forms -->\n"
 
 
 def run(command):
@@ -52,21 +51,15 @@ def table(models):
     lines = [f"| Model | {' | '.join(FORMS)} |", "|---" * (len(FORMS) + 1) + "|"]
     for name, entry in models.items():
         lines.append(f"| `{name}` | {' | '.join(cell(entry, form) for form in FORMS)} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
-    parser.add_argument("--readme", required=True, type=Path, help="the file with the two marks")
     options = parser.parse_args()
-    text = options.readme.read_text(encoding="utf-8")
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        parser.error(f"{options.readme}: expected one line {BEGIN.strip()} and one {END.strip()}")
     with tempfile.TemporaryDirectory(prefix="brdfc-forms-") as folder:
-        models = built(options.tool.resolve(), Path(folder))
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    options.readme.write_text(before + BEGIN + table(models) + END + after, encoding="utf-8")
+        print(table(built(options.tool.resolve(), Path(folder))))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@
 #include "analysis/albedo.h"
 #include "analysis/table_file.h"
 #include "model/choices.h"
-#include "model/formula.h"
 
 namespace brdfc {
 namespace {
@@ -39,6 +38,29 @@ constexpr AlbedoOptions kProofOptions{.absolute = 1e-6, .max_cells = 2000, .witn
 constexpr std::size_t kCorners = 4;
 /// Averaged over the azimuth of the view direction.
 constexpr std::nullopt_t kAllAzimuths = std::nullopt;
+
+/// The text of all that the model computes with these values fixed: equal texts are equal models.
+std::string formula(const Model& model, const ParamValues& fixed) {
+  Recorder recorder;
+  const auto direction = [](const char* x, const char* y, const char* z) {
+    return Vec3<Expr>{Expr::input(x), Expr::input(y), Expr::input(z)};
+  };
+  const Vec3<Expr> wi = direction("wi_x", "wi_y", "wi_z"), wo = direction("wo_x", "wo_y", "wo_z");
+  const auto brdf = model.record(fixed);
+  const Sample<Expr> sample = brdf->sample(wo, direction("u1", "u2", "u3"));
+  Program program;
+  program.output("f", brdf->eval(wi, wo));
+  program.output("pdf", brdf->pdf(wi, wo));
+  program.output("sample_x", sample.wi.x);
+  program.output("sample_y", sample.wi.y);
+  program.output("sample_z", sample.wi.z);
+  program.output("sample_weight", sample.weight);
+  program.output("sample_pdf", sample.pdf);
+  program.output("mirror", brdf->mirror(wo));
+  program.output("transmit", brdf->transmit(wo));
+  program.output("ior", brdf->ior());
+  return program.print_osl(0, {});
+}
 
 /// A coordinate of the albedo: the view cosine or a Number parameter.
 struct Coordinate {

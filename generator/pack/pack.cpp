@@ -234,11 +234,16 @@ bool has_table(const Model& model) {
          std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;
 }
 
+/// What a form looks its closures up in; none but fitted and controlled ones do.
+const Fit* fit_in(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
+  if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return nullptr;
+  return &fit_of(model, without_factors(model, fixed));
+}
+
 /// The number that a fit runs over, and how far.
-Json axis_json(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
-  if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return {};
-  const auto& axis = fit_of(model, without_factors(model, fixed)).axis();
-  return axis ? Json{{"name", axis->parameter}, {"min", axis->low}, {"max", axis->high}} : Json();
+Json axis_json(const Fit* fit) {
+  if (!fit || !fit->axis()) return {};
+  return {{"name", fit->axis()->parameter}, {"min", fit->axis()->low}, {"max", fit->axis()->high}};
 }
 
 /// What a form of a plan has no parameters for.
@@ -255,12 +260,6 @@ void prepare_fit(const PlannedModel& plan, RepresentationKind kind) {
     twin_of(*plan.model, values);
   else
     fit_of(*plan.model, values);
-}
-
-/// Numbers of the tables that a fit's closures are looked up in; a twin's are in its nodes.
-std::size_t fit_floats(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
-  if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return 0;
-  return fit_of(model, without_factors(model, fixed)).size();
 }
 
 BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::path& scratch) {
@@ -294,7 +293,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   for (RepresentationKind kind : plan.forms) {
     const bool twin = kind == RepresentationKind::Twin;
     const ParamValues fixed = fixed_in(plan, kind);
-    const std::size_t of_fit = fit_floats(kind, model, fixed);
+    const Fit* fit = fit_in(kind, model, fixed);
+    const std::size_t of_fit = fit ? fit->size() : 0;
     const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed);
     const Shader shader = twin ? write_nodes(model, fixed) : write_shader(model, kind, of_form, fixed, plan.max_lobes);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
@@ -318,7 +318,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"cost", cost ? Json(*cost) : Json()},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
-        {"axis", axis_json(kind, model, fixed)},
+        {"axis", axis_json(fit)},
         {"sha256", sha256(shader.source)}};
   }
   if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
