@@ -70,7 +70,8 @@ struct ModelProperties {
   /// Assignments ("n=1e8") at which nearly all of the light leaves in the direction of ideal reflection; "" if none do.
   std::string specular_limit = "";
   TabulatedChoice tabulated = {};
-  /// The number over which the repository keeps a fit, the others at their defaults (represent/fit.h); "" if none.
+  /// The number over which the repository keeps a fit (represent/fit.h), what multiplies or mixes open and the others
+  /// at their defaults; "" if none.
   std::string fit_axis = "";
 };
 

@@ -166,8 +166,8 @@ class Fit {
   std::vector<ViewError> errors_;
 };
 
-/// Where a fit along the number that `values` lack is kept, by the hash of all that it depends on but the code:
-/// formula, values, slider, settings.
+/// Where a fit along the number that `values` lack is kept, by the hash of all that it depends on but the code: what
+/// the model computes, along_axis() of the values, slider, settings.
 std::filesystem::path stored_fit(const Model&, const ParamValues& values);
 
 /// The fit for these values, made or read at first use and kept while the program runs.
