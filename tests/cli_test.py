@@ -428,6 +428,25 @@ def test_fit_prints_its_error_by_view_and_its_closures():
     assert fitted == pytest.approx(truth, rel=0.02)
 
 
+def test_a_model_that_is_refused_beside_one_that_is_not(tmp_path):
+    """While another one is being worked on: nothing is written, and what went on ends well."""
+    materials = {
+        f"{model} {i}": {"model": model, "parameters": {name: value}, "representation": form}
+        for model, name, form in (
+            ("oren_nayar", "rho", "controlled"),
+            ("schlick_double", "r0", "fitted"),
+        )
+        for i, value in enumerate((0.02, 0.1))
+    }
+    file = tmp_path / "materials.json"
+    file.write_text(json.dumps({"materials": materials}))
+    out = tmp_path / "out"
+    result = run("build", "--materials", file, "--out", out)
+    assert result.returncode == 2, (result.returncode, result.stderr)
+    assert "brdfc: oren_nayar: the controlled form has" in result.stderr.splitlines()[-1]
+    assert list(out.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("args", "words"),
     [

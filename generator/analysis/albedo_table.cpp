@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "analysis/albedo_table.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <functional>
@@ -15,6 +13,7 @@
 
 #include "analysis/albedo.h"
 #include "analysis/table_file.h"
+#include "core/parallel.h"
 #include "model/choices.h"
 
 namespace brdfc {
@@ -327,8 +326,6 @@ class Tabulator {
     for (std::size_t p = 1; p < coordinates_.size(); ++p)
       if (turns_[p]) x[p] = model_.info().param(coordinates_[p].name)->value[0];
   }
-
-  template <class F> static void for_all(std::size_t n, const F& f) { tbb::parallel_for(std::size_t(0), n, f); }
 
   void make_probes() {
     std::mt19937_64 random(7);

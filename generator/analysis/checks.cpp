@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "analysis/checks.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <functional>
@@ -12,6 +10,7 @@
 
 #include "analysis/properties.h"
 #include "analysis/stability.h"
+#include "core/parallel.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -78,8 +77,6 @@ class Worst {
   double excess_ = -std::numeric_limits<double>::infinity();
   std::mutex mutex_;
 };
-
-template <class F> void for_all(std::size_t n, const F& f) { tbb::parallel_for(std::size_t(0), n, f); }
 
 /// "n=0 m=1" as values.
 ParamValues parse_limit(const ModelInfo& info, const std::string& text) {

@@ -3,7 +3,6 @@
 
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include <optional>
 
 #include "analysis/probes.h"
+#include "core/parallel.h"
 
 namespace brdfc {
 namespace {
@@ -34,7 +34,8 @@ std::array<double, 3> color_of(double error) {
 
 void write_map(const std::string& path, const Map& map) {
   std::vector<unsigned char> pixels(std::size_t(3 * kWidth * kHeight * kScale * kScale));
-  tbb::parallel_for(0, kHeight, [&](int row) {
+  for_all(kHeight, [&](std::size_t index) {
+    const int row = int(index);
     for (int column = 0; column < kWidth; ++column) {
       const auto c = color_of(map((column + 0.5) / kWidth, 1 - (row + 0.5) / kHeight));
       for (int i = 0; i < kScale * kScale; ++i) {

@@ -2,7 +2,6 @@
 #include "represent/fit.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include "analysis/probes.h"
 #include "analysis/table_file.h"
 #include "core/hash.h"
+#include "core/parallel.h"
 #include "model/horizon.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -170,7 +170,7 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
   const Moments& at_normal = views[0].lobe;
   out.facets = facets(family, at_normal);
   for (std::size_t i = 0; i < views.size(); i += stride) out.cells.push_back({&views[i], {}, {}, {}, {}});
-  tbb::parallel_for(std::size_t(0), out.cells.size(), [&](std::size_t i) {
+  for_all(out.cells.size(), [&](std::size_t i) {
     Cell& c = out.cells[i];
     c.lobes = placed(family, c.view->lobe, at_normal, std::asin(c.view->wo.z));
     c.a = dictionary(c.lobes, out.facets, c.view->points, c.view->wo);
@@ -191,7 +191,8 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
   const Eigen::Index first_of_diffuse = Eigen::Index(out.cells[0].lobes.size() * kRampSize);
   // Differences of columns and their light, by cell.
   MatrixXd off(channels, Eigen::Index(out.cells.size())), light = off;
-  tbb::parallel_for(Eigen::Index(0), channels, [&](Eigen::Index channel) {
+  for_all(std::size_t(channels), [&](std::size_t index) {
+    const auto channel = Eigen::Index(index);
     // From one view to the next, so that neighbours are alike and what lies between them is a fit too.
     VectorXd near = VectorXd::Zero(out.cells[0].a.cols());
     for (std::size_t i = 0; i < out.cells.size(); ++i) {
@@ -234,8 +235,8 @@ struct ScaledModel {
 /// The views of a fit, for one set of parameters: f of each of `terms`, at points where `some` of all is seen.
 std::vector<View> views_of(const BoundModel& some, const std::vector<ScaledModel>& terms) {
   std::vector<View> views(kViews);
-  tbb::parallel_for(0, kViews, [&](int i) {
-    View& v = views[std::size_t(i)] = seen(some, view(double(i) / (kViews - 1)), kPoints);
+  for_all(kViews, [&](std::size_t i) {
+    View& v = views[i] = seen(some, view(double(i) / (kViews - 1)), kPoints);
     if (terms.empty()) return;
     v.f.resize(v.f.rows(), Eigen::Index(3 * terms.size()));
     for (std::size_t t = 0; t < terms.size(); ++t)
@@ -386,8 +387,7 @@ class Knots {
   /// What is fitted to every `stride`-th view.
   std::vector<Fitted> fitted(const std::vector<double>& places, std::size_t stride, Family family) const {
     std::vector<Fitted> out(places.size());
-    tbb::parallel_for(std::size_t(0), places.size(),
-                      [&](std::size_t i) { out[i] = fit_views(views_.at(places[i]), stride, family, terms_); });
+    for_all(places.size(), [&](std::size_t i) { out[i] = fit_views(views_.at(places[i]), stride, family, terms_); });
     return out;
   }
 
@@ -923,14 +923,13 @@ template <class T> ClosureSum<T> Fit::weighted(const Vec3<T>& wo, const T& numbe
         c.ramp[k] = colour(j, on(k), counts) * (divided ? amplitude / weight : amplitude);
       continue;
     }
-    // Of colours that may be black.
-    Rgb<T> weight(T(1e-20));
+    Rgb<T> weight(T(0));
     for (std::size_t t = 0; t < counts.size(); ++t) weight += counts[t] * share_of(t);
-    weight = weight * share;
-    c.weight = tint * weight;
+    // Of colours that may be black.
+    c.weight = tint * weight * share + Rgb<T>(T(1e-20));
     for (std::size_t k = 0; k < kRampSize; ++k) {
-      c.ramp[k] = colour(j, on(k), counts);
-      if (divided) c.ramp[k] = c.ramp[k] / weight;
+      c.ramp[k] = tint * colour(j, on(k), counts);
+      if (divided) c.ramp[k] = c.ramp[k] / c.weight;
     }
   }
   return sum;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "represent/twin.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <nlopt.hpp>
 
 #include "analysis/probes.h"
+#include "core/parallel.h"
 #include "represent/fit.h"
 
 namespace brdfc {
@@ -165,7 +164,7 @@ Twin::Twin(const Model& model, const ParamValues& values) {
   const auto [white, factor] = split_factors(model, values);
   const BoundModel bound = bind_model(model, white);
   std::vector<View> views(kTwinKnots);
-  tbb::parallel_for(0, kTwinKnots, [&](int k) { views[std::size_t(k)] = seen(bound, view_at(k), kPoints); });
+  for_all(kTwinKnots, [&](std::size_t k) { views[k] = seen(bound, view_at(int(k)), kPoints); });
   // A mirror has a colour of its own.
   if (!model.has_mirror()) tint_ = make_grey(views);
   const Eigen::Index channels = views.front().f.cols();
@@ -178,7 +177,7 @@ Twin::Twin(const Model& model, const ParamValues& values) {
     few.push_back(std::move(v));
   }
   std::vector<Found> found(std::size(kDictionaries));
-  tbb::parallel_for(std::size_t(0), found.size(), [&](std::size_t i) { found[i] = search(kDictionaries[i], few); });
+  for_all(found.size(), [&](std::size_t i) { found[i] = search(kDictionaries[i], few); });
   const auto best =
       std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.error < b.error; });
   const Dictionary& dictionary = kDictionaries[best - found.begin()];

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "represent/view.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
+#include "core/parallel.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -187,7 +186,7 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
 std::vector<ViewError> view_errors(const BoundModel& bound,
                                    const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures) {
   std::vector<ViewError> errors(kErrorViews);
-  tbb::parallel_for(std::size_t(0), errors.size(), [&](std::size_t i) {
+  for_all(errors.size(), [&](std::size_t i) {
     const Vec3<double> wo = direction(1 - (double(i) + 0.5) / kErrorViews, 0);
     const View v = seen(bound, wo, 2 * kPoints);
     const Points& points = v.points;

@@ -16,12 +16,12 @@ MATERIALS = {
     "phong": {"e": 40.0, "ks": (0.9, 0.6, 0.2)},
     "oren_nayar": {"sigma": 0.6, "rho": (0.9, 0.5, 0.1)},
     "cook_torrance": {"f0": (0.9, 0.5, 0.05)},
-    "schlick_double": {},
+    "schlick_double": {"rd": (0.8, 0.4, 0.1), "r0": 0.1},
 }
-#: Colours of a second material of the same model, so that they are sockets: one that multiplies
-#: all, and one that f is a polynomial of.
-SOCKETS = {"phong": {"ks": 0.4}, "oren_nayar": {"rho": 0.4}}
-OPEN = {"oren_nayar": ("--any", "rho")}
+#: What a second material of the same model has other values of, so that it is a socket: a colour
+#: that multiplies all, a colour and a number that f is a polynomial of.
+SOCKETS = {"phong": {"ks": 0.4}, "oren_nayar": {"rho": 0.4}, "schlick_double": {"r0": 0.02}}
+OPEN = {"oren_nayar": ("--any", "rho"), "schlick_double": ("--any", "r0")}
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
 COSINES = (0.1, 0.4, 0.8, 1.0)
 FACETS = 96
