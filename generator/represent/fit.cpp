@@ -145,10 +145,7 @@ struct Fitted {
 
 std::map<std::string, Rgb<double>> shares(const ParamValues& values) {
   std::map<std::string, Rgb<double>> out;
-  for (const auto& [name, value] : values) {
-    const auto* c = std::get_if<std::array<double, 3>>(&value);
-    out[name] = c ? Rgb<double>{(*c)[0], (*c)[1], (*c)[2]} : Rgb<double>(std::get<double>(value));
-  }
+  for (const auto& [name, value] : values) out[name] = as_rgb(value);
   return out;
 }
 
@@ -273,8 +270,7 @@ template Expr FitAxis::place(const Expr&) const;
 ParamValues without_factors(const Model& model, const ParamValues& known) {
   ParamValues values = known;
   for (const std::string& name : factors(model, known)) {
-    const ParamInfo& p = *model.info().param(name);
-    values.emplace(name, p.kind == ParamKind::Number ? ParamValue(1.0) : ParamValue(std::array<double, 3>{1, 1, 1}));
+    values.emplace(name, as_value(*model.info().param(name), Rgb<double>(1.0)));
   }
   missing(model, values);
   return values;
@@ -284,13 +280,8 @@ std::pair<ParamValues, Rgb<double>> split_factors(const Model& model, ParamValue
   Rgb<double> factor(1.0);
   for (const std::string& name : factors(model, values)) {
     ParamValue& value = values.at(name);
-    if (auto* colour = std::get_if<std::array<double, 3>>(&value)) {
-      factor = factor * Rgb<double>{(*colour)[0], (*colour)[1], (*colour)[2]};
-      *colour = {1, 1, 1};
-    } else {
-      factor = factor * std::get<double>(value);
-      value = 1.0;
-    }
+    factor = factor * as_rgb(value);
+    value = as_value(*model.info().param(name), Rgb<double>(1.0));
   }
   return {std::move(values), factor};
 }
@@ -322,9 +313,7 @@ ParamValues with_number(const Model& model, const ParamValues& values, double nu
 Varied<double> Fit::varied(const ParamValues& values) const {
   Varied<double> out;
   if (axis_) out.number = std::get<double>(values.at(axis_->parameter));
-  ParamValues of_terms;
-  for (const std::string& name : terms_.parameters) of_terms[name] = values.at(name);
-  out.parameters = shares(of_terms);
+  for (const std::string& name : terms_.parameters) out.parameters[name] = as_rgb(values.at(name));
   return out;
 }
 
@@ -354,7 +343,8 @@ class Knots {
 
   /// With these values of what there are terms by.
   BoundModel bound(double x, const ParamValues& of_terms) const {
-    ParamValues values = axis_ ? with_number(model_, values_, axis_->at(x)) : values_;
+    ParamValues values = values_;
+    if (axis_) values[axis_->parameter] = axis_->at(x);
     for (const auto& [name, value] : of_terms) values[name] = value;
     return bind_model(model_, values);
   }
@@ -396,12 +386,9 @@ class Knots {
     if (terms_.parameters.empty()) return views_of(bound(x, {}), {});
     ParamValues some;
     std::vector<ScaledModel> terms;
-    for (const Terms::Term& term : terms_.terms) {
-      terms.push_back({bound(x, term.values), term.scale});
-      for (const auto& [name, value] : term.values)
-        some[name] = std::holds_alternative<double>(value) ? ParamValue(kSome)
-                                                           : ParamValue(std::array<double, 3>{kSome, kSome, kSome});
-    }
+    for (const Terms::Term& term : terms_.terms) terms.push_back({bound(x, term.values), term.scale});
+    for (const std::string& name : terms_.parameters)
+      some[name] = as_value(*model_.info().param(name), Rgb<double>(kSome));
     return views_of(bound(x, some), terms);
   }
 
@@ -432,7 +419,9 @@ std::string samples_of(const Model& model, const ParamValues& values, const FitA
   constexpr int kPairs = 64;
   std::string text;
   for (const double x : {0.0, 0.2, 0.5, 0.8, 1.0}) {
-    const auto brdf = model.make_double(with_number(model, values, axis.at(x)));
+    ParamValues here = values;
+    here[axis.parameter] = axis.at(x);
+    const auto brdf = model.make_double(here);
     Sequence3 points(1);
     for (int i = 0; i < kPairs; ++i) {
       const Vec3<double> a = points.next(), b = points.next();

@@ -62,10 +62,9 @@ Varied<Expr> recorded_varied(const Model& model, const Fit& fit, const ParamValu
     if (it == fixed.end()) {
       const bool grey = model.info().param(name)->kind == ParamKind::Number;
       out.parameters[name] = grey ? Rgb<Expr>(Expr::input(name)) : Rgb<Expr>::input(name);
-    } else if (const auto* c = std::get_if<std::array<double, 3>>(&it->second)) {
-      out.parameters[name] = {(*c)[0], (*c)[1], (*c)[2]};
     } else {
-      out.parameters[name] = Rgb<Expr>(Expr(std::get<double>(it->second)));
+      const Rgb<double> c = as_rgb(it->second);
+      out.parameters[name] = {c.r, c.g, c.b};
     }
   }
   return out;

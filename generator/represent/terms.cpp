@@ -23,13 +23,9 @@ bool may_be_any_share(const ParamInfo& p) {
   return p.kind == ParamKind::Color || (p.kind == ParamKind::Number && p.min <= 0 && p.max >= 1);
 }
 
-ParamValue value(const ParamInfo& p, const Rgb<double>& c) {
-  return p.kind == ParamKind::Number ? ParamValue(c.r) : ParamValue(std::array<double, 3>{c.r, c.g, c.b});
-}
-
 Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.g), std::abs(c.b)}; }
 
-/// Pairs of directions for a model that these parameters make neither black nor white.
+/// Pairs of directions, some of them where the model with these parameters scatters to.
 std::vector<std::array<Vec3<double>, 2>> pairs(const Model& model, const ParamValues& values, int count) {
   Random random(12);
   return direction_pairs(*model.make_double(values), count, random, model.two_sided());
@@ -42,9 +38,9 @@ int degree(const Model& model, const std::vector<ParamValues>& places, const Par
   Random random(5);
   for (ParamValues values : places) {
     for (const ParamInfo* other : open)
-      values[other->name] = value(*other, {uniform(random), uniform(random), uniform(random)});
+      values[other->name] = as_value(*other, {uniform(random), uniform(random), uniform(random)});
     const auto with = [&](const Rgb<double>& c) {
-      values[p.name] = value(p, c);
+      values[p.name] = as_value(p, c);
       return model.make_double(values);
     };
     std::vector<std::unique_ptr<Brdf<double>>> steps;
@@ -94,10 +90,10 @@ std::set<Powers> powers_in(const Model& model, const std::vector<ParamValues>& p
     ParamValues values = place;
     for (const Powers& powers : all) {
       for (std::size_t i = 0; i < open.size(); ++i)
-        values[open[i]->name] = value(*open[i], Rgb<double>(double(powers[i]) / degrees[i]));
+        values[open[i]->name] = as_value(*open[i], Rgb<double>(double(powers[i]) / degrees[i]));
       nodes.push_back(model.make_double(values));
     }
-    for (const ParamInfo* p : open) values[p->name] = value(*p, Rgb<double>(0.5));
+    for (const ParamInfo* p : open) values[p->name] = as_value(*p, Rgb<double>(0.5));
     for (const auto& [wi, wo] : pairs(model, values, 256)) {
       std::vector<Rgb<double>> c;
       for (const auto& brdf : nodes) c.push_back(brdf->eval(wi, wo));
@@ -159,9 +155,9 @@ std::optional<Terms> solved(const std::set<Powers>& products, const std::vector<
     for (std::size_t i = 0; i < open.size(); ++i) {
       at.push_back(powers[i] == 0 ? 0 : powers[i] == degrees[i] ? 1 : kNearlyNone);
       if (at.back() == kNearlyNone) term.scale *= kNearlyNone;
-      term.values[open[i]->name] = value(*open[i], Rgb<double>(at.back()));
+      term.values[open[i]->name] = as_value(*open[i], Rgb<double>(at.back()));
       const double judged = powers[i] == 0 && has_more(products, powers, i) ? kLeastReflected : at.back();
-      term.judged[open[i]->name] = value(*open[i], Rgb<double>(judged));
+      term.judged[open[i]->name] = as_value(*open[i], Rgb<double>(judged));
     }
     Eigen::Index column = 0;
     for (const Powers& other : products) have(row, column++) = product(at, other) / term.scale;
@@ -223,6 +219,15 @@ std::set<Powers> closed(std::set<Powers> products) {
 
 }  // namespace
 
+Rgb<double> as_rgb(const ParamValue& value) {
+  const auto* c = std::get_if<std::array<double, 3>>(&value);
+  return c ? Rgb<double>{(*c)[0], (*c)[1], (*c)[2]} : Rgb<double>(std::get<double>(value));
+}
+
+ParamValue as_value(const ParamInfo& p, const Rgb<double>& c) {
+  return p.kind == ParamKind::Number ? ParamValue(c.r) : ParamValue(std::array<double, 3>{c.r, c.g, c.b});
+}
+
 std::vector<ParamValues> places(const Model& model, const ParamValues& known) {
   std::vector<ParamValues> out = {complete(model.info(), known)};
   for (const ParamInfo& p : model.info().params)
@@ -240,15 +245,13 @@ std::set<std::string> factors(const Model& model, const ParamValues& known) {
   for (const ParamInfo& p : model.info().params) {
     if (!may_be_any_share(p)) continue;
     const Rgb<double> colour = p.kind == ParamKind::Number ? Rgb<double>(0.3) : Rgb<double>{0.3, 0.6, 0.8};
-    const auto valued = [&](ParamValues values, const Rgb<double>& c) {
-      values[p.name] = value(p, c);
-      return model.make_double(values);
-    };
     bool proportional = true;
-    for (const ParamValues& values : places(model, known)) {
-      const auto of_white = valued(values, Rgb<double>(1.0)), of_coloured = valued(values, colour);
-      Random random(12);
-      for (const auto& [wi, wo] : direction_pairs(*of_white, 256, random, model.two_sided()))
+    for (ParamValues values : places(model, known)) {
+      values[p.name] = as_value(p, colour);
+      const auto of_coloured = model.make_double(values);
+      values[p.name] = as_value(p, Rgb<double>(1.0));
+      const auto of_white = model.make_double(values);
+      for (const auto& [wi, wo] : pairs(model, values, 256))
         proportional =
             proportional && relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < kTolerance;
     }

@@ -21,6 +21,10 @@ namespace brdfc {
 /// `known` lacks have their defaults, and numbers the ends of their sliders, too.
 std::set<std::string> factors(const Model&, const ParamValues& known);
 
+/// A colour, or a number as a grey one; and back.
+Rgb<double> as_rgb(const ParamValue&);
+ParamValue as_value(const ParamInfo&, const Rgb<double>&);
+
 /// Places to ask about a model: what `known` lacks at its default, and numbers at both ends of their sliders.
 std::vector<ParamValues> places(const Model&, const ParamValues& known);
 
