@@ -45,23 +45,43 @@ template <class T> struct Closure {
 
 template <class T> using ClosureSum = std::vector<Closure<T>>;
 
-/// Smith's Lambda.
-template <class T> T lambda(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& v) {
-  const T a2 = (sqr(alpha_x * v.x) + sqr(alpha_y * v.y)) / maximum(sqr(v.z), tiny<T>());
+/// Smith's Lambda for the square of alpha times the tangent of the direction.
+template <class T> T lambda(ClosureKind kind, const T& a2) {
   if (kind == ClosureKind::Ggx) return a2 / (T(2) * (sqrt(T(1) + a2) + T(1)));
   // Walter's rational fit, which leaves out all shadowing below a2 = 0.39.
   const T a = T(1) / sqrt(maximum(a2, tiny<T>()));
   return select(a2 < T(0.39), T(0), ((T(0.396) * a - T(1.259)) * a + T(1)) / ((T(2.181) * a + T(3.535)) * a));
 }
 
-/// f cos(theta_i) of facets without Fresnel term, for directions above the surface in the frame of the closure.
+/// f cos(theta_i) of facets without Fresnel term. Of the half vector, along the normal z2 and across it t2 in units of
+/// alpha, both squared; of the directions what lambda() takes.
+template <class T> T microfacet(ClosureKind kind, const T& alpha2, const T& t2, const T& z2, const T& slope_i,
+                                const T& slope_o, const T& cosTheta_o) {
+  const T density = kind == ClosureKind::Ggx ? T(1) / sqr(t2 + z2) : exp(-t2 / z2) / sqr(z2);
+  const T D = T(kInvPi) / alpha2 * density;
+  return D / (T(4) * cosTheta_o * (T(1) + lambda(kind, slope_i) + lambda(kind, slope_o)));
+}
+
+/// For directions above the surface in the frame of the closure.
 template <class T>
 T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& wi, const Vec3<T>& wo) {
   const Vec3<T> h = normalize(wi + wo);
-  const T z2 = maximum(sqr(h.z), tiny<T>()), t2 = sqr(h.x / alpha_x) + sqr(h.y / alpha_y);
-  const T density = kind == ClosureKind::Ggx ? T(1) / sqr(t2 + z2) : exp(-t2 / z2) / sqr(z2);
-  const T D = T(kInvPi) / (alpha_x * alpha_y) * density;
-  return D / (T(4) * wo.z * (T(1) + lambda(kind, alpha_x, alpha_y, wi) + lambda(kind, alpha_x, alpha_y, wo)));
+  const auto slope = [&](const Vec3<T>& v) {
+    return (sqr(alpha_x * v.x) + sqr(alpha_y * v.y)) / maximum(sqr(v.z), tiny<T>());
+  };
+  return microfacet(kind, alpha_x * alpha_y, sqr(h.x / alpha_x) + sqr(h.y / alpha_y), maximum(sqr(h.z), tiny<T>()),
+                    slope(wi), slope(wo), wo.z);
+}
+
+/// The same about any normal, on the side of which both directions are.
+template <class T>
+T microfacet(ClosureKind kind, const T& alpha, const Vec3<T>& normal, const Vec3<T>& wi, const Vec3<T>& wo) {
+  // The sine of the half vector needs all its digits: smooth facets make much of little.
+  const Vec3<T> across = cross(normal, normalize(wi + wo));
+  const T alpha2 = sqr(alpha), sin2 = dot(across, across), cosTheta_o = dot(normal, wo);
+  const auto slope = [&](const T& c) { return alpha2 * maximum(T(1) - sqr(c), T(0)) / maximum(sqr(c), tiny<T>()); };
+  return microfacet(kind, alpha2, sin2 / alpha2, maximum(T(1) - sin2, tiny<T>()), slope(dot(normal, wi)),
+                    slope(cosTheta_o), cosTheta_o);
 }
 
 /// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface. `ramp` is a
@@ -89,11 +109,10 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     }
     case ClosureKind::Ggx:
     case ClosureKind::Beckmann:
-      if (c.turned) {
-        const Vec3<T> i = seen_along_axis(c.normal, wi), o = seen_along_axis(c.normal, wo);
-        return select(both, c.weight * microfacet(c.kind, c.alpha, c.alpha, i, o), none);
-      }
-      return select(both, c.weight * microfacet(c.kind, c.alpha, c.alpha, wi, wo), none);
+      return select(both,
+                    c.weight * (c.turned ? microfacet(c.kind, c.alpha, c.normal, wi, wo)
+                                         : microfacet(c.kind, c.alpha, c.alpha, wi, wo)),
+                    none);
     case ClosureKind::Reflection:
     case ClosureKind::Refraction:
       return none;

@@ -6,6 +6,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <tuple>
@@ -40,6 +42,14 @@ constexpr double kSome = 0.05;
 /// Closure columns are scaled to unit integral, so that this is a share of the light: what the fit may not gain by
 /// larger colours of opposite signs.
 constexpr double kRidge = 1e-5;
+/// Those of facets are not negative: they gain nothing, and a strong pull towards the view above would keep light from
+/// them that is theirs.
+constexpr double kFacetRidge = 1e-8;
+/// Of the albedo: what weights of facets add up to, so that those of all closures can add up to it. What facets lose
+/// below the surface and behind each other is left to the ramps.
+constexpr double kMostOfFacets = 0.99;
+/// Searches for the shape of facets, by view.
+constexpr int kRounds = 2;
 
 struct Placed {
   double offset, exponent;
@@ -48,50 +58,74 @@ struct Placed {
 enum class Family {
   Moving,     ///< seven phong_ramps about the axis of the moments
   Fixed,      ///< seven about the mirror direction, of widths that do not depend on the view
-  Microfacet  ///< four about the axis of the moments, and facets about the normal
+  Microfacet  ///< five from the axis of the moments towards the normal, and facets that lean away from the viewer
 };
 constexpr Family kFamilies[] = {Family::Moving, Family::Fixed, Family::Microfacet};
-constexpr std::size_t kFacets = 3;
-/// Three widths on the axis, two pairs beside it; `height` is the viewer's angle above the surface.
+/// Three widths on the axis, two pairs beside it; or, as what facets leave at grazing views lies on one side, wider
+/// ones there. `height` is the viewer's angle above the surface.
 std::vector<Placed> placed(Family family, const Moments& here, const Moments& at_normal, double height) {
   const Moments& m = family == Family::Fixed ? at_normal : here;
   const double offset = family == Family::Fixed ? 0 : m.offset;
   const double e = std::max(m.narrow, 0.5), s = 1 / std::sqrt(std::max(m.wide, 0.5));
-  std::vector<Placed> lobes = {{offset, e}, {offset, e / 4}, {offset + 0.7 * s, e}, {offset - 0.7 * s, e}};
-  if (family != Family::Microfacet)
-    lobes.insert(lobes.end(), {{offset, 2 * e}, {offset + 1.5 * s, e / 2}, {offset - 1.5 * s, e / 2}});
+  std::vector<Placed> lobes = {{offset, e}, {offset + 0.7 * s, e}, {offset - 0.7 * s, e}};
+  if (family == Family::Microfacet)
+    lobes.insert(lobes.end(), {{offset + 1.4 * s, e / 4}, {offset + 2.8 * s, e / 16}});
+  else
+    lobes.insert(lobes.end(), {{offset, e / 4}, {offset, 2 * e}, {offset + 1.5 * s, e / 2}, {offset - 1.5 * s, e / 2}});
   // No axis below the surface: opposite the viewer the closure's normal would turn over.
   for (Placed& l : lobes) l.offset = std::max(l.offset, -height);
   return lobes;
 }
-/// Facets that give the lobe at normal incidence its width, and others about it.
-std::vector<Closure<double>> facets(Family family, const Moments& at_normal) {
-  if (family != Family::Microfacet) return {};
-  const double alpha = std::sqrt(1 / (2 * std::max(at_normal.narrow, 0.5) + 1));
-  std::vector<Closure<double>> out(kFacets, Closure<double>(ClosureKind::Beckmann, Rgb<double>(1.0)));
-  const double factors[kFacets] = {1, 0.6, 1};
-  out.back().kind = ClosureKind::Ggx;
-  for (std::size_t i = 0; i < kFacets; ++i) out[i].alpha = std::clamp(alpha * factors[i], 1e-3, 1.0);
-  return out;
+
+/// Facets whose lobe about the mirror direction leans by `offset`, as those of phong_ramps do.
+struct Facet {
+  ClosureKind kind;
+  double offset, alpha;
+};
+/// As many points tell how facets lie.
+constexpr std::size_t kFewerPoints = 4;
+/// How far facets lean, in units of the viewer's height times the sine of its angle: nothing where it looks along the
+/// normal. At -2 they would turn away from the viewer. Towards it they do not lean: Blender 4.5 keeps rays between the
+/// surface and a facet's horizon, though it evaluates them as 0.
+constexpr double kMostLean = -1.7;
+constexpr double kLeastAlpha = 1e-3;
+/// Of roots of alpha: to that of the lobe at normal incidence, and of the second facets to those of the first.
+constexpr double kLeastRatio = 0.3, kMostRatio = 2;
+/// Facets are sought at as many places of the axis, and at as many-th views.
+constexpr std::size_t kShapePlaces = 9, kShapeStride = 2;
+
+/// The normal, turned away from mirror_side() by half of `offset`: then a lobe about its mirror direction has its axis
+/// at beside_mirror(wo, offset).
+template <class T> Vec3<T> leaning(const Vec3<T>& side, const T& offset) {
+  const T half = offset / T(2);
+  Vec3<T> n = side * -sin(half);
+  n.z = cos(half);
+  return n;
 }
 
-/// The closure of a lobe without colours. Its axis is beside_mirror(wo, offset), so its normal, halfway between axis
-/// and viewer, is turned towards the viewer by half of that.
-template <class T> Closure<T> lobe_closure(const Vec3<T>& wo, const T& offset, const T& exponent) {
+/// The closure of a lobe without colours.
+template <class T> Closure<T> lobe_closure(const Vec3<T>& side, const T& offset, const T& exponent) {
   Closure<T> c(ClosureKind::PhongRamp, Rgb<T>(T(1)));
-  const T half = offset / T(2);
-  c.normal = mirror_side(wo) * -sin(half);
-  c.normal.z = cos(half);
+  c.normal = leaning(side, offset);
   c.turned = true;
   c.exponent = exponent;
   return c;
 }
 
+template <class T> Closure<T> facet_closure(ClosureKind kind, const Vec3<T>& side, const T& offset, const T& alpha) {
+  Closure<T> c(kind, Rgb<T>(T(1)));
+  c.normal = leaning(side, offset);
+  c.turned = true;
+  c.alpha = alpha;
+  return c;
+}
+
 /// What each entry of each ramp gives at the points: lobes, the diffuse_ramp, and the facets.
-MatrixXd dictionary(const std::vector<Placed>& lobes, const std::vector<Closure<double>>& facets, const Points& points,
+MatrixXd dictionary(const std::vector<Placed>& lobes, const std::vector<Facet>& facets, const Points& points,
                     const Vec3<double>& wo) {
+  const Vec3<double> side = mirror_side(wo);
   std::vector<Closure<double>> ramps;
-  for (const Placed& l : lobes) ramps.push_back(lobe_closure(wo, l.offset, l.exponent));
+  for (const Placed& l : lobes) ramps.push_back(lobe_closure(side, l.offset, l.exponent));
   ramps.emplace_back(ClosureKind::DiffuseRamp, Rgb<double>(1.0));
   MatrixXd a(Eigen::Index(points.wi.size()), Eigen::Index(ramps.size() * kRampSize + facets.size()));
   Eigen::Index column = 0;
@@ -108,7 +142,8 @@ MatrixXd dictionary(const std::vector<Placed>& lobes, const std::vector<Closure<
     }
     column += kRampSize;
   }
-  for (const Closure<double>& c : facets) {
+  for (const Facet& f : facets) {
+    const Closure<double> c = facet_closure(f.kind, side, f.offset, f.alpha);
     for (std::size_t p = 0; p < points.wi.size(); ++p) a(Eigen::Index(p), column) = evaluate(c, points.wi[p], wo).r;
     ++column;
   }
@@ -133,13 +168,13 @@ Vec3<double> view(double x) {
 struct Cell {
   const View* view;
   std::vector<Placed> lobes;
+  std::vector<Facet> facets;
   MatrixXd a;
   VectorXd scale;  ///< what the columns were divided by
   MatrixXd x;      ///< a column a channel
 };
 struct Fitted {
   std::vector<Cell> cells;
-  std::vector<Closure<double>> facets;
   double error = 0;  ///< relative L1, mean over the views
 };
 
@@ -161,23 +196,74 @@ MatrixXd judged(const Terms& terms) {
   return out;
 }
 
+/// What facets are sought by: how far each leans, and the root of its alpha in units of the one before, the first one's
+/// of that which gives the lobe at normal incidence its width.
+using Shape = std::vector<double>;
+const Shape kFirstShape = {0, 1, 0, 0.85};
+std::vector<Facet> facets(const Shape& shape, const Moments& at_normal, const Vec3<double>& wo) {
+  std::vector<Facet> out;
+  double root = std::pow(2 * std::max(at_normal.narrow, 0.5) + 1, -0.25);
+  for (std::size_t j = 0; j < shape.size(); j += 2) {
+    root *= shape[j + 1];
+    out.push_back({ClosureKind::Beckmann, shape[j] * std::asin(wo.z) * std::sqrt(sin2_theta(wo)),
+                   std::clamp(sqr(root), kLeastAlpha, 1.0)});
+  }
+  return out;
+}
+
+/// Relative L1 of facets and a matte closure, mean over the columns of f.
+double error_of(const std::vector<Facet>& facets, const View& view) {
+  const auto n = Eigen::Index(view.points.wi.size()), count = Eigen::Index(facets.size());
+  MatrixXd a(n, count + 1);
+  a.leftCols(count) = dictionary({}, facets, view.points, view.wo).rightCols(count);
+  for (Eigen::Index i = 0; i < n; ++i) a(i, count) = view.points.wi[std::size_t(i)].z * kInvPi;
+  const VectorXd weight = weights_of(view.points);
+  double error = 0;
+  for (const auto& column : view.f.colwise()) {
+    const VectorXd f = column;
+    const VectorXd x = solve(a, weight, f, VectorXd::Zero(a.cols()), VectorXd::Constant(a.cols(), kFacetRidge),
+                             a.cols(), std::numeric_limits<double>::infinity(), std::nullopt);
+    if (const double light = f.dot(weight); light > 0)
+      error += (a * x - f).cwiseAbs().dot(weight) / light / double(view.f.cols());
+  }
+  return error;
+}
+
+/// A better shape for a view than `shape`.
+Shape improved(const Shape& shape, const Moments& at_normal, const View& whole) {
+  View view{whole.wo, whole.lobe, {}, {}};
+  for (std::size_t i = 0; i < whole.points.wi.size(); i += kFewerPoints) {
+    view.points.wi.push_back(whole.points.wi[i]);
+    view.points.weight.push_back(whole.points.weight[i] * double(kFewerPoints));
+  }
+  view.f = whole.f(Eigen::seqN(0, Eigen::Index(view.points.wi.size()), Eigen::Index(kFewerPoints)), Eigen::all);
+  std::vector<Variable> variables;
+  for (std::size_t j = 0; j < shape.size(); j += 2) {
+    variables.push_back({shape[j], kMostLean, 0, 0.1});
+    variables.push_back({shape[j + 1], kLeastRatio, j == 0 ? kMostRatio : 0.9, 0.1 * shape[j + 1]});
+  }
+  return argmin(variables, [&](const Shape& x) { return error_of(facets(x, at_normal, view.wo), view); });
+}
+
 /// Fits every `stride`-th view, from that along the normal on, to the terms that its columns are.
-Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family family, const Terms& terms) {
+/// `shape` is that of facets by view; empty for a family that has none.
+Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family family, const Terms& terms,
+                 const std::function<Shape(std::size_t view)>& shape) {
   Fitted out;
   const Moments& at_normal = views[0].lobe;
-  out.facets = facets(family, at_normal);
-  for (std::size_t i = 0; i < views.size(); i += stride) out.cells.push_back({&views[i], {}, {}, {}, {}});
+  for (std::size_t i = 0; i < views.size(); i += stride)
+    out.cells.push_back({&views[i], {}, facets(shape(i), at_normal, views[i].wo), {}, {}, {}});
   for_all(out.cells.size(), [&](std::size_t i) {
     Cell& c = out.cells[i];
     c.lobes = placed(family, c.view->lobe, at_normal, std::asin(c.view->wo.z));
-    c.a = dictionary(c.lobes, out.facets, c.view->points, c.view->wo);
+    c.a = dictionary(c.lobes, c.facets, c.view->points, c.view->wo);
     // About the integral of a column over all directions: that over those above the surface may vanish.
     c.scale = VectorXd::Constant(c.a.cols(), 1.0 / kRampSize);
     for (std::size_t j = 0; j < c.lobes.size(); ++j) {
-      const Closure<double> l = lobe_closure(c.view->wo, c.lobes[j].offset, c.lobes[j].exponent);
+      const Closure<double> l = lobe_closure(mirror_side(c.view->wo), c.lobes[j].offset, c.lobes[j].exponent);
       c.scale.segment(Eigen::Index(j * kRampSize), kRampSize) *= dot(l.normal, c.view->wo);
     }
-    c.scale.tail(Eigen::Index(out.facets.size())).setOnes();
+    c.scale.tail(Eigen::Index(c.facets.size())).setOnes();
     c.a *= c.scale.cwiseInverse().asDiagonal();
   });
 
@@ -191,11 +277,13 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
   for_all(std::size_t(channels), [&](std::size_t index) {
     const auto channel = Eigen::Index(index);
     // From one view to the next, so that neighbours are alike and what lies between them is a fit too.
-    VectorXd near = VectorXd::Zero(out.cells[0].a.cols());
+    const auto facets_count = Eigen::Index(out.cells[0].facets.size());
+    VectorXd near = VectorXd::Zero(out.cells[0].a.cols()), ridge = VectorXd::Constant(near.size(), kRidge);
+    ridge.tail(facets_count).setConstant(kFacetRidge);
     for (std::size_t i = 0; i < out.cells.size(); ++i) {
       Cell& c = out.cells[i];
       const VectorXd weight = weights_of(c.view->points), f = c.view->f.col(channel);
-      c.x.col(channel) = near = solve(c.a, weight, f, near, kRidge, Eigen::Index(out.facets.size()), first_of_diffuse);
+      c.x.col(channel) = near = solve(c.a, weight, f, near, ridge, facets_count, kMostOfFacets, first_of_diffuse);
       off(channel, Eigen::Index(i)) = (c.a * near - f).cwiseAbs().dot(weight);
       light(channel, Eigen::Index(i)) = f.dot(weight);
     }
@@ -374,14 +462,59 @@ class Knots {
   const std::optional<Rgb<double>>& tint() const { return tint_; }
   const std::vector<View>& views(double x) const { return views_.at(x); }
 
-  /// What is fitted to every `stride`-th view.
+  /// Seeks shapes of facets, at few places and views, from one to the next, so that all lie in the same valley: between
+  /// shapes that do not, no sum is close. Returns what see() does.
+  bool find_shapes() {
+    const std::size_t last = axis_ ? kShapePlaces - 1 : 0, middle = last / 2;
+    std::vector<double> places;
+    for (std::size_t k = 0; k <= last; ++k) places.push_back(axis_ ? double(k) / double(last) : 0);
+    if (!see(places)) return false;
+    shapes_.assign(places.size(), std::vector<Shape>(kViews / kShapeStride + 1, kFirstShape));
+    const auto search = [&](std::size_t k, std::size_t v, const Shape& begin) {
+      const std::vector<View>& seen = views(places[k]);
+      shapes_[k][v] = improved(begin, seen[0].lobe, seen[v * kShapeStride]);
+    };
+    for (std::size_t v = 0; v < shapes_[middle].size(); ++v)
+      // A search that begins again where it ended, with wide steps, leaves many a bad place.
+      for (int round = 0; round < kRounds; ++round)
+        search(middle, v, round > 0 || v == 0 ? shapes_[middle][v] : shapes_[middle][v - 1]);
+    for_all(shapes_[middle].size(), [&](std::size_t v) {
+      for (std::size_t k = middle + 1; k <= last; ++k) search(k, v, shapes_[k - 1][v]);
+      for (std::size_t k = middle; k-- > 0;) search(k, v, shapes_[k + 1][v]);
+    });
+    return true;
+  }
+
+  /// What is fitted to every `stride`-th view. Facets need find_shapes().
   std::vector<Fitted> fitted(const std::vector<double>& places, std::size_t stride, Family family) const {
     std::vector<Fitted> out(places.size());
-    for_all(places.size(), [&](std::size_t i) { out[i] = fit_views(views_.at(places[i]), stride, family, terms_); });
+    for_all(places.size(), [&](std::size_t i) {
+      const double x = places[i];
+      out[i] = fit_views(views_.at(x), stride, family, terms_,
+                         [&](std::size_t view) { return family == Family::Microfacet ? shape(x, view) : Shape(); });
+    });
     return out;
   }
 
  private:
+  /// Linear between those that were found.
+  Shape shape(double x, std::size_t view) const {
+    const auto beside = [](double at, std::size_t count) {
+      const std::size_t first = std::min(std::size_t(at), count < 2 ? 0 : count - 2);
+      return std::pair(first, count < 2 ? 0 : at - double(first));
+    };
+    const auto [k, along] = beside(x * double(shapes_.size() - 1), shapes_.size());
+    const auto [v, down] = beside(double(view) / kShapeStride, shapes_[0].size());
+    Shape out = kFirstShape;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const auto at = [&, v = v, down = down](std::size_t place) {
+        return shapes_[place][v][i] * (1 - down) + shapes_[place][v + 1][i] * down;
+      };
+      out[i] = at(k) * (1 - along) + (along > 0 ? at(k + 1) * along : 0);
+    }
+    return out;
+  }
+
   std::vector<View> views_at(double x) const {
     if (terms_.parameters.empty()) return views_of(bound(x, {}), {});
     ParamValues some;
@@ -399,6 +532,7 @@ class Knots {
   bool grey_;
   std::optional<Rgb<double>> tint_;
   std::map<double, std::vector<View>> views_;
+  std::vector<std::vector<Shape>> shapes_;  ///< by place, all as far from each other, and by every kShapeStride-th view
 };
 
 /// To six digits and single precision: more the shader does not keep, and shorter texts have no more digits.
@@ -410,7 +544,7 @@ std::vector<double> rounded(std::vector<double> numbers) {
 
 /// All that a fit depends on but the code; a change of the code that changes fits changes the first number.
 std::string settings() {
-  return fmt::format("1 {} {} {} {} {} {} {} {}", kViews, kTrialStride, kPoints, kRidge, kFirstSteps, kSteps,
+  return fmt::format("2 {} {} {} {} {} {} {} {}", kViews, kTrialStride, kPoints, kRidge, kFirstSteps, kSteps,
                      kWorseBetween, kSlightlyOff);
 }
 /// What a model computes along an axis, to five digits. The text of its formula would not do: the order of statements
@@ -496,7 +630,7 @@ bool Fit::make(const Model& model, const ParamValues& values, bool grey) {
   Knots at(model, values, axis_, terms_, grey);
   std::vector<double> knots = {0};
   for (int i = 1; axis_ && i <= kFirstSteps; ++i) knots.push_back(double(i) / kFirstSteps);
-  if (!at.see(knots)) return false;
+  if (!at.see(knots) || !at.find_shapes()) return false;
   // Few views tell which closures suit.
   tint_ = Rgb<double>(1.0);
   Family family = kFamilies[0];
@@ -598,14 +732,11 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
   amplitude_.clear();
   for (std::size_t t = 0; axis_ && t < terms; ++t)
     amplitude_.push_back(table(name_of_term("amplitude", t), [&](const Cell& c) { return std::log(unit(c, t)); }));
-  for (std::size_t i = 0; i < knots[0].facets.size(); ++i) {
-    const Closure<double>& facet = knots[0].facets[i];
-    Facets& f = facets_.emplace_back(Facets{facet.kind, facet.alpha, nullptr});
-    if (!axis_) continue;
-    std::vector<double> numbers;
-    for (const Knot& knot : knots) numbers.push_back(std::log(knot.facets[i].alpha));
-    f.log_alpha = make_table(fmt::format("alpha_of_{}", i), {count}, rounded(numbers));
-  }
+  for (std::size_t i = 0; i < first_cells[0].facets.size(); ++i)
+    facets_.push_back(
+        {first_cells[0].facets[i].kind,
+         table(fmt::format("lean_of_{}", i), [&](const Cell& c) { return c.facets[i].offset; }),
+         table(fmt::format("alpha_of_{}", i), [&](const Cell& c) { return std::log(c.facets[i].alpha); })});
   const std::size_t lobes = first_cells[0].lobes.size(), closures_count = lobes + 1 + facets_.size();
   for (std::size_t j = 0; j < lobes; ++j)
     lobes_.push_back(
@@ -628,8 +759,8 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
           const double own = x.middleRows(first, entries).cwiseAbs().sum();
           const double all = std::max(x.topRows(of_ramps).cwiseAbs().sum(), 1e-300);
           const double albedo = albedo_of(c, t), of_facets = x.bottomRows(x.rows() - of_ramps).sum() / channels;
-          return std::max(albedo - of_facets, 1e-2 * albedo) * (own / all + 1e-3) / (1 + 1e-3 * double(lobes + 1)) /
-                 unit(c, t);
+          return std::max(albedo - of_facets, (1 - kMostOfFacets) * albedo) * (own / all + 1e-3) /
+                 (1 + 1e-3 * double(lobes + 1)) / unit(c, t);
         }));
       l.colour.emplace_back();
       for (int channel = 0; channel < channels; ++channel) {
@@ -656,7 +787,7 @@ std::vector<std::shared_ptr<const Table>> Fit::tables() const {
   };
   add(position_);
   for (const auto& table : amplitude_) add(table);
-  for (const Facets& f : facets_) add(f.log_alpha);
+  for (const Facets& f : facets_) add(f.offset), add(f.log_alpha);
   for (const Lobe& l : lobes_) add(l.offset), add(l.exponent);
   for (const Linear& l : linear_) {
     for (const auto& table : l.weight) add(table);
@@ -691,7 +822,7 @@ double Fit::mean_l1(const std::optional<double>& number) const {
 
 Fit Fit::knot(const Model& model, const ParamValues& values, double place) const {
   Knots at(model, values, axis_, terms_, grey_);
-  if (!at.see({place})) throw std::logic_error(model.info().name + ": a fit of another tint");
+  if (!at.see({place}) || !at.find_shapes()) throw std::logic_error(model.info().name + ": a fit of another tint");
   const Fitted cell = std::move(at.fitted({place}, 1, Family(family_)).front());
   Fit out;
   out.axis_ = axis_;
@@ -780,8 +911,8 @@ void Fit::read(const std::filesystem::path& path, const std::string& hash) {
     for (std::size_t t = 0; t < terms; ++t) amplitude_.push_back(term("amplitude", t));
     const auto& facets = meta.at("facets");
     for (std::size_t i = 0; i < facets.size(); ++i)
-      facets_.push_back(
-          {facets[i] == "ggx" ? ClosureKind::Ggx : ClosureKind::Beckmann, 1, tables.at(fmt::format("alpha_of_{}", i))});
+      facets_.push_back({facets[i] == "ggx" ? ClosureKind::Ggx : ClosureKind::Beckmann,
+                         tables.at(fmt::format("lean_of_{}", i)), tables.at(fmt::format("alpha_of_{}", i))});
     const std::size_t lobes = meta.at("lobes"), channels = meta.at("channels");
     for (std::size_t j = 0; j < lobes; ++j)
       lobes_.push_back({tables.at(fmt::format("offset_of_{}", j)), tables.at(fmt::format("power_of_{}", j))});
@@ -841,18 +972,18 @@ template <class T> std::vector<T> Fit::place(const Vec3<T>& wo, const T& number)
   return at;
 }
 
-template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& wo, const std::vector<T>& at) const {
+template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& side, const std::vector<T>& at) const {
   if (j < lobes_.size()) {
     const T offset = lookup(lobes_[j].offset, at), power = lookup(lobes_[j].exponent, at);
-    if (!axis_) return lobe_closure(wo, offset, power);
-    return lobe_closure(wo, offset * exp(power / T(-2)), exp(power));
+    if (!axis_) return lobe_closure(side, offset, power);
+    return lobe_closure(side, offset * exp(power / T(-2)), exp(power));
   }
   if (j == lobes_.size()) return Closure<T>(ClosureKind::DiffuseRamp, Rgb<T>(T(1)));
-  const Facets& facet = facets_[j - lobes_.size() - 1];
-  Closure<T> c(facet.kind, Rgb<T>(T(1)));
-  c.alpha = facet.log_alpha ? exp(lookup(facet.log_alpha, std::vector<T>{at[0]})) : T(facet.alpha);
-  return c;
+  const Facets& facets = facets_[j - lobes_.size() - 1];
+  return facet_closure(facets.kind, side, lookup(facets.offset, at), exp(lookup(facets.log_alpha, at)));
 }
+
+template <class T> Rgb<T> Fit::tint() const { return {T(tint_.r), T(tint_.g), T(tint_.b)}; }
 
 template <class T> T Fit::amplitude(std::size_t term, const std::vector<T>& at) const {
   return axis_ ? named("amplitude", T(scale_) * exp(lookup(amplitude_[term], at))) : T(1);
@@ -860,8 +991,10 @@ template <class T> T Fit::amplitude(std::size_t term, const std::vector<T>& at) 
 
 template <class T> std::vector<Rgb<T>> Fit::counts(const std::vector<T>& at, const std::vector<Rgb<T>>& weights) const {
   std::vector<Rgb<T>> out;
-  for (std::size_t t = 0; t < terms_.terms.size() && !terms_.parameters.empty(); ++t)
-    out.push_back(named("count_of_term", weights[t] * amplitude(t, at)));
+  for (std::size_t t = 0; t < terms_.terms.size() && !terms_.parameters.empty(); ++t) {
+    const Rgb<T> coloured = tint<T>() * weights[t];
+    out.push_back(named("count_of_term", axis_ ? coloured * amplitude(t, at) : coloured));
+  }
   return out;
 }
 
@@ -893,12 +1026,13 @@ template <class T> ClosureSum<T> Fit::weighted(const Vec3<T>& wo, const T& numbe
                                                const T& share, bool divided) const {
   const std::vector<T> at = place(wo, number);
   const std::vector<Rgb<T>> counts = this->counts(at, weights);
-  // With terms it is in their counts.
+  // With terms both are in their counts.
   const T amplitude = counts.empty() ? this->amplitude(0, at) : T(1);
-  const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
+  const Rgb<T> tint = counts.empty() ? this->tint<T>() : Rgb<T>(T(1));
+  const Vec3<T> side = mirror_side(wo);
   ClosureSum<T> sum;
   for (std::size_t j = 0; j < linear_.size(); ++j) {
-    Closure<T>& c = sum.emplace_back(shape(j, wo, at));
+    Closure<T>& c = sum.emplace_back(shape(j, side, at));
     if (!has_ramp(c.kind)) {
       c.weight = tint * amplitude * colour(j, at, counts);
       continue;
@@ -915,9 +1049,9 @@ template <class T> ClosureSum<T> Fit::weighted(const Vec3<T>& wo, const T& numbe
     Rgb<T> weight(T(0));
     for (std::size_t t = 0; t < counts.size(); ++t) weight += counts[t] * share_of(t);
     // Of colours that may be black.
-    c.weight = tint * weight * share + Rgb<T>(T(1e-20));
+    c.weight = weight * share + Rgb<T>(T(1e-20));
     for (std::size_t k = 0; k < kRampSize; ++k) {
-      c.ramp[k] = tint * colour(j, on(k), counts);
+      c.ramp[k] = colour(j, on(k), counts);
       if (divided) c.ramp[k] = c.ramp[k] / c.weight;
     }
   }
@@ -935,14 +1069,16 @@ template <class T>
 Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied) const {
   const std::vector<T> at = place(wo, varied.number);
   const std::vector<Rgb<T>> counts = this->counts(at, weights(varied));
+  // Turned into the plane of incidence, where normals have two components.
+  const Vec3<T> side = mirror_side(wo), x = {T(1), T(0), T(0)}, o = {-sqrt(sin2_theta(wo)), T(0), wo.z},
+                i = {dot(side, wi), side.x * wi.y - side.y * wi.x, wi.z};
   Rgb<T> sum(T(0));
   for (std::size_t j = 0; j < linear_.size(); ++j) {
-    Closure<T> c = shape(j, wo, at);
+    Closure<T> c = shape(j, x, at);
     if (!has_ramp(c.kind)) c.weight = colour(j, at, counts);
-    sum += evaluate(c, wi, wo, [&](const T& position) { return colour(j, on_ramp(at, position), counts); });
+    sum += evaluate(c, i, o, [&](const T& position) { return colour(j, on_ramp(at, position), counts); });
   }
-  const Rgb<T> tint(T(tint_.r), T(tint_.g), T(tint_.b));
-  return counts.empty() ? tint * amplitude(0, at) * sum : tint * sum;
+  return counts.empty() ? tint<T>() * amplitude(0, at) * sum : sum;
 }
 template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const Varied<double>&) const;
 template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Varied<Expr>&) const;

@@ -3,11 +3,12 @@
 // to it from lamps. For a material whose parameters are known, but for those that f is proportional to or a polynomial
 // of (terms.h) and one number, which the tables run over.
 //
-// The closures are phong_ramps about axes in the plane of incidence, and a diffuse_ramp. Both take eight colours that
-// may be negative, so each is a family that is linear in eight numbers, and a view is a linear problem: least absolute
-// differences of f cos(theta_i), by iteratively reweighted least squares over directions drawn from the model and from
-// lobes of every width; the albedo is a constraint, and a sum below 0 is fined. Axes and exponents come from the
-// moments of the model's own lobe. All is tabulated over the number and the view angle, and linear between.
+// The closures are phong_ramps about axes in the plane of incidence, a diffuse_ramp, and microfacets that lean in that
+// plane. Ramps take eight colours that may be negative, so each is a family that is linear in eight numbers, and a view
+// is a linear problem: least absolute differences of f cos(theta_i), by iteratively reweighted least squares over
+// directions drawn from the model and from lobes of every width; the albedo is a constraint, and a sum below 0 is
+// fined. Axes and exponents of ramps come from the moments of the model's own lobe; leaning and roughness of facets are
+// found by a search from one view to the next. All is tabulated over the number and the view angle, and linear between.
 #pragma once
 
 #include <filesystem>
@@ -85,9 +86,9 @@ class Fit {
   /// What closures() takes, from complete values.
   Varied<double> varied(const ParamValues& values) const;
 
-  /// The closures for a view above the surface. Their weights add up to the albedo, or where facets shadow each other
-  /// to a little more. Those with ramps have `share` of theirs and colours that make up for it; not `divided`, the
-  /// colours still have to be divided by the weight: by its largest channel, with terms by each.
+  /// The closures for a view above the surface. Their weights add up to the albedo. Those with ramps have `share` of
+  /// theirs and colours that make up for it; not `divided`, the colours still have to be divided by the weight: by its
+  /// largest channel, with terms by each.
   template <class T> ClosureSum<T> closures(const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied = {},
                                             const T& share = T(1), bool divided = true) const;
   /// f cos(theta_i) of their sum; directions above the surface.
@@ -114,8 +115,7 @@ class Fit {
   };
   struct Facets {
     ClosureKind kind;
-    double alpha;
-    std::shared_ptr<const Table> log_alpha;  ///< over the axis, if there is one
+    std::shared_ptr<const Table> offset, log_alpha;  ///< the angle like that of lobes
   };
   /// A closure's weight, and the colours of its ramp times that weight, by term and channel, over the view and the
   /// position in the ramp; one channel if `tint_` does. Without a ramp, colours over the view and no weight. In units
@@ -138,18 +138,19 @@ class Fit {
   double l1_at(const View&, double number) const;
   /// Coordinates of all tables that run over the view.
   template <class T> std::vector<T> place(const Vec3<T>& wo, const T& number) const;
-  /// What each term counts, in the closures' units. Empty without parameters that there are terms by: then all but the
-  /// amplitude is in the tables.
+  /// What each term counts, in the closures' units and with their tint. Empty without parameters that there are terms
+  /// by: then all but the amplitude is in the tables.
   template <class T> std::vector<Rgb<T>> counts(const std::vector<T>& at, const std::vector<Rgb<T>>& weights) const;
   /// closures() by the weights of terms.
   template <class T> ClosureSum<T> weighted(const Vec3<T>& wo, const T& number, const std::vector<Rgb<T>>& weights,
                                             const T& share, bool divided) const;
   template <class T> std::vector<Rgb<T>> weights(const Varied<T>&) const;
-  /// Closure j without weight and colours.
-  template <class T> Closure<T> shape(std::size_t j, const Vec3<T>& wo, const std::vector<T>& place) const;
-  /// Colour of closure j without tint, and without amplitude unless there are counts; `at` is what its tables run over.
+  /// Closure j without weight and colours; `side` is mirror_side().
+  template <class T> Closure<T> shape(std::size_t j, const Vec3<T>& side, const std::vector<T>& place) const;
+  /// Colour of closure j, without tint and amplitude unless there are counts; `at` is what its tables run over.
   template <class T> Rgb<T> colour(std::size_t j, const std::vector<T>& at, const std::vector<Rgb<T>>& counts) const;
   template <class T> T amplitude(std::size_t term, const std::vector<T>& at) const;
+  template <class T> Rgb<T> tint() const;
 
   std::optional<FitAxis> axis_;
   Terms terms_;

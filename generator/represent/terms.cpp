@@ -298,10 +298,11 @@ template <class T> std::vector<Rgb<T>> Terms::weights(const std::map<std::string
   for (const Term& term : terms) {
     Rgb<T> sum(T(0));
     for (const auto& [powers, coefficient] : term.polynomial) {
-      Rgb<T> part{T(coefficient)};
+      // What is taken away as often as it is added is shorter taken away than added with a factor.
+      Rgb<T> part{T(std::abs(coefficient))};
       for (std::size_t i = 0; i < powers.size(); ++i)
         for (int k = 0; k < powers[i]; ++k) part = part * values.at(parameters[i]);
-      sum += part;
+      sum = coefficient < 0 ? sum - part : sum + part;
     }
     out.push_back(named("weight_of_term", sum));
   }

@@ -2,7 +2,7 @@
 #include "represent/twin.h"
 
 #include <algorithm>
-#include <nlopt.hpp>
+#include <limits>
 
 #include "analysis/probes.h"
 #include "core/parallel.h"
@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Leaning and roughness are sought at every third knot, with fewer points; weights at all.
-constexpr int kStride = 3, kFewPoints = 800, kPoints = 3000, kTrials = 160, kRounds = 2;
+constexpr int kStride = 3, kFewPoints = 800, kPoints = 3000, kRounds = 2;
 /// The view of the first knot, which is level with the surface, is this much above it.
 constexpr double kLastCosine = 2e-3;
 constexpr std::size_t kFacets = 3;
@@ -70,7 +70,8 @@ MatrixXd columns(const Dictionary& dictionary, const Shape& shape, const View& v
 }
 
 VectorXd weights_for(const MatrixXd& a, const View& view, Eigen::Index channel, const VectorXd& near, double ridge) {
-  return solve(a, weights_of(view.points), view.f.col(channel), near, ridge, a.cols(), std::nullopt);
+  return solve(a, weights_of(view.points), view.f.col(channel), near, VectorXd::Constant(a.cols(), ridge), a.cols(),
+               std::numeric_limits<double>::infinity(), std::nullopt);
 }
 
 /// Relative L1, over all channels.
@@ -91,35 +92,15 @@ double error_of(const Dictionary& dictionary, const Shape& shape, const View& vi
 double roughness_of(double e) { return std::pow(1 / (2 * std::max(e, 0.5) + 1), 0.25); }
 
 /// A better shape for a view than `shape`, which is moved into the view's bounds.
-Shape improved(const Dictionary& dictionary, Shape shape, const View& view) {
-  nlopt::opt search(nlopt::LN_BOBYQA, unsigned(shape.size()));
-  Shape low(shape.size()), high(shape.size()), step(shape.size());
+Shape improved(const Dictionary& dictionary, const Shape& shape, const View& view) {
+  std::vector<Variable> variables;
   for (std::size_t j = 0; j < kFacets; ++j) {
-    const std::size_t i = kShape * j;
-    low[i] = least_lean(view.wo), high[i] = 1, step[i] = 0.02;
-    low[i + 1] = kLeastRoughness, high[i + 1] = 1, step[i + 1] = 0.1 * shape[i + 1];
-    low[i + 2] = 0, high[i + 2] = 1, step[i + 2] = 0.02;
+    const double* s = shape.data() + kShape * j;
+    variables.push_back({s[0], least_lean(view.wo), 1, 0.02});
+    variables.push_back({s[1], kLeastRoughness, 1, 0.1 * s[1]});
+    variables.push_back({s[2], 0, 1, 0.02});
   }
-  for (std::size_t i = 0; i < shape.size(); ++i) shape[i] = std::clamp(shape[i], low[i], high[i]);
-  search.set_lower_bounds(low);
-  search.set_upper_bounds(high);
-  search.set_initial_step(step);
-  search.set_maxeval(kTrials);
-  search.set_ftol_rel(3e-4);
-  std::pair<const Dictionary&, const View&> data(dictionary, view);
-  search.set_min_objective(
-      [](const std::vector<double>& x, std::vector<double>&, void* d) {
-        const auto& seen_ = *static_cast<std::pair<const Dictionary&, const View&>*>(d);
-        return error_of(seen_.first, x, seen_.second);
-      },
-      &data);
-  double least = 0;
-  try {
-    search.optimize(shape, least);
-  } catch (const nlopt::roundoff_limited&) {
-    // The best shape so far is in `shape`.
-  }
-  return shape;
+  return argmin(variables, [&](const Shape& x) { return error_of(dictionary, x, view); });
 }
 
 /// Shapes of every kStride-th knot, from that along the normal down.

@@ -5,8 +5,7 @@
 //
 // Facet lobes whose normals lean towards or away from the viewer, a Diffuse BSDF, and for an ideal mirror one more.
 // Native nodes take no negative colours, so weights are least absolute differences that are not negative, with the
-// albedo kept; leaning and roughness are found by NLopt's BOBYQA, M. Powell: The BOBYQA algorithm for bound constrained
-// optimization without derivatives, Cambridge NA2009/06, from one view to the next.
+// albedo kept; leaning and roughness are found by a search from one view to the next.
 #pragma once
 
 #include <memory>

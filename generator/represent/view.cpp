@@ -2,6 +2,7 @@
 #include "represent/view.h"
 
 #include <algorithm>
+#include <nlopt.hpp>
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
@@ -15,7 +16,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kErrorViews = 64, kPoints = 3000, kSteps = 14;
+constexpr int kErrorViews = 64, kPoints = 3000, kSteps = 14, kTrials = 160;
 
 /// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
 /// down to the whole sphere, each direction counted by the density of all of them together.
@@ -139,8 +140,8 @@ std::optional<Rgb<double>> make_grey(std::vector<View>& views) {
   return Rgb<double>{ratio[0], ratio[1], ratio[2]};
 }
 
-VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, const VectorXd& near, double ridge,
-               Eigen::Index positive, std::optional<Eigen::Index> none) {
+VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, const VectorXd& near,
+               const VectorXd& ridge, Eigen::Index positive, double most, std::optional<Eigen::Index> none) {
   const Eigen::Index n = a.cols();
   const double albedo = f.dot(weight);
   if (!(albedo > 0)) return VectorXd::Zero(n);
@@ -154,14 +155,27 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
     const MatrixXd scaled = (r + fine).cwiseSqrt().asDiagonal() * a;
     MatrixXd normal = MatrixXd::Zero(n, n);
     normal.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
-    const double pull = ridge * normal.trace() / double(n);
-    normal.diagonal().array() += pull;
-    const VectorXd right_f = a.transpose() * r.cwiseProduct(f) + pull * near;
-    for (bool again = true; again;) {
-      MatrixXd m(n + 1, n + 1);
-      m << MatrixXd(normal.selfadjointView<Eigen::Lower>()), integral, integral.transpose(), 0;
-      VectorXd right(n + 1);
-      right << right_f, albedo;
+    const VectorXd pull = ridge * (normal.trace() / double(n));
+    normal.diagonal() += pull;
+    normal = MatrixXd(normal.selfadjointView<Eigen::Lower>());
+    const VectorXd right_f = a.transpose() * r.cwiseProduct(f) + pull.cwiseProduct(near);
+    // What was negative is out until the sum would gain by more of it. Rounding may take the same ones in and out for
+    // ever: then what is left below 0 is none.
+    bool full = false;  // they add up to the most
+    for (Eigen::Index trial = 0, in = -1; trial < 4 * (positive + 1) && (trial == 0 || in >= 0); ++trial) {
+      MatrixXd m = MatrixXd::Zero(n + 2, n + 2);
+      m.topLeftCorner(n, n) = normal;
+      m.col(n).head(n) = m.row(n).head(n) = integral;
+      m(n + 1, n + 1) = 1;
+      VectorXd right(n + 2);
+      right << right_f, albedo, 0;
+      full = full && std::find(out.end() - positive, out.end(), false) != out.end();
+      if (full) {
+        m.col(n + 1).segment(n - positive, positive).setOnes();
+        m.row(n + 1).segment(n - positive, positive).setOnes();
+        m(n + 1, n + 1) = 0;
+        right[n + 1] = most * albedo;
+      }
       for (Eigen::Index k = 0; k < n; ++k)
         if (out[std::size_t(k)]) {
           m.row(k).setZero();
@@ -169,16 +183,61 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
           m(k, k) = 1;
           right[k] = 0;
         }
-      x = m.partialPivLu().solve(right).head(n);
-      again = false;
+      const VectorXd solution = m.partialPivLu().solve(right);
+      x = solution.head(n);
+      in = -1;
       for (Eigen::Index k = n - positive; k < n; ++k)
-        if (x[k] < 0) again = out[std::size_t(k)] = true;
+        if (x[k] < 0) {
+          out[std::size_t(k)] = true;
+          in = k;
+        }
+      if (in >= 0) continue;
+      if (!full && x.tail(positive).sum() > most * albedo) {
+        full = true;
+        in = n;
+        continue;
+      }
+      const VectorXd gain =
+          right_f - normal * x - solution[n] * integral - VectorXd::Constant(n, full ? solution[n + 1] : 0);
+      for (Eigen::Index k = n - positive; k < n; ++k)
+        if (out[std::size_t(k)] && k != none && gain[k] > 1e-9 * normal(k, k) && (in < 0 || gain[k] > gain[in])) in = k;
+      if (in >= 0) out[std::size_t(in)] = false;
     }
+    x.tail(positive) = x.tail(positive).cwiseMax(0);
     const VectorXd sum = a * x, rest = (sum - f).cwiseAbs();
     const double mean = rest.dot(weight) / weight.sum();
     r = weight.cwiseQuotient((rest.array() + 1e-3 * mean + 1e-12 * scale).matrix());
     r *= weight.sum() / r.sum();
     for (Eigen::Index i = 0; i < f.size(); ++i) fine[i] = sum[i] < 0 ? 2 * fine[i] + 0.02 * r[i] : 0.9 * fine[i];
+  }
+  return x;
+}
+
+std::vector<double> argmin(const std::vector<Variable>& variables,
+                           const std::function<double(const std::vector<double>&)>& error) {
+  std::vector<double> x, low, high, step;
+  for (const Variable& v : variables) {
+    x.push_back(std::clamp(v.start, v.low, v.high));
+    low.push_back(v.low);
+    high.push_back(v.high);
+    step.push_back(v.step);
+  }
+  nlopt::opt search(nlopt::LN_BOBYQA, unsigned(x.size()));
+  search.set_lower_bounds(low);
+  search.set_upper_bounds(high);
+  search.set_initial_step(step);
+  search.set_maxeval(kTrials);
+  search.set_ftol_rel(3e-4);
+  search.set_min_objective(
+      [](const std::vector<double>& at, std::vector<double>&, void* f) {
+        return (*static_cast<const std::function<double(const std::vector<double>&)>*>(f))(at);
+      },
+      const_cast<void*>(static_cast<const void*>(&error)));
+  double value = 0;
+  try {
+    search.optimize(x, value);
+  } catch (const nlopt::roundoff_limited&) {
+    // The best so far is in `x`.
   }
   return x;
 }

@@ -69,11 +69,20 @@ Eigen::MatrixXd scattering(const BoundModel&, const Points&, const Vec3<double>&
 std::optional<Rgb<double>> make_grey(std::vector<View>&);
 
 /// Least absolute differences over the columns of `a`, whose integrals are about 1, with the integral of f kept, and
-/// drawn towards `near` by `ridge`, in units of the mean square of a column. The last `positive` coefficients are not
-/// negative, and that at `none` is 0.
+/// each coefficient drawn towards that of `near` by its `ridge`, in units of the mean square of a column. The last
+/// `positive` coefficients are not negative and add up to at most `most` times that integral; that at `none` is 0.
 Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& weight, const Eigen::VectorXd& f,
-                      const Eigen::VectorXd& near, double ridge, Eigen::Index positive,
+                      const Eigen::VectorXd& near, const Eigen::VectorXd& ridge, Eigen::Index positive, double most,
                       std::optional<Eigen::Index> none);
+
+/// What a search varies: where it begins, how far it goes, and its first steps.
+struct Variable {
+  double start, low, high, step;
+};
+/// Where `error` is least, as far as NLopt's BOBYQA finds it. M. Powell: The BOBYQA algorithm for bound constrained
+/// optimization without derivatives, Cambridge NA2009/06.
+std::vector<double> argmin(const std::vector<Variable>&,
+                           const std::function<double(const std::vector<double>&)>& error);
 
 /// The closures of a view against the model.
 struct ViewError {
