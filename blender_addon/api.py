@@ -278,7 +278,8 @@ def used_materials():
 
 
 def write_materials(path):
-    """Writes used_materials() for `brdfc build --materials`, which makes a pack of just that.
+    """Writes used_materials(), and which lamps have no size, for `brdfc build --materials`, which
+    makes a pack of just that.
 
     Returns how many there are. Raises ValueError if there is none, OSError if the file can't be
     written; an older file is then as it was.
@@ -289,7 +290,7 @@ def write_materials(path):
     path = Path(path)
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        beside.write_text(json.dumps({"materials": materials}, indent=1) + "\n", encoding="utf-8")
+        beside.write_text(json.dumps(lean.needs(materials), indent=1) + "\n", encoding="utf-8")
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)

@@ -75,6 +75,24 @@ def _is_tiny(light):
     return light.shadow_soft_size < SMALL_LIGHT
 
 
+def _is_sizeless(light):
+    if light.type == "SUN":
+        return light.angle == 0
+    return light.type in {"POINT", "SPOT"} and light.shadow_soft_size == 0
+
+
+def sizeless_lamps():
+    """Names of the lamps of the open file that pictures show and no drawn direction meets."""
+    return sorted(
+        {
+            o.name
+            for scene in bpy.data.scenes
+            for o in scene.objects
+            if o.type == "LIGHT" and not o.hide_render and _is_sizeless(o.data)
+        }
+    )
+
+
 def _tiny_lights(scene):
     return [o.name for o in scene.objects if o.type == "LIGHT" and _is_tiny(o.data)]
 

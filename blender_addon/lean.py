@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from . import nodes, pack
+from . import checks, nodes, pack
 
 #: Forms that a budget does not choose: they are for who asks for them.
 ASKED_FOR = ("controlled", "twin")
@@ -45,6 +45,13 @@ def program():
     )
 
 
+def needs(materials):
+    """Content of a file for `brdfc build --materials`: `materials` as those of a scene file, and
+    the lamps of the open file that its forms are chosen by."""
+    lamps = checks.sizeless_lamps()
+    return {"materials": materials} | ({"sizeless_lamps": lamps} if lamps else {})
+
+
 class Plan:
     """What a pack of the open file alone holds, and the pack."""
 
@@ -59,7 +66,7 @@ class Plan:
         self._folder = tempfile.TemporaryDirectory(prefix="brdfc-lean-")
         folder = Path(self._folder.name)
         file = folder / "materials.json"
-        file.write_text(json.dumps({"materials": materials}), encoding="utf-8")
+        file.write_text(json.dumps(needs(materials)), encoding="utf-8")
         command = [program(), "build", "--materials", file, "--explain", *options, "--out", folder]
         try:
             done = subprocess.run([str(c) for c in command], capture_output=True, text=True)

@@ -315,6 +315,9 @@ def materials(**parameters):
         (materials(e={"texture": "a.exr"}), ["materials.m.parameters.e", "texture"]),
         (materials(gloss={"varies": True}), ["materials.m.parameters.gloss"]),
         (materials(e=-1), ["materials.m.parameters.e"]),
+        (materials() | {"sizeless_lamps": "Sun"}, ["sizeless_lamps", "Sun"]),
+        (materials() | {"sizeless_lamps": ["Sun", 3]}, ["sizeless_lamps[1]", "3"]),
+        (materials() | {"lamps": ["Sun"]}, ["lamps", "sizeless_lamps"]),
         (scene(), ["camera"]),
     ],
 )

@@ -500,7 +500,7 @@ def phong(tmp_path):
         out = tmp_path / "out"
         return run("build", "--materials", file, "--addon", addon, "--out", out, *options)
 
-    build.addon, build.out = addon, tmp_path / "out"
+    build.addon, build.file, build.out = addon, file, tmp_path / "out"
     return build
 
 
@@ -543,6 +543,19 @@ def test_build_prints_every_form_with_cost_and_error(phong):
     assert " ".join(fitted[3:]) == "taken: a: the form is left open"
     without = phong().stdout
     assert "not taken: nothing is fitted unasked" in without
+
+
+@pytest.mark.parametrize("time", ["1.15x", "1x"])
+def test_lamps_of_a_blend_take_the_fit(phong, time):
+    """It comes before the sampled form even where both keep the time."""
+    content = json.loads(phong.file.read_text())
+    phong.file.write_text(json.dumps(content | {"sizeless_lamps": ["Sun.001"]}))
+    (model,) = json.loads(phong("--explain", "--time", time).stdout)["models"]
+    (taken,) = [c for c in model["choices"] if c["taken"]]
+    assert taken["form"] == "fitted" and "Sun.001 without a size" in taken["why"]
+    (model,) = json.loads(phong("--explain").stdout)["models"]
+    (taken,) = [c for c in model["choices"] if c["taken"]]
+    assert taken["form"] == "sampled" and "Sun.001 without a size" in taken["why"]
 
 
 @pytest.mark.parametrize("time", ["x", "fast", "0x", "-1", "1.2xx", "1,2", "inf", "nan", "1.2 x"])

@@ -57,6 +57,44 @@ TEST(Plan, SaysWhichLampsADrawnDirectionDoesNotMeet) {
   for (const FormChoice& c : matte.choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
 }
 
+TEST(Plan, TakesAFitBeforeDrawingUnderLampsWithoutASize) {
+  const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})};
+  Budget budget;
+  budget.costs = costs("phong,sampled,1.1\nphong,fitted,1.3\ncoupled,exact,1\ncoupled,fitted,0.9\n");
+  budget.sizeless = {"lights[0]"};
+  const auto plan = [&](const std::vector<MaterialNeed>& needs, std::optional<double> error,
+                        std::optional<double> time) {
+    budget.error = error;
+    budget.time = time;
+    return plan_scene(needs, budget)[0];
+  };
+  EXPECT_THAT(plan(phong, {}, {}).forms, ElementsAre(RepresentationKind::Sampled)) << "nothing unasked";
+  EXPECT_THAT(plan(phong, {}, 1.5).forms, ElementsAre(RepresentationKind::Fitted));
+  EXPECT_EQ(why(plan(phong, {}, 1.5), RepresentationKind::Fitted),
+            "a: the form is left open; lights[0] without a size shines as on Blender's own nodes, on drawn directions "
+            "as rare bright dots");
+  EXPECT_EQ(why(plan(phong, {}, 1.5), RepresentationKind::Sampled), "fitted comes first");
+  EXPECT_THAT(plan(phong, 0.03, {}).forms, ElementsAre(RepresentationKind::Fitted));
+  EXPECT_THAT(why(plan(phong, 0.03, {}), RepresentationKind::Fitted), HasSubstr("lights[0] without a size"));
+  for (const std::optional<double> time : {std::optional<double>(), std::optional<double>(1.5)}) {
+    const PlannedModel off = plan(phong, 0.001, time);
+    EXPECT_THAT(off.forms, ElementsAre(RepresentationKind::Sampled));
+    EXPECT_THAT(why(off, RepresentationKind::Fitted), HasSubstr("0.001 is allowed"));
+    EXPECT_THAT(why(off, RepresentationKind::Sampled), HasSubstr("lights[0] without a size shines as rare bright"));
+  }
+  const PlannedModel late = plan(phong, {}, 1.2);
+  EXPECT_THAT(late.forms, ElementsAre(RepresentationKind::Sampled));
+  EXPECT_EQ(why(late, RepresentationKind::Fitted), "costs 1.3x, and 1.2x is allowed");
+  EXPECT_THAT(plan({need("a", "coupled", {})}, {}, 1.5).forms, ElementsAre(RepresentationKind::Exact));
+  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, {}, 1.5).forms, ElementsAre(RepresentationKind::Sampled));
+
+  budget.offer = true;
+  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, {}, 1.5).forms,
+              ElementsAre(RepresentationKind::Sampled, RepresentationKind::Fitted));
+  EXPECT_THAT(why(plan({need("a", "phong", {"e=20"}, "controlled")}, {}, {}), RepresentationKind::Controlled),
+              HasSubstr("lights[0] without a size shines on its closures alone"));
+}
+
 TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {
   auto textured = need("c", "coupled", {"r0=0.1", "rm=0.5"});
   textured.textured.insert("rm");

@@ -171,7 +171,9 @@ void run(const Options& options) {
         budget.sizeless.push_back(l.key);
     plan = plan_scene(needs_of(scene.materials), budget);
   } else if (!options.materials.empty()) {
-    plan = plan_scene(needs_of(load_materials(options.materials)), budget);
+    const UsedMaterials used = load_materials(options.materials);
+    budget.sizeless = used.sizeless_lamps;
+    plan = plan_scene(needs_of(used.materials), budget);
   } else {
     plan = plan_models(options.models);
   }

@@ -135,12 +135,28 @@ Chosen within_time(const Needs& needs, const std::vector<RepresentationKind>& or
   return {*cheapest, fmt::format("no form is known to keep {:g}x, this is the cheapest", *budget.time)};
 }
 
+/// Whether a fitted form that the budget allows comes before the sampled one. Without an error the one is off by any
+/// amount and the other right on average, but not in a picture where a lamp is met by chance alone.
+bool fitted_first(const Budget& budget) { return budget.error || !budget.sizeless.empty(); }
+
 /// In place of a form that samples the model: that one, and where the budget allows it the fitted one.
 std::vector<RepresentationKind> sampled_or_fitted(const Needs& needs, const Budget& budget) {
-  if (fits(needs, budget)) return {RepresentationKind::Fitted, RepresentationKind::Sampled};
-  if (budget.time && !budget.error && !unfit(needs, RepresentationKind::Fitted))
-    return {RepresentationKind::Sampled, RepresentationKind::Fitted};
-  return {RepresentationKind::Sampled};
+  const bool allowed =
+      fits(needs, budget) || (budget.time && !budget.error && !unfit(needs, RepresentationKind::Fitted));
+  if (!allowed) return {RepresentationKind::Sampled};
+  if (fitted_first(budget)) return {RepresentationKind::Fitted, RepresentationKind::Sampled};
+  return {RepresentationKind::Sampled, RepresentationKind::Fitted};
+}
+
+/// What lamps without a size make of a form, as script/conditions measured it; empty where they do nothing to it.
+std::string under_lamps(RepresentationKind kind, const Budget& budget) {
+  const char* shine = kind == RepresentationKind::Sampled  ? "as rare bright dots"
+                      : kind == RepresentationKind::Fitted ? "as on Blender's own nodes, on drawn directions as rare "
+                                                             "bright dots"
+                      : kind == RepresentationKind::Controlled ? "on its closures alone"
+                                                               : nullptr;
+  if (!shine || budget.sizeless.empty()) return {};
+  return fmt::format("; {} without a size shines {}", fmt::join(budget.sizeless, ", "), shine);
 }
 
 Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& budget) {
@@ -185,7 +201,7 @@ std::string why_not(RepresentationKind kind, const Needs& needs, const std::vect
   if (open == needs.end() && !(fitted && budget.offer)) return "the materials ask for another";
   // Of what comes after a form that keeps the budget nothing has to be known.
   const auto rank = [&](RepresentationKind k) {
-    return k == RepresentationKind::Exact ? 0 : k == RepresentationKind::Sampled ? 2 : budget.error ? 1 : 3;
+    return k == RepresentationKind::Exact ? 0 : k == RepresentationKind::Sampled ? 2 : fitted_first(budget) ? 1 : 3;
   };
   const RepresentationKind first =
       open == needs.end() ? RepresentationKind::Sampled : chosen[std::size_t(open - needs.begin())].form;
@@ -221,12 +237,7 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
     }
     if (kind == RepresentationKind::Fitted && choice.exists && (choice.taken || budget.error || budget.time))
       choice.error = fitted_error(needs);
-    // As script/conditions measured it.
-    if (kind == RepresentationKind::Sampled && choice.taken && !budget.sizeless.empty())
-      choice.why += fmt::format(
-          "; {} without a size shines on drawn directions as rare bright dots, on a fitted form as "
-          "on Blender's own nodes",
-          fmt::join(budget.sizeless, ", "));
+    if (choice.taken) choice.why += under_lamps(kind, budget);
     choices.push_back(std::move(choice));
   };
   for (const RepresentationKind kind : representations(model)) {

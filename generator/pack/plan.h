@@ -56,7 +56,7 @@ struct Budget {
   bool controlled = false;      ///< so does a controlled form
   std::optional<double> time = {};  ///< cost that a form may have where the material leaves the form open
   Costs costs = {};
-  /// Lamps that no drawn direction meets, for they have no size: their places in the file.
+  /// Lamps that no drawn direction meets, for they have no size: their places in the file, or names.
   std::vector<std::string> sizeless = {};
 };
 
@@ -64,8 +64,8 @@ struct Budget {
 /// constant is fixed, a form that none uses is left out. Throws InputError naming the material for a representation
 /// that its model does not have.
 /// Where a material leaves its form open, forms stand in this order: exact; fitted, if the budget has an error and the
-/// fit keeps it; sampled; fitted, if the budget has a time and no error. The first is taken that keeps the time, or
-/// where none does the one of the least cost that is known.
+/// fit keeps it, or a time and no error and lamps have no size; sampled; fitted, if the budget has a time and no error.
+/// The first is taken that keeps the time, or where none does the one of the least cost that is known.
 std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Budget& = {});
 
 /// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and

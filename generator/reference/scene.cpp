@@ -60,12 +60,15 @@ class Loader {
  public:
   explicit Loader(const fs::path& path) : path_(path), json_(read_json(path)) {}
 
-  std::vector<Material> load_materials() {
+  UsedMaterials load_materials() {
     const JsonView root(json_, path_.string());
-    root.only({"$schema", "materials"});
+    root.only({"$schema", "materials", "sizeless_lamps"});
     materials_alone_ = true;
     read_materials(root.at("materials"));
-    return std::move(scene_.materials);
+    UsedMaterials used{std::move(scene_.materials), {}};
+    if (const auto lamps = root.find("sizeless_lamps"))
+      for (const JsonView& lamp : lamps->elements()) used.sizeless_lamps.push_back(lamp.text());
+    return used;
   }
 
   Scene load() {
@@ -516,7 +519,7 @@ Rgb<double> Environment::radiance(const Vec3<double>& direction) const {
 
 Scene load_scene(const fs::path& path) { return Loader(path).load(); }
 
-std::vector<Material> load_materials(const fs::path& path) { return Loader(path).load_materials(); }
+UsedMaterials load_materials(const fs::path& path) { return Loader(path).load_materials(); }
 
 void write_resolved(const Scene& scene, const fs::path& folder) {
   for (const auto& [stem, mesh] : scene.mesh_files) {

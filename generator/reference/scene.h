@@ -110,9 +110,14 @@ struct Scene {
 /// Throws InputError naming the file, the key and what was expected.
 Scene load_scene(const std::filesystem::path& path);
 
-/// The materials of a file that has nothing but the schema's "materials", with {"varies": true} in place of the value
-/// of a parameter that is not constant. Throws as load_scene().
-std::vector<Material> load_materials(const std::filesystem::path& path);
+/// What a .blend uses.
+struct UsedMaterials {
+  std::vector<Material> materials;
+  std::vector<std::string> sizeless_lamps;  ///< names of lamps that are points, or suns without an angle
+};
+/// A file that has nothing but the schema's "materials", with {"varies": true} in place of the value of a parameter
+/// that is not constant, and "sizeless_lamps", a list of names, if there are any. Throws as load_scene().
+UsedMaterials load_materials(const std::filesystem::path& path);
 
 /// Writes scene.json, the meshes as .npy and the images as .exr into the folder, scene.json last.
 void write_resolved(const Scene& scene, const std::filesystem::path& folder);

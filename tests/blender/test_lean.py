@@ -137,6 +137,47 @@ def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, program):
     assert np.isfinite(picture(extension, material)).all()
 
 
+def lamp(name, kind, **settings):
+    data = bpy.data.lights.new(name, kind)
+    item = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(item)
+    for key, value in settings.items():
+        setattr(item if key == "hide_render" else data, key, value)
+    return data
+
+
+def test_lamps_without_a_size_choose_the_fit(extension, empty, program, monkeypatch, tmp_path):
+    monkeypatch.setenv("BRDFC_TOOL", str(program))
+    api = extension.api
+    api.new_material("phong", e=40.0)
+    for name, kind, settings in (
+        ("Ball", "POINT", {"shadow_soft_size": 0.1}),
+        ("Disk", "AREA", {"shadow_soft_size": 0.0}),
+        ("Hidden", "POINT", {"shadow_soft_size": 0.0, "hide_render": True}),
+        ("Wide Sun", "SUN", {"angle": 0.1, "shadow_soft_size": 0.0}),
+    ):
+        lamp(name, kind, **settings)
+    file = tmp_path / "m.json"
+    api.write_materials(file)
+    assert file.read_text().count("sizeless_lamps") == 0
+
+    def taken(time):
+        (model,) = api.plan(time=time).explanation["models"]
+        return [(c["form"], c["why"]) for c in model["choices"] if c["taken"]]
+
+    ((form, _),) = taken(9)
+    assert form == "sampled"
+    lamp("Spot", "SPOT", shadow_soft_size=0.0)
+    lamp("Point", "POINT", shadow_soft_size=0.0)
+    lamp("Sun", "SUN", angle=0.0)
+    ((form, why),) = taken(9)
+    assert form == "fitted" and "Point, Spot, Sun without a size" in why
+    ((form, why),) = taken(None)
+    assert form == "sampled" and "Point, Spot, Sun without a size" in why
+    api.write_materials(file)
+    assert '"Point",\n  "Spot",\n  "Sun"' in file.read_text()
+
+
 def refused_and_unchanged(extension, material, match):
     before, group = counts(), the_node(extension, material).node_tree
     with pytest.raises(RuntimeError, match=match):
