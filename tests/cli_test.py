@@ -14,7 +14,7 @@ import shutil
 import subprocess
 
 import pytest
-from support import MODELS, ROOT, TOOL
+from support import MODELS, ROOT, TOOL, scene
 
 EVAL_HEADER = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
 SAMPLE_HEADER = "wo_x,wo_y,wo_z,u1,u2,u3"
@@ -483,6 +483,44 @@ def test_a_lamp_without_a_size_is_named_beside_drawn_forms(tmp_path, radius, sai
     assert drawn
     for reason in drawn:
         assert ("lights[0] without a size" in reason) == said
+
+
+def test_a_scene_of_camera_rays_alone_has_tables_of_the_views_that_occur(tmp_path):
+    content = scene(
+        camera={
+            "type": "perspective",
+            "position": [0, -4, 2],
+            "look_at": [0, 0, 0],
+            "fov_y_degrees": 10,
+        },
+        materials={"m": {"model": "phong", "parameters": {"e": 20}, "representation": "fitted"}},
+        objects=[{"name": "floor", "shape": {"type": "quad", "size": [2, 2]}, "material": "m"}],
+    )
+    # What one quad scatters meets nothing; a second one is met by it.
+    (floor,) = content["objects"]
+    below = floor | {"name": "below", "transform": {"translate": [0, 0, -1]}}
+    file = tmp_path / "s.json"
+    floats = []
+    for objects, cut in (([floor], True), ([floor, below], False)):
+        file.write_text(json.dumps(content | {"objects": objects}))
+        done = run("build", "--scene", file, "--explain", "--out", tmp_path / "out")
+        assert done.returncode == 0, done.stderr
+        (model,) = json.loads(done.stdout)["models"]
+        low, high = model["view_cosines"]
+        (form,) = model["forms"]
+        before, after = form["before"], form["after"]
+        floats.append(after["table_floats"])
+        assert (after["bytes"] < before["bytes"]) == cut
+        assert after["operations"] == before["operations"]
+        assert ("degrees: never seen" in " ".join(model["left_out"])) == cut
+        manifest = json.loads((tmp_path / "out" / "brdfc_shaders" / "manifest.json").read_text())
+        entry = manifest["models"]["phong"]
+        if cut:
+            assert 0.25 < low < 5**-0.5 < high < 0.6
+            assert entry["view_cosines"] == [low, high]
+        else:
+            assert (low, high) == (0, 1) and "view_cosines" not in entry
+    assert floats[0] < floats[1] / 3
 
 
 @pytest.fixture

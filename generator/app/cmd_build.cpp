@@ -14,6 +14,7 @@
 #include "app/commands.h"
 #include "pack/pack.h"
 #include "reference/scene.h"
+#include "reference/views.h"
 
 namespace brdfc {
 namespace {
@@ -93,8 +94,14 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
     else
       std::visit([&](const auto& v) { fixed[p.name] = v; }, it->second);
   }
-  return {{"model", info.name}, {"materials", plan.materials}, {"choices", choices}, {"forms", forms}, {"fixed", fixed},
-          {"free", free},       {"left_out", plan.reasons}};
+  return {{"model", info.name},
+          {"materials", plan.materials},
+          {"choices", choices},
+          {"forms", forms},
+          {"fixed", fixed},
+          {"free", free},
+          {"view_cosines", {plan.views.low, plan.views.high}},
+          {"left_out", plan.reasons}};
 }
 
 /// What forms there are and which is taken, why each thing is left out, and what that saves.
@@ -169,7 +176,10 @@ void run(const Options& options) {
     for (const Light& l : scene.lights)
       if ((l.kind == Light::Kind::Point || l.kind == Light::Kind::Sun) && l.radius == 0)
         budget.sizeless.push_back(l.key);
-    plan = plan_scene(needs_of(scene.materials), budget);
+    std::vector<MaterialNeed> needs = needs_of(scene.materials);
+    const std::vector<Cosines> views = seen_cosines(scene);
+    for (std::size_t i = 0; i < needs.size(); ++i) needs[i].views = views[i];
+    plan = plan_scene(needs, budget);
   } else if (!options.materials.empty()) {
     const UsedMaterials used = load_materials(options.materials);
     budget.sizeless = used.sizeless_lamps;

@@ -19,4 +19,16 @@ std::shared_ptr<const Table> make_table(std::string name, std::vector<int> sizes
   return std::make_shared<const Table>(Table{std::move(name), std::move(sizes), std::move(values)});
 }
 
+std::shared_ptr<const Table> part(const Table& table, std::size_t axis, int first, int last) {
+  std::vector<int> sizes = table.sizes;
+  std::size_t stride = 1;
+  for (std::size_t a = axis + 1; a < sizes.size(); ++a) stride *= std::size_t(sizes[a]);
+  std::vector<double> values;
+  for (std::size_t i = 0; i < table.values.size(); ++i)
+    if (const int knot = int(i / stride % std::size_t(sizes[axis])); knot >= first && knot <= last)
+      values.push_back(table.values[i]);
+  sizes[axis] = last - first + 1;
+  return make_table(table.name, std::move(sizes), std::move(values));
+}
+
 }  // namespace brdfc

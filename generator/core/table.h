@@ -23,6 +23,9 @@ struct Table {
 /// table, index and value for one that is not finite.
 std::shared_ptr<const Table> make_table(std::string name, std::vector<int> sizes, std::vector<double> values);
 
+/// The knots from `first` to `last` of an axis.
+std::shared_ptr<const Table> part(const Table&, std::size_t axis, int first, int last);
+
 /// Multilinear interpolation; coordinates outside [0, 1] take the nearest end.
 template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>& table, const std::array<T, D>& x) {
   std::array<T, D> fraction;

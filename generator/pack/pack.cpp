@@ -277,12 +277,13 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   for (const ParamInfo& p : info.params)
     if (!plan.fixed.count(p.name)) j["parameters"].push_back(parameter_json(p));
   j["fixed"] = values_json(plan.fixed);
+  if (!plan.views.all()) j["view_cosines"] = {plan.views.low, plan.views.high};
 
   AlbedoTable table, whole_table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
   if (has_table(model)) {
     whole_table = tabulate_albedo(model);
-    table = fold(whole_table, model, plan.fixed);
+    table = fold(whole_table, model, plan.fixed, plan.views);
     const fs::path exr = scratch / (info.name + ".exr");
     write_albedo_exr(table, exr.string());
     built.files[table_file] = read_text(exr);
@@ -294,20 +295,24 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const bool twin = kind == RepresentationKind::Twin;
     const ParamValues fixed = fixed_in(plan, kind);
     const Fit* fit = fit_in(kind, model, fixed);
-    const std::size_t of_fit = fit ? fit->size() : 0;
-    const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed);
-    const Shader shader = twin ? write_nodes(model, fixed) : write_shader(model, kind, of_form, fixed, plan.max_lobes);
+    const std::size_t of_whole_fit = fit ? fit->size() : 0,
+                      of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
+    const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
+    const Shader shader =
+        twin ? write_nodes(model, fixed) : write_shader(model, kind, of_form, fixed, plan.max_lobes, plan.views);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
-    const bool cut = !is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes);
-    const Shader whole = cut ? write_shader(model, kind, whole_table) : shader;
-    const RepresentationError error = measure_error(model, kind, fixed);
+    const ParamValues whole_fixed = is_fit(kind) ? fixed : ParamValues{};
+    const bool cut = !plan.views.all() || (!is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes));
+    const Shader whole =
+        cut && !twin ? write_shader(model, kind, fold(whole_table, model, whole_fixed), whole_fixed) : shader;
+    const RepresentationError error = measure_error(model, kind, fixed, plan.views);
     const std::optional<double> cost = costs.of(model, kind);
     const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
                            of_form.size() + of_fit, table.error, shader.source.size(), whole.closures, whole.operations,
-                           whole_table.size() + of_fit, whole.source.size()});
+                           whole_table.size() + of_whole_fit, whole.source.size()});
     j["representations"][name_of(kind)] = {
         {twin ? "nodes" : "shader", file},
         {"only", values_json(form_values(model, kind, plan.fixed))},

@@ -2,6 +2,7 @@
 #include "pack/plan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "pack/shader.h"
@@ -62,10 +63,17 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   return unfit(model, without_factors(model, fixed));
 }
 
+/// What one of the materials can be seen from.
+Cosines views_of(const Needs& needs) {
+  Cosines views = needs.front()->views;
+  for (const MaterialNeed* need : needs) views.add(need->views);
+  return views;
+}
+
 /// Of the material that is off by most. The mean along an axis says little of a material at one end of it.
 double fitted_error(const Needs& needs) {
   const Model& model = *needs.front()->model;
-  const Fit& fit = fit_of(model, without_factors(model, constants(needs)));
+  const Fit fit = fit_of(model, without_factors(model, constants(needs)), views_of(needs));
   double worst = 0;
   for (const MaterialNeed* need : needs) {
     std::optional<double> number;
@@ -285,11 +293,35 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   });
   if (drawn && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
+  plan.views = views_of(needs);
+  std::vector<std::string> unseen;
+  const auto degrees = [](double cosine) { return std::acos(cosine) * 180 / kPi; };
+  if (const double first = std::floor(degrees(plan.views.high)); first > 0)
+    unseen.push_back(fmt::format("below {:g}", first));
+  if (const double last = std::ceil(degrees(plan.views.low)); last < 90)
+    unseen.push_back(fmt::format("beyond {:g}", last));
+  if (!unseen.empty())
+    plan.reasons.push_back(fmt::format("view angles {} degrees: never seen", fmt::join(unseen, " and ")));
   plan.fixed = constants(needs);
   for (const ParamInfo& p : info.params)
     if (const auto it = plan.fixed.find(p.name); it != plan.fixed.end())
       plan.reasons.push_back(fmt::format("parameter {}: constant, {}", p.name, value_text(info, p.name, it->second)));
   return plan;
+}
+
+/// The knots over the view that `views` lie between, as lookup() takes them.
+AlbedoGrid seen(const AlbedoGrid& grid, const Cosines& views) {
+  AlbedoGrid out = grid;
+  if (grid.axes.empty() || grid.axes[0].name != "cos_theta_o") return out;
+  const std::vector<double>& knots = grid.axes[0].values;
+  const auto last_knot = std::ptrdiff_t(knots.size()) - 1;
+  const auto first =
+      std::clamp(std::ranges::upper_bound(knots, views.low) - knots.begin() - 1, std::ptrdiff_t(0), last_knot - 1);
+  const auto last = std::clamp(std::ranges::lower_bound(knots, views.high) - knots.begin(), first + 1, last_knot);
+  const auto row = std::ptrdiff_t(grid.values.size() / knots.size());
+  out.axes[0].values.assign(knots.begin() + first, knots.begin() + last + 1);
+  out.values.assign(grid.values.begin() + first * row, grid.values.begin() + (last + 1) * row);
+  return out;
 }
 
 /// The grid at fixed coordinates: linear between two knots of the axis' scale, as lookup() does.
@@ -379,8 +411,8 @@ std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>& needs, con
   return plan;
 }
 
-AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues& fixed) {
-  if (fixed.empty()) return table;
+AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues& fixed, const Cosines& views) {
+  if (fixed.empty() && views.all()) return table;
   AlbedoTable out = table;
   out.grids.clear();
   const std::vector<Choices> combinations = choice_combinations(model.info());
@@ -391,7 +423,7 @@ AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues
       std::vector<std::pair<AlbedoTerm, AlbedoGrid>> parts;
       for (const AlbedoTerm& t : table.terms.at(i)) {
         AlbedoTerm term = t;
-        AlbedoGrid grid = sliced(table.grids.at(std::size_t(t.grid)), fixed);
+        AlbedoGrid grid = sliced(seen(table.grids.at(std::size_t(t.grid)), views), fixed);
         term.colors.clear();
         for (const std::string& c : t.colors) {
           const auto it = fixed.find(c);

@@ -21,6 +21,7 @@ struct MaterialNeed {
   std::set<std::string> textured;  ///< parameters that vary over the surface
   std::string representation = "auto";
   int lobes = kDefaultLobes;  ///< directions a sampled form draws
+  Cosines views = {};         ///< that it can be seen from
 };
 
 /// Why a form of a model is in a pack, or is not.
@@ -41,6 +42,7 @@ struct PlannedModel {
   ParamValues fixed;                      ///< folded into shaders and tables: no sockets
   std::vector<RepresentationKind> forms;  ///< preferred first
   int max_lobes = kMaxLobes;              ///< of sampled forms
+  Cosines views;                          ///< that one of the materials can be seen from; tables have no others
   std::vector<FormChoice> choices;        ///< every form, where materials were planned for
   std::vector<std::string> reasons;       ///< why something else is left out, a line each
 };
@@ -69,7 +71,8 @@ struct Budget {
 std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Budget& = {});
 
 /// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and
-/// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out.
-AlbedoTable fold(const AlbedoTable&, const Model&, const ParamValues& fixed);
+/// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out. Of the knots
+/// over the view those that these `views` lie between.
+AlbedoTable fold(const AlbedoTable&, const Model&, const ParamValues& fixed, const Cosines& views = {});
 
 }  // namespace brdfc

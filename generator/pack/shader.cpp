@@ -342,7 +342,7 @@ std::string balanced_sum(const std::vector<std::string>& terms) {
 }
 
 Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
-                    int max_lobes) {
+                    int max_lobes, const Cosines& views) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
   for (const auto& [name, value] : form_values(model, kind, given))
@@ -361,7 +361,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    const Recording r = record(model, kind, values, indent);
+    const Recording r = record(model, kind, values, indent, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, r.statements);
     inputs.insert(r.inputs.begin(), r.inputs.end());

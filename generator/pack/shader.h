@@ -21,11 +21,12 @@ struct Shader {
 };
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
-/// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. Throws
+/// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. The form is
+/// right for these `views`. Throws
 /// InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
 /// kMaxOperations.
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
-                    int max_lobes = kMaxLobes);
+                    int max_lobes = kMaxLobes, const Cosines& views = {});
 
 /// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
 std::string balanced_sum(const std::vector<std::string>& terms);

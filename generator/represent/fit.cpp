@@ -797,6 +797,29 @@ std::vector<std::shared_ptr<const Table>> Fit::tables() const {
   return out;
 }
 
+Fit Fit::seen(const Cosines& views) const {
+  const auto knot = [](double cosine) { return brdfc::place(direction(cosine, 0)) * (kViews - 1); };
+  Fit out = *this;
+  out.first_view_ = std::min(int(std::floor(knot(views.high))), kViews - 2);
+  out.last_view_ = std::clamp(int(std::ceil(knot(views.low))), out.first_view_ + 1, kViews - 1);
+  const auto cut = [&](std::shared_ptr<const Table>& table) {
+    table = part(*table, axis_ ? 1 : 0, out.first_view_, out.last_view_);
+  };
+  for (auto& table : out.amplitude_) cut(table);
+  for (Lobe& l : out.lobes_) cut(l.offset), cut(l.exponent);
+  for (Linear& l : out.linear_) {
+    for (auto& table : l.weight) cut(table);
+    for (auto& term : l.colour)
+      for (auto& channel : term) cut(channel);
+  }
+  // As many that at least one is left.
+  const double apart = errors_[0].cos_theta_o - errors_[1].cos_theta_o;
+  std::erase_if(out.errors_, [&](const ViewError& e) {
+    return e.cos_theta_o < views.low - apart || e.cos_theta_o > views.high + apart;
+  });
+  return out;
+}
+
 std::size_t Fit::size() const {
   std::size_t sum = 0;
   for (const auto& table : tables()) sum += table->values.size();
@@ -968,7 +991,9 @@ double Fit::l1_at(const View& view, double number) const {
 template <class T> std::vector<T> Fit::place(const Vec3<T>& wo, const T& number) const {
   std::vector<T> at;
   if (axis_) at.push_back(named("place_on_axis", lookup(position_, std::vector<T>{axis_->place(number)})));
-  at.push_back(named("place", brdfc::place(wo)));
+  const T x = brdfc::place(wo);
+  const double knots = last_view_ - first_view_;
+  at.push_back(named("place", knots < 0 ? x : x * T((kViews - 1) / knots) - T(first_view_ / knots)));
   return at;
 }
 
@@ -1088,5 +1113,10 @@ std::filesystem::path stored_fit(const Model& model, const ParamValues& values) 
 }
 
 const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }
+
+Fit fit_of(const Model& model, const ParamValues& values, const Cosines& views) {
+  const Fit& whole = fit_of(model, values);
+  return views.all() ? whole : whole.seen(views);
+}
 
 }  // namespace brdfc

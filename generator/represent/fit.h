@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "analysis/albedo_table.h"
+#include "core/cosines.h"
 #include "core/table.h"
 #include "model/model.h"
 #include "represent/closure.h"
@@ -78,6 +79,8 @@ class Fit {
   void store(const Model&, const ParamValues& values, const std::filesystem::path&) const;
   /// What is fitted at the knot at this place: the same closures for every value of the axis.
   Fit knot(const Model&, const ParamValues& values, double place) const;
+  /// The same for these views alone, of those views its errors; what lies beyond them is shown as the nearest knot.
+  Fit seen(const Cosines& views) const;
   /// Places of the knots on the axis.
   const std::vector<double>& knots() const { return knots_; }
 
@@ -155,6 +158,7 @@ class Fit {
   std::optional<FitAxis> axis_;
   Terms terms_;
   std::vector<double> knots_;
+  int first_view_ = 0, last_view_ = -1;    ///< knots that tables over the view have, if not all
   int family_ = 0;                         ///< which closures
   bool grey_ = false;                      ///< whether one channel serves all, with a tint
   double scale_ = 1;                       ///< of all closures along an axis, whose fit is made without factors
@@ -173,6 +177,8 @@ std::filesystem::path stored_fit(const Model&, const ParamValues& values);
 
 /// The fit for these values, made or read at first use and kept while the program runs.
 const Fit& fit_of(const Model&, const ParamValues& values);
+/// The same for these views alone.
+Fit fit_of(const Model&, const ParamValues& values, const Cosines& views);
 
 extern template ClosureSum<double> Fit::closures(const Vec3<double>&, const Varied<double>&, const double&, bool) const;
 extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Varied<Expr>&, const Expr&, bool) const;

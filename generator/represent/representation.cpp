@@ -101,11 +101,11 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
 
 Vec3<Expr> recorded_u() { return {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")}; }
 
-void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed, Program& program,
-                       std::vector<RecordedClosure>& recorded) {
+void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed, const Cosines& views,
+                       Program& program, std::vector<RecordedClosure>& recorded) {
   const ParamValues values = without_factors(model, fixed);
   const std::unique_ptr<Brdf<Expr>> scatter = model.record(values);
-  const Fit& fit = fit_of(model, values);
+  const Fit fit = fit_of(model, values, views);
   const Controlled<Expr> c =
       controlled(*scatter, fit, recorded_wo(model, brdf), recorded_u(), recorded_varied(model, fit, fixed));
   output_closures(with_mirror(model, brdf, c.closures), program, recorded, division_of(fit));
@@ -186,7 +186,7 @@ RepresentationError controlled_error(const Model& model, const ParamValues& fixe
   const std::unique_ptr<Brdf<Expr>> recorded = model.record(values);
   Program program;
   std::vector<RecordedClosure> kinds;
-  output_controlled(model, *recorded, values, program, kinds);
+  output_controlled(model, *recorded, values, {}, program, kinds);
   const Fit& fit = fit_of(model, values);
   const RepresentationError of_fit = fitted_error(fit.errors(), "closures", fit.axis());
   RepresentationError out;
@@ -313,7 +313,8 @@ ParamValues form_values(const Model& model, RepresentationKind kind, const Param
   return only;
 }
 
-Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent) {
+Recording record(const Model& model, RepresentationKind kind, const ParamValues& fixed, int indent,
+                 const Cosines& views) {
   if (kind == RepresentationKind::Twin) throw std::logic_error("a twin has no shader");
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
@@ -324,10 +325,10 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
     if (!sum) input_error("{}: has no exact representation", model.info().name);
     output_closures(*sum, program, closures);
   } else if (kind == RepresentationKind::Fitted) {
-    const Fit& fit = fit_of(model, without_factors(model, fixed));
+    const Fit fit = fit_of(model, without_factors(model, fixed), views);
     output_closures(recorded_fit(model, *brdf, fit, fixed), program, closures, division_of(fit));
   } else if (kind == RepresentationKind::Controlled) {
-    output_controlled(model, *brdf, fixed, program, closures);
+    output_controlled(model, *brdf, fixed, views, program, closures);
   } else {
     output_sampled(model, *brdf, program);
   }
@@ -347,10 +348,11 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   return finish(program, indent, {{ClosureKind::Reflection, false, Division::Done}});
 }
 
-RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
+RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,
+                                  const Cosines& views) {
   if (kind == RepresentationKind::Controlled) return controlled_error(model, fixed);
   if (kind == RepresentationKind::Fitted) {
-    const Fit& fit = fit_of(model, without_factors(model, fixed));
+    const Fit fit = fit_of(model, without_factors(model, fixed), views);
     return fitted_error(fit.errors(), "closures", fit.axis());
   }
   if (kind == RepresentationKind::Twin)

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/cosines.h"
 #include "model/choices.h"
 
 namespace brdfc {
@@ -62,9 +63,10 @@ struct Recording {
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
 /// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
 /// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number and what it has
-/// terms by, which it reads, and factors(), which its weights still have to be multiplied by, the mirror's excepted.
+/// terms by, which it reads, and factors(), which its weights still have to be multiplied by, the mirror's excepted; it
+/// is right for these `views`.
 /// Throws InputError if more closures than Cycles keeps would be needed.
-Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent);
+Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent, const Cosines& views = {});
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
 
@@ -79,7 +81,8 @@ struct RepresentationError {
 /// Executes the recorded form in float at random parameters and directions (fixed seed). Throws ValueError naming
 /// model, parameters, directions and value for a result that is NaN, infinite or negative.
 /// Of a form of a fit, at the parameters in `fixed`, which the others do without: mean over views with cosines spread
-/// evenly and over the number that it runs along, the worst in `note`.
-RepresentationError measure_error(const Model&, RepresentationKind, const ParamValues& fixed = {});
+/// evenly and over the number that it runs along, the worst in `note`; of fitted closures over these `views`.
+RepresentationError measure_error(const Model&, RepresentationKind, const ParamValues& fixed = {},
+                                  const Cosines& views = {});
 
 }  // namespace brdfc

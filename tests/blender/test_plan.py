@@ -91,6 +91,59 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
         assert shaders_and_tables(cut) <= shaders_and_tables(extension_zip) / 10
 
 
+@pytest.mark.parametrize("form", ["sampled", "fitted", "controlled"])
+def test_tables_of_the_views_that_occur_show_the_same(empty, extension_zip, tool, tmp_path, form):
+    """A tilted disk: with camera rays alone the pack has a part of the tables over the view."""
+    content = {
+        "name": "disk",
+        "settings": {"width": 32, "height": 32, "spp": 8, "max_bounces": 0},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -4, 2.5],
+            "look_at": [0, 0, 0],
+            "fov_y_degrees": 26,
+        },
+        "materials": {
+            "m": {"model": "phong", "parameters": {"e": 12}, "representation": form},
+        },
+        "objects": [{"name": "d", "shape": {"type": "disk", "radius": 1.2}, "material": "m"}],
+        "lights": [
+            {
+                "type": "area",
+                "position": [0, 3, 2],
+                "direction": [0, -3, -2],
+                "size": 1.5,
+                "power": 60,
+            }
+        ],
+        "environment": {"color": [0.2, 0.3, 0.4]},
+    }
+    source = tmp_path / "disk.json"
+    source.write_text(json.dumps(content))
+    why = json.loads(tool("build", "--scene", source, "--out", tmp_path / "cut", "--explain"))
+    (built,) = why["models"][0]["forms"]
+    assert built["after"]["table_floats"] < built["before"]["table_floats"]
+    assert "never seen" in " ".join(why["models"][0]["left_out"])
+    alone = tmp_path / "materials.json"
+    alone.write_text(json.dumps({"materials": content["materials"]}))
+    why = json.loads(tool("build", "--materials", alone, "--out", tmp_path / "whole", "--explain"))
+    assert "never seen" not in " ".join(why["models"][0]["left_out"])
+
+    tool("scene", source, "--out", tmp_path / "scene")
+    jobs = [
+        {"out": str(tmp_path / f"{pack}.exr"), "pack": str(tmp_path / pack / "brdfc_shaders")}
+        for pack in ("cut", "whole")
+    ]
+    done = render(extension_zip, tmp_path / "scene" / "scene.json", *jobs)
+    assert done.returncode == 0, done.stderr
+    cut, whole = (read_picture(Path(job["out"]))[..., :3] for job in jobs)
+    assert whole.mean() > 0.05 and whole.std() > 0.05
+    # What is drawn may fall on the other side of an edge in a few pixels.
+    off = np.abs(cut - whole).max(-1) / (1e-3 + whole.max(-1))
+    assert np.quantile(off, 0.98) < 1e-4, np.quantile(off, [0.5, 0.9, 0.98, 1])
+    assert cut.mean() == pytest.approx(whole.mean(), rel=1e-3)
+
+
 def test_a_pack_that_is_none(empty, extension_zip, tool, tmp_path):
     tool("scene", ROOT / "scenes" / "ra-vanish.json", "--out", tmp_path)
     out = tmp_path / "a.exr"

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How obliquely something is seen.
+#pragma once
+
+#include <algorithm>
+
+namespace brdfc {
+
+/// Cosines of the angles between shading normal and viewer; of all views unless told otherwise.
+struct Cosines {
+  double low = 0, high = 1;
+
+  bool all() const { return low <= 0 && high >= 1; }
+  bool has(const Cosines& c) const { return low <= c.low && high >= c.high; }
+  void add(const Cosines& c) {
+    low = std::min(low, c.low);
+    high = std::max(high, c.high);
+  }
+};
+
+}  // namespace brdfc
