@@ -49,15 +49,27 @@ def _combination(table, schema, values):
     return index
 
 
+def views(model_name):
+    """Cosines between which the tables are: of a pack cut to a scene those that occur there."""
+    return tuple(pack.model(model_name).get("view_cosines", (0, 1)))
+
+
 def albedo(model_name, values, cos_theta_o):
     """Directional albedo (r, g, b) for a view cosine in (0, 1], mirror term included.
 
     `values` has the model's parameters in the form of pack.check_value; what is missing takes its
-    default. Raises ValueError for an unknown model, and for one without a table.
+    default. Raises ValueError for an unknown model, for one without a table, and for a view that
+    the table was cut of.
     """
     table, schema = pack.model(model_name).get("albedo"), pack.parameters(model_name)
     if table is None:
         raise ValueError(f"{model_name}: its albedo is not tabulated")
+    low, high = views(model_name)
+    if not low <= cos_theta_o <= high:
+        raise ValueError(
+            f"cos_theta_o: this pack was built for one scene, where {model_name} is seen at "
+            f"{low:.3g} to {high:.3g}; got {cos_theta_o:.3g}"
+        )
     complete = {name: p["default"] for name, p in schema.items()} | values
     coordinates = complete | {"cos_theta_o": cos_theta_o}
     total = [0.0, 0.0, 0.0]

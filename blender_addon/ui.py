@@ -81,7 +81,8 @@ ANGLES = (0, 45, 75, 85)
 
 
 def energy_text(node):
-    """Directional albedo for the current values at a few view angles, or why there is none."""
+    """Directional albedo for the current values at a few view angles that occur, or why there is
+    none."""
     model_name, _ = nodes.identity(node)
     values = {}
     for name, parameter in pack.parameters(model_name).items():
@@ -89,12 +90,16 @@ def energy_text(node):
         if value is None:
             return f"depends on what is linked to {parameter['label']}"
         values[name] = value
+    low, high = energy.views(model_name)
     numbers = []
     for angle in ANGLES:
-        rgb = energy.albedo(model_name, values, math.cos(math.radians(angle)))
+        cosine = math.cos(math.radians(angle))
+        if not low <= cosine <= high:
+            continue
+        rgb = energy.albedo(model_name, values, cosine)
         luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
         numbers.append(f"{angle}\u00b0 {luminance:.3f}")
-    return "   ".join(numbers)
+    return "   ".join(numbers) or "not at a view angle of this scene"
 
 
 def _draw_form(layout, node, form, editable):

@@ -234,7 +234,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
     const Shader whole = write_shader(m, kind, table, values), cut = write_shader(m, kind, table, values, 1, kSome);
     EXPECT_LT(cut.source.size(), whole.source.size());
-    EXPECT_LE(cut.operations, whole.operations + 2);
+    EXPECT_EQ(cut.operations, whole.operations);
   }
 }
 

@@ -152,11 +152,13 @@ MatrixXd dictionary(const std::vector<Placed>& lobes, const std::vector<Facet>& 
 
 /// Of the last view, as view() and place() measure heights.
 double last_place() { return std::sqrt(2 * kInvPi * std::asin(kLastCosine)); }
-/// How far along its axis of the tables a view is: knots crowd towards the horizon, where lobes change most.
-template <class T> T place(const Vec3<T>& wo) {
+/// How far along its axis of the tables, or along a `part` of it from `first` on, a view is: knots crowd towards the
+/// horizon, where lobes change most.
+template <class T> T place(const Vec3<T>& wo, double first = 0, double part = 1) {
   // The angle above the surface, from its half, keeps its digits at the horizon.
   const T height = named("height_o", T(2) * atan(wo.z / (T(1) + sqrt(sin2_theta(wo)))));
-  return (T(1) - sqrt(maximum(height, T(0)) * T(2 * kInvPi))) / T(1 - last_place());
+  const double whole = 1 - last_place();
+  return (T(1 - whole * first) - sqrt(maximum(height, T(0)) * T(2 * kInvPi))) / T(whole * part);
 }
 /// The view at which place() is x.
 Vec3<double> view(double x) {
@@ -800,11 +802,11 @@ std::vector<std::shared_ptr<const Table>> Fit::tables() const {
 Fit Fit::seen(const Cosines& views) const {
   const auto knot = [](double cosine) { return brdfc::place(direction(cosine, 0)) * (kViews - 1); };
   Fit out = *this;
-  out.first_view_ = std::min(int(std::floor(knot(views.high))), kViews - 2);
-  out.last_view_ = std::clamp(int(std::ceil(knot(views.low))), out.first_view_ + 1, kViews - 1);
-  const auto cut = [&](std::shared_ptr<const Table>& table) {
-    table = part(*table, axis_ ? 1 : 0, out.first_view_, out.last_view_);
-  };
+  const int first = std::min(int(std::floor(knot(views.high))), kViews - 2),
+            last = std::clamp(int(std::ceil(knot(views.low))), first + 1, kViews - 1);
+  out.first_view_ = double(first) / (kViews - 1);
+  out.views_ = double(last - first) / (kViews - 1);
+  const auto cut = [&](std::shared_ptr<const Table>& table) { table = part(*table, axis_ ? 1 : 0, first, last); };
   for (auto& table : out.amplitude_) cut(table);
   for (Lobe& l : out.lobes_) cut(l.offset), cut(l.exponent);
   for (Linear& l : out.linear_) {
@@ -812,7 +814,7 @@ Fit Fit::seen(const Cosines& views) const {
     for (auto& term : l.colour)
       for (auto& channel : term) cut(channel);
   }
-  // As many that at least one is left.
+  // At least one is left.
   const double apart = errors_[0].cos_theta_o - errors_[1].cos_theta_o;
   std::erase_if(out.errors_, [&](const ViewError& e) {
     return e.cos_theta_o < views.low - apart || e.cos_theta_o > views.high + apart;
@@ -991,9 +993,7 @@ double Fit::l1_at(const View& view, double number) const {
 template <class T> std::vector<T> Fit::place(const Vec3<T>& wo, const T& number) const {
   std::vector<T> at;
   if (axis_) at.push_back(named("place_on_axis", lookup(position_, std::vector<T>{axis_->place(number)})));
-  const T x = brdfc::place(wo);
-  const double knots = last_view_ - first_view_;
-  at.push_back(named("place", knots < 0 ? x : x * T((kViews - 1) / knots) - T(first_view_ / knots)));
+  at.push_back(named("place", brdfc::place(wo, first_view_, views_)));
   return at;
 }
 

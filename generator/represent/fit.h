@@ -158,7 +158,7 @@ class Fit {
   std::optional<FitAxis> axis_;
   Terms terms_;
   std::vector<double> knots_;
-  int first_view_ = 0, last_view_ = -1;    ///< knots that tables over the view have, if not all
+  double first_view_ = 0, views_ = 1;      ///< where on their axis tables over the view begin, and how much they have
   int family_ = 0;                         ///< which closures
   bool grey_ = false;                      ///< whether one channel serves all, with a tint
   double scale_ = 1;                       ///< of all closures along an axis, whose fit is made without factors

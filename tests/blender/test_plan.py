@@ -92,7 +92,9 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
 
 
 @pytest.mark.parametrize("form", ["sampled", "fitted", "controlled"])
-def test_tables_of_the_views_that_occur_show_the_same(empty, extension_zip, tool, tmp_path, form):
+def test_tables_of_the_views_that_occur_show_the_same(
+    extension, empty, extension_zip, tool, tmp_path, form
+):
     """A tilted disk: with camera rays alone the pack has a part of the tables over the view."""
     content = {
         "name": "disk",
@@ -128,6 +130,14 @@ def test_tables_of_the_views_that_occur_show_the_same(empty, extension_zip, tool
     alone.write_text(json.dumps({"materials": content["materials"]}))
     why = json.loads(tool("build", "--materials", alone, "--out", tmp_path / "whole", "--explain"))
     assert "never seen" not in " ".join(why["models"][0]["left_out"])
+
+    extension.pack.use(tmp_path / "cut" / "brdfc_shaders")
+    try:
+        assert extension.api.albedo("phong", 0.53)[0] > 0
+        with pytest.raises(ValueError, match="built for one scene, where phong is seen at 0.43"):
+            extension.api.albedo("phong", 1)
+    finally:
+        extension.pack.use()
 
     tool("scene", source, "--out", tmp_path / "scene")
     jobs = [
