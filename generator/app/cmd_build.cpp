@@ -207,9 +207,9 @@ void add_build_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* c = app.add_subcommand("build", "Write the Blender extension");
   c->add_flag("--all", options->all, "Every model");
-  c->add_option(
-      "--scene", options->scene,
-      "Only what the materials of a scene file need: models, forms, lobes, and parameters that are not constant");
+  c->add_option("--scene", options->scene,
+                "Only what the materials of a scene file need: models, forms, lobes, parameters that are not constant, "
+                "view angles");
   c->add_option("--materials", options->materials,
                 "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses");
   c->add_flag("--explain", options->json,

@@ -136,6 +136,8 @@ def test_tables_of_the_views_that_occur_show_the_same(
         assert extension.api.albedo("phong", 0.53)[0] > 0
         with pytest.raises(ValueError, match="built for one scene, where phong is seen at 0.43"):
             extension.api.albedo("phong", 1)
+        (node,) = extension.nodes.group_nodes(extension.api.new_material("phong", form))
+        assert extension.ui.energy_text(node) == "not at a view angle of this scene"
     finally:
         extension.pack.use()
 
