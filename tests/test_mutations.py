@@ -96,7 +96,11 @@ def run_in_blender(zip_file, tests):
     expression = " or ".join(f"({t})" for t in tests)
     command = [BLENDER_PYTHON, "-m", "pytest", "-q", "--show-capture=no", f"--junitxml={report}"]
     command += ["tests/blender/test_physics.py", "-k", expression]
-    environment = os.environ | {"BRDFC_TOOL": str(TOOL), "BRDFC_EXTENSION_ZIP": str(zip_file)}
+    environment = os.environ | {
+        "BRDFC_TOOL": str(TOOL),
+        "BRDFC_EXTENSION_ZIP": str(zip_file),
+        "BRDFC_ANSWERS": str(zip_file.parents[1] / "answers"),
+    }
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert report.exists(), f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     outcomes = {}

@@ -6,18 +6,17 @@ BRDFC_ANSWERS, if it is set, names a folder in which what the tool made is kept:
 versions of Blender ask it the same questions.
 """
 
-import contextlib
-import fcntl
-import hashlib
 import json
 import os
-import subprocess
+import shlex
+import sys
 import tempfile
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from answers import Answers
 
 # Blender reads this when bpy is first imported.
 _RESOURCES = tempfile.TemporaryDirectory(prefix="brdfc-test-")
@@ -41,28 +40,6 @@ def extension_zip():
     return _path_from_environment("BRDFC_EXTENSION_ZIP", "brdfc_shaders-<version>.zip")
 
 
-#: Commands that write nothing but their output.
-PRINTING = {"albedo", "closure", "eval", "fit", "list", "probe", "sample"}
-
-
-class Answers:
-    """Files that were made once, by what they were made of."""
-
-    def __init__(self, folder, program):
-        self.folder = Path(folder)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self.program = hashlib.sha256(program.read_bytes()).hexdigest()
-
-    @contextlib.contextmanager
-    def of(self, *question):
-        """The path of the answer; while this is held nobody else makes it."""
-        text = json.dumps([self.program, *question])
-        path = self.folder / hashlib.sha256(text.encode()).hexdigest()
-        with path.with_suffix(".lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield path
-
-
 @pytest.fixture(scope="session")
 def program():
     return _path_from_environment("BRDFC_TOOL", "the built brdfc")
@@ -75,43 +52,36 @@ def answers(program, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def tool(program, answers):
+def tool(answers):
     """Runs the generator's tool: tool("albedo", "lambert", stdin=...) returns stdout."""
 
     def run(*arguments, stdin=""):
-        arguments = [str(a) for a in arguments]
-        if arguments[0] not in PRINTING:
-            return ask(arguments, stdin)
-        with answers.of(arguments, stdin) as path:
-            if not path.exists():
-                answer = ask(arguments, stdin)
-                beside = path.with_suffix(".part")
-                beside.write_text(answer)
-                beside.replace(path)
-            return path.read_text()
-
-    def ask(arguments, stdin):
-        done = subprocess.run([program, *arguments], input=stdin, capture_output=True, text=True)
-        assert done.returncode == 0, f"{arguments}: {done.stderr}"
-        return done.stdout
+        return answers.ask([str(a) for a in arguments], stdin)
 
     return run
 
 
 @pytest.fixture(scope="session")
-def lean_pack(tool, answers):
+def kept_program(program, answers, tmp_path_factory):
+    """A program that answers as the tool, which runs once a question."""
+    path = tmp_path_factory.mktemp("program") / "brdfc"
+    command = [sys.executable, Path(__file__).with_name("answers.py"), answers.folder, program]
+    path.write_text(f'#!/bin/sh\nexec {shlex.join(map(str, command))} "$@"\n')
+    path.chmod(0o755)
+    return path
+
+
+@pytest.fixture(scope="session")
+def lean_pack(answers, tmp_path_factory):
     """lean_pack(materials, *options): the folder of a pack of these alone, as `brdfc build
     --materials` makes it. To be read only."""
 
     def make(materials, *options):
-        with answers.of("pack", materials, options) as path:
-            done = path / "brdfc_shaders"
-            if not done.exists():
-                path.mkdir(exist_ok=True)
-                file = path / "materials.json"
-                file.write_text(json.dumps({"materials": materials}))
-                tool("build", "--materials", file, *options, "--out", path)
-            return done
+        folder = tmp_path_factory.mktemp("pack")
+        file = folder / "materials.json"
+        file.write_text(json.dumps({"materials": materials}))
+        built = answers.built(["build", "--materials", str(file), *options, "--out", str(folder)])
+        return built / "out" / "brdfc_shaders"
 
     return make
 

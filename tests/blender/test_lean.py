@@ -9,9 +9,9 @@ from helpers import Layout, counts
 
 
 @pytest.fixture
-def used(extension, empty, program, monkeypatch):
+def used(extension, empty, kept_program, monkeypatch):
     """Materials of three models, one with a link; by model."""
-    monkeypatch.setenv("BRDFC_TOOL", str(program))
+    monkeypatch.setenv("BRDFC_TOOL", str(kept_program))
     api = extension.api
     made = {
         "radziszewski_alda": api.new_material("radziszewski_alda", n=7.0, tint=(0.9, 0.5, 0.25)),
@@ -121,10 +121,10 @@ def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
     api.set_parameters(material, r0=0.2)
 
 
-def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, program):
+def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, kept_program):
     api, nodes = extension.api, extension.nodes
     preferences = bpy.context.preferences.addons[extension.package].preferences
-    preferences.program = str(program)
+    preferences.program = str(kept_program)
     try:
         material = api.new_material("phong", e=40.0)
         assert bpy.ops.brdfc.bake(error=5) == {"FINISHED"}

@@ -19,6 +19,13 @@ SEEDS = 4
 SCENES = ["gl-fig8-radziszewski_alda", pytest.param("small-lamp", marks=pytest.mark.full)]
 
 
+def small(name):
+    """That scene as a small picture of few samples."""
+    content = json.loads((ROOT / "scenes" / f"{name}.json").read_text())
+    content["settings"] |= {"width": 48, "height": 48, "spp": 16}
+    return content
+
+
 def shaders_and_tables(extension_zip):
     """Bytes, uncompressed; the manifest holds the tables that the panel reads."""
     with zipfile.ZipFile(extension_zip) as archive:
@@ -42,8 +49,7 @@ def render(extension_zip, scene, *pictures):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_path, name):
-    content = json.loads((ROOT / "scenes" / f"{name}.json").read_text())
-    content["settings"] |= {"width": 48, "height": 48, "spp": 16}
+    content = small(name)
     source = tmp_path / f"{name}.json"
     source.write_text(json.dumps(content))
     why = json.loads(tool("build", "--scene", source, "--out", tmp_path / "cut", "--explain"))
@@ -168,7 +174,7 @@ def test_a_pack_that_is_none(empty, extension_zip, tool, tmp_path):
 
 def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):
     source = tmp_path / "s.json"
-    content = json.loads((ROOT / "scenes" / "gl-fig8-radziszewski_alda.json").read_text())
+    content = small("gl-fig8-radziszewski_alda")
     source.write_text(json.dumps(content))
     tool("build", "--scene", source, "--out", tmp_path / "cut", "--explain")
     cut = next((tmp_path / "cut").glob("*.zip"))
