@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import helpers
@@ -49,16 +50,42 @@ def test_zip_holds_no_binary(extension_zip):
     assert suffixes <= {".py", ".toml", ".json", ".osl", ".exr"}
 
 
-def test_every_form_compiles_and_renders(extension, empty, subtests):
-    # One file for all: it also shows that groups live beside each other.
-    pairs = forms(extension)
-    assert len(pairs) >= 4
-    for model, representation in pairs:
-        with subtests.test(model=model, representation=representation):
-            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-            scene = bpy.context.scene
+@pytest.fixture(scope="module")
+def every_form(extension, tmp_path_factory):
+    """One file for all, which also shows that groups live beside each other: a sphere of each form
+    in a row, pixels a sphere. What making a material raised stands in its place."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    extension.api.enable_osl(scene)
+    pairs, made, pixels = forms(extension), {}, 16
+    for x, (model, representation) in enumerate(pairs):
+        try:
             material = extension.api.new_material(model, representation)
-            node = extension.nodes.group_nodes(material)[0]
+        except Exception as error:  # it belongs to this form alone
+            made[model, representation] = error
+            continue
+        made[model, representation] = material.name
+        helpers.add_sphere(scene, material).location.x = 2.1 * x
+    width = 2.1 * len(pairs)
+    helpers.add_camera(scene, location=(width / 2 - 1, -8, 0), orthographic=width)
+    helpers.add_world(scene)
+    scene.render.resolution_x, scene.render.resolution_y = pixels * len(pairs), pixels
+    scene.cycles.samples = 16
+    picture = helpers.render(scene)
+    blend = tmp_path_factory.mktemp("saved") / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    return SimpleNamespace(made=made, pixels=pixels, picture=picture, blend=blend)
+
+
+def test_every_form_compiles_and_renders(extension, every_form, subtests):
+    assert len(every_form.made) >= 4
+    bpy.ops.wm.open_mainfile(filepath=str(every_form.blend))
+    for x, ((model, representation), made) in enumerate(every_form.made.items()):
+        with subtests.test(model=model, representation=representation):
+            if isinstance(made, Exception):
+                raise made
+            node = extension.nodes.group_nodes(bpy.data.materials[made])[0]
             assert extension.nodes.identity(node) == (model, representation)
             script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
             found = {s.identifier: s.type for s in script.inputs}
@@ -69,9 +96,7 @@ def test_every_form_compiles_and_renders(extension, empty, subtests):
             for name in expected:
                 assert next(s for s in script.inputs if s.identifier == name).is_linked
 
-            extension.api.enable_osl(scene)
-            helpers.sphere_scene(scene, material)
-            picture = helpers.render(scene)
+            picture = every_form.picture[:, x * every_form.pixels :][:, : every_form.pixels]
             assert np.isfinite(picture).all()
             centre = picture[6:10, 6:10, :3]
             assert centre.min() > 0.01
@@ -81,29 +106,36 @@ def test_every_form_compiles_and_renders(extension, empty, subtests):
 def test_every_choice_reaches_the_shader(extension, empty, subtests):
     """Each choice of a parameter gives the picture of its own index: the script node's own input
     set by hand must render the same as the group's socket."""
-    scene = empty
-    extension.api.enable_osl(scene)
     tested = 0
     for model, representation in forms(extension):
-        for parameter in extension.pack.socket_parameters(model, representation).values():
-            if parameter["kind"] != "choice":
-                continue
+        sockets = extension.pack.socket_parameters(model, representation).values()
+        choices = [p for p in sockets if p["kind"] == "choice"]
+        if not choices:
+            continue
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.api.enable_osl(scene)
+        # One material for all: compiling its shader takes longer than rendering.
+        material = extension.api.new_material(model, representation)
+        helpers.sphere_scene(scene, material, size=8, samples=4)
+        tree = extension.nodes.group_nodes(material)[0].node_tree
+        script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
+        for parameter in choices:
+            name = parameter["name"]
+            by_socket = []
+            for choice in parameter["choices"]:
+                extension.api.set_parameters(material, **{name: choice})
+                by_socket.append(helpers.render(scene))
+            extension.api.set_parameters(material, **{name: parameter["default"]})
+            socket = next(s for s in script.inputs if s.identifier == name)
+            source = socket.links[0].from_socket
+            tree.links.remove(socket.links[0])
             for index, choice in enumerate(parameter["choices"]):
                 with subtests.test(model=model, representation=representation, choice=choice):
-                    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-                    scene = bpy.context.scene
-                    extension.api.enable_osl(scene)
-                    name = parameter["name"]
-                    material = extension.api.new_material(model, representation, **{name: choice})
-                    helpers.sphere_scene(scene, material, size=8, samples=4)
-                    by_socket = helpers.render(scene)
-                    tree = extension.nodes.group_nodes(material)[0].node_tree
-                    script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
-                    socket = next(s for s in script.inputs if s.identifier == name)
-                    tree.links.remove(socket.links[0])
                     socket.default_value = index
-                    assert np.array_equal(helpers.render(scene), by_socket)
+                    assert np.array_equal(helpers.render(scene), by_socket[index])
                     tested += 1
+            tree.links.new(source, socket)
     assert tested
 
 
@@ -554,25 +586,12 @@ bpy.ops.render.render(write_still=True)
 """
 
 
-def test_saved_file_renders_without_the_extension(extension, empty, tmp_path):
-    scene = empty
-    extension.api.enable_osl(scene)
-    for x, (model, representation) in enumerate(forms(extension)):
-        ball = helpers.add_sphere(scene, extension.api.new_material(model, representation))
-        ball.location.x = 2.1 * x
-    width = 2.1 * len(forms(extension))
-    helpers.add_camera(scene, location=(width / 2 - 1, -8, 0), orthographic=width)
-    helpers.add_world(scene)
-    scene.render.resolution_x, scene.render.resolution_y = 16 * len(forms(extension)), 16
-    scene.cycles.samples = 8
-    expected = helpers.render(scene)
+def test_saved_file_renders_without_the_extension(every_form, tmp_path):
+    expected, picture = every_form.picture, tmp_path / "picture.exr"
     assert (expected[6:10, :, :3].max(axis=(0, 2)) > 0.01).all()
-
-    blend, picture = tmp_path / "saved.blend", tmp_path / "picture.exr"
-    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "nothing")}
     done = subprocess.run(
-        [sys.executable, "-c", FACTORY_RENDER, blend, picture],
+        [sys.executable, "-c", FACTORY_RENDER, every_form.blend, picture],
         env=environment,
         capture_output=True,
         text=True,
@@ -589,8 +608,6 @@ def draw_functions(menu):
 
 
 def test_add_menu_lists_every_model(extension, empty):
-    from types import SimpleNamespace
-
     assert draw_functions("NODE_MT_category_shader_shader").count("draw_add_menu") == 1
     layout = helpers.Layout()
     extension.ui.draw_add_menu(SimpleNamespace(layout=layout), bpy.context)
