@@ -809,6 +809,7 @@ Fit Fit::seen(const Cosines& views) const {
   const auto cut = [&](std::shared_ptr<const Table>& table) { table = part(*table, axis_ ? 1 : 0, first, last); };
   for (auto& table : out.amplitude_) cut(table);
   for (Lobe& l : out.lobes_) cut(l.offset), cut(l.exponent);
+  for (Facets& f : out.facets_) cut(f.offset), cut(f.log_alpha);
   for (Linear& l : out.linear_) {
     for (auto& table : l.weight) cut(table);
     for (auto& term : l.colour)
@@ -847,7 +848,8 @@ double Fit::mean_l1(const std::optional<double>& number) const {
 
 Fit Fit::knot(const Model& model, const ParamValues& values, double place) const {
   Knots at(model, values, axis_, terms_, grey_);
-  if (!at.see({place}) || !at.find_shapes()) throw std::logic_error(model.info().name + ": a fit of another tint");
+  if (!at.see({place}) || (Family(family_) == Family::Microfacet && !at.find_shapes()))
+    throw std::logic_error(model.info().name + ": a fit of another tint");
   const Fitted cell = std::move(at.fitted({place}, 1, Family(family_)).front());
   Fit out;
   out.axis_ = axis_;
