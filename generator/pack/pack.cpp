@@ -96,7 +96,7 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   // Measured in Cycles (script/conditions): bump-map correction turns closures where a normal is bent; a clamp on
   // indirect light or a lamp of no size meets a sampled lobe differently from Blender's own closures, and its lobes'
   // normals are not the surface's; a clamp darkens lights in a mirror and, if it is low, highlights; Filter Glossy
-  // blurs a mirror.
+  // blurs mirrors and facets.
   std::vector<std::string> codes = {"bump_correction"};
   if (kind == RepresentationKind::Twin) return codes;
   if (kind == RepresentationKind::Controlled)
@@ -109,7 +109,7 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
     codes.push_back("clamp_low");
   // Cycles drops glossy closures behind a diffuse surface; ramps it does not.
   if (shader.facets) codes.push_back("caustics");
-  if (mirror) codes.push_back("filter_glossy");
+  if (mirror || shader.facets) codes.push_back("filter_glossy");
   if (mirror && kind == RepresentationKind::Sampled) codes.push_back("albedo_passes_mirror");
   // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
   // do not see.
