@@ -173,6 +173,8 @@ TEST_F(SceneTest, RefusesBrokenJson) {
   EXPECT_THAT(error_of(write(R"({"name": 1e999})")), AllOf(HasSubstr("not valid JSON"), HasSubstr("1e999")));
   EXPECT_THAT(error_of(write(R"({"name": "a", "camera": {"type": 1, "type": 2}})")),
               HasSubstr("key \"type\" is given twice"));
+  EXPECT_THAT(error_of(write(R"({"na\nme": "a", "na\nme": "a"})")), HasSubstr(R"(key "na\nme" is given twice)"));
+  EXPECT_THAT(error_of(write(R"({"na\nme": "a"})")), HasSubstr(R"(na\nme: unknown key)"));
   EXPECT_THAT(error_of(write(std::string(100000, '['))), HasSubstr("nested deeper than 32 levels"));
   EXPECT_THAT(error_of(write(R"({"a":)" + std::string(40, '[') + std::string(40, ']') + "}")),
               HasSubstr("nested deeper than 32 levels"));

@@ -23,6 +23,12 @@ std::string plain_message(const std::string& what) {
   return text;
 }
 
+/// A key as a file would have it, in one line, without the quotes about it.
+std::string shown(const std::string& key) {
+  const std::string quoted = nlohmann::json(key).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return quoted.substr(1, quoted.size() - 2);
+}
+
 }  // namespace
 
 nlohmann::json read_json(const std::filesystem::path& path) {
@@ -42,7 +48,7 @@ nlohmann::json read_json(const std::filesystem::path& path) {
     if (event == Event::object_start) keys.emplace_back();
     if (event == Event::object_end) keys.pop_back();
     if (event == Event::key && !keys.back().insert(value.get<std::string>()).second)
-      input_error("{}: key \"{}\" is given twice in one object", name, value.get<std::string>());
+      input_error("{}: key \"{}\" is given twice in one object", name, shown(value.get<std::string>()));
     return true;
   };
   try {
@@ -53,7 +59,7 @@ nlohmann::json read_json(const std::filesystem::path& path) {
 }
 
 void JsonView::error(const std::string& message) const {
-  throw InputError(file_ + ": " + (key_.empty() ? "" : key_ + ": ") + message);
+  throw InputError(file_ + ": " + (key_.empty() ? "" : shown(key_) + ": ") + message);
 }
 
 void JsonView::fail(const std::string& expected) const {
