@@ -95,18 +95,21 @@ Json values_json(const ParamValues& values) {
 std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Shader& shader) {
   // Measured in Cycles (script/conditions): bump-map correction turns closures where a normal is bent; a clamp on
   // indirect light or a lamp of no size meets a sampled lobe differently from Blender's own closures, and its lobes'
-  // normals are not the surface's; a clamp darkens lights in a mirror and, if it is low, highlights; Filter Glossy
-  // blurs mirrors and facets.
+  // normals are not the surface's; a clamp darkens lights in a mirror and, by how bright they are, highlights; Filter
+  // Glossy blurs mirrors and facets.
   std::vector<std::string> codes = {"bump_correction"};
-  if (kind == RepresentationKind::Twin) return codes;
+  if (kind == RepresentationKind::Twin) {
+    // Blender's own nodes: a matte one, glossy ones whose facets lean, and a mirror.
+    codes.insert(codes.end(), {"leaning_facets", "caustics", "filter_glossy"});
+    if (mirror) codes.push_back("clamp_mirror");
+    return codes;
+  }
   if (kind == RepresentationKind::Controlled)
     codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "zero_size_lights_fit", "orthographic_far"});
   else if (kind == RepresentationKind::Sampled)
     codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
   else if (mirror)
     codes.push_back("clamp_mirror");
-  else if (shader.slots > shader.closures)
-    codes.push_back("clamp_low");
   // Cycles drops glossy closures behind a diffuse surface; ramps it does not.
   if (shader.facets) codes.push_back("caustics");
   if (mirror || shader.facets) codes.push_back("filter_glossy");
@@ -115,6 +118,14 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   // do not see.
   if (kind == RepresentationKind::Exact && shader.slots > shader.closures) codes.push_back("albedo_passes");
   return codes;
+}
+
+/// Whether a clamp shows in a form by how bright its highlight is: in closures that are glossy, of which no mirror
+/// shows it before.
+bool has_highlight(RepresentationKind kind, bool mirror, const Shader& shader) {
+  const bool ramps = shader.slots > shader.closures;
+  return !mirror && (kind == RepresentationKind::Twin ||
+                     ((kind == RepresentationKind::Exact || kind == RepresentationKind::Fitted) && ramps));
 }
 
 Json table_json(const AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
@@ -246,6 +257,37 @@ Json axis_json(const Fit* fit) {
   return {{"name", fit->axis()->parameter}, {"min", fit->axis()->low}, {"max", fit->axis()->high}};
 }
 
+/// How bright a form's highlight is: f cos about the mirror direction, the brighter of two views; and over which number
+/// of its sliders, if any. A clamp on indirect light shows the earlier the brighter it is.
+Json highlight_json(const Model& model, const ParamValues& fixed) {
+  constexpr int kValues = 9;
+  const ModelInfo& info = model.info();
+  std::vector<const ParamInfo*> numbers;
+  const std::set<std::string> scales = factors(model, fixed);
+  for (const ParamInfo& p : info.params)
+    if (p.kind == ParamKind::Number && !fixed.count(p.name) && !scales.count(p.name)) numbers.push_back(&p);
+  const auto declared =
+      std::ranges::find(numbers, info.properties.fit_axis, [](const ParamInfo* p) { return p->name; });
+  const ParamInfo* over = declared != numbers.end() ? *declared : numbers.size() == 1 ? numbers[0] : nullptr;
+  Json values = Json::array(), bright = Json::array();
+  for (int i = 0; i < (over ? kValues : 1); ++i) {
+    ParamValues at = fixed;
+    if (over) {
+      const double number = fit_axis(*over).at(double(i) / (kValues - 1));
+      at[over->name] = number;
+      values.push_back(number);
+    }
+    const BoundModel bound = bind_model(model, at);
+    double most = 0;
+    for (const Vec3<double>& wo : {Vec3<double>{0, 0, 1}, Vec3<double>{std::sqrt(0.5), 0, std::sqrt(0.5)}}) {
+      const Rgb<double> f = bound.brdf->eval({-wo.x, -wo.y, wo.z}, wo);
+      most = std::max(most, std::max({f.r, f.g, f.b}) * wo.z);
+    }
+    bright.push_back(most);
+  }
+  return {{"name", over ? Json(over->name) : Json()}, {"values", values}, {"f_cos", bright}};
+}
+
 /// What a form of a plan has no parameters for.
 ParamValues fixed_in(const PlannedModel& plan, RepresentationKind kind) {
   ParamValues fixed = plan.fixed;
@@ -324,6 +366,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
         {"axis", axis_json(fit)},
+        {"highlight", has_highlight(kind, model.has_mirror(), shader) ? highlight_json(model, fixed) : Json()},
         {"sha256", sha256(shader.source)}};
   }
   if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);

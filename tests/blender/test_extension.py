@@ -511,6 +511,19 @@ def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
         assert codes(extension, highlight, empty) == in_highlight
 
 
+def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
+    """The narrower it is the brighter, in a fit along its slider and in an exact form."""
+    for model, form in (("max_phong", "fitted"), ("modified_phong", "exact")):
+        material = clean(extension, empty, model, form)
+        empty.cycles.sample_clamp_indirect = 10
+        extension.api.set_parameters(material, e=10.0)
+        assert codes(extension, material, empty) == []
+        extension.api.set_parameters(material, e=500.0)
+        assert codes(extension, material, empty) == ["clamp_low"]
+        empty.cycles.sample_clamp_indirect = 0
+        assert codes(extension, material, empty) == []
+
+
 def test_warning_normal_pass(extension, empty):
     """A drawn lobe has a normal of its own, and the denoiser sees it."""
     material = clean(extension, empty, *sampled_forms(extension)[0])

@@ -5,7 +5,6 @@ and stand where the shader does."""
 import math
 
 import bpy
-import furnace
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
@@ -67,16 +66,6 @@ def test_a_sun_on_a_twin(lean, tool):
         assert off <= 1e-3 * largest, name
 
 
-@pytest.mark.full
-def test_a_white_world_on_a_twin(lean, tool):
-    """The furnace gives the model's albedo, off by what is stated and by noise."""
-    scene, made = start(lean)
-    cosines = (0.2, 0.6, 1.0)
-    furnace.check(
-        tool, scene, made, MATERIALS, cosines, "--twin", replicas=40, samples=128, slack=2e-3
-    )
-
-
 def test_a_twin_stands_beside_its_model(lean, empty):
     """The shader is for Cycles, the twin for EEVEE; that OSL is off concerns the shader alone."""
     api = lean.api
@@ -102,6 +91,14 @@ def test_a_twin_stands_beside_its_model(lean, empty):
     assert "osl_off" not in {f.code for f in api.warnings(material, empty)}
     api.switch_representation(material, "sampled")
     assert lean.nodes.identity(shown["CYCLES"])[1] == "sampled"
+
+
+def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
+    material = lean.api.new_material("phong", "twin")
+    found = {f.code for f in lean.api.warnings(material, empty)}
+    assert ("leaning_facets" in found) == (bpy.app.version < (5, 0, 0))
+    empty.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    assert "leaning_facets" not in {f.code for f in lean.api.warnings(material, empty)}
 
 
 def test_no_twin_in_the_whole_extension(extension, empty):
