@@ -14,15 +14,17 @@ Made by `script/conditions`. Each row changes one thing in a clean scene, a grid
 sun and a bright sky, so that light bounces; a cell is what that does to the mean radiance of a
 form, with its standard error. Bold is what exceeds 2 % and 5 standard errors; there the panel warns
 if that is said. Forms stand for all of their kind: closures with a mirror, alone, with a ramp;
-drawn directions with a mirror, of an anisotropic model, alone. `coupled` has r0 = 0.5, the others
-their defaults. Blender's own Diffuse and Glossy nodes are there to compare with.
+drawn directions with a mirror, of an anisotropic model, alone; fits with facets, of lobes alone.
+`coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and Glossy nodes are there
+to compare with. `tests/blender/test_every_fit.py` holds fitted and controlled forms and twins of
+every model to the same.
 
 Of the tilted normals (by the mesh's own, by the Normal input, by that with Bump Map Correction on)
 the worst of three views is shown, against the model's own rays without those that end below the
 surface. Passes: mean difference from the model's albedo, median angle from the true normal,
-largest difference of picture and light group. "sun without size" compares the median cells, since
-drawn directions meet that lamp as rare, bright dots; it leaves out exact forms with a mirror, which
-by its nature does not show it.
+largest difference of picture and light group. "sun without size" compares the median cells of
+drawn directions, which meet that lamp as rare, bright dots, and other forms with a sun 0.02 wide;
+it leaves out exact forms with a mirror, which by its nature does not show it.
 """
 
 

@@ -63,6 +63,10 @@ def representatives(extension, listed):
     def has_ramp(entry):
         return entry["representations"]["exact"]["slots"] > 1
 
+    def of_facets(entry):
+        warnings = entry["representations"]["fitted"]["warnings"]
+        return any(code.startswith("filter_glossy") for code in warnings)
+
     def pick(name, form, key):
         fitting = [
             m
@@ -78,6 +82,8 @@ def representatives(extension, listed):
     pick("closures with a ramp", "exact", lambda m, e: not m["mirror"] and has_ramp(e))
     pick("drawn, with a mirror", "sampled", lambda m, e: m["mirror"])
     pick("drawn, anisotropic", "sampled", lambda m, e: not e["isotropic"])
+    pick("fitted, with facets", "fitted", lambda m, e: of_facets(e))
+    pick("fitted, of lobes", "fitted", lambda m, e: not of_facets(e))
     pick(
         "drawn alone",
         "sampled",
@@ -274,6 +280,10 @@ def _displaced(grooves):
             material.displacement_method = "DISPLACEMENT"
 
 
+#: Small, but met by what is drawn.
+SMALL_SUN = 0.02
+
+
 def _no_size(grooves):
     grooves.sun.data.angle = 0.0
 
@@ -281,8 +291,10 @@ def _no_size(grooves):
 @dataclasses.dataclass(frozen=True)
 class Condition:
     """`change` alters clean grooves, built with `build`. `code`: how the panel's codes begin where
-    a form suffers. `light_from_a_point`: no mirror shows that lamp, the model's neither; and what
-    shows it as rare, bright dots is judged by the median cell, as a person would."""
+    a form suffers. `light_from_a_point`: no mirror shows that lamp, the model's neither. What draws
+    its directions shows it as rare, bright dots, judged by the median cell, as a person would;
+    closures meet it, and are compared with what a very small lamp shows: a narrow highlight is
+    another one under a wide lamp."""
 
     name: str
     change: object = None
@@ -332,6 +344,8 @@ def measure(extension, forms, names, samples):
     rows = []
     clean = Grooves(extension, forms, samples)
     before = clean.measure()
+    clean.sun.data.angle = SMALL_SUN
+    small = clean.measure()
     for condition in CONDITIONS:
         if names is not None and condition.name not in names:
             continue
@@ -341,14 +355,15 @@ def measure(extension, forms, names, samples):
         after = grooves.measure()
         warned = panel_warns(extension, grooves)
         for i, form in enumerate(forms):
-            if condition.light_from_a_point and form.mirror and form.form == "exact":
+            if condition.light_from_a_point and form.mirror and form.form != "sampled":
                 continue
-            if condition.light_from_a_point:
+            if condition.light_from_a_point and form.form == "sampled":
                 bias, error = change_of_median(before[i], after[i])
             else:
                 # The same cells: where random numbers stay, so does the noise.
-                mean = before[i].mean()
-                off = after[i] - before[i]
+                clear = small[i] if condition.light_from_a_point else before[i]
+                mean = clear.mean()
+                off = after[i] - clear
                 bias = off.mean() / mean
                 error = np.sqrt(off.var(1, ddof=1).sum() / REPLICAS) / (2 * mean)
             biased = abs(bias) > BIASED and abs(bias) > SIGNIFICANT * error
