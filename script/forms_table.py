@@ -1,19 +1,39 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Closures, error and cost of every form of every model with its default parameters, as a table in
-Markdown."""
+"""Tables in Markdown about the forms of models: closures, error and cost of every form of every
+model with its default parameters; and by the view what fits and twins are off by."""
 
 import argparse
+import csv
+import io
 import json
+import math
 import subprocess
 import tempfile
 from pathlib import Path
 
 FORMS = ("exact", "sampled", "fitted", "controlled", "twin")
 
+#: What f is a polynomial of, for models that have such parameters.
+ANY = {
+    "ashikhmin_shirley": ("rs", "rd"),
+    "cook_torrance": ("f0",),
+    "coupled": ("r0",),
+    "oren_nayar": ("rho",),
+    "phong_material": ("kd", "cd", "ks", "cs", "kr", "cr"),
+    "schlick": ("r",),
+    "schlick_double": ("r0",),
+}
+#: Beside the default parameters.
+ELSEWHERE = {"ashikhmin_shirley": [("nu=10", "nv=10")]}
+
 
 def run(command):
     return subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, text=True, check=True)
+
+
+def listed(tool):
+    return json.loads(run([tool, "list", "--json"]).stdout)
 
 
 def built(tool, folder):
@@ -21,7 +41,7 @@ def built(tool, folder):
     file = folder / "materials.json"
     materials = {
         f"{model['name']} {form}": {"model": model["name"], "representation": form}
-        for model in json.loads(run([tool, "list", "--json"]).stdout)
+        for model in listed(tool)
         for form in model["representations"]
         if form in ("exact", "sampled")
     }
@@ -34,9 +54,8 @@ def built(tool, folder):
 
 
 def error(form):
-    """Relative L1 in percent; 0 where only rounding is left or the mean is right."""
-    off = form["error"]["relative_l1"]
-    return "0" if off is None or off < 1e-5 else f"{100 * off:.2g} %"
+    """Relative L1; 0 where the mean is right."""
+    return percent(form["error"]["relative_l1"] or 0)
 
 
 def cell(entry, name):
@@ -47,19 +66,107 @@ def cell(entry, name):
     return f"{form['closures']}, {error(form)}, {cost}"
 
 
-def table(models):
+def forms(tool):
+    with tempfile.TemporaryDirectory(prefix="brdfc-forms-") as folder:
+        models = built(tool, Path(folder))
     lines = [f"| Model | {' | '.join(FORMS)} |", "|---" * (len(FORMS) + 1) + "|"]
     for name, entry in models.items():
         lines.append(f"| `{name}` | {' | '.join(cell(entry, form) for form in FORMS)} |")
     return "\n".join(lines)
 
 
+def by_view(tool, *arguments):
+    """Of the light off, a number a view; None where the tool says that the model has no fit."""
+    command = [str(tool), "fit", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode == 2 and "has no fitted form" in done.stderr:
+        return None
+    if done.returncode:
+        raise SystemExit(f"{' '.join(command)}: {done.stderr}")
+    return [float(row["relative_l1"]) for row in csv.DictReader(io.StringIO(done.stdout))]
+
+
+def line(*cells):
+    return f"| {' | '.join(cells)} |"
+
+
+def spread(off):
+    """Half of the views do not exceed the first, 95 % the second, none the third."""
+    off = sorted(off)
+    parts = (off[math.ceil(q * len(off)) - 1] for q in (0.5, 0.95, 1))
+    return [percent(part) for part in parts]
+
+
+def percent(part):
+    """Of two digits; 0 where only rounding is left."""
+    return "0" if part < 1e-5 else f"{float(f'{100 * part:.2g}'):g} %"
+
+
+def errors(columns, found):
+    """`found`: the first cells of a row, and what each view is off by."""
+    lines = [line(*columns, "half of the views below", "95 % of the views below", "worst view")]
+    lines.append("|---" * (len(columns) + 3) + "|")
+    for first, off in sorted(found, key=lambda row: sorted(row[1])[len(row[1]) // 2]):
+        lines.append(line(*first, *spread(off)))
+    return lines
+
+
+def at_defaults(tool, *options):
+    """Of each model without a mirror alone: its entry in `brdfc list`, the cell that names the
+    parameters, what each view is off by."""
+    for model in listed(tool):
+        for values in [(), *ELSEWHERE.get(model["name"], [])]:
+            named = (model["name"], *values)
+            if off := by_view(tool, *named, *options):
+                yield model, (f"`{' '.join(named)}`",), off
+
+
+def fits(tool):
+    found = list(at_defaults(tool))
+    lines = errors(("Model",), [row[1:] for row in found])
+    # A fit is for models that have no other form with light sampling.
+    needed = [e for model, _, off in found if "exact" not in model["representations"] for e in off]
+    lines.append(line("all that have no exact form", *spread(needed)))
+    return "\n".join(lines)
+
+
+def twins(tool):
+    return "\n".join(errors(("Model",), [row[1:] for row in at_defaults(tool, "--twin")]))
+
+
+def fits_any(tool):
+    found = []
+    for name, parameters in ANY.items():
+        first = (f"`{name}`", " ".join(f"`{p}`" for p in parameters))
+        found.append((first, by_view(tool, name, "--any", *parameters)))
+    return "\n".join(errors(("Model", "parameters"), found))
+
+
+def fits_over(tool):
+    """Those that the extension holds."""
+    found = []
+    for model in listed(tool):
+        if over := model["properties"]["fit_axis"]:
+            first = (f"`{model['name']}`", f"`{over}`")
+            found.append((first, by_view(tool, model["name"], "--over", over)))
+    return "\n".join(errors(("Model", "number"), found))
+
+
+TABLES = {
+    "forms": forms,
+    "fits": fits,
+    "fits-any": fits_any,
+    "fits-over": fits_over,
+    "twins": twins,
+}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
+    parser.add_argument("table", choices=TABLES)
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="brdfc-forms-") as folder:
-        print(table(built(options.tool.resolve(), Path(folder))))
+    print(TABLES[options.table](options.tool.resolve()))
 
 
 if __name__ == "__main__":

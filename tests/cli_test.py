@@ -457,6 +457,9 @@ def test_a_model_that_is_refused_beside_one_that_is_not(tmp_path):
         (["fit", "schlick", "--any", "p"], ["--any p", "a polynomial of"]),
         (["fit", "schlick", "--any", "r", "--twin"], ["--any goes without --twin"]),
         (["fit", "phong_material", "--over", "kd"], ["--over kd", "take --any kd"]),
+        (["fit", "phong", "--over", "e", "e=4"], ["--over e", "e="]),
+        (["fit", "schlick", "--any", "r", "r=0.5"], ["--any r", "r="]),
+        (["build", "--model", "phong", "--model", "phong", "--out", "x"], ["phong", "twice"]),
         (["build", "--model", "phong", "--error", "2", "--out", "x"], ["--error", "--scene"]),
         (["build", "--model", "phong", "--twin", "--out", "x"], ["--twin", "--scene"]),
         (["build", "--model", "phong", "--time", "1x", "--out", "x"], ["--time", "--scene"]),
@@ -549,7 +552,7 @@ def phong(tmp_path):
         (["--time", "1"], "fitted"),
         (["--time", "0.5x"], "fitted"),
         (["--time", "1x", "--error", "0.1"], "sampled"),
-        (["--time", "1.15", "--error", "5"], "fitted"),
+        (["--time", "1.15", "--error", "5%"], "fitted"),
     ],
 )
 def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
@@ -599,6 +602,12 @@ def test_lamps_of_a_blend_take_the_fit(phong, time):
 @pytest.mark.parametrize("time", ["x", "fast", "0x", "-1", "1.2xx", "1,2", "inf", "nan", "1.2 x"])
 def test_a_time_that_is_none(phong, time):
     refused(phong(f"--time={time}"), "--time: expected a positive number, as 1.2 or 1.2x", time)
+    assert not phong.out.exists()
+
+
+@pytest.mark.parametrize("error", ["abc", "-1", "100.5", "nan", "inf", "5%%", "5 %", "%", "1,5"])
+def test_an_error_that_is_none(phong, error):
+    refused(phong(f"--error={error}"), "--error: expected percent from 0 to 100, as 5 or 5%", error)
     assert not phong.out.exists()
 
 

@@ -249,6 +249,20 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.2, 0.1), kFitted), "costs 1.3x, and 1.2x is allowed");
 }
 
+TEST(Plan, SaysThatAFitOfAnotherChoiceIsTooFarOff) {
+  Budget budget;
+  budget.error = 0.001;
+  const std::vector<MaterialNeed> back = {need("a", "radziszewski_alda", {"around=retro", "n=20"})};
+  EXPECT_THAT(why(plan_scene(back, budget)[0], kFitted), HasSubstr("0.001 is allowed"));
+}
+
+TEST(Plan, SaysWhatAModelLacksBeforeWhatItsMaterialsDifferIn) {
+  const std::vector<MaterialNeed> two = {need("a", "fresnel_conductor", {"metal=cu"}),
+                                         need("b", "fresnel_conductor", {"metal=au"})};
+  for (const RepresentationKind kind : {kFitted, kControlled, RepresentationKind::Twin})
+    EXPECT_EQ(why(plan_scene(two, {})[0], kind), "it only reflects and refracts ideally");
+}
+
 TEST(Plan, SaysWhichCostIsNotKnown) {
   std::vector<MaterialNeed> needs = {need("a", "phong", {"e=20"})};
   Budget budget;

@@ -21,8 +21,7 @@ namespace {
 
 struct Options {
   bool all = false, json = false, twin = false, controlled = false;
-  std::optional<double> error;  // percent
-  std::optional<std::string> time;
+  std::optional<std::string> error, time;
   std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
 };
@@ -139,15 +138,29 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
 }
 
-/// A budget of time in units of Blender's Glossy node.
-double parse_time(const std::string& text) {
+/// A finite number, which may end in `unit`.
+std::optional<double> parse_number(const std::string& text, char unit) {
   const char *first = text.data(), *last = first + text.size();
   double value = 0;
   const auto [end, error] = std::from_chars(first, last, value);
-  const bool ends = end == last || (end + 1 == last && *end == 'x');
-  if (error != std::errc() || !ends || !std::isfinite(value) || value <= 0)
-    input_error("build: --time: expected a positive number, as 1.2 or 1.2x, got '{}'", text);
+  const bool ends = end == last || (end + 1 == last && *end == unit);
+  if (error != std::errc() || !ends || !std::isfinite(value)) return std::nullopt;
   return value;
+}
+
+/// A budget of time in units of Blender's Glossy node.
+double parse_time(const std::string& text) {
+  const auto value = parse_number(text, 'x');
+  if (!value || *value <= 0) input_error("build: --time: expected a positive number, as 1.2 or 1.2x, got '{}'", text);
+  return *value;
+}
+
+/// A part of the light, from percent of it.
+double parse_error(const std::string& text) {
+  const auto value = parse_number(text, '%');
+  if (!value || *value < 0 || *value > 100)
+    input_error("build: --error: expected percent from 0 to 100, as 5 or 5%, got '{}'", text);
+  return *value / 100;
 }
 
 void run(const Options& options) {
@@ -164,7 +177,7 @@ void run(const Options& options) {
   const std::filesystem::path costs = std::filesystem::path(options.addon) / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
   Budget budget{{}, !options.materials.empty(), options.twin, options.controlled, {}, Costs(costs)};
-  if (options.error) budget.error = *options.error / 100;
+  if (options.error) budget.error = parse_error(*options.error);
   if (options.time) {
     budget.time = parse_time(*options.time);
     if (!std::filesystem::exists(costs))
@@ -215,11 +228,11 @@ void add_build_command(CLI::App& app) {
   c->add_flag("--explain", options->json,
               "With --scene or --materials: what forms there are, what is left out, why and what that saves, as JSON");
   c->add_option(
-       "--error", options->error,
-       "With --scene or --materials: percent of the light (relative L1 of f cos) that a fitted form may be off,\n"
-       "where a material of a scene leaves its form open, or beside the sampled form of a .blend; without, no\n"
-       "form is fitted unasked")
-      ->check(CLI::Range(0.0, 100.0));
+      "--error", options->error,
+      "With --scene or --materials: percent of the light (relative L1 of f cos), as 5%, that a fitted form may be "
+      "off,\n"
+      "where a material of a scene leaves its form open, or beside the sampled form of a .blend; without, no\n"
+      "form is fitted unasked");
   c->add_option("--time", options->time,
                 "With --scene or --materials: what a form may cost, as 1.2x, in CPU time of Blender's Glossy node at\n"
                 "equal samples, where a material leaves its form open; --explain prints what forms cost");

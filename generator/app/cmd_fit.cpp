@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc fit: how close a few closures of Cycles come to a model.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "app/commands.h"
@@ -16,7 +17,8 @@ void print_errors(const std::vector<ViewError>& errors, const std::string& axis,
   std::vector<double> l1;
   for (const ViewError& e : errors) l1.push_back(e.relative_l1);
   std::sort(l1.begin(), l1.end());
-  const auto quantile = [&](double q) { return 100 * l1[std::size_t(q * double(l1.size() - 1))]; };
+  // The least that so large a part of the views does not exceed.
+  const auto quantile = [&](double q) { return 100 * l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]; };
   fmt::print(stderr, "{}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
              label, quantile(0.5), quantile(0.95), quantile(1));
   CsvWriter out((axis.empty() ? "" : axis + ",") + "cos_theta_o,relative_l1,relative_l2,albedo,negative");
@@ -86,17 +88,22 @@ void add_fit_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
+    const auto given = [&](const std::string& name) {
+      return std::ranges::any_of(o->values, [&](const std::string& value) { return value.starts_with(name + "="); });
+    };
     const ParamValues asked = values;
     if (!o->over.empty()) {
       const ParamInfo* p = model.info().param(o->over);
       if (!p || p->kind != ParamKind::Number)
         input_error("fit: --over {}: expected a parameter of {} that is a number", o->over, o->model);
       if (o->twin) input_error("fit: a twin is for one set of parameters: --over goes without --twin");
+      if (given(o->over)) input_error("fit: --over {0} runs over all values of {0}: {0}= is one too many", o->over);
       values.erase(o->over);
     }
     for (const std::string& name : o->any) {
       if (!model.info().param(name)) input_error("fit: --any {}: {} has no such parameter", name, o->model);
       if (o->twin) input_error("fit: a twin is for one set of parameters: --any goes without --twin");
+      if (given(name)) input_error("fit: --any {0} is for any value of {0}: {0}= is one too many", name);
       values.erase(name);
     }
     if (!o->any.empty() || !o->over.empty()) {

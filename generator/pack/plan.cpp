@@ -43,6 +43,8 @@ std::string how_it_varies(const std::string& name, const Needs& needs) {
 std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
+  // What it lacks at any values comes before what the values are.
+  if (!model.has_scatter()) return unfit(model, fixed);
   std::optional<std::string> axis;
   const std::set<std::string> may_vary = factors(model, fixed);
   const Terms terms = kind == RepresentationKind::Twin ? Terms{} : terms_of(model, fixed);
@@ -203,8 +205,9 @@ std::string why_not(RepresentationKind kind, const Needs& needs, const std::vect
   const bool fitted = kind == RepresentationKind::Fitted;
   if (is_fit(kind) && !fitted) return "only where it is asked for";
   if (fitted && !budget.error && !budget.time) return "nothing is fitted unasked";
+  // A fit is of whatever choices the materials have.
   const auto open = std::find_if(needs.begin(), needs.end(), [&](const MaterialNeed* need) {
-    return need->representation == "auto" && lacking(*need, kind).empty();
+    return need->representation == "auto" && (fitted || lacking(*need, kind).empty());
   });
   if (open == needs.end() && !(fitted && budget.offer)) return "the materials ask for another";
   // Of what comes after a form that keeps the budget nothing has to be known.
@@ -399,7 +402,11 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
   };
   if (names.empty())
     for (const auto& [name, model] : models()) add_model(*model);
-  for (const std::string& name : names) add_model(find_model(name));
+  std::set<std::string> named;
+  for (const std::string& name : names) {
+    add_model(find_model(name));
+    if (!named.insert(name).second) input_error("build: --model {}: given twice", name);
+  }
   return plan;
 }
 
