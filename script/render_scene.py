@@ -143,7 +143,7 @@ def describe(bpy, loader, scene, job, samples):
         for node in nodes.group_nodes(material):
             model, representation = nodes.identity(node)
             entry = pack.representation(model, representation)
-            keep = ("closures", "slots", "statements", "error", "warnings")
+            keep = ("closures", "slots", "operations", "error", "warnings")
             forms.append(
                 {"model": model, "representation": representation}
                 | {key: entry.get(key) for key in keep}

@@ -573,7 +573,10 @@ def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
     assert 0.005 < choices["fitted"]["error"] < 0.03
     manifest = json.loads((phong.out / "brdfc_shaders" / "manifest.json").read_text())
     assert manifest["models"]["phong"]["auto"] == form
-    assert manifest["models"]["phong"]["representations"][form]["cost"] == choices[form]["cost"]
+    entry = manifest["models"]["phong"]["representations"][form]
+    assert entry["cost"] == choices[form]["cost"]
+    (sizes,) = model["forms"]
+    assert entry["operations"] == sizes["after"]["operations"]
 
 
 def test_build_prints_every_form_with_cost_and_error(phong):

@@ -360,7 +360,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"only", values_json(form_values(model, kind, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
-        {"statements", shader.operations},
+        {"operations", shader.operations},
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
