@@ -571,12 +571,23 @@ def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
     }
     assert choices["sampled"]["error"] == choices["controlled"]["error"] == "expectation"
     assert 0.005 < choices["fitted"]["error"] < 0.03
+    assert model["material_forms"] == [
+        {
+            "material": "a",
+            "before": {"form": "sampled", "cost": 1.1},
+            "after": {"form": form, "cost": choices[form]["cost"]},
+        }
+    ]
     manifest = json.loads((phong.out / "brdfc_shaders" / "manifest.json").read_text())
     assert manifest["models"]["phong"]["auto"] == form
     entry = manifest["models"]["phong"]["representations"][form]
     assert entry["cost"] == choices[form]["cost"]
     (sizes,) = model["forms"]
     assert entry["operations"] == sizes["after"]["operations"]
+    text = (phong.out / "brdfc_shaders" / entry["shader"]).read_text()
+    assert sizes["after"]["bytes"] == len(text.encode())
+    body = text[text.index("\n{\n", text.index("\nshader ")) :]
+    assert sizes["after"]["statements"] == body.count(";\n")
 
 
 def test_build_prints_every_form_with_cost_and_error(phong):

@@ -128,6 +128,8 @@ TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
   EXPECT_EQ(representations(model), std::vector{RepresentationKind::Exact});
   const Shader s = write_shader(model, RepresentationKind::Exact, empty_table(model));
   EXPECT_THAT(s.source, HasSubstr("BSDF = weight_0 * reflection(frame_n);"));
+  const std::string body = s.source.substr(s.source.find("\n{\n", s.source.find("\nshader ")));
+  EXPECT_EQ(s.statements, std::count(body.begin(), body.end(), ';')) << "there is no loop";
   EXPECT_LT(measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
   const AlbedoTable table = tabulate_albedo(model);
   EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
@@ -143,6 +145,7 @@ TEST(Shader, AFixedParameterLeavesTheText) {
   EXPECT_THAT(specular.source, Not(HasSubstr("int part")));
   EXPECT_THAT(specular.source, Not(HasSubstr("rotation")));
   EXPECT_LT(specular.operations, all.operations);
+  EXPECT_LT(specular.statements, all.statements);
   EXPECT_LT(specular.source.size(), all.source.size());
 }
 

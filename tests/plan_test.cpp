@@ -287,6 +287,26 @@ TEST(Plan, SaysWhichCostIsNotKnown) {
   EXPECT_EQ(why(plan, kSampled), "its cost was measured with one direction alone");
 }
 
+TEST(Plan, SaysWhatABudgetChangesForEachMaterial) {
+  std::vector<MaterialNeed> needs = {need("open", "phong", {"e=20"}), need("many", "phong", {"e=20"}, "sampled")};
+  needs[1].lobes = 4;
+  Budget budget;
+  budget.costs = costs("phong,sampled,0.9\nphong,fitted,1.5\n");
+  budget.error = 1;
+  const PlannedModel plan = plan_scene(needs, budget)[0];
+  ASSERT_EQ(plan.material_forms.size(), 2u);
+  const MaterialForm &open = plan.material_forms[0], &many = plan.material_forms[1];
+  EXPECT_EQ(open.id, "open");
+  EXPECT_EQ(open.before, kSampled);
+  EXPECT_EQ(open.cost_before, 0.9);
+  EXPECT_EQ(open.after, kFitted);
+  EXPECT_EQ(open.cost_after, 1.5);
+  EXPECT_EQ(many.id, "many");
+  EXPECT_EQ(many.before, kSampled);
+  EXPECT_EQ(many.after, kSampled);
+  EXPECT_FALSE(many.cost_before || many.cost_after) << "measured with one direction";
+}
+
 TEST(Plan, AddsControlledFormsWhereThereCanBeOne) {
   Budget budget;
   budget.controlled = true;

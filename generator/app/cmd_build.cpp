@@ -62,15 +62,24 @@ nlohmann::ordered_json error_of(const PlannedModel& plan, const FormChoice& choi
   return kExpectation;
 }
 
+nlohmann::ordered_json cost_json(const std::optional<double>& cost) {
+  return cost ? nlohmann::ordered_json(*cost) : nullptr;
+}
+
 nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& result) {
   const ModelInfo& info = plan.model->info();
   nlohmann::ordered_json choices = nlohmann::ordered_json::array();
   for (const FormChoice& c : plan.choices)
     choices.push_back({{"form", name_of(c.form)},
                        {"taken", c.taken},
-                       {"cost", c.cost ? nlohmann::ordered_json(*c.cost) : nullptr},
+                       {"cost", cost_json(c.cost)},
                        {"error", error_of(plan, c, result)},
                        {"why", c.why}});
+  nlohmann::ordered_json of_materials = nlohmann::ordered_json::array();
+  for (const MaterialForm& m : plan.material_forms)
+    of_materials.push_back({{"material", m.id},
+                            {"before", {{"form", name_of(m.before)}, {"cost", cost_json(m.cost_before)}}},
+                            {"after", {{"form", name_of(m.after)}, {"cost", cost_json(m.cost_after)}}}});
   nlohmann::ordered_json forms = nlohmann::ordered_json::array(), free = nlohmann::ordered_json::array();
   for (const PackLine& l : result.lines)
     if (l.model == info.name)
@@ -78,11 +87,13 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
                        {"before",
                         {{"bytes", l.whole_bytes},
                          {"operations", l.whole_operations},
+                         {"statements", l.whole_statements},
                          {"closures", l.whole_closures},
                          {"table_floats", l.whole_table_floats}}},
                        {"after",
                         {{"bytes", l.bytes},
                          {"operations", l.operations},
+                         {"statements", l.statements},
                          {"closures", l.closures},
                          {"table_floats", l.table_floats}}}});
   nlohmann::ordered_json fixed = nlohmann::ordered_json::object();
@@ -95,6 +106,7 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
   }
   return {{"model", info.name},
           {"materials", plan.materials},
+          {"material_forms", of_materials},
           {"choices", choices},
           {"forms", forms},
           {"fixed", fixed},
@@ -130,9 +142,11 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
     for (const std::string& reason : p.reasons) fmt::print("  without {}\n", reason);
     for (const PackLine& l : result.lines)
       if (l.model == p.model->info().name)
-        fmt::print("  {}: {} -> {} bytes, {} -> {} operations, {} -> {} closures, {} -> {} floats of tables\n",
-                   l.representation, l.whole_bytes, l.bytes, l.whole_operations, l.operations, l.whole_closures,
-                   l.closures, l.whole_table_floats, l.table_floats);
+        fmt::print(
+            "  {}: {} -> {} bytes, {} -> {} operations, {} -> {} statements, {} -> {} closures, {} -> {} floats of "
+            "tables\n",
+            l.representation, l.whole_bytes, l.bytes, l.whole_operations, l.operations, l.whole_statements,
+            l.statements, l.whole_closures, l.closures, l.whole_table_floats, l.table_floats);
   }
   fmt::print("costs: CPU time with default parameters, in units of Blender's Glossy node at equal samples\n");
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));

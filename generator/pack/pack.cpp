@@ -352,9 +352,10 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const std::optional<double> cost = costs.of(model, kind);
     const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
-    built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations, error,
-                           of_form.size() + of_fit, table.error, shader.source.size(), whole.closures, whole.operations,
-                           whole_table.size() + of_whole_fit, whole.source.size()});
+    built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations,
+                           shader.statements, error, of_form.size() + of_fit, table.error, shader.source.size(),
+                           whole.closures, whole.operations, whole.statements, whole_table.size() + of_whole_fit,
+                           whole.source.size()});
     j["representations"][name_of(kind)] = {
         {twin ? "nodes" : "shader", file},
         {"only", values_json(form_values(model, kind, plan.fixed))},

@@ -22,13 +22,13 @@ struct PackOptions {
 /// A line of the table that a build prints.
 struct PackLine {
   std::string model, representation;
-  int closures = 0, slots = 0, operations = 0;
+  int closures = 0, slots = 0, operations = 0, statements = 0;
   RepresentationError error;
   std::size_t table_floats = 0;
   double table_error = 0;
   std::size_t bytes = 0;  ///< of the shader's text
   /// The same with nothing left out; equal where nothing is.
-  int whole_closures = 0, whole_operations = 0;
+  int whole_closures = 0, whole_operations = 0, whole_statements = 0;
   std::size_t whole_table_floats = 0, whole_bytes = 0;
 };
 

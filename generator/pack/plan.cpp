@@ -280,6 +280,9 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   for (const MaterialNeed* need : needs) {
     plan.materials.push_back(need->id);
     chosen.push_back(chosen_form(*need, needs, budget));
+    const RepresentationKind before = chosen_form(*need, needs, {}).form, after = chosen.back().form;
+    plan.material_forms.push_back(
+        {need->id, before, after, cost_of({need}, before, budget), cost_of({need}, after, budget)});
     plan.max_lobes = std::max(plan.max_lobes, std::min(need->lobes, kMaxLobes));
   }
   plan.choices = choose_forms(needs, chosen, budget);

@@ -16,6 +16,7 @@ struct Shader {
   int closures = 0;     ///< most that one shading point adds
   int slots = 0;        ///< what they take of Cycles' kMaxClosures
   int operations = 0;   ///< most that one combination of choices executes, a loop's body counted once
+  int statements = 0;   ///< of the shader for all combinations of choices, without the library it calls
   bool lobes = false;   ///< has the Lobes parameter
   bool facets = false;  ///< has closures of facets
 };
