@@ -1,0 +1,149 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What `brdfc build --explain` says of three scenes, in Markdown. Runs in the repository's root."""
+
+import argparse
+import itertools
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+
+# Options that show most: many materials of one model, a form that is too dear, forms that change.
+SCENES = {
+    "as-fig2": [],
+    "gl-fig8-radziszewski_alda": ["--error", "5", "--time", "1.2x"],
+    "small-lamp": ["--error", "5"],
+}
+
+INTRODUCTION = """\
+# What a build leaves out, and why: three scenes
+
+Made by `script/explain` of what the commands below print as JSON. An arrow leads from the whole
+extension to that of the scene alone: in a scene's first table from the form that a material gets
+without a budget to the one taken, in its second from the whole shader of the form taken, which has
+all parameters and draws up to eight directions, to the one that the scene gets. Where there is no
+arrow both are the same.
+
+- Costs are those of the table of forms in the [README](../README.md#what-each-form-takes), measured
+  by model and form with default parameters: they change where the form does, and do not tell what
+  folding saves. Errors are measured with the scene's parameters.
+- Bytes and statements are those of a shader's text, for all combinations of choices that it has,
+  statements without the library; operations are the most that one combination executes. Floats are
+  those of the tables of albedo and fit, of which a shader has the ones it reads.
+- A fit is made for the scene's parameters, so there is no other shader to compare with.
+- A colour that is folded into a table makes three of one, a channel each: bytes or floats may grow.
+"""
+
+SIZES = {
+    "bytes": "bytes",
+    "operations": "operations",
+    "statements": "statements",
+    "closures": "closures",
+    "table_floats": "floats of tables",
+}
+
+
+def explained(tool, scene, options):
+    with tempfile.TemporaryDirectory(prefix="brdfc-explain-") as folder:
+        command = [tool, *arguments(scene, options), "--out", folder]
+        done = subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, check=True)
+    return json.loads(done.stdout)
+
+
+def arguments(scene, options):
+    return ["build", "--scene", f"scenes/{scene}.json", *options, "--explain"]
+
+
+def row(*cells):
+    return f"| {' | '.join(str(c).replace('|', chr(92) + '|') for c in cells)} |"
+
+
+def header(*cells):
+    return [row(*cells), "|---" * len(cells) + "|"]
+
+
+def change(before, after):
+    return before if before == after else f"{before} → {after}"
+
+
+def cost(value):
+    return "?" if value is None else f"{value:.2f}"
+
+
+def error(value):
+    """Relative L1 in percent; 0 where only rounding is left."""
+    if value is None:
+        return "-"
+    if value == "expectation":
+        return "0 on average"
+    return "0" if value < 1e-5 else f"{100 * value:.2g} %"
+
+
+def material_rows(model):
+    """Materials that one row holds for, together."""
+    errors = {choice["form"]: choice["error"] for choice in model["choices"]}
+
+    def cells(material):
+        before, after = material["before"], material["after"]
+        return (
+            f"`{model['model']}`",
+            change(before["form"], after["form"]),
+            error(errors[after["form"]]),
+            change(cost(before["cost"]), cost(after["cost"])),
+        )
+
+    for alike, materials in itertools.groupby(model["material_forms"], cells):
+        yield row(", ".join(m["material"] for m in materials), *alike)
+
+
+def size_rows(model):
+    for form in model["forms"]:
+        sizes = (change(f"{form['before'][key]:,}", f"{form['after'][key]:,}") for key in SIZES)
+        yield row(f"`{model['model']}`", form["form"], *sizes)
+
+
+def reasons(model):
+    lines = [f"### {model['model']}", "", *header("Form", "Cost", "Error", "Taken", "Why")]
+    for c in model["choices"]:
+        taken = "**yes**" if c["taken"] else "no"
+        lines.append(row(c["form"], cost(c["cost"]), error(c["error"]), taken, c["why"]))
+    lines.append("")
+    if model["left_out"]:
+        lines += ["Left out:", "", *(f"- {reason}" for reason in model["left_out"]), ""]
+    if model["free"]:
+        lines += [f"Parameters of the shader: {', '.join(model['free'])}", ""]
+    return lines
+
+
+def section(tool, scene, options):
+    said = explained(tool, scene, options)
+    models = said["models"]
+    lines = [
+        f"## {scene}",
+        "",
+        f"    build/brdfc {' '.join(arguments(scene, options))} --out DIR",
+        "",
+    ]
+    lines += header("Material", "Model", "Form", "Error", "Cost")
+    lines += itertools.chain.from_iterable(map(material_rows, models))
+    lines += ["", *header("Model", "Form", *SIZES.values())]
+    lines += itertools.chain.from_iterable(map(size_rows, models))
+    lines.append("")
+    for model in models:
+        lines += reasons(model)
+    return [*lines, f"Models that no material uses: {', '.join(said['unused_models'])}", ""]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
+    options = parser.parse_args()
+    lines = [INTRODUCTION]
+    for scene, budget in SCENES.items():
+        lines += section(options.tool.resolve(), scene, budget)
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
