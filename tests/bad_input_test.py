@@ -9,6 +9,7 @@ import resource
 import signal
 import struct
 import subprocess
+import time
 
 import pytest
 from support import TOOL, scene
