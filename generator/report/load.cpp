@@ -100,16 +100,30 @@ void set_equal_time(FormReport& form, const std::vector<Rendering>& pictures, co
       measure_difference(form.equal_time_picture, scene.reference, form.images.front(), scene.reference_image);
 }
 
-/// Times are paired by index: what slows the machine for a while slows both of a pair.
+/// Times of a form's pictures, or of those with so many samples on which convergence was measured; empty without such.
+std::vector<double> times_of(const FormReport& form, std::optional<int> convergence_spp) {
+  if (!convergence_spp) return form.cpu_seconds;
+  for (const ConvergencePoint& p : form.convergence)
+    if (p.spp == *convergence_spp) return p.cpu_seconds;
+  return {};
+}
+
+/// Of the pictures that took longest. Times are paired by index: what slows the machine for a while slows both of a
+/// pair.
 void set_costs(std::vector<FormReport>& forms) {
   const auto glossy =
       std::find_if(forms.begin(), forms.end(), [](const FormReport& f) { return f.form == kNativeForm; });
   if (glossy == forms.end()) return;
-  const std::vector<double> unit = glossy->cpu_seconds;
+  std::optional<int> longest;
+  for (const ConvergencePoint& p : glossy->convergence)
+    if (median(p.cpu_seconds) > median(times_of(*glossy, longest))) longest = p.spp;
+  const std::vector<double> unit = times_of(*glossy, longest);
+  if (median(unit) < kShortestTime) return;
   for (FormReport& form : forms) {
+    const std::vector<double> times = times_of(form, longest);
     std::vector<double> ratios;
-    for (std::size_t i = 0; i < std::min(unit.size(), form.cpu_seconds.size()); ++i)
-      if (unit[i] > 0) ratios.push_back(form.cpu_seconds[i] / unit[i]);
+    for (std::size_t i = 0; i < std::min(unit.size(), times.size()); ++i)
+      if (unit[i] > 0) ratios.push_back(times[i] / unit[i]);
     if (!ratios.empty()) form.cost = median(ratios);
   }
 }
@@ -132,7 +146,7 @@ ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view) 
     point.noise += double(mean.variance->rgb[i]) * double(pictures.size()) /
                    (sqr(double(mean.mean.rgb[i])) + kRelMseEpsilon) / double(mean.mean.rgb.size());
   if (!std::isfinite(point.noise)) images.fail("images of finite numbers");
-  point.cpu_seconds = median(read_times(view.at("cpu_seconds"), pictures.size()));
+  point.cpu_seconds = read_times(view.at("cpu_seconds"), pictures.size());
   return point;
 }
 
@@ -158,13 +172,13 @@ void set_equal_error(std::vector<FormReport>& forms) {
       std::find_if(forms.begin(), forms.end(), [](const FormReport& f) { return f.form == kNativeForm; });
   if (glossy == forms.end()) return;
   const std::vector<ConvergencePoint> unit = glossy->convergence;
-  const auto seconds_a_sample = [](const ConvergencePoint& p) { return p.cpu_seconds / p.spp; };
+  const auto seconds_a_sample = [](const ConvergencePoint& p) { return median(p.cpu_seconds) / p.spp; };
   for (FormReport& form : forms) {
     if (form.convergence.empty()) continue;
     for (const int spp : kEqualErrorAt) {
       form.equal_error.emplace_back();
       const auto at = std::find_if(unit.begin(), unit.end(), [&](const ConvergencePoint& p) { return p.spp == spp; });
-      if (at == unit.end() || !(at->cpu_seconds > 0)) continue;
+      if (at == unit.end() || !(median(at->cpu_seconds) > 0)) continue;
       // The time of a sample is known best where most were taken.
       if (const auto needed = samples_for(form.convergence, at->noise))
         form.equal_error.back() =
@@ -215,8 +229,6 @@ SceneReport load_scene(const fs::path& folder) {
     if (!seen.insert(scene.forms.back().form).second) run.at("form").fail("each form once");
   }
   if (scene.forms.empty()) runs.fail("at least one form");
-  set_costs(scene.forms);
-  for (std::size_t i = 0; i < scene.forms.size(); ++i) set_equal_time(scene.forms[i], pictures[i], scene);
   if (const auto convergence = top.find("convergence")) {
     for (const JsonView& point : convergence->elements()) {
       const std::string name = point.at("form").text();
@@ -233,6 +245,8 @@ SceneReport load_scene(const fs::path& folder) {
     }
     set_equal_error(scene.forms);
   }
+  set_costs(scene.forms);
+  for (std::size_t i = 0; i < scene.forms.size(); ++i) set_equal_time(scene.forms[i], pictures[i], scene);
   read_flip(folder / "flip.json", scene.forms);
   for (const auto& [name, value] : top.at("provenance").members()) scene.provenance[name] = value.text();
   for (const JsonView& command : top.at("commands").elements()) scene.commands.push_back(command.text());

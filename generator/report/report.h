@@ -36,7 +36,9 @@
 // A file flip.json beside it, if there is one, holds {"FORM": mean FLIP of its picture against the reference, ...}.
 //
 // CPU times of different forms are comparable when images with the same index were rendered in turns in one
-// process; the cost of a form is the median over the images of its time divided by the time of "glossy".
+// process; the cost of a form is the median over the images of its time divided by the time of "glossy": of the images
+// for "convergence" with one number of samples where those took longer, and of none where "glossy" took less than
+// kShortestTime.
 #pragma once
 
 #include <filesystem>
@@ -52,6 +54,9 @@ namespace brdfc {
 /// The form that is Blender's own Glossy node.
 inline constexpr const char* kNativeForm = "glossy";
 
+/// CPU seconds. Of shorter times, differences of two renders, a good part is chance.
+inline constexpr double kShortestTime = 0.5;
+
 struct MaterialForm {
   std::string id, model, representation;
   int closures = 0;
@@ -61,8 +66,8 @@ struct MaterialForm {
 /// Noise of one picture with so many samples a pixel, and what it cost.
 struct ConvergencePoint {
   int spp = 0;
-  double noise = 0;        ///< relMSE of one picture against its own expectation
-  double cpu_seconds = 0;  ///< of one picture, median
+  double noise = 0;                 ///< relMSE of one picture against its own expectation
+  std::vector<double> cpu_seconds;  ///< of each picture
 };
 
 /// Samples a pixel at which forms are compared at equal error.
@@ -85,8 +90,9 @@ struct FormReport {
   int equal_time_images = 0;
   Rendering equal_time_picture;
   Difference equal_time;
-  std::optional<double> cost;  ///< CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered
-  Rendering picture;           ///< mean of the images
+  /// CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered, or in less than kShortestTime.
+  std::optional<double> cost;
+  Rendering picture;  ///< mean of the images
 
   /// Largest over the materials; nothing if there is none.
   std::optional<int> closures() const;
