@@ -425,6 +425,54 @@ TEST(StoredFits, StateTheirErrors) {
   }
 }
 
+/// Under a slider that moves slowly the light that a fixed direction gets shows no step. One would be a difference that
+/// its neighbours have not: of a function without steps, also where its slope changes, none is much larger than the
+/// larger beside it. What is steep over several differences may be little steeper than the model. Both but for what no
+/// screen shows: of its 255 steps a quarter at once, and one under a thousandth of the slider. Of ramps alone, of
+/// facets that lean and of terms.
+TEST(StoredFits, HaveNoStepsAlongTheSlider) {
+  constexpr std::size_t kSteps = 1000;
+  constexpr double kShown = 1.0 / 255;
+  std::set<std::string> seen;
+  for (const auto& [model, values] : stored()) {
+    const std::string& name = model->info().name;
+    if (name != "phong" && name != "cook_torrance" && name != "oren_nayar") continue;
+    seen.insert(name);
+    const Fit& fit = fit_of(*model, values);
+    Varied<double> varied = fit.varied(complete(model->info(), values));
+    for (const double c : {0.95, 0.6, 0.2}) {
+      const Vec3<double> wo = direction(c, 0);
+      const std::vector<Vec3<double>> lit = {direction(c, kPi), direction(c + 0.005, kPi + 0.1),
+                                             direction(c + 0.03, kPi + 0.6)};
+      std::vector<std::vector<double>> f(lit.size()), truth(lit.size());
+      for (std::size_t i = 0; i <= kSteps; ++i) {
+        varied.number = fit.axis()->at(double(i) / kSteps);
+        const ClosureSum<double> sum = fit.closures(wo, varied);
+        const auto brdf = model->make_double(complete(model->info(), with_number(*model, values, varied.number)));
+        for (std::size_t j = 0; j < lit.size(); ++j) {
+          f[j].push_back(max_component(evaluate(sum, lit[j], wo)));
+          truth[j].push_back(max_component(brdf->eval(lit[j], wo) * lit[j].z));
+        }
+      }
+      for (std::size_t j = 0; j < lit.size(); ++j) {
+        const auto differences = [](std::vector<double> v) {
+          for (std::size_t i = 0; i + 1 < v.size(); ++i) v[i] = std::abs(v[i + 1] - v[i]);
+          v.pop_back();
+          return v;
+        };
+        const std::vector<double> d = differences(f[j]);
+        const double scale = std::ranges::max(truth[j]);
+        for (std::size_t i = 1; i + 1 < d.size(); ++i)
+          EXPECT_LE(d[i], 1.5 * std::max(d[i - 1], d[i + 1]) + 0.25 * kShown * scale)
+              << name << " at " << fit.axis()->at(double(i) / kSteps) << ", view " << c << ", direction " << j;
+        EXPECT_LE(std::ranges::max(d), 1.5 * std::ranges::max(differences(truth[j])) + kShown * scale)
+            << name << ", view " << c << ", direction " << j;
+      }
+    }
+  }
+  EXPECT_EQ(seen.size(), 3u);
+}
+
 /// One cell, of a model and a knot that change with what is stored.
 TEST(StoredFits, AreWhatIsMadeAnew) {
   const auto all = stored();
