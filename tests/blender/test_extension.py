@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -101,6 +102,47 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
             centre = picture[6:10, 6:10, :3]
             assert centre.min() > 0.01
             assert centre.max() < 1.5  # a white world can't be outshone, but for noise
+
+
+def statements(source):
+    """Most statements that one call of a shader executes, of alternatives the longest, a loop's
+    body once."""
+
+    def count(text):
+        chains = re.finditer(r"#\d+#(?:\s*else[^#;]*#\d+#)*", text)
+        longest = (max(map(int, re.findall(r"#(\d+)#", chain[0]))) for chain in chains)
+        return text.count(";") + sum(longest)
+
+    code = re.sub(r"//.*|\[\[.*?\]\]", "", source)
+    body = code[re.search(r"^shader \w+\(", code, re.MULTILINE).start() :]
+    body = body[body.index("\n{") :]
+    # Semicolons of loops and braces of tables.
+    body = re.sub(r"for \([^;]*;[^;]*;[^{\n]*\)|= \{[^{}]*\}", "", body)
+    while "{" in body:
+        body = re.sub(r"\{([^{}]*)\}", lambda block: f"#{count(block[1])}#", body)
+    return count(body)
+
+
+def test_shaders_are_short(extension_zip, subtests):
+    """Every shader of the extension has fewer than 600 statements, counted by the generator as
+    operations and here in its text."""
+    import zipfile
+
+    text = "shader x(float a = 0 [[ int b = 1; ]],\n    output color Albedo = 0)\n{\n"
+    text += "float t[2] = {0.0,\n 1.0}; // ;\nif (a == 0) { a; b; }\nelse if (a == 1) "
+    text += "{ for (int i = 0; i < 9; i++) { c; d;\n e; } f; }\nelse { g; }\nh;\n}\n"
+    assert statements(text) == 6
+    with zipfile.ZipFile(extension_zip) as archive:
+        manifest = json.loads(archive.read("manifest.json"))
+        forms = [f for m in manifest["models"].values() for f in m["representations"].values()]
+        shaders = {f["shader"]: f["statements"] for f in forms}
+        assert set(shaders) == {name for name in archive.namelist() if name.endswith(".osl")}
+        for name, operations in shaders.items():
+            with subtests.test(name):
+                found = statements(archive.read(name).decode())
+                print(f"{name}: {operations} operations, {found} statements")
+                assert operations < 600
+                assert 0 < found < 600
 
 
 def test_every_choice_reaches_the_shader(extension, empty, subtests):
