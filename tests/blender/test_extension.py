@@ -104,6 +104,52 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
             assert centre.max() < 1.5  # a white world can't be outshone, but for noise
 
 
+def test_sliders_do_not_recompile(extension, every_form, monkeypatch, subtests):
+    """Every number and colour of every form is a socket: a change leaves text and bytecode alone,
+    and the compiler is not asked."""
+    import cycles.osl
+
+    compiled, compiler = [], cycles.osl.osl_compile
+
+    def compile_and_note(path, report):
+        compiled.append(path)
+        return compiler(path, report)
+
+    monkeypatch.setattr(cycles.osl, "osl_compile", compile_and_note)
+    bpy.ops.wm.open_mainfile(filepath=str(every_form.blend))
+    assert not any(isinstance(made, Exception) for made in every_form.made.values())
+
+    def state(group):
+        script = next(n for n in group.nodes if n.bl_idname == "ShaderNodeScript")
+        text = script.script
+        assert script.bytecode and script.bytecode_hash
+        return script, text, text.as_string(), script.bytecode, script.bytecode_hash
+
+    for (model, representation), made in every_form.made.items():
+        with subtests.test(model=model, representation=representation):
+            material = bpy.data.materials[made]
+            (node,) = extension.nodes.group_nodes(material)
+            group, before, data = node.node_tree, state(node.node_tree), helpers.counts()
+            old, values = extension.api.get_parameters(material), {}
+            for name, p in extension.pack.socket_parameters(model, representation).items():
+                if p["kind"] == "color":
+                    values[name] = (0.3, 0.6, 0.2)
+                elif p["kind"] == "number":
+                    values[name] = p["soft_min"] + 0.37 * (p["soft_max"] - p["soft_min"])
+            assert values
+            extension.api.set_parameters(material, **values)
+            found = extension.api.get_parameters(material)
+            for name, value in values.items():
+                assert found[name] == pytest.approx(value, rel=1e-6) != old[name]
+            assert node.node_tree == group and state(group) == before
+            assert helpers.counts() == data
+            assert not compiled
+    # Had one been compiled, it would have been seen.
+    script = state(group)[0]
+    script.script = script.script
+    assert compiled
+
+
 def statements(source):
     """Most statements that one call of a shader executes, of alternatives the longest, a loop's
     body once."""
