@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -473,28 +474,32 @@ TEST(StoredFits, HaveNoStepsAlongTheSlider) {
   EXPECT_EQ(seen.size(), 3u);
 }
 
-/// One cell, of a model and a knot that change with what is stored.
-TEST(StoredFits, AreWhatIsMadeAnew) {
+/// Another processor finds other closures: where several sums are about as close, how its library rounds decides, and
+/// mean errors of the same cell were found 13 % apart. Those that are stored are as close as those that are made here
+/// but for that. One cell, of a model and a knot, by what BRDFC_CELL is: script/test sets it to the commit, so that in
+/// time all are made.
+TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
+  const char* given = std::getenv("BRDFC_CELL");
+  const std::string choice = given ? given : "";
+  const std::uint64_t random = std::stoull(sha256(choice).substr(0, 15), nullptr, 16);
   const auto all = stored();
-  std::string names;
-  for (const auto& [model, values] : all) names += stored_fit(*model, values).filename();
-  const std::uint64_t random = std::stoull(sha256(names).substr(0, 15), nullptr, 16);
   const auto& [model, values] = all[random % all.size()];
   const Fit& fit = fit_of(*model, values);
   const double x = fit.knots()[random / all.size() % fit.knots().size()], number = fit.axis()->at(x);
   const Fit cell = fit.knot(*model, values, x);
   const ParamValues whole = complete(model->info(), with_number(*model, values, number));
-  const Varied<double> varied = fit.varied(whole);
-  const auto brdf = model->make_double(whole);
-  Random numbers(3);
-  double largest = 0, off = 0;
-  for (const auto& [wi, wo] : direction_pairs(*brdf, 300, numbers, false)) {
-    const Rgb<double> a = evaluate(fit.closures(wo, varied), wi, wo), b = evaluate(cell.closures(wo, varied), wi, wo);
-    largest = std::max(largest, max_component(b));
-    off = std::max(off, max_component(Rgb<double>(std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b))));
-  }
-  EXPECT_GT(largest, 0) << model->info().name;
-  EXPECT_LE(off, 1e-3 * largest) << model->info().name << " at " << number;
+  const BoundModel bound = bind_model(*model, whole);
+  const auto l1 = [&](const Fit& of) {
+    const Varied<double> varied = of.varied(whole);
+    double sum = 0;
+    for (const ViewError& e : view_errors(bound, [&](const Vec3<double>& wo) { return of.closures(wo, varied); }))
+      sum += e.relative_l1 / 64;
+    return sum;
+  };
+  const double kept = l1(fit), anew = l1(cell);
+  fmt::print("BRDFC_CELL={}: {} at {:.4g}, relative L1 {:.5f} stored, {:.5f} anew\n", choice, model->info().name,
+             number, kept, anew);
+  EXPECT_LE(kept, 1.25 * anew + 5e-4) << model->info().name << " at " << number << ", BRDFC_CELL=" << choice;
 }
 
 TEST(StoredFits, ServeFactorsThatAreKnown) {
