@@ -55,7 +55,8 @@ def resolved_files(folder):
         elif isinstance(value, list):
             for item in value:
                 walk(item)
-        elif isinstance(value, str) and value and (folder / value).is_file():
+        # Not Path.is_file: a description may be too long for a name.
+        elif isinstance(value, str) and value and os.path.isfile(folder / value):
             found.add(folder / value)
 
     walk(read_json(scene))
