@@ -181,7 +181,7 @@ def test_shaders_are_short(extension_zip, subtests):
     with zipfile.ZipFile(extension_zip) as archive:
         manifest = json.loads(archive.read("manifest.json"))
         forms = [f for m in manifest["models"].values() for f in m["representations"].values()]
-        shaders = {f["shader"]: f["statements"] for f in forms}
+        shaders = {f["shader"]: f["operations"] for f in forms}
         assert set(shaders) == {name for name in archive.namelist() if name.endswith(".osl")}
         for name, operations in shaders.items():
             with subtests.test(name):
