@@ -125,6 +125,26 @@ TEST(Fit, HasNoStepsBetweenViews) {
   }
 }
 
+/// Lower than the lowest view of the tables: as there, about a normal that is turned. Otherwise, of colours that are a
+/// hundred times what they add up to, some are left alone.
+TEST(Fit, LowViewsAreLikeTheLowestFitted) {
+  for (const auto& [name, text] : {std::pair("phong", "e=20"), {"max_phong", "e=50"}, {"ward", "ax=0.15"}}) {
+    const Model& m = find_model(name);
+    const Fit& fit = fit_of(m, values_of(m, {text}));
+    for (const double height : {0.02, 0.3, 1.2, 2.9}) {
+      const Vec3<double> wi = {-std::cos(height), 0, std::sin(height)};
+      const Vec3<double> lowest = direction(kLowestView, 0);
+      const double at_lowest = evaluate(fit.closures(lowest), wi, lowest).r;
+      for (const double c : {1.9e-3, 1e-3, 1e-4}) {
+        const Vec3<double> wo = direction(c, 0);
+        const double f = evaluate(fit.closures(wo), wi, wo).r;
+        EXPECT_NEAR(f, at_lowest, 0.15 * std::abs(at_lowest) + 0.03) << name << " at " << c << ", light at " << height;
+        EXPECT_NEAR(f, fit.f_cos(wi, wo).r, 1e-6 * (1 + std::abs(f))) << name << " at " << c << ", light at " << height;
+      }
+    }
+  }
+}
+
 TEST(Fit, KeepsColoursThatDifferByAngle) {
   const Model& m = find_model("cook_torrance");
   const ParamValues values = values_of(m, {"f0=0.9,0.5,0.05"});

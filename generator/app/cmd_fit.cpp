@@ -88,8 +88,10 @@ void add_fit_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
-    const auto given = [&](const std::string& name) {
-      return std::ranges::any_of(o->values, [&](const std::string& value) { return value.starts_with(name + "="); });
+    // Pairs are of one value.
+    const auto superfluous = [&](const std::string& name) {
+      return !o->pairs &&
+             std::ranges::any_of(o->values, [&](const std::string& value) { return value.starts_with(name + "="); });
     };
     const ParamValues asked = values;
     if (!o->over.empty()) {
@@ -97,13 +99,14 @@ void add_fit_command(CLI::App& app) {
       if (!p || p->kind != ParamKind::Number)
         input_error("fit: --over {}: expected a parameter of {} that is a number", o->over, o->model);
       if (o->twin) input_error("fit: a twin is for one set of parameters: --over goes without --twin");
-      if (given(o->over)) input_error("fit: --over {0} runs over all values of {0}: {0}= is one too many", o->over);
+      if (superfluous(o->over))
+        input_error("fit: --over {0} runs over all values of {0}: {0}= is one too many", o->over);
       values.erase(o->over);
     }
     for (const std::string& name : o->any) {
       if (!model.info().param(name)) input_error("fit: --any {}: {} has no such parameter", name, o->model);
       if (o->twin) input_error("fit: a twin is for one set of parameters: --any goes without --twin");
-      if (given(name)) input_error("fit: --any {0} is for any value of {0}: {0}= is one too many", name);
+      if (superfluous(name)) input_error("fit: --any {0} is for any value of {0}: {0}= is one too many", name);
       values.erase(name);
     }
     if (!o->any.empty() || !o->over.empty()) {

@@ -377,8 +377,11 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   shader.operations = operations + mirror_operations;
 
   std::string body;
+  body += "    vector frame_n = normalize(Normal);\n";
+  if (kind == RepresentationKind::Fitted || controlled)
+    body += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", kLowestView);
   body +=
-      "    vector frame_n = normalize(Normal);\n    vector frame_t, frame_b;\n"
+      "    vector frame_t, frame_b;\n"
       "    brdfc_frame(frame_n, Tangent, frame_t, frame_b);\n"
       "    // Towards the viewer: I in Cycles points away from the surface.\n"
       "    float wo_x = dot(I, frame_t);\n    float wo_y = dot(I, frame_b);\n    float wo_z = dot(I, frame_n);\n\n";

@@ -29,8 +29,6 @@ using Eigen::VectorXd;
 
 constexpr int kViews = 33;
 constexpr std::size_t kTrialStride = 4;
-/// The height of the last view; below it the closures keep their shape.
-constexpr double kLastCosine = 2e-3;
 constexpr int kPoints = 3000;
 /// The axis has knots at its quarters, and more half way between two where the sum would be further off there than it
 /// is at the two, down to 1 / kSteps.
@@ -151,7 +149,7 @@ MatrixXd dictionary(const std::vector<Placed>& lobes, const std::vector<Facet>& 
 }
 
 /// Of the last view, as view() and place() measure heights.
-double last_place() { return std::sqrt(2 * kInvPi * std::asin(kLastCosine)); }
+double last_place() { return std::sqrt(2 * kInvPi * std::asin(kLowestView)); }
 /// How far along its axis of the tables, or along a `part` of it from `first` on, a view is: knots crowd towards the
 /// horizon, where lobes change most.
 template <class T> T place(const Vec3<T>& wo, double first = 0, double part = 1) {
@@ -1085,8 +1083,43 @@ template <class T> ClosureSum<T> Fit::weighted(const Vec3<T>& wo, const T& numbe
   return sum;
 }
 
+namespace {
+
+/// The frame about a normal that is turned towards a viewer below kLowestView until it is as high.
+class TurnedFrame {
+ public:
+  explicit TurnedFrame(const Vec3<double>& wo) : side_(mirror_side(wo)) {
+    const double angle = std::asin(kLowestView) - std::asin(wo.z);
+    cos_ = std::cos(angle), sin_ = std::sin(angle);
+  }
+  Vec3<double> into(const Vec3<double>& v) const { return turned(v, sin_); }
+  Vec3<double> out_of(const Vec3<double>& v) const { return turned(v, -sin_); }
+
+ private:
+  Vec3<double> turned(const Vec3<double>& v, double sin) const {
+    const double along = dot(side_, v);
+    Vec3<double> out = v + side_ * (along * (cos_ - 1) + v.z * sin);
+    out.z = v.z * cos_ - along * sin;
+    return out;
+  }
+  Vec3<double> side_;
+  double cos_, sin_;
+};
+
+}  // namespace
+
 template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied,
                                                const T& share, bool divided) const {
+  if constexpr (std::is_same_v<T, double>)
+    if (wo.z < kLowestView) {
+      const TurnedFrame frame(wo);
+      ClosureSum<T> sum = weighted(frame.into(wo), varied.number, weights(varied), share, divided);
+      for (Closure<T>& c : sum) {
+        c.normal = frame.out_of(c.normal);
+        c.turned = true;
+      }
+      return sum;
+    }
   return weighted(wo, varied.number, weights(varied), share, divided);
 }
 template ClosureSum<double> Fit::closures(const Vec3<double>&, const Varied<double>&, const double&, bool) const;
@@ -1094,6 +1127,13 @@ template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Varied<Expr>&, 
 
 template <class T>
 Rgb<T> Fit::f_cos(const Vec3<T>& wi, const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied) const {
+  if constexpr (std::is_same_v<T, double>)
+    if (wo.z < kLowestView) {
+      const TurnedFrame frame(wo);
+      const Vec3<T> turned = frame.into(wo);
+      // No lower, or this would not end.
+      return f_cos(frame.into(wi), {turned.x, turned.y, std::max(turned.z, kLowestView)}, varied);
+    }
   const std::vector<T> at = place(wo, varied.number);
   const std::vector<Rgb<T>> counts = this->counts(at, weights(varied));
   // Turned into the plane of incidence, where normals have two components.

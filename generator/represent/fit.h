@@ -66,6 +66,11 @@ template <class T> struct Varied {
 /// what there are terms by.
 std::optional<std::string> unfit(const Model&, const ParamValues&);
 
+/// The height, as a cosine, of the lowest view that closures are fitted to. Of a lower one, as bent and interpolated
+/// normals have it too, the normal is turned towards the viewer until the view is as high: about the normal itself
+/// closures would turn black one after the other, and what is left of the sum no longer cancels.
+inline constexpr double kLowestView = 2e-3;
+
 class Fit {
  public:
   enum class From { Store, Scratch };
@@ -91,7 +96,8 @@ class Fit {
 
   /// The closures for a view above the surface. Their weights add up to the albedo. Those with ramps have `share` of
   /// theirs and colours that make up for it; not `divided`, the colours still have to be divided by the weight: by its
-  /// largest channel, with terms by each.
+  /// largest channel, with terms by each. Of numbers, a lower view than kLowestView is taken as described there; a
+  /// shader that records closures has to turn its normal itself.
   template <class T> ClosureSum<T> closures(const Vec3<T>& wo, const std::type_identity_t<Varied<T>>& varied = {},
                                             const T& share = T(1), bool divided = true) const;
   /// f cos(theta_i) of their sum; directions above the surface.

@@ -180,6 +180,14 @@ def add_sphere(scene, material, segments=32):
     return ball
 
 
+def bend(mesh, normals):
+    """Gives each face of the mesh the normal (x, y, z) that shaders see."""
+    for polygon in mesh.polygons:
+        polygon.use_smooth = True
+    corners = [polygon.loop_total for polygon in mesh.polygons]
+    mesh.normals_split_custom_set(np.repeat(normals, corners, axis=0).tolist())
+
+
 def sphere_scene(scene, material, size=16, samples=16):
     """A sphere in a white world that fills most of a small picture."""
     add_sphere(scene, material)

@@ -9,7 +9,7 @@ import furnace
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
-from helpers import arguments, pairs_csv, read_csv
+from helpers import arguments, bend, pairs_csv, read_csv
 
 #: A model for each family of closures, one of three channels, one of terms, one beside a mirror.
 MATERIALS = {
@@ -95,6 +95,43 @@ def test_furnace_of_a_fitted_form(lean, tool):
     made = start(lean)
     scene = bpy.context.scene
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)
+
+
+def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
+    """They turn from the viewer at the rims of smooth meshes, where closures of opposite signs turn
+    black one before the other and left pixels of minus a half in a white world. The light is that
+    of the lowest view that fits have."""
+    materials = {
+        "phong": {"e": 20.0},
+        "max_phong": {"e": 50.0},
+        "ashikhmin_shirley": {"nu": 20.0, "nv": 20.0},
+        "ward": {"ax": 0.15, "ay": 0.15},
+    }
+    listed = {
+        f"{name} {form}": {"model": name, "parameters": values, "representation": form}
+        for name, values in materials.items()
+        for form in ("fitted", "controlled")
+    }
+    use_pack(listed)
+    cosines = (2.1e-3, 1.9e-3, 1e-3, 1e-4, -1e-3, -0.1)
+    seen = np.repeat(cosines, 40)
+    turns = np.random.default_rng(5).uniform(0, 2 * math.pi, len(seen))
+    for name, values in materials.items():
+        for form, samples, slack in (("fitted", 256, 5e-3), ("controlled", 1024, 3e-3)):
+            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+            scene = bpy.context.scene
+            extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+            made = extension.api.new_material(name, form, **values)
+            meter = Goniometer(scene, made, tilted(np.full(len(seen), 0.3), turns), samples)
+            bend(meter.mesh, tilted(seen, turns))
+            meter.add_world()
+            picture = meter.measure()[:, 0].reshape(len(cosines), -1)
+            means = picture.mean(1)
+            print(f"{name} {form}: {means}, {picture.min()} to {picture.max()}")
+            assert means[0] > 0.005
+            assert np.abs(means[1:] - means[0]).max() < slack, f"{name} {form}"
+            if form == "fitted":
+                assert picture.min() > 0, name
 
 
 #: Where along the slider of its number, by factors, each fitted form of the extension is looked at,
