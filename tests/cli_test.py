@@ -12,6 +12,7 @@ import json
 import math
 import shutil
 import subprocess
+import sys
 
 import pytest
 from support import MODELS, ROOT, TOOL, scene
@@ -368,11 +369,15 @@ def test_check_json():
     assert all(row["passed"] and row["cases"] > 0 for row in table)
 
 
+def table_of_readme(name):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    return readme.split(f"<!-- {name} -->\n")[1].split(f"<!-- end of {name} -->")[0]
+
+
 def test_check_markdown_is_the_table_of_the_readme():
     result = run("check", "--markdown")
     assert result.returncode == 0, result.stderr
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    table = readme.split("<!-- properties -->\n")[1].split("<!-- end of properties -->")[0]
+    table = table_of_readme("properties")
     assert result.stdout == table, "run script/properties"
     for name in MODELS:
         assert f"| `{name}` |" in table
@@ -386,6 +391,14 @@ def test_check_scales_with_the_effort_asked_for():
     few, many = cases("0.1"), cases("1")
     assert few.keys() == many.keys()
     assert few["values"] < many["values"] / 4
+
+
+def test_errors_of_stored_fits_are_the_table_of_the_readme():
+    script = ROOT / "script" / "forms_table.py"
+    command = [sys.executable, script, "--tool", TOOL, "fits-over"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == table_of_readme("fits-over"), "run script/forms fits-over"
 
 
 # ---- stability --------------------------------------------------------------------------------
