@@ -295,7 +295,7 @@ TEST(Plan, SaysWhatABudgetChangesForEachMaterial) {
   budget.error = 1;
   const PlannedModel plan = plan_scene(needs, budget)[0];
   ASSERT_EQ(plan.material_forms.size(), 2u);
-  const MaterialForm &open = plan.material_forms[0], &many = plan.material_forms[1];
+  const FormChange &open = plan.material_forms[0], &many = plan.material_forms[1];
   EXPECT_EQ(open.id, "open");
   EXPECT_EQ(open.before, kSampled);
   EXPECT_EQ(open.cost_before, 0.9);

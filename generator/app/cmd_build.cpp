@@ -76,7 +76,7 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
                        {"error", error_of(plan, c, result)},
                        {"why", c.why}});
   nlohmann::ordered_json of_materials = nlohmann::ordered_json::array();
-  for (const MaterialForm& m : plan.material_forms)
+  for (const FormChange& m : plan.material_forms)
     of_materials.push_back({{"material", m.id},
                             {"before", {{"form", name_of(m.before)}, {"cost", cost_json(m.cost_before)}}},
                             {"after", {{"form", name_of(m.after)}, {"cost", cost_json(m.cost_after)}}}});

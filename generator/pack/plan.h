@@ -35,8 +35,8 @@ struct FormChoice {
   std::optional<double> error = {};
 };
 
-/// The form of a material.
-struct MaterialForm {
+/// What a budget makes of the form of a material.
+struct FormChange {
   std::string id;
   RepresentationKind before, after;               ///< without a budget, as in a pack of everything; and with it
   std::optional<double> cost_before, cost_after;  ///< none where more directions are drawn than were measured
@@ -45,14 +45,14 @@ struct MaterialForm {
 /// What a pack holds of one model.
 struct PlannedModel {
   const Model* model = nullptr;
-  std::vector<std::string> materials;        ///< that need it; none in a pack of everything
-  ParamValues fixed;                         ///< folded into shaders and tables: no sockets
-  std::vector<RepresentationKind> forms;     ///< preferred first
-  int max_lobes = kMaxLobes;                 ///< of sampled forms
-  Cosines views;                             ///< that one of the materials can be seen from; tables have no others
-  std::vector<FormChoice> choices;           ///< every form, where materials were planned for
-  std::vector<MaterialForm> material_forms;  ///< of `materials`
-  std::vector<std::string> reasons;          ///< why something else is left out, a line each
+  std::vector<std::string> materials;      ///< that need it; none in a pack of everything
+  ParamValues fixed;                       ///< folded into shaders and tables: no sockets
+  std::vector<RepresentationKind> forms;   ///< preferred first
+  int max_lobes = kMaxLobes;               ///< of sampled forms
+  Cosines views;                           ///< that one of the materials can be seen from; tables have no others
+  std::vector<FormChoice> choices;         ///< every form, where materials were planned for
+  std::vector<FormChange> material_forms;  ///< of `materials`
+  std::vector<std::string> reasons;        ///< why something else is left out, a line each
 };
 
 /// Whole models in every form. Throws InputError for an unknown name; no names: every model.
