@@ -5,10 +5,19 @@ and stand where the shader does."""
 import math
 
 import bpy
+import eevee
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
-from helpers import arguments, pairs_csv, read_csv
+from helpers import (
+    add_camera,
+    add_sphere,
+    arguments,
+    pairs_csv,
+    read_csv,
+    read_picture,
+    render,
+)
 
 #: One colour for all closures, and three channels beside a mirror.
 MATERIALS = {
@@ -91,6 +100,55 @@ def test_a_twin_stands_beside_its_model(lean, empty):
     assert "osl_off" not in {f.code for f in api.warnings(material, empty)}
     api.switch_representation(material, "sampled")
     assert lean.nodes.identity(shown["CYCLES"])[1] == "sampled"
+
+
+@pytest.mark.full
+def test_a_twin_in_eevee(extension, use_pack, tmp_path):
+    """Two balls in the sun look as Cycles shows the same nodes: as bright, to 5 %, and their
+    highlights where those are. EEVEE's lobes are its own, so pixels differ by more."""
+    from mathutils import Vector
+
+    balls = {"phong": {"e": 20.0, "ks": (0.9, 0.6, 0.2)}, "oren_nayar": {"sigma": 0.5}}
+    listed = {name: {"model": name, "parameters": values} for name, values in balls.items()}
+    use_pack(listed, "--twin")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, samples=64, max_bounces=0)
+    materials = [extension.api.new_material(name, "sampled", **v) for name, v in balls.items()]
+    for x, material in zip((-1.1, 1.1), materials, strict=True):
+        extension.api.add_twin(material)
+        add_sphere(scene, material).location.x = x
+    add_camera(scene, orthographic=4.4)
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy, data.angle = 3, 0.1
+    sun = bpy.data.objects.new("Sun", data)
+    sun.rotation_mode = "QUATERNION"
+    sun.rotation_quaternion = Vector((0.5, -1, 0.7)).to_track_quat("Z", "Y")
+    scene.collection.objects.link(sun)
+    scene.render.resolution_x, scene.render.resolution_y = 96, 48
+
+    scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    scene.eevee.taa_render_samples = 16
+    scene.render.filepath = str(tmp_path / "eevee.exr")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "eevee.blend"))
+    if missing := eevee.picture_of(tmp_path / "eevee.blend", scene.render.filepath):
+        pytest.skip(missing)
+    shown = read_picture(tmp_path / "eevee.exr")[..., :3]
+    scene.render.engine = "CYCLES"
+    for material in materials:
+        extension.api.switch_representation(material, "twin")
+    expected = render(scene)[..., :3]
+    for name, part in {"phong": np.s_[:, :48], "oren_nayar": np.s_[:, 48:]}.items():
+        a, b = expected[part], shown[part]
+        brighter = b.mean((0, 1)) / a.mean((0, 1))
+        like = np.corrcoef(a.ravel(), b.ravel())[0, 1]
+        apart = np.subtract(
+            *(np.argwhere(p[..., 0] > 0.9 * p[..., 0].max()).mean(0) for p in (a, b))
+        )
+        print(f"{name}: {brighter} times as bright, correlation {like:.4f}, {apart} pixels apart")
+        assert brighter == pytest.approx(1, abs=0.05), name
+        assert like > 0.98, name
+        assert np.abs(apart).max() < 1.5, name
 
 
 def test_a_twin_is_too_bright_in_an_old_version(lean, empty):

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures by EEVEE, in a process of its own: without a driver, such as Mesa's, Blender ends it.
+
+python eevee.py FILE.blend      renders it as it says, after `STARTED` is printed
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+STARTED = "EEVEE runs"
+
+
+def picture_of(file, out):
+    """Renders a .blend file that writes the file `out`. Returns why EEVEE can't start."""
+    command = [sys.executable, __file__, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    if STARTED not in done.stdout:
+        return (
+            f"EEVEE does not start here: {' '.join(done.stderr.split())[-300:] or done.returncode}"
+        )
+    assert done.returncode == 0 and Path(out).is_file(), done.stdout + done.stderr
+    return None
+
+
+def main():
+    import bpy
+    import numpy as np
+    from helpers import add_camera, add_world, render
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    scene.view_settings.view_transform = "Standard"
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    add_camera(scene)
+    add_world(scene)
+    picture = render(scene)
+    if not np.allclose(picture[..., :3], 1, atol=0.01):
+        raise SystemExit(f"a white world is {picture.reshape(-1, 4).mean(0)}")
+    print(STARTED, flush=True)
+    bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+    bpy.ops.render.render(write_still=True)
+
+
+if __name__ == "__main__":
+    main()
