@@ -192,8 +192,8 @@ def test_shaders_are_short(extension_zip, subtests):
 
 
 def test_every_choice_reaches_the_shader(extension, empty, subtests):
-    """Each choice of a parameter gives the picture of its own index: the script node's own input
-    set by hand must render the same as the group's socket."""
+    """Each choice of a parameter gives a picture of its own, that of its index: the script node's
+    own input set by hand must render the same as the group's socket."""
     tested = 0
     for model, representation in forms(extension):
         sockets = extension.pack.socket_parameters(model, representation).values()
@@ -202,18 +202,25 @@ def test_every_choice_reaches_the_shader(extension, empty, subtests):
             continue
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         scene = bpy.context.scene
-        extension.api.enable_osl(scene)
+        extension.scene_loader.apply_clean_settings(scene)
         # One material for all: compiling its shader takes longer than rendering.
         material = extension.api.new_material(model, representation)
-        helpers.sphere_scene(scene, material, size=8, samples=4)
+        helpers.sphere_scene(scene, material, size=16, samples=16)
         tree = extension.nodes.group_nodes(material)[0].node_tree
         script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
+        # Different ones, and broad lobes: else some choices make no difference.
+        for i, number in enumerate(p for p in sockets if p["kind"] == "number"):
+            least = number["soft_min"]
+            value = least + (number["default"] - least) * min(0.1 * (i + 1), 0.9)
+            extension.api.set_parameters(material, **{number["name"]: value})
         for parameter in choices:
             name = parameter["name"]
             by_socket = []
             for choice in parameter["choices"]:
                 extension.api.set_parameters(material, **{name: choice})
                 by_socket.append(helpers.render(scene))
+            with subtests.test(model=model, representation=representation, parameter=name):
+                assert len({picture.tobytes() for picture in by_socket}) == len(by_socket)
             extension.api.set_parameters(material, **{name: parameter["default"]})
             socket = next(s for s in script.inputs if s.identifier == name)
             source = socket.links[0].from_socket
