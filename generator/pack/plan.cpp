@@ -186,11 +186,7 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
   }
   const RepresentationKind kind = representation_named(need.representation);
   if (is_fit(kind)) {
-    // The shader is one for all: to say of the first whether it is too long is enough.
-    const auto asks = [&](const MaterialNeed* n) { return n->representation == need.representation; };
-    const bool first = *std::find_if(needs.begin(), needs.end(), asks) == &need;
-    const bool write = first && kind == RepresentationKind::Controlled;
-    if (const auto reason = write ? not_controlled(needs) : unfit(needs, kind))
+    if (const auto reason = unfit(needs, kind))
       input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
                   *reason);
     return {kind, "asked for"};
