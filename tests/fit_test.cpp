@@ -188,7 +188,7 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   ParamValues fixed = values_of(m, {"e=20"});
   fixed.erase("ks");
   for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
-    const Shader s = write_shader(m, kind, fold(tabulate_albedo(m), m, fixed), fixed);
+    const Shader s = write_shader(m, kind, fold(albedo_table_of(m), m, fixed), fixed);
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
     EXPECT_THAT(s.source, HasSubstr("weight_0 *= ks;"));
     EXPECT_EQ(s.source.find("residual_weight *= brdfc_max_component(color(ks));") != std::string::npos,
@@ -244,7 +244,7 @@ TEST(Fit, RunsAlongANumber) {
 
   ParamValues fixed = values;
   fixed.erase("rho");
-  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, fixed), fixed);
+  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, fixed), fixed);
   EXPECT_THAT(s.source, HasSubstr("float sigma = "));
   EXPECT_THAT(s.source, HasSubstr("color rho = color("));
   EXPECT_LE(s.operations, 600);
@@ -306,7 +306,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
 
     ParamValues fixed = values_of(m, {});
     fixed.erase(open);
-    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, fixed), fixed);
+    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, fixed), fixed);
     EXPECT_THAT(s.source, HasSubstr(fmt::format("color {} = color(", open)));
     EXPECT_THAT(s.source, HasSubstr("ramp_0[k] /= weight_0;"));
     EXPECT_LE(s.operations, 600) << model;
@@ -330,7 +330,7 @@ TEST(StoredFits, ServeColoursThatAreKnown) {
   EXPECT_EQ(a.r, b.r);
   EXPECT_EQ(a.b, b.b);
   EXPECT_GT(a.r, 2 * a.b);
-  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, known), known);
+  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, known), known);
   EXPECT_THAT(s.source, testing::Not(HasSubstr("f0")));
 }
 
@@ -575,7 +575,7 @@ TEST(Fit, ShadersStayWithinBounds) {
   for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
     const Model& m = find_model(name);
     const ParamValues values = values_of(m, {text});
-    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, values), values);
+    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, values), values);
     EXPECT_LE(s.operations, 600) << name;
     EXPECT_LE(s.closures, 9) << name;
     EXPECT_THAT(s.source, HasSubstr("phong_ramp(normal_0, exponent_0, ramp_0)"));

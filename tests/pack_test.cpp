@@ -209,7 +209,7 @@ TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
   others.erase("cz");
   EXPECT_TRUE(form_values(m, RepresentationKind::Fitted, others).empty());
   EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
-  const std::string source = write_shader(m, RepresentationKind::Fitted, fold(tabulate_albedo(m), m, only), {}).source;
+  const std::string source = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, only), {}).source;
   for (const char* socket : {"    float e = ", "    color ks = "}) EXPECT_THAT(source, HasSubstr(socket));
   for (const char* gone : {"float cxy", "float cz"}) EXPECT_THAT(source, Not(HasSubstr(gone)));
 }

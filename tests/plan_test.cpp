@@ -321,7 +321,7 @@ TEST(Plan, AddsControlledFormsWhereThereCanBeOne) {
 
 TEST(Plan, FoldedTablesInterpolateToTheSame) {
   const Model& m = find_model("coupled");
-  const AlbedoTable whole = tabulate_albedo(m);
+  const AlbedoTable whole = albedo_table_of(m);
   for (const std::vector<std::string>& fixed_text :
        {std::vector<std::string>{"r0=0.137"}, {"rm=0.9,0.5,0.1"}, {"r0=0.137", "rm=0.9,0.5,0.1"}}) {
     const ParamValues all = parse_values(m.info(), {"r0=0.137", "rm=0.9,0.5,0.1"});
@@ -342,7 +342,7 @@ TEST(Plan, FoldedTablesInterpolateToTheSame) {
 
 TEST(Plan, AShaderOfOneDirectionHasNoLobes) {
   const Model& m = find_model("radziszewski_alda");
-  const AlbedoTable table = tabulate_albedo(m);
+  const AlbedoTable table = albedo_table_of(m);
   const Shader one = write_shader(m, RepresentationKind::Sampled, table, {}, 1),
                all = write_shader(m, RepresentationKind::Sampled, table);
   EXPECT_EQ(one.closures, 1);

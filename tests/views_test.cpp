@@ -159,7 +159,7 @@ constexpr Cosines kSome{0.35, 0.9};
 
 TEST(Views, CutAlbedoTablesHoldTheSameNumbers) {
   const Model& m = find_model("coupled");
-  const AlbedoTable whole = tabulate_albedo(m);
+  const AlbedoTable whole = albedo_table_of(m);
   for (const ParamValues& fixed : {ParamValues{}, ParamValues{{"r0", 0.137}}}) {
     ParamValues values = complete(m.info(), {{"r0", 0.137}});
     const AlbedoTable all = fold(whole, m, fixed), cut = fold(whole, m, fixed, kSome);
@@ -230,7 +230,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   EXPECT_EQ(plan_scene({need("a", {})}, budget)[0].forms[0], RepresentationKind::Sampled);
   EXPECT_EQ(plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], RepresentationKind::Fitted);
 
-  const AlbedoTable table = fold(tabulate_albedo(m), m, values, kSome);
+  const AlbedoTable table = fold(albedo_table_of(m), m, values, kSome);
   for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
     const Shader whole = write_shader(m, kind, table, values), cut = write_shader(m, kind, table, values, 1, kSome);
     EXPECT_LT(cut.source.size(), whole.source.size());

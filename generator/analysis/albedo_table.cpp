@@ -13,6 +13,7 @@
 
 #include "analysis/albedo.h"
 #include "analysis/table_file.h"
+#include "core/hash.h"
 #include "core/parallel.h"
 #include "model/choices.h"
 
@@ -712,6 +713,60 @@ class Tabulator {
   AlbedoTable table_;
 };
 
+/// All that a table depends on but the code; a change of the code that changes tables changes the first number.
+std::string settings() {
+  return fmt::format("1 {} {} {} {} {} {} {} {}", kMinCos, kAimError, kMaxPoints, kMaxPoints4, kSame, kGridSamples,
+                     kProofSamples, kProfileNoise);
+}
+
+/// What a model computes, to five digits, at random values of all its parameters. The text of its formula would not do:
+/// the order of statements in it is that in which a compiler evaluates arguments. Not near the upper ends of ranges,
+/// where exponents of a million leave what a library rounds in the fifth digit.
+std::string samples_of(const Model& model) {
+  constexpr int kPlaces = 64, kPairs = 4;
+  constexpr double kUpTo = 0.7;
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> uniform;
+  Sequence3 points(1);
+  std::string text;
+  const auto add = [&](const Rgb<double>& c) { text += fmt::format("{:.5g} {:.5g} {:.5g}\n", c.r, c.g, c.b); };
+  for (const Choices& choices : choice_combinations(model.info()))
+    for (int place = 0; place < kPlaces; ++place) {
+      ParamValues values = with_choices(model.info(), choices);
+      for (const ParamInfo& p : model.info().params) {
+        if (p.kind == ParamKind::Number) values[p.name] = coordinate(p).at(kUpTo * uniform(random));
+        if (p.kind != ParamKind::Color) continue;
+        std::array<double, 3> color;
+        for (double& c : color) c = uniform(random);
+        values[p.name] = color;
+      }
+      const auto brdf = model.make_double(values);
+      for (int i = 0; i < kPairs; ++i) {
+        const Vec3<double> a = points.next(), b = points.next();
+        const Vec3<double> wo = direction(0.02 + 0.98 * a.x, 2 * kPi * a.y), drawn = brdf->sample(wo, b).wi;
+        add(brdf->eval(i % 2 == 0 && drawn.z > 0 ? drawn : direction(b.x, 2 * kPi * b.y), wo));
+        add(brdf->mirror(wo));
+        add(brdf->transmit(wo));
+      }
+    }
+  return text;
+}
+
+std::string hash_of(const Model& model) {
+  std::string params;
+  for (const ParamInfo& p : model.info().params)
+    params += fmt::format("{} {} {} {} {}\n", p.name, int(p.kind), p.min, p.max, fmt::join(p.choices, " "));
+  return sha256(fmt::format("{}\n{}\n{}\n{}{}", model.info().name,
+                            format_values(model.info(), complete(model.info(), {})), settings(), params,
+                            samples_of(model)));
+}
+
+std::optional<AxisScale> scale_named(const std::string& name) {
+  for (const AxisScale s : {AxisScale::Linear, AxisScale::Log, AxisScale::Log1p})
+    if (name == name_of(s)) return s;
+  return std::nullopt;
+}
+
 }  // namespace
 
 double from_scale(AxisScale s, double x) {
@@ -738,6 +793,26 @@ const std::vector<AlbedoTerm>& AlbedoTable::terms_for(const Model& m, const Para
 }
 
 AlbedoTable tabulate_albedo(const Model& model) { return Tabulator(model).run(); }
+
+bool has_albedo_table(const Model& model) {
+  const std::vector<ParamInfo>& params = model.info().params;
+  return model.has_scatter() ||
+         std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;
+}
+
+std::filesystem::path stored_albedo(const Model& model) {
+  return std::filesystem::path(BRDFC_SOURCE_DIR) / "generator" / "albedos" /
+         fmt::format("{}_{}.exr", model.info().name, hash_of(model).substr(0, 16));
+}
+
+AlbedoTable albedo_table_of(const Model& model) {
+  const std::filesystem::path path = stored_albedo(model);
+  if (!std::filesystem::exists(path)) return tabulate_albedo(model);
+  AlbedoTable table = read_albedo_exr(path);
+  if (table.model != model.info().name)
+    input_error("{}: model: expected {}, got {}", path.string(), model.info().name, table.model);
+  return table;
+}
 
 Rgb<double> lookup(const AlbedoGrid& g, const std::vector<double>& x) {
   // Weights of the two knots on every axis, then the sum over the corners of the cell.
@@ -785,7 +860,7 @@ Rgb<double> lookup(const AlbedoTable& table, const Model& m, const ParamValues& 
   return sum;
 }
 
-void write_albedo_exr(const AlbedoTable& table, const std::string& path) {
+void write_albedo_exr(const AlbedoTable& table, const std::filesystem::path& path) {
   using Json = nlohmann::ordered_json;
   std::size_t width = 1;
   int channels = 1;
@@ -825,8 +900,58 @@ void write_albedo_exr(const AlbedoTable& table, const std::string& path) {
                   {"choice_sizes", table.choice_sizes},
                   {"terms", terms},
                   {"grids", grids}};
-
   write_table_image({int(width), int(height), channels, std::move(pixels), meta.dump()}, path);
+}
+
+AlbedoTable read_albedo_exr(const std::filesystem::path& path) {
+  const TableImage image = read_table_image(path);
+  AlbedoTable table;
+  try {
+    const auto meta = nlohmann::json::parse(image.meta);
+    table.model = meta.at("model");
+    table.doc = meta.at("doc");
+    table.error = meta.at("error");
+    table.quadrature = meta.at("quadrature_error");
+    table.anisotropy = meta.at("anisotropy");
+    table.choices = meta.at("choices").get<std::vector<std::string>>();
+    table.choice_sizes = meta.at("choice_sizes").get<std::vector<int>>();
+    for (const auto& g : meta.at("grids")) {
+      AlbedoGrid grid;
+      grid.channels = g.at("channels");
+      grid.error = g.at("error");
+      std::size_t size = 1;
+      for (const auto& a : g.at("axes")) {
+        const std::string name = a.at("name"), scale = a.at("scale");
+        TableAxis axis{name, AxisScale::Linear, a.at("values").get<std::vector<double>>()};
+        if (const auto known = scale_named(scale))
+          axis.scale = *known;
+        else
+          input_error("{}: scale of {}: expected linear, log or log1p, got {}", path.string(), name, scale);
+        size *= axis.values.size();
+        grid.axes.push_back(std::move(axis));
+      }
+      const std::size_t row = table.grids.size(), all = std::size_t(image.channels);
+      if (row >= std::size_t(image.height) || size > std::size_t(image.width) || g.at("points") != size ||
+          grid.channels < 1 || grid.channels > image.channels)
+        input_error("{}: grids: {} has other numbers than its axes", path.string(), row);
+      for (std::size_t i = 0; i < size; ++i)
+        for (std::size_t c = 0; c < std::size_t(grid.channels); ++c)
+          grid.values.push_back(image.pixels[(row * std::size_t(image.width) + i) * all + c]);
+      table.grids.push_back(std::move(grid));
+    }
+    for (const auto& combination : meta.at("terms")) {
+      std::vector<AlbedoTerm> terms;
+      for (const auto& t : combination) {
+        terms.push_back({t.at("mirror"), t.at("colors").get<std::vector<std::string>>(), t.at("grid")});
+        if (terms.back().grid < 0 || std::size_t(terms.back().grid) >= table.grids.size())
+          input_error("{}: terms: there is no grid {}", path.string(), terms.back().grid);
+      }
+      table.terms.push_back(std::move(terms));
+    }
+  } catch (const nlohmann::json::exception& e) {
+    input_error("{}: expected a table of albedos: {}", path.string(), e.what());
+  }
+  return table;
 }
 
 }  // namespace brdfc

@@ -44,4 +44,20 @@ TableImage read_table_image(const std::filesystem::path& path) {
   return image;
 }
 
+void replace_stored(const std::filesystem::path& path, const std::string& model,
+                    const std::function<void(const std::filesystem::path&)>& write) {
+  const std::filesystem::path folder = path.parent_path();
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) input_error("{}: cannot be created: {}", folder.string(), error.message());
+  write(path);
+  const std::string prefix = model + "_";
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().stem().string();
+    // Names of models may begin alike: what follows is a hash of 16 digits and no more.
+    if (name.starts_with(prefix) && name.size() == prefix.size() + 16 && entry.path() != path)
+      std::filesystem::remove(entry.path());
+  }
+}
+
 }  // namespace brdfc

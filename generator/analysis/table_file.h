@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,5 +21,10 @@ struct TableImage {
 void write_table_image(const TableImage&, const std::filesystem::path&);
 /// Throws InputError naming the path if it can't be read or has no such attribute.
 TableImage read_table_image(const std::filesystem::path&);
+
+/// Writes the file FOLDER/MODEL_HASH.exr, of a hash of 16 digits, and removes what is there of the model by other
+/// hashes. Throws InputError naming the folder if it can't be created.
+void replace_stored(const std::filesystem::path&, const std::string& model,
+                    const std::function<void(const std::filesystem::path&)>& write);
 
 }  // namespace brdfc

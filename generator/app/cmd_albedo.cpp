@@ -6,7 +6,9 @@
 #include <optional>
 
 #include "analysis/albedo.h"
+#include "analysis/albedo_table.h"
 #include "analysis/probes.h"
+#include "analysis/table_file.h"
 #include "app/commands.h"
 #include "app/csv.h"
 
@@ -18,6 +20,7 @@ void add_albedo_command(CLI::App& app) {
     std::vector<std::string> values;
     int count = 0;
     double phi = 0;
+    bool store = false;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
@@ -33,8 +36,22 @@ void add_albedo_command(CLI::App& app) {
   cmd->add_option("--count", o->count, "So many cosines from 0.01 to 1; stdin is not read")
       ->check(CLI::Range(2, 1 << 20));
   cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
+  cmd->add_flag("--store", o->store,
+                "Instead makes the table of all parameters anew that packs are built of, and keeps it in\n"
+                "generator/albedos, in place of what is kept of the model")
+      ->excludes("values", "--count", "--phi");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
+    if (o->store) {
+      if (!has_albedo_table(model)) {
+        std::cerr << "brdfc albedo: " << o->model << " has no table: its shader adds the albedo up\n";
+        return;
+      }
+      const AlbedoTable table = tabulate_albedo(model);
+      replace_stored(stored_albedo(model), o->model,
+                     [&](const std::filesystem::path& path) { write_albedo_exr(table, path); });
+      return;
+    }
     const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
     CsvWriter out("cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate");
     const auto write = [&](double cos_theta_o) {

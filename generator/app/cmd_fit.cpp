@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "analysis/table_file.h"
 #include "app/commands.h"
 #include "app/csv.h"
 #include "represent/fit.h"
@@ -28,21 +29,6 @@ void print_errors(const std::vector<ViewError>& errors, const std::string& axis,
     out.row(row);
   }
   out.finish();
-}
-
-void replace_stored(const Fit& fit, const Model& model, const ParamValues& values) {
-  const std::filesystem::path path = stored_fit(model, values), folder = path.parent_path();
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) input_error("{}: cannot be created: {}", folder.string(), error.message());
-  fit.store(model, values, path);
-  const std::string prefix = model.info().name + "_";
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string name = entry.path().stem().string();
-    // Names of models may begin alike: what follows is a hash of 16 digits and no more.
-    if (name.starts_with(prefix) && name.size() == prefix.size() + 16 && entry.path() != path)
-      std::filesystem::remove(entry.path());
-  }
 }
 
 }  // namespace
@@ -134,7 +120,8 @@ void add_fit_command(CLI::App& app) {
     if (o->store) {
       values = along_axis(model, values);
       const Fit fit(model, values, Fit::From::Scratch);
-      replace_stored(fit, model, values);
+      replace_stored(stored_fit(model, values), model.info().name,
+                     [&](const std::filesystem::path& path) { fit.store(model, values, path); });
       print_errors(fit.errors(), o->over, label());
     } else if (o->twin) {
       const Twin& twin = twin_of(model, values);

@@ -237,14 +237,6 @@ struct BuiltModel {
   std::vector<PackLine> lines;
 };
 
-/// Delta terms alone need no table: the shader adds up their weights. With few parameters they still get one, for the
-/// panel, which can't run the formula.
-bool has_table(const Model& model) {
-  const std::vector<ParamInfo>& params = model.info().params;
-  return model.has_scatter() ||
-         std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;
-}
-
 /// What a form looks its closures up in; none but fitted and controlled ones do.
 const Fit* fit_in(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
   if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return nullptr;
@@ -323,11 +315,11 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
 
   AlbedoTable table, whole_table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
-  if (has_table(model)) {
-    whole_table = tabulate_albedo(model);
+  if (has_albedo_table(model)) {
+    whole_table = albedo_table_of(model);
     table = fold(whole_table, model, plan.fixed, plan.views);
     const fs::path exr = scratch / (info.name + ".exr");
-    write_albedo_exr(table, exr.string());
+    write_albedo_exr(table, exr);
     built.files[table_file] = read_text(exr);
     fs::remove(exr);
   }
@@ -370,7 +362,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"highlight", has_highlight(kind, model.has_mirror(), shader) ? highlight_json(model, fixed) : Json()},
         {"sha256", sha256(shader.source)}};
   }
-  if (has_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
+  if (has_albedo_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
   return built;
 }
 

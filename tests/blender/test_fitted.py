@@ -117,7 +117,7 @@ def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
     seen = np.repeat(cosines, 40)
     turns = np.random.default_rng(5).uniform(0, 2 * math.pi, len(seen))
     for name, values in materials.items():
-        for form, samples, slack in (("fitted", 256, 5e-3), ("controlled", 1024, 3e-3)):
+        for form, samples, slack in (("fitted", 256, 5e-3), ("controlled", 1024, 0)):
             bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
             scene = bpy.context.scene
             extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
@@ -126,10 +126,12 @@ def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
             bend(meter.mesh, tilted(seen, turns))
             meter.add_world()
             picture = meter.measure()[:, 0].reshape(len(cosines), -1)
-            means = picture.mean(1)
-            print(f"{name} {form}: {means}, {picture.min()} to {picture.max()}")
+            means, errors = picture.mean(1), picture.std(1, ddof=1) / math.sqrt(picture.shape[1])
+            noise = 5 * np.hypot(errors[1:], errors[0]).max()
+            print(f"{name} {form}: {means}, {picture.min()} to {picture.max()}, noise {noise}")
             assert means[0] > 0.005
-            assert np.abs(means[1:] - means[0]).max() < slack, f"{name} {form}"
+            assert noise < 0.01, "too noisy to tell"
+            assert np.abs(means[1:] - means[0]).max() < slack + noise, f"{name} {form}"
             if form == "fitted":
                 assert picture.min() > 0, name
 
