@@ -10,9 +10,9 @@ import bpy
 import conditions
 import numpy as np
 import pytest
-from goniometer import Goniometer, frame, tilted, unit
-from helpers import evaluate, script_material
-from test_physics import KINDS, axes, expected_radiance
+from goniometer import Goniometer, tilted, unit
+from helpers import script_material
+from test_physics import KINDS, axes, expected_radiance, light_of_lamp
 from worlds import half, spot, white
 
 FULL = pytest.mark.full
@@ -95,25 +95,11 @@ def test_light_of_a_world(extension, tool, material, world):
     assert np.abs(z).max() < 5, f"z = {np.round(z, 1)}"
 
 
-def light_of_lamp(tool, material, wo):
-    """Of the views `wo`, (n, 3), in the frames of LIT: f cos, mean over points on the lamp."""
-    i = np.arange(64) + 0.5
-    radius, turn = math.tan(LAMP / 2) * np.sqrt(i / 64), i * math.pi * (3 - math.sqrt(5))
-    t, b = frame(SUN[None])
-    points = unit(SUN + radius[:, None] * (np.cos(turn)[:, None] * t + np.sin(turn)[:, None] * b))
-    truth = []
-    for normal, view in zip(LIT, wo, strict=True):
-        wi = np.stack([points @ a for a in axes(normal)], -1)
-        f = evaluate(tool, material.model, material.values, wi, np.broadcast_to(view, wi.shape))
-        truth.append((f[:, 0] * wi[:, 2]).mean())
-    return np.array(truth)
-
-
 def test_noise_under_a_small_lamp(extension, tool, material):
     """relMSE, the squares of errors over those of the truth, at equal samples."""
     found, _ = measure(extension, material, FORMS, 1024, sun(LAMP), LIT)
     wo = np.array([axes(n) @ (0, 0, 1) for n in LIT])
-    truth = light_of_lamp(tool, material, wo)
+    truth = light_of_lamp(tool, material.model, material.values, LIT, wo, SUN, LAMP)[:, 0]
     errors = ((found[..., 0] - truth[:, None]) ** 2).mean(-1).sum(-1) / (truth**2).sum()
     rel_mse = dict(zip(FORMS, errors, strict=True))
     ratio = rel_mse["sampled"] / rel_mse["controlled"]

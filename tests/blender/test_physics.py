@@ -227,6 +227,23 @@ def expected_radiance(tool, model, values, radiance):
     return np.array(result)
 
 
+def light_of_lamp(tool, model, values, normals, wo, towards, angle):
+    """Radiance under a sun of irradiance 1 that is `angle` wide, of facets with these normals seen
+    from `wo`, (n, 3) in their frames; (n, 3)."""
+    i = np.arange(64) + 0.5
+    radius, turn = math.tan(angle / 2) * np.sqrt(i / 64), i * math.pi * (3 - math.sqrt(5))
+    t, b = frame(towards[None])
+    points = unit(
+        towards + radius[:, None] * (np.cos(turn)[:, None] * t + np.sin(turn)[:, None] * b)
+    )
+    result = []
+    for normal, view in zip(normals, wo, strict=True):
+        wi = points @ axes(normal).T
+        f = evaluate(tool, model, values, wi, np.broadcast_to(view, wi.shape))
+        result.append((f * wi[:, 2:]).mean(0))
+    return np.array(result)
+
+
 # The gradient alone would find most errors; it is the one of the developer's loop.
 WORLDS = [
     pytest.param(white, marks=pytest.mark.full),
