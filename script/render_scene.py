@@ -56,7 +56,7 @@ def quiet():
 def start_blender(extension, resources):
     """Imports bpy with scratch user folders, installs the extension; returns bpy, scene_loader."""
     os.environ["BLENDER_USER_RESOURCES"] = str(resources)
-    # Blender leaves the bytecode of every script that it compiles in the folder for temporary files.
+    # Blender leaves the bytecode of each script that it compiles in the folder for temporary files.
     tempfile.tempdir = str(resources)
     import bpy
 

@@ -306,8 +306,10 @@ class AlbedoText {
 std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
   const auto microfacet = [&](const char* distribution) {
-    return fmt::format("weight_{} * microfacet(\"{}\", {}, vector(0.0), alpha_{}, alpha_{}, 1.0, 0)", i, distribution,
-                       n, i, i);
+    // The viewer's direction lies in the plane that facets are stretched in. Along the normal, where it is no tangent,
+    // they are not, and Cycles takes none.
+    return fmt::format("weight_{0} * microfacet(\"{1}\", {2}, {3}, alpha_{0}, {4}_{0}, 1.0, 0)", i, distribution, n,
+                       closure.stretched ? "I" : "vector(0.0)", closure.stretched ? "alpha_across" : "alpha");
   };
   switch (closure.kind) {
     case ClosureKind::Diffuse:
@@ -420,6 +422,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (has_ramp(closure)) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
       if (closure == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
       if (has_facets(closure)) body += fmt::format("    float alpha_{};\n", c);
+      if (kinds[c].stretched) body += fmt::format("    float alpha_across_{};\n", c);
       if (closure == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
       if (kinds[c].turned) body += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
       shader.facets = shader.facets || has_facets(closure);

@@ -35,12 +35,22 @@ template <class T> struct Closure {
   Vec3<T> normal;
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
   T exponent;                          ///< PhongRamp
-  T alpha;                             ///< Ggx, Beckmann: roughness
+  T alpha;                             ///< Ggx, Beckmann: roughness, of stretched facets along the tangent
+  T alpha_across;                      ///< of stretched facets: across it
+  Vec3<T> tangent;                     ///< of stretched facets: in the plane of the normal and the viewer
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
   bool turned = false;                 ///< `normal` is not the surface's; it is not below it
+  bool stretched = false;              ///< facets that are rougher or smoother in the plane of incidence than across it
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
-      : kind(kind_), weight(weight_), normal{T(0), T(0), T(1)}, exponent(0), alpha(1), ior(1) {}
+      : kind(kind_),
+        weight(weight_),
+        normal{T(0), T(0), T(1)},
+        exponent(0),
+        alpha(1),
+        alpha_across(1),
+        tangent{T(1), T(0), T(0)},
+        ior(1) {}
 };
 
 template <class T> using ClosureSum = std::vector<Closure<T>>;
@@ -84,6 +94,14 @@ T microfacet(ClosureKind kind, const T& alpha, const Vec3<T>& normal, const Vec3
                     slope(cosTheta_o), cosTheta_o);
 }
 
+/// The same of stretched facets, in the frame that Cycles builds about normal and tangent.
+template <class T> T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& normal,
+                                const Vec3<T>& tangent, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const Vec3<T> y = normalize(cross(normal, tangent)), x = cross(y, normal);
+  const auto in_frame = [&](const Vec3<T>& v) { return Vec3<T>{dot(x, v), dot(y, v), dot(normal, v)}; };
+  return microfacet(kind, alpha_x, alpha_y, in_frame(wi), in_frame(wo));
+}
+
 /// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface. `ramp` is a
 /// function that gives the ramp's colour at a position, which may lie above 1.
 template <class T, class Ramp>
@@ -108,11 +126,14 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
       return select(both && cosAlpha > T(0), c.weight * ramp(lobe) * height, none);
     }
     case ClosureKind::Ggx:
-    case ClosureKind::Beckmann:
-      return select(both,
-                    c.weight * (c.turned ? microfacet(c.kind, c.alpha, c.normal, wi, wo)
-                                         : microfacet(c.kind, c.alpha, c.alpha, wi, wo)),
-                    none);
+    case ClosureKind::Beckmann: {
+      const auto of_facets = [&] {
+        if (c.stretched) return microfacet(c.kind, c.alpha, c.alpha_across, c.normal, c.tangent, wi, wo);
+        if (c.turned) return microfacet(c.kind, c.alpha, c.normal, wi, wo);
+        return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
+      };
+      return select(both, c.weight * of_facets(), none);
+    }
     case ClosureKind::Reflection:
     case ClosureKind::Refraction:
       return none;

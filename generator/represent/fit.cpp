@@ -75,10 +75,11 @@ std::vector<Placed> placed(Family family, const Moments& here, const Moments& at
   return lobes;
 }
 
-/// Facets whose lobe about the mirror direction leans by `offset`, as those of phong_ramps do.
+/// Facets whose lobe about the mirror direction leans by `offset`, as those of phong_ramps do. Their roughness is
+/// alpha * stretch in the plane of incidence, alpha / stretch across it.
 struct Facet {
   ClosureKind kind;
-  double offset, alpha;
+  double offset, alpha, stretch;
 };
 /// As many points tell how facets lie.
 constexpr std::size_t kFewerPoints = 4;
@@ -87,6 +88,9 @@ constexpr std::size_t kFewerPoints = 4;
 /// surface and a facet's horizon, though it evaluates them as 0.
 constexpr double kMostLean = -1.7;
 constexpr double kLeastAlpha = 1e-3;
+/// Of the logarithm of the stretch of facets, in units of the square of the view's sine: along the normal nothing is
+/// stretched.
+constexpr double kMostStretch = 3;
 /// Of roots of alpha: to that of the lobe at normal incidence, and of the second facets to those of the first.
 constexpr double kLeastRatio = 0.3, kMostRatio = 2;
 /// Facets are sought at as many places of the axis, and at as many-th views.
@@ -110,11 +114,15 @@ template <class T> Closure<T> lobe_closure(const Vec3<T>& side, const T& offset,
   return c;
 }
 
-template <class T> Closure<T> facet_closure(ClosureKind kind, const Vec3<T>& side, const T& offset, const T& alpha) {
+template <class T>
+Closure<T> facet_closure(ClosureKind kind, const Vec3<T>& side, const T& offset, const T& alpha, const T& stretch) {
   Closure<T> c(kind, Rgb<T>(T(1)));
   c.normal = leaning(side, offset);
   c.turned = true;
-  c.alpha = alpha;
+  c.alpha = alpha * stretch;
+  c.alpha_across = alpha / stretch;
+  c.tangent = side;
+  c.stretched = true;
   return c;
 }
 
@@ -141,7 +149,7 @@ MatrixXd dictionary(const std::vector<Placed>& lobes, const std::vector<Facet>& 
     column += kRampSize;
   }
   for (const Facet& f : facets) {
-    const Closure<double> c = facet_closure(f.kind, side, f.offset, f.alpha);
+    const Closure<double> c = facet_closure(f.kind, side, f.offset, f.alpha, f.stretch);
     for (std::size_t p = 0; p < points.wi.size(); ++p) a(Eigen::Index(p), column) = evaluate(c, points.wi[p], wo).r;
     ++column;
   }
@@ -196,17 +204,20 @@ MatrixXd judged(const Terms& terms) {
   return out;
 }
 
-/// What facets are sought by: how far each leans, and the root of its alpha in units of the one before, the first one's
-/// of that which gives the lobe at normal incidence its width.
+/// What facets are sought by: how far each leans, the root of its alpha in units of the one before, the first one's of
+/// that which gives the lobe at normal incidence its width, and how much it is stretched.
 using Shape = std::vector<double>;
-const Shape kFirstShape = {0, 1, 0, 0.85};
+constexpr std::size_t kNumbers = 3;
+const Shape kFirstShape = {0, 1, 0, 0, 0.85, 0};
 std::vector<Facet> facets(const Shape& shape, const Moments& at_normal, const Vec3<double>& wo) {
   std::vector<Facet> out;
   double root = std::pow(2 * std::max(at_normal.narrow, 0.5) + 1, -0.25);
-  for (std::size_t j = 0; j < shape.size(); j += 2) {
+  for (std::size_t j = 0; j < shape.size(); j += kNumbers) {
     root *= shape[j + 1];
-    out.push_back({ClosureKind::Beckmann, shape[j] * std::asin(wo.z) * std::sqrt(sin2_theta(wo)),
-                   std::clamp(sqr(root), kLeastAlpha, 1.0)});
+    const double sin2Theta = sin2_theta(wo), alpha = std::clamp(sqr(root), kLeastAlpha, 1.0),
+                 most = std::min(1 / alpha, alpha / kLeastAlpha);
+    out.push_back({ClosureKind::Beckmann, shape[j] * std::asin(wo.z) * std::sqrt(sin2Theta), alpha,
+                   std::clamp(std::exp(shape[j + 2] * sin2Theta), 1 / most, most)});
   }
   return out;
 }
@@ -238,9 +249,10 @@ Shape improved(const Shape& shape, const Moments& at_normal, const View& whole) 
   }
   view.f = whole.f(Eigen::seqN(0, Eigen::Index(view.points.wi.size()), Eigen::Index(kFewerPoints)), Eigen::all);
   std::vector<Variable> variables;
-  for (std::size_t j = 0; j < shape.size(); j += 2) {
+  for (std::size_t j = 0; j < shape.size(); j += kNumbers) {
     variables.push_back({shape[j], kMostLean, 0, 0.1});
     variables.push_back({shape[j + 1], kLeastRatio, j == 0 ? kMostRatio : 0.9, 0.1 * shape[j + 1]});
+    variables.push_back({shape[j + 2], -kMostStretch, kMostStretch, 0.1});
   }
   return argmin(variables, [&](const Shape& x) { return error_of(facets(x, at_normal, view.wo), view); });
 }
@@ -544,7 +556,7 @@ std::vector<double> rounded(std::vector<double> numbers) {
 
 /// All that a fit depends on but the code; a change of the code that changes fits changes the first number.
 std::string settings() {
-  return fmt::format("2 {} {} {} {} {} {} {} {}", kViews, kTrialStride, kPoints, kRidge, kFirstSteps, kSteps,
+  return fmt::format("3 {} {} {} {} {} {} {} {}", kViews, kTrialStride, kPoints, kRidge, kFirstSteps, kSteps,
                      kWorseBetween, kSlightlyOff);
 }
 /// What a model computes along an axis, to five digits. The text of its formula would not do: the order of statements
@@ -736,7 +748,8 @@ template <class Knot> void Fit::tabulate(const std::vector<double>& places, cons
     facets_.push_back(
         {first_cells[0].facets[i].kind,
          table(fmt::format("lean_of_{}", i), [&](const Cell& c) { return c.facets[i].offset; }),
-         table(fmt::format("alpha_of_{}", i), [&](const Cell& c) { return std::log(c.facets[i].alpha); })});
+         table(fmt::format("alpha_of_{}", i), [&](const Cell& c) { return std::log(c.facets[i].alpha); }),
+         table(fmt::format("stretch_of_{}", i), [&](const Cell& c) { return std::log(c.facets[i].stretch); })});
   const std::size_t lobes = first_cells[0].lobes.size(), closures_count = lobes + 1 + facets_.size();
   for (std::size_t j = 0; j < lobes; ++j)
     lobes_.push_back(
@@ -787,7 +800,7 @@ std::vector<std::shared_ptr<const Table>> Fit::tables() const {
   };
   add(position_);
   for (const auto& table : amplitude_) add(table);
-  for (const Facets& f : facets_) add(f.offset), add(f.log_alpha);
+  for (const Facets& f : facets_) add(f.offset), add(f.log_alpha), add(f.log_stretch);
   for (const Lobe& l : lobes_) add(l.offset), add(l.exponent);
   for (const Linear& l : linear_) {
     for (const auto& table : l.weight) add(table);
@@ -807,7 +820,7 @@ Fit Fit::seen(const Cosines& views) const {
   const auto cut = [&](std::shared_ptr<const Table>& table) { table = part(*table, axis_ ? 1 : 0, first, last); };
   for (auto& table : out.amplitude_) cut(table);
   for (Lobe& l : out.lobes_) cut(l.offset), cut(l.exponent);
-  for (Facets& f : out.facets_) cut(f.offset), cut(f.log_alpha);
+  for (Facets& f : out.facets_) cut(f.offset), cut(f.log_alpha), cut(f.log_stretch);
   for (Linear& l : out.linear_) {
     for (auto& table : l.weight) cut(table);
     for (auto& term : l.colour)
@@ -937,7 +950,8 @@ void Fit::read(const std::filesystem::path& path, const std::string& hash) {
     const auto& facets = meta.at("facets");
     for (std::size_t i = 0; i < facets.size(); ++i)
       facets_.push_back({facets[i] == "ggx" ? ClosureKind::Ggx : ClosureKind::Beckmann,
-                         tables.at(fmt::format("lean_of_{}", i)), tables.at(fmt::format("alpha_of_{}", i))});
+                         tables.at(fmt::format("lean_of_{}", i)), tables.at(fmt::format("alpha_of_{}", i)),
+                         tables.at(fmt::format("stretch_of_{}", i))});
     const std::size_t lobes = meta.at("lobes"), channels = meta.at("channels");
     for (std::size_t j = 0; j < lobes; ++j)
       lobes_.push_back({tables.at(fmt::format("offset_of_{}", j)), tables.at(fmt::format("power_of_{}", j))});
@@ -1005,7 +1019,8 @@ template <class T> Closure<T> Fit::shape(std::size_t j, const Vec3<T>& side, con
   }
   if (j == lobes_.size()) return Closure<T>(ClosureKind::DiffuseRamp, Rgb<T>(T(1)));
   const Facets& facets = facets_[j - lobes_.size() - 1];
-  return facet_closure(facets.kind, side, lookup(facets.offset, at), exp(lookup(facets.log_alpha, at)));
+  return facet_closure(facets.kind, side, lookup(facets.offset, at), exp(lookup(facets.log_alpha, at)),
+                       exp(lookup(facets.log_stretch, at)));
 }
 
 template <class T> Rgb<T> Fit::tint() const { return {T(tint_.r), T(tint_.g), T(tint_.b)}; }

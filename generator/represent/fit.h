@@ -3,12 +3,14 @@
 // to it from lamps. For a material whose parameters are known, but for those that f is proportional to or a polynomial
 // of (terms.h) and one number, which the tables run over.
 //
-// The closures are phong_ramps about axes in the plane of incidence, a diffuse_ramp, and microfacets that lean in that
-// plane. Ramps take eight colours that may be negative, so each is a family that is linear in eight numbers, and a view
-// is a linear problem: least absolute differences of f cos(theta_i), by iteratively reweighted least squares over
-// directions drawn from the model and from lobes of every width; the albedo is a constraint, and a sum below 0 is
-// fined. Axes and exponents of ramps come from the moments of the model's own lobe; leaning and roughness of facets are
-// found by a search from one view to the next. All is tabulated over the number and the view angle, and linear between.
+// The closures are phong_ramps about axes in the plane of incidence, a diffuse_ramp, and microfacets that lean and are
+// stretched in that plane: at low views most models have a lobe that is flat and wide, which no round closure follows.
+// Ramps take eight colours that may be negative, so each is a family that is linear in eight numbers, and a view is a
+// linear problem: least absolute differences of f cos(theta_i), by iteratively reweighted least squares over directions
+// drawn from the model and from lobes of every width; the albedo is a constraint, and a sum below 0 is fined. Axes and
+// exponents of ramps come from the moments of the model's own lobe; how facets lean and how rough they are, in the
+// plane and across it, is found by a search from one view to the next. All is tabulated over the number and the view
+// angle, and linear between.
 #pragma once
 
 #include <filesystem>
@@ -124,7 +126,7 @@ class Fit {
   };
   struct Facets {
     ClosureKind kind;
-    std::shared_ptr<const Table> offset, log_alpha;  ///< the angle like that of lobes
+    std::shared_ptr<const Table> offset, log_alpha, log_stretch;  ///< the angle like that of lobes
   };
   /// A closure's weight, and the colours of its ramp times that weight, by term and channel, over the view and the
   /// position in the ramp; one channel if `tint_` does. Without a ramp, colours over the view and no weight. In units

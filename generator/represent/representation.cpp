@@ -84,12 +84,14 @@ std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format(
 void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<RecordedClosure>& recorded,
                      Division division = Division::Done) {
   for (std::size_t c = 0; c < sum.size(); ++c) {
-    recorded.push_back({sum[c].kind, sum[c].turned, has_ramp(sum[c].kind) ? division : Division::Done});
+    recorded.push_back(
+        {sum[c].kind, sum[c].turned, sum[c].stretched, has_ramp(sum[c].kind) ? division : Division::Done});
     program.output(fmt::format("weight_{}", c), sum[c].weight);
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
     if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
+    if (sum[c].stretched) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
     if (sum[c].turned) {
       program.output(fmt::format("normal_{}_x", c), sum[c].normal.x);
       program.output(fmt::format("normal_{}_y", c), sum[c].normal.y);
@@ -345,7 +347,7 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false, Division::Done}});
+  return finish(program, indent, {{ClosureKind::Reflection, false, false, Division::Done}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,

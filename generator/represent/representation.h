@@ -47,7 +47,8 @@ ParamValues form_values(const Model&, RepresentationKind, const ParamValues& fix
 enum class Division { Done, ByLargest, ByChannel };
 struct RecordedClosure {
   ClosureKind kind;
-  bool turned;  ///< has a normal of its own
+  bool turned;     ///< has a normal of its own
+  bool stretched;  ///< facets of two roughnesses
   Division division;
   bool operator==(const RecordedClosure&) const = default;
 };

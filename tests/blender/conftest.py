@@ -21,7 +21,7 @@ from answers import Answers
 # Blender reads this when bpy is first imported.
 _RESOURCES = tempfile.TemporaryDirectory(prefix="brdfc-test-")
 os.environ["BLENDER_USER_RESOURCES"] = _RESOURCES.name
-# Blender leaves the bytecode of every script that it compiles in the folder for temporary files.
+# Blender leaves the bytecode of each script that it compiles in the folder for temporary files.
 tempfile.tempdir = _RESOURCES.name
 
 PACKAGE = "bl_ext.user_default.brdfc_shaders"
