@@ -282,13 +282,15 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
         const Rgb<double> again = fit.f_cos(wi, wo, varied);
         EXPECT_NEAR(again.r, found.r, 1e-9 * (1 + truth.r));
         EXPECT_NEAR(again.b, found.b, 1e-9 * (1 + truth.b));
+        // Nearly along the surface f is large, so that few pairs would decide.
+        if (wo.z < 0.05) continue;
         off += magnitude(found - truth);
         off_known += magnitude(evaluate(of_known.closures(wo), wi, wo) - truth);
         sum += truth;
       }
       // Nearly as close as closures for this colour alone.
       EXPECT_LE(max_component(off / sum), 1.3 * max_component(off_known / sum) + 0.002) << model;
-      EXPECT_LE(max_component(off / sum), 0.3) << model;
+      EXPECT_LE(max_component(off / sum), 0.15) << model;
     }
     // A weight by channel is the albedo.
     const Vec3<double> wo = direction(0.7, 0);
@@ -382,16 +384,16 @@ struct StoredRow {
 };
 /// What was measured. The albedo's error is absolute, with factors of 1. Where it is worst, phong and glossy_reflector
 /// nearly along the surface, a lobe is wide and most of it lies below.
-const StoredRow kStored[] = {{"blinn", {0.02675, 0.09389, 0.3496}, {0.001012, 0.005287, 0.02421}},
-                             {"cook_torrance", {0.07066, 0.1492, 0.3478}, {0.001757, 0.008617, 0.0196}},
-                             {"glossy_reflector", {0.01005, 0.09981, 0.3077}, {0.002555, 0.02124, 0.2677}},
-                             {"glossy_specular", {0.004309, 0.02448, 0.6452}, {0.0002964, 0.00279, 0.006365}},
-                             {"lafortune", {0.008462, 0.04187, 0.06173}, {0.0002475, 0.001628, 0.01172}},
-                             {"max_phong", {0.01519, 0.08899, 0.2534}, {0.002165, 0.0114, 0.0881}},
-                             {"oren_nayar", {0.005135, 0.02886, 0.03548}, {0.0006933, 0.006161, 0.01246}},
-                             {"phong", {0.01502, 0.05643, 0.2272}, {0.001611, 0.02239, 0.278}},
-                             {"radziszewski_alda", {0.02127, 0.136, 0.2922}, {0.001494, 0.009492, 0.03416}},
-                             {"schlick", {0.07324, 0.1553, 0.1942}, {0.002783, 0.009489, 0.01089}}};
+const StoredRow kStored[] = {{"blinn", {0.0221, 0.06755, 0.161}, {0.000687, 0.004371, 0.01198}},
+                             {"cook_torrance", {0.04856, 0.1198, 0.2081}, {0.001148, 0.009879, 0.02324}},
+                             {"glossy_reflector", {0.01101, 0.1127, 0.2641}, {0.001935, 0.009183, 0.06801}},
+                             {"glossy_specular", {0.004192, 0.02068, 0.4807}, {0.0003142, 0.002767, 0.01047}},
+                             {"lafortune", {0.008485, 0.04256, 0.05803}, {0.0002743, 0.00174, 0.01132}},
+                             {"max_phong", {0.01432, 0.08615, 0.1726}, {0.002562, 0.01332, 0.05253}},
+                             {"oren_nayar", {0.005128, 0.0287, 0.03547}, {0.0007024, 0.006148, 0.0124}},
+                             {"phong", {0.01087, 0.0888, 0.3248}, {0.000981, 0.01051, 0.0473}},
+                             {"radziszewski_alda", {0.02576, 0.08314, 0.2364}, {0.001096, 0.01113, 0.02702}},
+                             {"schlick", {0.06832, 0.1267, 0.2092}, {0.002764, 0.009457, 0.01051}}};
 
 /// They are offered for any value of their number.
 TEST(StoredFits, AreAsCloseAsMeasuredAlongTheWholeSlider) {

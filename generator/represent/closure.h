@@ -35,9 +35,9 @@ template <class T> struct Closure {
   Vec3<T> normal;
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
   T exponent;                          ///< PhongRamp
-  T alpha;                             ///< Ggx, Beckmann: roughness, of stretched facets along the tangent
-  T alpha_across;                      ///< of stretched facets: across it
-  Vec3<T> tangent;                     ///< of stretched facets: in the plane of the normal and the viewer
+  T alpha;                             ///< Ggx, Beckmann: roughness, of stretched facets in the plane of incidence
+  T alpha_across;                      ///< of stretched facets: across that plane
+  Vec3<T> across;                      ///< of stretched facets: unit, perpendicular to that plane, and so to the normal
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
   bool turned = false;                 ///< `normal` is not the surface's; it is not below it
   bool stretched = false;              ///< facets that are rougher or smoother in the plane of incidence than across it
@@ -49,7 +49,7 @@ template <class T> struct Closure {
         exponent(0),
         alpha(1),
         alpha_across(1),
-        tangent{T(1), T(0), T(0)},
+        across{T(0), T(1), T(0)},
         ior(1) {}
 };
 
@@ -94,10 +94,10 @@ T microfacet(ClosureKind kind, const T& alpha, const Vec3<T>& normal, const Vec3
                     slope(cosTheta_o), cosTheta_o);
 }
 
-/// The same of stretched facets, in the frame that Cycles builds about normal and tangent.
+/// The same of stretched facets, whose y axis is perpendicular to the normal. Cycles builds it from a tangent.
 template <class T> T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& normal,
-                                const Vec3<T>& tangent, const Vec3<T>& wi, const Vec3<T>& wo) {
-  const Vec3<T> y = normalize(cross(normal, tangent)), x = cross(y, normal);
+                                const Vec3<T>& y, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const Vec3<T> x = cross(y, normal);
   const auto in_frame = [&](const Vec3<T>& v) { return Vec3<T>{dot(x, v), dot(y, v), dot(normal, v)}; };
   return microfacet(kind, alpha_x, alpha_y, in_frame(wi), in_frame(wo));
 }
@@ -128,7 +128,7 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     case ClosureKind::Ggx:
     case ClosureKind::Beckmann: {
       const auto of_facets = [&] {
-        if (c.stretched) return microfacet(c.kind, c.alpha, c.alpha_across, c.normal, c.tangent, wi, wo);
+        if (c.stretched) return microfacet(c.kind, c.alpha, c.alpha_across, c.normal, c.across, wi, wo);
         if (c.turned) return microfacet(c.kind, c.alpha, c.normal, wi, wo);
         return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
       };

@@ -48,6 +48,12 @@ constexpr double kFacetRidge = 1e-8;
 constexpr double kMostOfFacets = 0.99;
 /// Searches for the shape of facets, by view.
 constexpr int kRounds = 2;
+/// What a shape's distance from that where its search began costs, in units of the error by the square of its numbers:
+/// neighbours that are alike leave little between them.
+constexpr double kDrag = 0.01;
+/// Searches from flatter facets: how much flatter, and the share of the error at which what they find is taken. Little
+/// better would be worse between two views.
+constexpr double kFlatter = 1, kClearlyBetter = 0.9;
 
 struct Placed {
   double offset, exponent;
@@ -59,6 +65,8 @@ enum class Family {
   Microfacet  ///< five from the axis of the moments towards the normal, and facets that lean away from the viewer
 };
 constexpr Family kFamilies[] = {Family::Moving, Family::Fixed, Family::Microfacet};
+/// How far lobes lean towards the surface and below it, in units of the viewer's height.
+constexpr double kBelow = 0.8, kFarBelow = 1.3;
 /// Three widths on the axis, two pairs beside it; or, as what facets leave at grazing views lies on one side, wider
 /// ones there. `height` is the viewer's angle above the surface.
 std::vector<Placed> placed(Family family, const Moments& here, const Moments& at_normal, double height) {
@@ -70,8 +78,9 @@ std::vector<Placed> placed(Family family, const Moments& here, const Moments& at
     lobes.insert(lobes.end(), {{offset + 1.4 * s, e / 4}, {offset + 2.8 * s, e / 16}});
   else
     lobes.insert(lobes.end(), {{offset, e / 4}, {offset, 2 * e}, {offset + 1.5 * s, e / 2}, {offset - 1.5 * s, e / 2}});
-  // No axis below the surface: opposite the viewer the closure's normal would turn over.
-  for (Placed& l : lobes) l.offset = std::max(l.offset, -height);
+  // At -2 times the height, opposite the viewer, a closure's normal would turn over. What would lie below the surface
+  // at low views lies in two places, so that two closures are not the same.
+  for (Placed& l : lobes) l.offset = std::max(l.offset, (l.offset < offset - s ? -kFarBelow : -kBelow) * height);
   return lobes;
 }
 
@@ -121,7 +130,7 @@ Closure<T> facet_closure(ClosureKind kind, const Vec3<T>& side, const T& offset,
   c.turned = true;
   c.alpha = alpha * stretch;
   c.alpha_across = alpha / stretch;
-  c.tangent = side;
+  c.across = {-side.y, side.x, T(0)};
   c.stretched = true;
   return c;
 }
@@ -254,7 +263,11 @@ Shape improved(const Shape& shape, const Moments& at_normal, const View& whole) 
     variables.push_back({shape[j + 1], kLeastRatio, j == 0 ? kMostRatio : 0.9, 0.1 * shape[j + 1]});
     variables.push_back({shape[j + 2], -kMostStretch, kMostStretch, 0.1});
   }
-  return argmin(variables, [&](const Shape& x) { return error_of(facets(x, at_normal, view.wo), view); });
+  return argmin(variables, [&](const Shape& x) {
+    double distance2 = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) distance2 += sqr(x[i] - shape[i]);
+    return error_of(facets(x, at_normal, view.wo), view) + kDrag * distance2;
+  });
 }
 
 /// Fits every `stride`-th view, from that along the normal on, to the terms that its columns are.
@@ -486,10 +499,23 @@ class Knots {
       const std::vector<View>& seen = views(places[k]);
       shapes_[k][v] = improved(begin, seen[0].lobe, seen[v * kShapeStride]);
     };
-    for (std::size_t v = 0; v < shapes_[middle].size(); ++v)
+    const auto error = [&](std::size_t v, const Shape& shape) {
+      const std::vector<View>& seen = views(places[middle]);
+      const View& view = seen[v * kShapeStride];
+      return error_of(facets(shape, seen[0].lobe, view.wo), view);
+    };
+    for (std::size_t v = 0; v < shapes_[middle].size(); ++v) {
       // A search that begins again where it ended, with wide steps, leaves many a bad place.
       for (int round = 0; round < kRounds; ++round)
         search(middle, v, round > 0 || v == 0 ? shapes_[middle][v] : shapes_[middle][v - 1]);
+      for (std::size_t stretch = kNumbers - 1; v > 0 && stretch < kFirstShape.size(); stretch += kNumbers) {
+        const Shape before = shapes_[middle][v];
+        Shape begin = before;
+        begin[stretch] = std::max(begin[stretch] - kFlatter, -kMostStretch);
+        search(middle, v, begin);
+        if (!(error(v, shapes_[middle][v]) < kClearlyBetter * error(v, before))) shapes_[middle][v] = before;
+      }
+    }
     for_all(shapes_[middle].size(), [&](std::size_t v) {
       for (std::size_t k = middle + 1; k <= last; ++k) search(k, v, shapes_[k - 1][v]);
       for (std::size_t k = middle; k-- > 0;) search(k, v, shapes_[k + 1][v]);
