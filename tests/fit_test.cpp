@@ -18,6 +18,7 @@
 #include "core/hash.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
+#include "represent/lobe.h"
 #include "support.h"
 
 namespace brdfc {
@@ -257,6 +258,33 @@ TEST(Fit, RunsAlongANumber) {
   EXPECT_THROW(fit_of(lafortune, two), std::logic_error);
 }
 
+/// Lobe is what the conformance tests hold against Cycles, with any tangent; shaders give the viewer's direction for
+/// it.
+TEST(Fit, StretchesFacetsAsCyclesDoes) {
+  const Fit& fit = fit_of(find_model("ward"), values_of(find_model("ward"), {"ax=0.2", "ay=0.2"}));
+  Random random(4);
+  double stretched = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Vec3<double> wo = uniform_direction(random), wi = uniform_direction(random);
+    for (const Closure<double>& c : fit.closures(wo)) {
+      if (!has_facets(c.kind)) continue;
+      Lobe lobe;
+      lobe.kind = LobeKind::Beckmann;
+      lobe.weight = c.weight;
+      lobe.normal = c.normal;
+      lobe.tangent = wo;
+      lobe.alpha_x = c.alpha, lobe.alpha_y = c.alpha_across;
+      EXPECT_NEAR(evaluate(c, wi, wo).g, evaluate(lobe, wi, wo).g, 1e-9 * (1 + evaluate(lobe, wi, wo).g));
+      stretched = std::max(stretched, c.alpha_across / c.alpha);
+    }
+  }
+  EXPECT_GT(stretched, 2);
+  for (const Closure<double>& c : fit.closures(Vec3<double>{0, 0, 1})) {
+    if (!has_facets(c.kind)) continue;
+    EXPECT_EQ(c.alpha, c.alpha_across) << "Cycles is given no tangent there";
+  }
+}
+
 /// A reflectance at normal incidence whatever it is: closures of the same shapes, coloured by it.
 TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
   for (const auto& [model, open] : {std::pair{"cook_torrance", "f0"}, {"oren_nayar", "rho"}}) {
@@ -382,8 +410,8 @@ struct StoredRow {
   const char* model;
   Spread relative_l1, albedo;
 };
-/// What was measured. The albedo's error is absolute, with factors of 1. Where it is worst, phong and glossy_reflector
-/// nearly along the surface, a lobe is wide and most of it lies below.
+/// What was measured. The albedo's error is absolute, with factors of 1. Where it is worst, glossy_reflector nearly
+/// along the surface, a lobe is wide and most of it lies below.
 const StoredRow kStored[] = {{"blinn", {0.0221, 0.06755, 0.161}, {0.000687, 0.004371, 0.01198}},
                              {"cook_torrance", {0.04856, 0.1198, 0.2081}, {0.001148, 0.009879, 0.02324}},
                              {"glossy_reflector", {0.01101, 0.1127, 0.2641}, {0.001935, 0.009183, 0.06801}},
