@@ -4,9 +4,10 @@
 
 Runs in a Python that has `bpy`. A sphere under a sky is rendered with each model's default
 parameters, all forms of a model in turns in one process, so that what else the machine does meets
-them alike; the cost of a form is the median over the repetitions of its sampling time divided by
-that of the Glossy node. Forms made of a fit come from a pack of these very materials. Prints CSV,
-a model's rows as soon as they are measured.
+them alike, and in several processes, because times of one differ from those of the next by more
+than they differ within it; the cost of a form is the median over all repetitions of its sampling
+time divided by that of the Glossy node. Forms made of a fit come from a pack of these very
+materials. Prints CSV, a model's rows as soon as they are measured.
 """
 
 import argparse
@@ -82,12 +83,12 @@ def measure(options, model, forms, folder):
     file = folder / "jobs.json"
     file.write_text(json.dumps(jobs), encoding="utf-8")
     command = [sys.executable, RENDER_SCENE, "--extension", options.extension, "--jobs", file]
-    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
-    records = json.loads(done.stdout)
-    return {
-        name: [r["sampling_cpu_seconds"] for r in record["repeats"]]
-        for name, record in zip(names, records, strict=True)
-    }
+    times = {name: [] for name in names}
+    for _ in range(options.processes):
+        done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+        for name, record in zip(names, json.loads(done.stdout), strict=True):
+            times[name] += [r["sampling_cpu_seconds"] for r in record["repeats"]]
+    return times
 
 
 def main():
@@ -99,10 +100,13 @@ def main():
     parser.add_argument("--model", action="append", help="only this model; may be repeated")
     parser.add_argument("--size", type=int, default=128, help="pixels along each side (128)")
     parser.add_argument("--spp", type=int, default=32, help="samples a pixel (32)")
-    parser.add_argument("--repeat", type=int, default=3, help="renders a form (3)")
+    parser.add_argument("--repeat", type=int, default=3, help="renders a form and process (3)")
+    parser.add_argument("--processes", type=int, default=3, help="processes a model (3)")
     options = parser.parse_args()
-    if min(options.size, options.spp - 1, options.repeat) < 1:
-        parser.error("expected --size and --repeat of at least 1 and --spp of at least 2")
+    if min(options.size, options.spp - 1, options.repeat, options.processes) < 1:
+        parser.error(
+            "expected --size, --repeat and --processes of at least 1 and --spp of at least 2"
+        )
     for path in (options.tool, options.extension):
         if not path.is_file():
             parser.error(f"{path}: no such file")

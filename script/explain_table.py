@@ -12,7 +12,7 @@ from pathlib import Path
 # Options that show most: many materials of one model, a form that is too dear, forms that change.
 SCENES = {
     "as-fig2": [],
-    "gl-fig8-radziszewski_alda": ["--error", "5", "--time", "1.2x"],
+    "gl-fig8-radziszewski_alda": ["--error", "5", "--time", "1.3x"],
     "small-lamp": ["--error", "5"],
 }
 
