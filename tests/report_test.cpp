@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <regex>
 
 #include "core/error.h"
 
@@ -158,6 +159,35 @@ TEST_F(ReportTest, WritesPageJsonAndCsv) {
   EXPECT_THAT(page, testing::Not(HasSubstr("http")));  // self-contained
   for (const auto& entry : fs::recursive_directory_iterator(folder_))
     EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << ": a temporary file was left";
+}
+
+TEST_F(ReportTest, NamesInTheChartLieBesideEachOther) {
+  for (const char* form : {"sampled", "planned", "controlled", "twin"}) {
+    runs_["runs"].push_back(runs_["runs"][1]);
+    runs_["runs"].back()["form"] = form;
+  }
+  load();
+  write_report(folder_);
+  std::ifstream in(folder_ / "index.html");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  struct Name {
+    double x, y;
+    std::string text;
+  };
+  std::vector<Name> names;
+  const std::regex pattern("class=\"name\" x=\"([0-9.]+)\" y=\"([0-9.]+)\">([^<]+)<");
+  for (auto it = std::sregex_iterator(page.begin(), page.end(), pattern); it != std::sregex_iterator(); ++it)
+    names.push_back({std::stod((*it)[1]), std::stod((*it)[2]), (*it)[3]});
+  ASSERT_EQ(names.size(), 6u);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_GT(names[i].y, 12) << names[i].text << " lies above the picture";
+    for (std::size_t j = 0; j < i; ++j)
+      // Letters of 12 pixels, which are about half as wide.
+      EXPECT_TRUE(std::abs(names[i].y - names[j].y) >= 12 ||
+                  names[i].x + 6.0 * double(names[i].text.size()) < names[j].x ||
+                  names[j].x + 6.0 * double(names[j].text.size()) < names[i].x)
+          << names[i].text << " lies on " << names[j].text;
+  }
 }
 
 TEST_F(ReportTest, ShowsWhatTheClosuresOfEachVersionDo) {

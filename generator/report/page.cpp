@@ -130,14 +130,28 @@ void put_chart(std::string& out, const SceneReport& s) {
       (kLeft + kWidth - kRight) / 2, kHeight - 6);
   put(out, "<text x=\"14\" y=\"{}\" transform=\"rotate(-90 14 {})\" text-anchor=\"middle\">relMSE</text>\n",
       kHeight / 2 - 10, kHeight / 2 - 10);
+  // From below: a name that would lie on another moves up until it is free.
+  std::ranges::stable_sort(points, std::less(), [](const FormReport* f) { return f->difference.rel_mse; });
+  constexpr double kLine = 13, kLetter = 7;
+  struct Name {
+    double left, right, base;
+  };
+  std::vector<Name> names;
   for (const FormReport* f : points) {
     const double at_x = x(*f->cost), at_y = y(f->difference.rel_mse);
     if (f->difference.noise > 0)
       put(out, "<line class=\"floor\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", at_x - 12, at_x + 12,
           y(f->difference.noise), y(f->difference.noise));
+    Name name{at_x + 9, at_x + 9 + kLetter * double(label(*f).size()), at_y + 4};
+    const auto covers = [&](const Name& n) {
+      return n.left < name.right && name.left < n.right && std::abs(n.base - name.base) < kLine;
+    };
+    for (auto other = names.begin(); (other = std::ranges::find_if(names, covers)) != names.end();)
+      name.base = other->base - kLine;
+    names.push_back(name);
     put(out,
         "<circle{} cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-        on_front(s, *f) ? "" : " class=\"behind\"", at_x, at_y, at_x + 9, at_y + 4, escaped(label(*f)));
+        on_front(s, *f) ? "" : " class=\"behind\"", at_x, at_y, name.left, name.base, escaped(label(*f)));
   }
   out += "</svg>\n";
 }
