@@ -9,6 +9,7 @@
 
 #include "analysis/albedo_table.h"
 #include "pack/costs.h"
+#include "represent/aimed.h"
 #include "represent/representation.h"
 
 namespace brdfc {
@@ -49,6 +50,7 @@ struct PlannedModel {
   ParamValues fixed;                       ///< folded into shaders and tables: no sockets
   std::vector<RepresentationKind> forms;   ///< preferred first
   int max_lobes = kMaxLobes;               ///< of sampled forms
+  int max_lamps = kMaxLamps;               ///< that aimed forms can be told of
   Cosines views;                           ///< that one of the materials can be seen from; tables have no others
   std::vector<FormChoice> choices;         ///< every form, where materials were planned for
   std::vector<FormChange> material_forms;  ///< of `materials`

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <random>
 #include <set>
 
@@ -10,6 +11,7 @@
 #include "analysis/probes.h"
 #include "model/horizon.h"
 #include "model/sampling.h"
+#include "represent/aimed.h"
 #include "represent/controlled.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
@@ -22,7 +24,14 @@ std::vector<std::string> frame_names() {
   std::vector<std::string> names = {
       "Normal", "Tangent",  "Lobes",           "BSDF",           "Albedo", "frame_n",     "frame_t", "frame_b",
       "wi",     "weight",   "mirror_weight",   "lobe",           "side",   "path_length", "u",       "wo",
-      "sum",    "position", "residual_weight", "residual_colour"};
+      "sum",    "position", "residual_weight", "residual_colour",
+      // of aimed forms
+      "lamps",  "lamp",     "lamp_place",      "lamp_turn",      "lamp_scale", "lamp_shape", "centre",  "across",
+      "along",  "disk",     "drawn_x",         "drawn_y",        "drawn_z", "wi_x",       "wi_y",    "wi_z",
+      "half_x", "half_y",   "half_z",          "exponent",       "height", "extent",      "emphasis", "solid_angle",
+      "covers", "met",      "met_here",        "covered",        "covered_here", "value", "density", "lobe_weight",
+      "lobe_colour", "lobe_half", "lobe_exponent", "rest_weight", "rest_colour", "v_1", "v_2", "u_0", "u_1", "u_2",
+      "u_all", "v_all", "aimed"};
   return names;
 }
 
@@ -129,6 +138,39 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
 
 Recording finish(const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
   return {program.print_osl(indent, frame_names()), std::move(closures), program.operations(), program.inputs()};
+}
+
+Vec3<Expr> input3(const std::string& name) {
+  return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
+}
+/// An OSL vector.
+Vec3<Expr> input_vector(const std::string& name) {
+  return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
+}
+void output3(Program& program, const std::string& name, const Vec3<Expr>& v) {
+  program.output(name + "_x", v.x);
+  program.output(name + "_y", v.y);
+  program.output(name + "_z", v.z);
+}
+
+/// Closures whose numbers are the variables that output_closures() assigned.
+ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
+  for (std::size_t c = 0; c < sum.size(); ++c) {
+    sum[c].weight = Rgb<Expr>::input(fmt::format("weight_{}", c));
+    if (has_ramp(sum[c].kind))
+      for (std::size_t i = 0; i < kRampSize; ++i) sum[c].ramp[i] = Rgb<Expr>::input(ramp_entry(c, i));
+    if (sum[c].kind == ClosureKind::PhongRamp) sum[c].exponent = Expr::input(fmt::format("exponent_{}", c));
+    if (has_facets(sum[c].kind)) sum[c].alpha = Expr::input(fmt::format("alpha_{}", c));
+    if (sum[c].stretched) sum[c].alpha_across = Expr::input(fmt::format("alpha_across_{}", c));
+    if (sum[c].turned) sum[c].normal = input3(fmt::format("normal_{}", c));
+  }
+  return sum;
+}
+
+/// The base of an aimed form; none for what lies on both sides of the surface.
+ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf) {
+  (void)model, (void)brdf;
+  return {};
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
@@ -264,6 +306,8 @@ const char* name_of(RepresentationKind kind) {
   switch (kind) {
     case RepresentationKind::Exact:
       return "exact";
+    case RepresentationKind::Aimed:
+      return "aimed";
     case RepresentationKind::Sampled:
       return "sampled";
     case RepresentationKind::Fitted:
@@ -277,15 +321,16 @@ const char* name_of(RepresentationKind kind) {
 }
 
 RepresentationKind representation_named(const std::string& name) {
-  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled, RepresentationKind::Fitted,
-                                  RepresentationKind::Controlled, RepresentationKind::Twin})
+  for (RepresentationKind kind :
+       {RepresentationKind::Exact, RepresentationKind::Aimed, RepresentationKind::Sampled, RepresentationKind::Fitted,
+        RepresentationKind::Controlled, RepresentationKind::Twin})
     if (name == name_of(kind)) return kind;
-  input_error("unknown representation '{}': expected one of exact, sampled, fitted, controlled, twin", name);
+  input_error("unknown representation '{}': expected one of exact, aimed, sampled, fitted, controlled, twin", name);
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
   if (!model.has_scatter()) return {RepresentationKind::Exact};
-  std::vector<RepresentationKind> kinds = {RepresentationKind::Sampled};
+  std::vector<RepresentationKind> kinds = {RepresentationKind::Aimed, RepresentationKind::Sampled};
   if (model.has_exact()) kinds.insert(kinds.begin(), RepresentationKind::Exact);
   if (!model.info().properties.fit_axis.empty()) kinds.push_back(RepresentationKind::Fitted);
   return kinds;
@@ -340,6 +385,93 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", model.info().name, name_of(kind), used,
                 kMaxClosures);
   return finish(program, indent, std::move(closures));
+}
+
+AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int indent) {
+  Recorder recorder;
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  const Vec3<Expr> wo = recorded_wo(model, *brdf);
+  // The side that a model of two sides calls z > 0.
+  const auto turned = [&](Vec3<Expr> w) {
+    if (two_sided(model, *brdf)) w.z = w.z * Expr::input("side");
+    return w;
+  };
+  AimedRecording out;
+  const ClosureSum<Expr> base = recorded_base(model, *brdf);
+  {
+    Program program;
+    std::vector<RecordedClosure> closures;
+    output_closures(base, program, closures);
+    out.base = finish(program, indent, closures);
+  }
+  {
+    Program program;
+    output3(program, "drawn", turned(draw(*brdf, !base.empty(), wo, recorded_u())));
+    out.draw = finish(program, indent);
+  }
+  {
+    Program program;
+    const Vec3<Expr> wi = input3("wi");
+    Rgb<Expr> given(Expr(0));
+    // Closures are on the viewer's side, where the model's frame is the shader's.
+    (void)input_closures(base);
+    const Excess<Expr> e = excess(*brdf, !base.empty(), given, turned(wi), wo);
+    program.output("value", e.value);
+    program.output("density", e.density);
+    out.value = finish(program, indent);
+  }
+  return out;
+}
+
+const AimedSteps& aimed_steps(int indent) {
+  static std::mutex mutex;
+  static std::map<int, AimedSteps> made;
+  const std::lock_guard lock(mutex);
+  if (const auto it = made.find(indent); it != made.end()) return it->second;
+  Recorder recorder;
+  AimedSteps steps;
+  {
+    const LampPatch<Expr> patch{input_vector("centre"), input_vector("across"), input_vector("along"),
+                                Expr::input("disk")};
+    const AimedLamp<Expr> lamp =
+        aim_at(patch, Expr::input("v_1"), Expr::input("v_2"), input3("drawn"), input3("wo"));
+    Program program;
+    output3(program, "wi", lamp.wi);
+    output3(program, "half", lamp.lobe.half);
+    program.output("exponent", lamp.lobe.exponent);
+    program.output("height", lamp.lobe.height);
+    program.output("extent", lamp.lobe.extent);
+    program.output("emphasis", lamp.emphasis);
+    program.output("solid_angle", lamp.solid_angle);
+    program.output("covers", lamp.covers);
+    program.output("met_here", lamp.met);
+    steps.aim = finish(program, indent);
+  }
+  const Rgb<Expr> value = Rgb<Expr>::input("value");
+  const Expr density = Expr::input("density");
+  {
+    AimedLamp<Expr> lamp;
+    lamp.lobe.height = Expr::input("height");
+    lamp.lobe.extent = Expr::input("extent");
+    lamp.emphasis = Expr::input("emphasis");
+    lamp.solid_angle = Expr::input("solid_angle");
+    lamp.covers = Expr::input("covers");
+    lamp.met = Expr::input("met_here");
+    const Sent<Expr> sent = send(lamp, value, density);
+    Program program;
+    program.output("covered_here", sent.covered);
+    program.output("lobe_weight[lamp]", sent.weight);
+    program.output("lobe_colour[lamp]", sent.colour);
+    steps.send = finish(program, indent);
+  }
+  {
+    const Rest<Expr> left = rest(value, density, Rgb<Expr>::input("covered"), Expr::input("met"));
+    Program program;
+    program.output("rest_weight", left.weight);
+    program.output("rest_colour", left.colour);
+    steps.rest = finish(program, indent);
+  }
+  return made.emplace(indent, std::move(steps)).first->second;
 }
 
 Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {

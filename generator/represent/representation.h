@@ -13,6 +13,7 @@ namespace brdfc {
 
 enum class RepresentationKind {
   Exact,       ///< closures that equal the model
+  Aimed,       ///< closures aimed at lamps that carry the model there, and one drawn direction for the rest (aimed.h)
   Sampled,     ///< the shader samples the model itself, one narrow lobe per sample
   Fitted,      ///< closures that come close to the model, for one set of parameters or along a number (fit.h)
   Controlled,  ///< those and a sample of what they lack (controlled.h)
@@ -68,6 +69,22 @@ struct Recording {
 /// is right for these `views`.
 /// Throws InputError if more closures than Cycles keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent, const Cosines& views = {});
+/// The statements of an aimed form, for one combination of choices. All read the parameters and wo_x, wo_y, wo_z.
+struct AimedRecording {
+  Recording base;   ///< assigns what its closures take, as an exact form's
+  Recording draw;   ///< reads u_0, u_1, u_2; assigns drawn_x, drawn_y, drawn_z
+  Recording value;  ///< reads wi_x, wi_y, wi_z and the base's closures; assigns value and density
+};
+AimedRecording record_aimed(const Model&, const ParamValues& fixed, int indent);
+/// What is done with each lamp and at the end, which is the same for all models (aimed.h).
+struct AimedSteps {
+  Recording aim;   ///< reads centre, across, along, disk, v_1, v_2, drawn_*; assigns wi_*, half_*, exponent, height,
+                   ///< extent, emphasis, solid_angle, covers and met
+  Recording send;  ///< reads those, value and density; assigns covered_here, lobe_weight and lobe_colour
+  Recording rest;  ///< reads value, density, covered, met; assigns rest_weight and rest_colour
+};
+const AimedSteps& aimed_steps(int indent);
+
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
 
