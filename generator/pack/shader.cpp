@@ -350,7 +350,7 @@ class AimedText {
 
   int operations() const {
     const AimedSteps& steps = aimed_steps(0);
-    return operations_ + steps.rest.operations + (lamps_ > 0 ? steps.aim.operations + steps.send.operations : 0);
+    return operations_ + steps.rest.operations + (lamps_ > 0 ? steps.room.operations + steps.aim.operations + steps.less.operations + steps.send.operations : 0);
   }
 
   std::string print() const {
@@ -360,12 +360,14 @@ class AimedText {
                       "    color rest_colour, covered = 0.0;\n    float rest_weight, met = 0.0;\n";
     if (lamps_ == 0)
       return out +
-             "    color value;\n    float density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
+             "    color value, before = 0.0;\n    float density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
              indented(value_.print(0)) + block(steps.rest.statements, 1);
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
     out += fmt::format(
-        "    color lobe_colour[{0}];\n    float lobe_weight[{0}], lobe_exponent[{0}];\n    vector lobe_half[{0}];\n"
-        "    int lamps = 0;\n"
+        "    color lobe_value[{0}], lobe_colour[{0}];\n"
+        "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}];\n"
+        "    vector lobe_towards[{0}], lobe_half[{0}];\n"
+        "    color before = 0.0;\n    int lamps = 0;\n"
         "    for (int lamp = 0; lamp < {0}; lamp++)\n"
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);
@@ -374,28 +376,32 @@ class AimedText {
         "    // The lamps, and at last the direction that was drawn.\n"
         "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
         "        float wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n"
-        "        float exponent, height, extent, emphasis, solid_angle, covers, met_here;\n"
+        "        float height, extent, emphasis, solid_angle, covers, met_here;\n"
         "        if (lamp < lamps) {\n"
-        "            vector centre, across, along;\n            float disk;\n"
+        "            vector centre, across, along;\n            float disk, room = 1.0;\n"
         "            lobe_weight[lamp] = 0.0;\n"
         "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], centre, across,\n"
         "                           along, disk) == 0)\n"
         "                continue;\n"
         "            centre = brdfc_local(centre, frame_t, frame_b, frame_n);\n"
         "            across = brdfc_local(across, frame_t, frame_b, frame_n);\n"
-        "            along = brdfc_local(along, frame_t, frame_b, frame_n);\n"
-        "            float half_x, half_y, half_z;\n";
+        "            along = brdfc_local(along, frame_t, frame_b, frame_n);\n";
+    out += earlier_lobes("", steps.room.statements);
+    out += "            float towards_x, towards_y, towards_z, half_x, half_y, half_z;\n";
     out += indented(steps.aim.statements, 3);
     out +=
         "            if (emphasis == 0.0)\n                continue;\n"
-        "            lobe_half[lamp] = frame_t * half_x + frame_b * half_y + frame_n * half_z;\n"
-        "            lobe_exponent[lamp] = exponent;\n"
-        "            if (met_here > 0.0)\n                met = solid_angle;\n"
+        "            lobe_towards[lamp] = vector(towards_x, towards_y, towards_z);\n"
+        "            lobe_half[lamp] = vector(half_x, half_y, half_z);\n"
+        "            if (met_here > 0.0) {\n                met = solid_angle;\n                before = covered;\n"
+        "            }\n"
         "        }\n"
         "        color value;\n        float density;\n";
     out += indented(value_.print(0), 2);
-    out += "        if (lamp < lamps) {\n            color covered_here;\n" + indented(steps.send.statements, 3) +
-           "            covered += covered_here;\n        } else {\n" + indented(steps.rest.statements, 3) +
+    out += "        if (lamp < lamps) {\n" +
+           earlier_lobes(" && dot(lobe_towards[earlier], vector(wi_x, wi_y, wi_z)) > lobe_end[earlier]",
+                         steps.less.statements) +
+           indented(steps.send.statements, 3) + "        } else {\n" + indented(steps.rest.statements, 3) +
            "        }\n    }\n";
     // Each joins the sum from the left: Cycles walks it without a stack.
     std::string ramp;
@@ -407,7 +413,9 @@ class AimedText {
         "            float level[{0}] = {{{1}}};\n"
         "            color colours[{0}];\n"
         "            for (int k = 0; k < {0}; k++)\n                colours[k] = level[k] * lobe_colour[lamp];\n"
-        "            aimed = lobe_weight[lamp] * phong_ramp(lobe_half[lamp], lobe_exponent[lamp], colours) + aimed;\n"
+        "            vector half_way = lobe_half[lamp];\n"
+        "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
+        "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], colours) + aimed;\n"
         "        }}\n",
         kRampSize, ramp);
     return out;
@@ -426,6 +434,15 @@ class AimedText {
     std::string name = what;
     name[0] = char(std::tolower(name[0]));
     return fmt::format("    vector lamp_{}[{}] = {{{}}};\n", name, lamps_, list);
+  }
+
+  /// Done with every lobe before this one, in the loop's branch for lamps.
+  static std::string earlier_lobes(const char* condition, const std::string& statements) {
+    return fmt::format(
+               "            for (int earlier = 0; earlier < lamp; earlier++)\n"
+               "                if (lobe_weight[earlier] > 0.0{}) {{\n",
+               condition) +
+           indented(statements, 5) + "                }\n";
   }
 
   static std::string block(const std::string& statements, std::size_t levels) {

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "model/sampling.h"
 #include "represent/closure.h"
@@ -52,18 +53,20 @@ template <class T> struct AimedLobe {
   Vec3<T> towards;  ///< the lamp's centre
   Vec3<T> half;     ///< the closure's normal
   T exponent;
-  T height;  ///< of the colours
-  T extent;  ///< solid angle under the lobe, roughly
+  T sinRadius;  ///< of the lamp
+  T cosEnd;     ///< from its centre on the lobe is 0
 };
 
 /// What a shading point makes of a lamp.
 template <class T> struct AimedLamp {
   AimedLobe<T> lobe;
-  Vec3<T> wi;        ///< to a point of the lamp, unit
-  T emphasis;        ///< what the point stands for, over the mean of all points; 0 where the lamp is left to the rest
-  T solid_angle;     ///< of the lamp
-  T covers;          ///< the lobe's f cos in the drawn direction
-  T met;             ///< 1 where the drawn direction meets the lamp, else 0
+  Vec3<T> wi;     ///< to a point of the lamp, unit
+  T emphasis;     ///< what the point stands for, over the mean of all points; 0 where the lamp is left to the rest
+  T solid_angle;  ///< of the lamp
+  T height;       ///< of the closure's colours over aimed_ramp() where f cos is 1
+  T extent;       ///< solid angle under the lobe, roughly
+  T covers;       ///< the lobe's f cos in the drawn direction
+  T met;          ///< 1 where the drawn direction meets the lamp, else 0
 };
 
 /// cos^e -> f cos of an aimed lobe over its height and (half.wi): ramp times cos^e.
@@ -80,29 +83,38 @@ template <class T> T aimed_profile(const T& lobe) {
 /// f cos of the lobe of an aimed closure.
 template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
   const T cosAlpha = dot(lobe.towards, wi), rise = dot(lobe.half, wi);
-  const T profile = aimed_profile(pow(maximum(cosAlpha, tiny<T>()), lobe.exponent));
-  return select(cosAlpha > T(0) && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
+  const T profile = aimed_profile(pow(maximum(cosAlpha, lobe.cosEnd), lobe.exponent));
+  return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
+}
+
+/// How far a lobe towards `centre` may reach, as a sine, without covering the lamp of an earlier one: what it gave there
+/// the drawn directions would have to take off again, bright as the lamp is.
+template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earlier) {
+  return length(normalize(centre) - earlier.towards) - earlier.sinRadius;
 }
 
 /// A closure aimed at a lamp whose bounding sphere has the radius of this sine. wo: towards the viewer, unit.
-template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, const Vec3<T>& wo) {
-  // Room for the drawn directions' own lobes, 5e-3 wide; and cos^e of a narrower one loses digits in single precision.
-  constexpr double kRoom = 1.1, kLeast = 0.02, kMost = 0.95;
-  const T sinWidth = minimum(T(kRoom) * sinRadius + T(kLeast), T(kMost));
+template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, const T& room, const Vec3<T>& wo) {
+  // Room for the drawn directions' own lobes, 5e-3 wide; and cos^e of a narrower lobe loses digits in single precision.
+  constexpr double kRoom = 1.1, kLeast = 0.02, kTight = 0.005, kMost = 0.95;
+  // The flank ends where cos^e = (kLevel - 1) / 7; sines of small angles are as the roots of the logarithms.
+  const double level = std::log(double(kLevel) / (kRampSize - 1)), end = std::log(double(kLevel - 1) / (kRampSize - 1));
+  const T wide = minimum(T(kRoom) * sinRadius + T(kLeast), T(std::sqrt(level / end)) * room);
+  const T sinWidth = minimum(maximum(wide, sinRadius + T(kTight)), T(kMost));
   AimedLobe<T> lobe;
   lobe.towards = towards;
   lobe.half = normalize(towards + wo);
   // cos^e = kLevel / 7 at the width
-  lobe.exponent =
-      T(2 * std::log(double(kLevel) / (kRampSize - 1))) / log1p(-sqr(sinWidth));
-  lobe.height = T(2) * pi<T>() / (dot(lobe.half, towards) * (lobe.exponent + T(2)));
-  lobe.extent = T(1.2) * pi<T>() * sqr(sinWidth);
+  lobe.exponent = T(2 * level) / log1p(-sqr(sinWidth));
+  lobe.sinRadius = sinRadius;
+  lobe.cosEnd = exp(T(end) / lobe.exponent);
   return lobe;
 }
 
-/// v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that the rest carries.
-template <class T>
-AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& v1, const T& v2, const Vec3<T>& drawn, const Vec3<T>& wo) {
+/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that the
+/// rest carries.
+template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2,
+                                       const Vec3<T>& drawn, const Vec3<T>& wo) {
   /// Sine of the radius beyond which a lamp is so near that drawn directions meet it well.
   constexpr double kNearest = 0.85;
   /// Cosine of half the angle between lamp and viewer below which the closure would shine through the surface.
@@ -113,7 +125,10 @@ AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& v1, const T& v2, const V
   const T radius2 = select(disk, maximum(a2, b2), a2 + b2);
   AimedLamp<T> lamp;
   const Vec3<T> towards = patch.centre / sqrt(distance2);
-  lamp.lobe = aim(towards, sqrt(minimum(radius2 / distance2, T(1))), wo);
+  lamp.lobe = aim(towards, sqrt(minimum(radius2 / distance2, T(1))), room, wo);
+  const T rise = dot(lamp.lobe.half, towards);
+  lamp.height = T(2) * pi<T>() / (rise * (lamp.lobe.exponent + T(2)));
+  lamp.extent = T(2) * pi<T>() * (T(1) - lamp.lobe.cosEnd);
 
   const T radius = sqrt(v1), angle = T(2) * pi<T>() * v2;
   const Vec3<T> point = patch.at(select(disk, radius * cos(angle), T(2) * v1 - T(1)),
@@ -132,7 +147,7 @@ AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& v1, const T& v2, const V
                   density(patch.at(other * T(-1), node)) + density(patch.at(other, -node))) /
                  T(4);
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
-  const auto usable = radius2 < T(kNearest * kNearest) * distance2 && dot(lamp.lobe.half, towards) > T(kLeastHalf);
+  const auto usable = radius2 < T(kNearest * kNearest) * distance2 && rise > T(kLeastHalf);
   lamp.emphasis = select(usable, density(point) / maximum(mean, tiny<T>()), T(0));
 
   lamp.covers = evaluate(lamp.lobe, drawn);
@@ -153,7 +168,8 @@ template <class T> struct Sent {
   Rgb<T> colour;   ///< aimed_ramp() times this are the closure's colours
 };
 
-/// `value`: f cos - base towards AimedLamp::wi, `density` that of drawing it.
+/// `value`: f cos - base towards AimedLamp::wi, less what the lobes of earlier lamps give there; `density` that of
+/// drawing it.
 template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, const T& density) {
   // Cycles drops closures of small weight.
   constexpr double kLeastWeight = 1e-3;
@@ -161,8 +177,8 @@ template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, c
   out.value = value * (lamp.emphasis / (T(1) + lamp.solid_angle * density));
   out.covered = out.value * (lamp.covers - lamp.met);
   const T size = maximum(max_component(out.value), max_component(out.value * T(-1)));
-  out.weight = select(size > T(0), minimum(maximum(size * lamp.lobe.extent, T(kLeastWeight)), T(1)), T(0));
-  out.colour = out.value * (lamp.lobe.height / maximum(out.weight, T(kLeastWeight)));
+  out.weight = select(size > T(0), minimum(maximum(size * lamp.extent, T(kLeastWeight)), T(1)), T(0));
+  out.colour = out.value * (lamp.height / maximum(out.weight, T(kLeastWeight)));
   return out;
 }
 
@@ -172,13 +188,15 @@ template <class T> struct Rest {
   Rgb<T> colour;
 };
 
-/// `value`: f cos - base in the drawn direction, `density` that of drawing it, `covered` the sum over the lamps, `met`
-/// the solid angle of the lamp that it meets, 0 if none.
-template <class T> Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met) {
+/// `value`: f cos - base in the drawn direction, `density` that of drawing it, `covered` the sum over the lamps. `met`:
+/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one.
+template <class T>
+Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met, const Rgb<T>& before) {
   const auto drawn = density > T(0);
   const T p = select(drawn, density, T(1));
-  const Rgb<T> kept = select(met > T(0), value * (met / (T(1) + met * p)), value / p);
-  const Rgb<T> all = select(drawn, kept - covered / p, Rgb<T>(T(0)));
+  const Rgb<T> left = value - before;
+  const Rgb<T> kept = select(met > T(0), left * (met / (T(1) + met * p)), left / p);
+  const Rgb<T> all = select(drawn, kept - (covered - before) / p, Rgb<T>(T(0)));
   Rest<T> out;
   out.weight = maximum(max_component(all), max_component(all * T(-1)));
   out.colour = all / maximum(out.weight, tiny<T>());
@@ -212,5 +230,18 @@ Excess<T> excess(const Brdf<T>& brdf, bool with_base, const Rgb<T>& base, const 
   if (with_base) out.density = T(1 - kFromEverywhere) * out.density + T(kFromEverywhere) * cosine_pdf(wi);
   return out;
 }
+
+/// All that one sample hands to the renderer beside the base.
+struct AimedSum {
+  std::vector<AimedLobe<double>> lobes;
+  std::vector<Rgb<double>> values;  ///< of the lobes: f cos is value times evaluate(lobe, wi)
+  Vec3<double> wi;                  ///< the drawn direction
+  Rgb<double> rest;                 ///< its weight
+};
+
+/// As the shader goes about it (pack/shader.cpp). u: three numbers that draw the direction, v1, v2: that choose points of
+/// the lamps.
+AimedSum aimed_sum(const Brdf<double>&, const std::vector<LampPatch<double>>&, const Vec3<double>& wo,
+                   const Vec3<double>& u, double v1, double v2);
 
 }  // namespace brdfc

@@ -28,10 +28,12 @@ std::vector<std::string> frame_names() {
       // of aimed forms
       "lamps",  "lamp",     "lamp_place",      "lamp_turn",      "lamp_scale", "lamp_shape", "centre",  "across",
       "along",  "disk",     "drawn_x",         "drawn_y",        "drawn_z", "wi_x",       "wi_y",    "wi_z",
-      "half_x", "half_y",   "half_z",          "exponent",       "height", "extent",      "emphasis", "solid_angle",
-      "covers", "met",      "met_here",        "covered",        "covered_here", "value", "density", "lobe_weight",
-      "lobe_colour", "lobe_half", "lobe_exponent", "rest_weight", "rest_colour", "v_1", "v_2", "u_0", "u_1", "u_2",
-      "u_all", "v_all", "aimed"};
+      "towards_x", "towards_y", "towards_z",   "half_x",         "half_y", "half_z",      "height",  "extent",
+      "emphasis", "solid_angle", "covers",     "met",            "met_here", "room",      "covered", "before",
+      "value",  "density",  "earlier",         "lobe_value",     "lobe_weight", "lobe_colour", "lobe_towards",
+      "lobe_half", "lobe_exponent", "lobe_radius", "lobe_end",   "rest_weight", "rest_colour", "v_1",  "v_2",
+      "u_0",    "u_1",      "u_2",             "u_all",          "v_all",  "aimed",       "level",   "colours",
+      "half_way"};
   return names;
 }
 
@@ -430,47 +432,61 @@ const AimedSteps& aimed_steps(int indent) {
   if (const auto it = made.find(indent); it != made.end()) return it->second;
   Recorder recorder;
   AimedSteps steps;
-  {
-    const LampPatch<Expr> patch{input_vector("centre"), input_vector("across"), input_vector("along"),
-                                Expr::input("disk")};
-    const AimedLamp<Expr> lamp =
-        aim_at(patch, Expr::input("v_1"), Expr::input("v_2"), input3("drawn"), input3("wo"));
+  const auto record_step = [&](const auto& outputs) {
     Program program;
-    output3(program, "wi", lamp.wi);
-    output3(program, "half", lamp.lobe.half);
-    program.output("exponent", lamp.lobe.exponent);
-    program.output("height", lamp.lobe.height);
-    program.output("extent", lamp.lobe.extent);
-    program.output("emphasis", lamp.emphasis);
-    program.output("solid_angle", lamp.solid_angle);
-    program.output("covers", lamp.covers);
-    program.output("met_here", lamp.met);
-    steps.aim = finish(program, indent);
-  }
+    outputs(program);
+    return finish(program, indent);
+  };
+  AimedLobe<Expr> earlier;
+  earlier.towards = input_vector("lobe_towards[earlier]");
+  earlier.half = input_vector("lobe_half[earlier]");
+  earlier.exponent = Expr::input("lobe_exponent[earlier]");
+  earlier.sinRadius = Expr::input("lobe_radius[earlier]");
+  earlier.cosEnd = Expr::input("lobe_end[earlier]");
+  const Vec3<Expr> centre = input_vector("centre");
+  steps.room = record_step([&](Program& p) { p.output("room", minimum(Expr::input("room"), room_beside(centre, earlier))); });
+  steps.aim = record_step([&](Program& p) {
+    const LampPatch<Expr> patch{centre, input_vector("across"), input_vector("along"), Expr::input("disk")};
+    const AimedLamp<Expr> lamp = aim_at(patch, Expr::input("room"), Expr::input("v_1"), Expr::input("v_2"),
+                                        input3("drawn"), input3("wo"));
+    output3(p, "wi", lamp.wi);
+    output3(p, "towards", lamp.lobe.towards);
+    output3(p, "half", lamp.lobe.half);
+    p.output("lobe_exponent[lamp]", lamp.lobe.exponent);
+    p.output("lobe_radius[lamp]", lamp.lobe.sinRadius);
+    p.output("lobe_end[lamp]", lamp.lobe.cosEnd);
+    p.output("height", lamp.height);
+    p.output("extent", lamp.extent);
+    p.output("emphasis", lamp.emphasis);
+    p.output("solid_angle", lamp.solid_angle);
+    p.output("covers", lamp.covers);
+    p.output("met_here", lamp.met);
+  });
   const Rgb<Expr> value = Rgb<Expr>::input("value");
   const Expr density = Expr::input("density");
-  {
+  steps.less = record_step([&](Program& p) {
+    p.output("value", value - Rgb<Expr>::input("lobe_value[earlier]") * evaluate(earlier, input3("wi")));
+  });
+  steps.send = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;
-    lamp.lobe.height = Expr::input("height");
-    lamp.lobe.extent = Expr::input("extent");
+    lamp.height = Expr::input("height");
+    lamp.extent = Expr::input("extent");
     lamp.emphasis = Expr::input("emphasis");
     lamp.solid_angle = Expr::input("solid_angle");
     lamp.covers = Expr::input("covers");
     lamp.met = Expr::input("met_here");
     const Sent<Expr> sent = send(lamp, value, density);
-    Program program;
-    program.output("covered_here", sent.covered);
-    program.output("lobe_weight[lamp]", sent.weight);
-    program.output("lobe_colour[lamp]", sent.colour);
-    steps.send = finish(program, indent);
-  }
-  {
-    const Rest<Expr> left = rest(value, density, Rgb<Expr>::input("covered"), Expr::input("met"));
-    Program program;
-    program.output("rest_weight", left.weight);
-    program.output("rest_colour", left.colour);
-    steps.rest = finish(program, indent);
-  }
+    p.output("covered", Rgb<Expr>::input("covered") + sent.covered);
+    p.output("lobe_value[lamp]", sent.value);
+    p.output("lobe_weight[lamp]", sent.weight);
+    p.output("lobe_colour[lamp]", sent.colour);
+  });
+  steps.rest = record_step([&](Program& p) {
+    const Rest<Expr> left =
+        rest(value, density, Rgb<Expr>::input("covered"), Expr::input("met"), Rgb<Expr>::input("before"));
+    p.output("rest_weight", left.weight);
+    p.output("rest_colour", left.colour);
+  });
   return made.emplace(indent, std::move(steps)).first->second;
 }
 

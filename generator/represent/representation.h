@@ -78,10 +78,12 @@ struct AimedRecording {
 AimedRecording record_aimed(const Model&, const ParamValues& fixed, int indent);
 /// What is done with each lamp and at the end, which is the same for all models (aimed.h).
 struct AimedSteps {
-  Recording aim;   ///< reads centre, across, along, disk, v_1, v_2, drawn_*; assigns wi_*, half_*, exponent, height,
-                   ///< extent, emphasis, solid_angle, covers and met
-  Recording send;  ///< reads those, value and density; assigns covered_here, lobe_weight and lobe_colour
-  Recording rest;  ///< reads value, density, covered, met; assigns rest_weight and rest_colour
+  Recording room;  ///< of lamp `earlier` and centre: assigns room_here
+  Recording aim;   ///< reads centre, across, along, disk, room, v_1, v_2, drawn_*; assigns wi_*, emphasis, solid_angle,
+                   ///< height, extent, covers, met_here and of the lobe towards_*, half_*, exponent, radius and cosine
+  Recording less;  ///< reads the lobe `earlier` and wi_*; assigns covers_here
+  Recording send;  ///< reads value, density and what aim assigned; assigns sent, covered_here, weight and colour
+  Recording rest;  ///< reads value, density, covered, met, before; assigns rest_weight and rest_colour
 };
 const AimedSteps& aimed_steps(int indent);
 
