@@ -306,10 +306,13 @@ class AlbedoText {
 std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
   const auto microfacet = [&](const char* distribution) {
-    // The viewer's direction lies in the plane that facets are stretched in. Along the normal, where it is no tangent,
-    // they are not, and Cycles takes none.
+    // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
+    // stretched by it, and Cycles takes none.
+    const std::string tangent = closure.stretched == Tangent::View      ? "I"
+                                : closure.stretched == Tangent::Surface ? fmt::format("tangent_{}", i)
+                                                                        : "vector(0.0)";
     return fmt::format("weight_{0} * microfacet(\"{1}\", {2}, {3}, alpha_{0}, {4}_{0}, 1.0, 0)", i, distribution, n,
-                       closure.stretched ? "I" : "vector(0.0)", closure.stretched ? "alpha_across" : "alpha");
+                       tangent, closure.stretched == Tangent::None ? "alpha" : "alpha_across");
   };
   switch (closure.kind) {
     case ClosureKind::Diffuse:
@@ -541,7 +544,9 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (has_ramp(closure)) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
       if (closure == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
       if (has_facets(closure)) body += fmt::format("    float alpha_{};\n", c);
-      if (kinds[c].stretched) body += fmt::format("    float alpha_across_{};\n", c);
+      if (kinds[c].stretched != Tangent::None) body += fmt::format("    float alpha_across_{};\n", c);
+      if (kinds[c].stretched == Tangent::Surface)
+        body += fmt::format("    float tangent_{0}_x, tangent_{0}_y, tangent_{0}_z;\n", c);
       if (closure == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
       if (kinds[c].turned) body += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
       shader.facets = shader.facets || has_facets(closure);
@@ -577,12 +582,16 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
             kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
-    for (std::size_t c = 0; c < kinds.size(); ++c)
+    for (std::size_t c = 0; c < kinds.size(); ++c) {
+      if (kinds[c].stretched == Tangent::Surface)
+        body += fmt::format(
+            "    vector tangent_{0} = frame_t * tangent_{0}_x + frame_b * tangent_{0}_y + frame_n * tangent_{0}_z;\n", c);
       if (kinds[c].turned)
         body += fmt::format(
             "    normal normal_{0} = normalize(frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * "
             "normal_{0}_z);\n",
             c);
+    }
   }
   if ((sampled || aimed) && model.has_mirror()) {
     terms.push_back("mirror_weight * reflection(frame_n)");

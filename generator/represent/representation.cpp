@@ -102,7 +102,12 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
     if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
-    if (sum[c].stretched) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
+    if (sum[c].stretched != Tangent::None) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
+    if (sum[c].stretched == Tangent::Surface) {
+      program.output(fmt::format("tangent_{}_x", c), sum[c].tangent.x);
+      program.output(fmt::format("tangent_{}_y", c), sum[c].tangent.y);
+      program.output(fmt::format("tangent_{}_z", c), sum[c].tangent.z);
+    }
     if (sum[c].turned) {
       program.output(fmt::format("normal_{}_x", c), sum[c].normal.x);
       program.output(fmt::format("normal_{}_y", c), sum[c].normal.y);
@@ -495,7 +500,7 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false, false, Division::Done}});
+  return finish(program, indent, {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,

@@ -49,7 +49,7 @@ enum class Division { Done, ByLargest, ByChannel };
 struct RecordedClosure {
   ClosureKind kind;
   bool turned;     ///< has a normal of its own
-  bool stretched;  ///< facets of two roughnesses
+  Tangent stretched;  ///< facets of two roughnesses, and along what
   Division division;
   bool operator==(const RecordedClosure&) const = default;
 };
@@ -63,7 +63,7 @@ struct Recording {
 };
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
-/// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
+/// alpha_i, alpha_across_i, ior_i, and of its normal and tangent, if they are its own, normal_i_x and so on; Controlled: these, wi_x, wi_y, wi_z,
 /// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number and what it has
 /// terms by, which it reads, and factors(), which its weights still have to be multiplied by, the mirror's excepted; it
 /// is right for these `views`.
