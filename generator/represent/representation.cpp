@@ -168,7 +168,8 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
       for (std::size_t i = 0; i < kRampSize; ++i) sum[c].ramp[i] = Rgb<Expr>::input(ramp_entry(c, i));
     if (sum[c].kind == ClosureKind::PhongRamp) sum[c].exponent = Expr::input(fmt::format("exponent_{}", c));
     if (has_facets(sum[c].kind)) sum[c].alpha = Expr::input(fmt::format("alpha_{}", c));
-    if (sum[c].stretched) sum[c].alpha_across = Expr::input(fmt::format("alpha_across_{}", c));
+    if (sum[c].stretched != Tangent::None) sum[c].alpha_across = Expr::input(fmt::format("alpha_across_{}", c));
+    if (sum[c].stretched == Tangent::Surface) sum[c].tangent = input3(fmt::format("tangent_{}", c));
     if (sum[c].turned) sum[c].normal = input3(fmt::format("normal_{}", c));
   }
   return sum;
@@ -176,8 +177,7 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
 
 /// The base of an aimed form; none for what lies on both sides of the surface.
 ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf) {
-  (void)model, (void)brdf;
-  return {};
+  return two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(recorded_wo(model, brdf));
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
@@ -421,7 +421,7 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     const Vec3<Expr> wi = input3("wi");
     Rgb<Expr> given(Expr(0));
     // Closures are on the viewer's side, where the model's frame is the shader's.
-    (void)input_closures(base);
+    for (const Closure<Expr>& c : input_closures(base)) given += evaluate(c, wi, wo);
     const Excess<Expr> e = excess(*brdf, !base.empty(), given, turned(wi), wo);
     program.output("value", e.value);
     program.output("density", e.density);
