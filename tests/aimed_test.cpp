@@ -86,11 +86,11 @@ struct Scene {
 Scene scene_for(const Vec3<double>& wo) {
   const Vec3<double> mirror = reflect(wo), beside = normalize(mirror + Vec3<double>{0.05, 0.12, 0.1});
   Scene scene;
-  scene.patches = {disk(normalize(Vec3<double>{0.4, -0.6, 0.8}) * 3, 0.6),
-                   disk(beside * 5, 0.1),
+  scene.patches = {disk(normalize(Vec3<double>{0.4, -0.6, 0.8}) * 3.0, 0.6),
+                   disk(beside * 5.0, 0.1),
                    {Vec3<double>{-0.5, 1.2, 1.4}, {0.5, 0, 0}, {0, 0.3, -0.25}, 0},
                    disk(normalize(beside + Vec3<double>{0.03, 0, 0}), 0.005),
-                   disk(normalize(Vec3<double>{-0.6, 0.2, 0.5}) * 2, 0.3, 0.4)};
+                   disk(normalize(Vec3<double>{-0.6, 0.2, 0.5}) * 2.0, 0.3, 0.4)};
   scene.light = {3, 400, 5, 1e5, 10};
   return scene;
 }

@@ -337,8 +337,12 @@ RepresentationKind representation_named(const std::string& name) {
 
 std::vector<RepresentationKind> representations(const Model& model) {
   if (!model.has_scatter()) return {RepresentationKind::Exact};
-  std::vector<RepresentationKind> kinds = {RepresentationKind::Aimed, RepresentationKind::Sampled};
-  if (model.has_exact()) kinds.insert(kinds.begin(), RepresentationKind::Exact);
+  std::vector<RepresentationKind> kinds = {RepresentationKind::Sampled};
+  // An exact form for all choices leaves nothing to aim.
+  const bool exact = model.has_exact();
+  if (!exact || !form_values(model, RepresentationKind::Exact).empty())
+    kinds.insert(kinds.begin(), RepresentationKind::Aimed);
+  if (exact) kinds.insert(kinds.begin(), RepresentationKind::Exact);
   if (!model.info().properties.fit_axis.empty()) kinds.push_back(RepresentationKind::Fitted);
   return kinds;
 }
