@@ -4,61 +4,12 @@
 #include <algorithm>
 #include <set>
 
+#include "core/osl_words.h"
 #include "pack/osl_library.h"
 #include "represent/fit.h"
 
 namespace brdfc {
 namespace {
-
-/// Words a parameter may not be called in OSL: globals, keywords and the names of this generator.
-const std::set<std::string>& reserved_words() {
-  static const std::set<std::string> words = {"and",
-                                              "break",
-                                              "closure",
-                                              "color",
-                                              "continue",
-                                              "do",
-                                              "else",
-                                              "emit",
-                                              "float",
-                                              "for",
-                                              "if",
-                                              "illuminance",
-                                              "illuminate",
-                                              "int",
-                                              "matrix",
-                                              "normal",
-                                              "not",
-                                              "or",
-                                              "output",
-                                              "point",
-                                              "public",
-                                              "return",
-                                              "string",
-                                              "struct",
-                                              "vector",
-                                              "void",
-                                              "while",
-                                              "u",
-                                              "v",
-                                              "time",
-                                              "dtime",
-                                              "wi",
-                                              "wo",
-                                              "weight",
-                                              "lobe",
-                                              "sum",
-                                              "position",
-                                              "frame_n",
-                                              "frame_t",
-                                              "frame_b",
-                                              "mirror_weight",
-                                              "side",
-                                              "path_length",
-                                              "residual_weight",
-                                              "residual_colour"};
-  return words;
-}
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -313,7 +264,7 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   };
   switch (closure.kind) {
     case ClosureKind::Diffuse:
-      return fmt::format("weight_{} * diffuse({})", i, n);
+      return fmt::format("weight_{} * brdfc_diffuse({})", i, n);
     case ClosureKind::Burley:
       return fmt::format("weight_{} * burley_diffuse_bsdf({}, color(1), 0.0)", i, n);
     case ClosureKind::DiffuseRamp:
@@ -444,7 +395,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (kinds[c].division != Division::Done) {
         const std::string weight = fmt::format("weight_{}", c);
         body += fmt::format(
-            "    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= {};\n", kRampSize, c,
+            "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
             kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
@@ -496,7 +447,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const ParamInfo& p : info.params) {
     if (fixed.count(p.name)) continue;
     if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
-    if (reserved_words().count(p.name))
+    if (is_osl_word(p.name))
       input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
                   p.name);
     out += parameter(p);

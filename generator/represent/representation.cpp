@@ -17,12 +17,10 @@
 namespace brdfc {
 namespace {
 
-/// Names the statements around a recording use; a recording may not declare them.
-std::vector<std::string> frame_names() {
-  std::vector<std::string> names = {
-      "Normal", "Tangent",  "Lobes",           "BSDF",           "Albedo", "frame_n",     "frame_t", "frame_b",
-      "wi",     "weight",   "mirror_weight",   "lobe",           "side",   "path_length", "u",       "wo",
-      "sum",    "position", "residual_weight", "residual_colour"};
+/// What a shader has for parameters: statements may not declare them, not even those that they do not read.
+std::vector<std::string> parameter_names(const Model& model) {
+  std::vector<std::string> names;
+  for (const ParamInfo& p : model.info().params) names.push_back(p.name);
   return names;
 }
 
@@ -127,8 +125,9 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
   program.output("weight", s.weight);
 }
 
-Recording finish(const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
-  return {program.print_osl(indent, frame_names()), std::move(closures), program.operations(), program.inputs()};
+Recording finish(const Model& model, const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
+  return {program.print_osl(indent, parameter_names(model)), std::move(closures), program.operations(),
+          program.inputs()};
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
@@ -339,7 +338,7 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
   if (used > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", model.info().name, name_of(kind), used,
                 kMaxClosures);
-  return finish(program, indent, std::move(closures));
+  return finish(model, program, indent, std::move(closures));
 }
 
 Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
@@ -347,7 +346,7 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false, false, Division::Done}});
+  return finish(model, program, indent, {{ClosureKind::Reflection, false, false, Division::Done}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,
