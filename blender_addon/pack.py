@@ -29,6 +29,7 @@ def use(folder=None):
     global root
     root = _INSTALLED if folder is None else Path(folder)
     manifest.cache_clear()
+    digest.cache_clear()
 
 
 @lru_cache(maxsize=1)
@@ -172,11 +173,13 @@ def source(model_name, name):
     return path.stem, path.read_text(encoding="utf-8")
 
 
+@lru_cache(maxsize=None)
 def digest(model_name, name):
-    """Changes whenever the shader or the sockets of its group would."""
+    """Changes whenever the shader or the sockets of its group would. Panels ask for it at each
+    redraw: of the source, of up to a megabyte, the manifest has the hash."""
     form = representation(model_name, name)
     schema = [model(model_name)["parameters"], form.get("lobes"), form["only"]]
-    text = source(model_name, name)[1] + json.dumps(schema, sort_keys=True)
+    text = form["sha256"] + json.dumps(schema, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   brdfc::add_check_command(app);
   brdfc::add_stability_command(app);
   brdfc::add_fit_command(app);
+  brdfc::add_base_command(app);
   brdfc::add_build_command(app);
   brdfc::add_render_command(app);
   brdfc::add_scene_command(app);

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "core/osl_arithmetic.h"
+#include "core/osl_words.h"
 #include "core/table.h"
 
 namespace brdfc {
@@ -582,13 +583,6 @@ class OslPrinter {
  public:
   OslPrinter(const std::vector<bool>& reachable, const std::vector<std::string>& taken)
       : r_(Recorder::current()), reachable_(reachable), taken_(taken.begin(), taken.end()) {
-    for (const char* word :
-         {"I",          "P",        "N",       "Ng",      "u",     "v",      "dPdu",         "dPdv",   "Ps",
-          "time",       "dtime",    "Ci",      "color",   "float", "int",    "vector",       "normal", "point",
-          "matrix",     "string",   "closure", "if",      "else",  "for",    "while",        "do",     "return",
-          "break",      "continue", "output",  "struct",  "void",  "and",    "or",           "not",    "emit",
-          "illuminate", "public",   "shader",  "surface", "light", "volume", "displacement", "D"})
-      taken_.insert(word);
     uses_.assign(reachable.size(), 0);
     for (std::size_t i = 0; i < reachable.size(); ++i)
       if (reachable[i])
@@ -665,8 +659,9 @@ class OslPrinter {
   }
 
   std::string fresh(const std::string& base) {
-    std::string name = base;
-    for (int i = 1; !taken_.insert(name).second; ++i) name = fmt::format("{}_{}", base, i);
+    const std::string start = unnumbered(base);
+    std::string name = start;
+    for (int i = 1; is_osl_word(name) || !taken_.insert(name).second; ++i) name = fmt::format("{}_{}", start, i);
     return name;
   }
 

@@ -229,7 +229,8 @@ class Program {
   void output(const std::string& name, const Rgb<Expr>& value) { outputs_.push_back({name, value.id()}); }
 
   /// OSL statements that assign every output (to variables declared by the caller), indented. The current
-  /// recorder must be the one the outputs were recorded with. `taken` are names the text may not declare.
+  /// recorder must be the one the outputs were recorded with. The text declares no name of `taken`, as it declares no
+  /// osl_words(), inputs and outputs.
   std::string print_osl(int indent, const std::vector<std::string>& taken) const;
   /// Operations the outputs reach: what the shader executes, selections with both arms.
   int operations() const;

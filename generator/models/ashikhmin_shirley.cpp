@@ -21,6 +21,7 @@
 // 1 / (n + 1) along the axes; what counts are its variances along and across the plane of incidence and the correlation
 // of the two. A cosine alone would not do: where the lobe begins to sink below the surface moves with the lobe's width.
 // Interpolation errs by at most 0.02 of the incident light, 0.003 on average; that is what R_d = 1 gains or loses.
+#include "model/base_terms.h"
 #include "core/table.h"
 #include "model/half_vector.h"
 
@@ -168,18 +169,25 @@ template <class T> struct AshikhminShirley {
     return rest(LobeAtView<T>(rotate_z(k, cos(rotation), sin(rotation)), nu, nv));
   }
 
+  /// 1 - (1 - c/2)^5 of eq. 14, as a polynomial: no cancellation for small c.
+  static T fade(const T& c) {
+    const T x = c / T(2);
+    return x * (T(5) - x * (T(10) - x * (T(10) - x * (T(5) - x))));
+  }
+
   /// Diffuse term, eq. 14 or 12.
   Rgb<T> substrate(const Vec3<T>& wi, const Vec3<T>& wo) const {
     if (diffuse == Tabulated) {
       const Rgb<T> mean = named("rest_mean", rest(MeanWidth<T>(nu, nv)));
       return rd * named("rest_i", rest_at(wi)) * (named("rest_o", rest_at(wo)) / (mean * pi<T>()));
     }
-    // 1 - (1 - c/2)^5 as a polynomial: no cancellation for small c.
-    const auto fade = [](const T& c) {
-      const T x = c / T(2);
-      return x * (T(5) - x * (T(10) - x * (T(10) - x * (T(5) - x))));
-    };
     return rd * (Rgb<T>(T(1)) - rs) * (T(28) / (T(23) * pi<T>()) * fade(wi.z) * fade(wo.z));
+  }
+
+  /// The diffuse term's albedo; the mean of the fade over the cosine is 23/28.
+  Rgb<T> substrate_albedo(const Vec3<T>& wo) const {
+    if (diffuse == Tabulated) return rd * named("rest_o", rest_at(wo));
+    return rd * (Rgb<T>(T(1)) - rs) * fade(wo.z);
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -232,6 +240,19 @@ template <class T> struct AshikhminShirley {
     const Vec3<T> wi = select(specular_lobe, glossy, matte);
     const T p = pdf(wi, wo);
     return sample_if(p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
+  }
+
+  /// Facets whose slopes have the lobe's widths, and eq. 14 of which eq. 12 is a variation.
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const Rgb<T> F = named("F_view", rs + (Rgb<T>(T(1)) - rs) * schlick_weight(wo.z));
+    const T along = sqrt(T(2) / (nu + T(2))), across = sqrt(T(2) / (nv + T(2)));
+    const Rgb<T> none(T(0));
+    Closure<T> matte(ClosureKind::DiffuseRamp, part == Specular ? none : substrate_albedo(wo));
+    for (int i = 0; i < kRampSize; ++i) {
+      const T c = T(i) / T(kRampSize - 1);
+      matte.ramp[std::size_t(i)] = Rgb<T>(T(28. / 23) * fade(c) * c);
+    }
+    return {facets(ClosureKind::Beckmann, part == Diffuse ? none : F, along, across, rotation), matte};
   }
 };
 

@@ -7,6 +7,7 @@
 // The paper leaves the constant of D open (its D is 1 at h = n) and folds the rest into k_s. Here D (n.h) integrates to
 // 1 and the factor 1/4 is that of the reflection's Jacobian, so that k_s = F is a reflectance, and k_s = 1 loses only
 // what the cavities block. (n.h)^e comes from 1 - (n.h)^2 = h_x^2 + h_y^2, which keeps its digits near the normal.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/v_cavity.h"
 
@@ -55,6 +56,11 @@ template <class T> struct Blinn {
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
     return sample_if(above(wi, wo), wi, ks * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
+  }
+
+  /// Gaussian slopes as wide as the power of the cosine.
+  ClosureSum<T> base(const Vec3<T>&) const {
+    return {facets(ClosureKind::Beckmann, ks, sqrt(T(2) / (e + T(2))))};
   }
 };
 

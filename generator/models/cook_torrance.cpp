@@ -9,6 +9,7 @@
 // (D (n.h) must integrate to 1, the reflection's Jacobian is 1/4). F is Schlick's approximation from the reflectance f0
 // at normal incidence, where the paper solves f0 for a refractive index and takes Fresnel's equations: linear in f0,
 // which the tables of the albedo need.
+#include "model/base_terms.h"
 #include "model/v_cavity.h"
 
 namespace brdfc {
@@ -60,6 +61,10 @@ template <class T> struct CookTorrance {
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
     return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
+  }
+
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    return {facets(ClosureKind::Beckmann, F(clamp01(T(1) - wo.z)), m)};
   }
 };
 

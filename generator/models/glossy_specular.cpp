@@ -8,6 +8,7 @@
 // "conserving" is (e + 2) / (2 pi), which at normal incidence reflects k_s c_s and never more.
 //
 // Rays are drawn about r, eq. 25.8, and lost below the surface. Stable forms: see power_lobe.h.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -70,6 +71,11 @@ template <class T> struct GlossySpecular {
     const Vec3<T> wi = about_axis(reflect(wo), sample_power_lobe(e, u.y, u.z));
     const T share = c() * (T(2) * pi<T>()) / (e + T(1));
     return sample_if(above(wi, wo), wi, cs * (ks * share * wi.z), pdf(wi, wo));
+  }
+
+  /// Eq. 25.2 itself, in the cosine that Cycles has rounded.
+  ClosureSum<T> base(const Vec3<T>&) const {
+    return {power_closure(cs * (c() * ks * T(2) * pi<T>() / (e + T(2))), e)};
   }
 };
 

@@ -10,6 +10,7 @@
 //
 // Stable form. The bracket is |w| cos, w = (C_xy o_x, C_xy o_y, C_z o_z); |w|^e = exp(e log1p(|w|^2 - 1) / 2) with
 // 1 - |w|^2 = (1 - C_xy^2) sin^2 theta_o + (1 - C_z^2) cos^2 theta_o, a sum of positive terms.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -78,6 +79,15 @@ template <class T> struct Lafortune {
     const Lobe l = lobe(wo);
     const Vec3<T> wi = about_axis(l.axis, sample_power_lobe(e, u.y, u.z));
     return sample_if(above(wi, wo), wi, ks * ((e + T(2)) / (e + T(1)) * l.scale * wi.z), pdf(wi, wo));
+  }
+
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const Lobe l = lobe(wo);
+    const Vec3<T> n = normalize(wo + l.axis);
+    Closure<T> c = power_closure(ks * (l.scale * lobe_height(l.axis.z, e) / dot(n, l.axis)), e);
+    c.normal = n;
+    c.turned = true;
+    return {c};
   }
 };
 

@@ -17,6 +17,7 @@
 // (sin alpha + sin beta) / (cos alpha + cos beta). Angles are 2 atan(sin / (1 + cos)), 1 - 2 beta / pi the same of the
 // complement. 1 - |c| is half the squared distance of the unit vectors at both azimuths (of one and the other's
 // opposite for c < 0). Opposite, sin alpha - (2 beta / pi)^3 is taken from 1 - 2 beta / pi and 1 - sin alpha.
+#include "model/base_terms.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -97,6 +98,10 @@ template <class T> struct OrenNayar {
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const Vec3<T> wi = sample_cosine(u.y, u.z);
     return sample_if(above(wi, wo), wi, eval(wi, wo) * pi<T>(), cosine_pdf(wi));
+  }
+
+  ClosureSum<T> base(const Vec3<T>&) const {
+    return {Closure<T>(ClosureKind::Diffuse, rho * C1())};
   }
 };
 

@@ -12,6 +12,7 @@
 // left out: an emission shader beside this one is the same.
 //
 // Stable forms: see power_lobe.h.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -88,6 +89,11 @@ template <class T> struct PhongMaterial {
     const Vec3<T> wi = select(u.x < p.reflection + p.specular, glossy, sample_cosine(u.y, u.z));
     const T density = pdf(wi, wo);
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
+  }
+
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    return {Closure<T>(ClosureKind::Diffuse, cd * kd), power_closure(cs * (ks * T(2) * pi<T>() / (es + T(2))), es),
+            power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, e))), e)};
   }
 };
 

@@ -17,6 +17,7 @@
 // Stable forms. 1 + s t^2 - t^2 = sin^2 theta_h + s t^2; G(v) / v = 1 / (s (1 - v) + v). sqrt(p) A has no elementary
 // inverse of its integral; A / (2 pi) is the geometric mean of the uniform density and of
 // q = p / (2 pi (p^2 sin^2 + cos^2)), hence at most their arithmetic mean, which is sampled: weights stay below S.
+#include "model/base_terms.h"
 #include "model/half_vector.h"
 
 namespace brdfc {
@@ -111,6 +112,13 @@ template <class T> struct Schlick {
     const Vec3<T> wi = select(matte_lobe, matte, glossy);
     const T density = pdf(wi, wo);
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
+  }
+
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const Rgb<T> at_view = S(clamp01(T(1) - wo.z));
+    const T wide = sqrt(rough), thin = sqrt(p);
+    return {facets(ClosureKind::Ggx, at_view * b(), wide * thin, wide / thin, T(0)),
+            Closure<T>(ClosureKind::Diffuse, r * a())};
   }
 };
 

@@ -7,6 +7,7 @@
 // directions. Reciprocal, but at grazing views the mirror takes all the light and the matte term still gives off most.
 //
 // Misprint: the fraction bar of the paper's equation divides the mirror term by pi, too.
+#include "model/base_terms.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -51,6 +52,10 @@ template <class T> struct SchlickDouble {
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const Vec3<T> wi = sample_cosine(u.y, u.z);
     return sample_if(above(wi, wo), wi, matte(wi, wo), cosine_pdf(wi));
+  }
+
+  ClosureSum<T> base(const Vec3<T>&) const {
+    return {Closure<T>(ClosureKind::Diffuse, rd * (T(1) - r0))};
   }
 };
 

@@ -11,6 +11,7 @@
 //
 // Stable forms. E from the slopes of h; (o.h)(n.h) = (n.i + n.o) / 2 turns the last N into ((n.i + n.o) (n.h) / 2)^2.
 // Sampling as in B. Walter: Notes on the Ward BRDF, Cornell PCG-05-06, 2005: Gaussian slopes, reflected.
+#include "model/base_terms.h"
 #include "model/half_vector.h"
 
 namespace brdfc {
@@ -85,6 +86,10 @@ template <class T> struct Ward {
     const T inverse_cos2 = T(1) / (h.z * h.z);
     const T weight = wi.z * over_norm(middle(wi, wo) / inverse_cos2, wi, wo, inverse_cos2);
     return sample_if(above(wi, wo), wi, ks * weight, pdf(wi, wo));
+  }
+
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    return {facets(ClosureKind::Beckmann, normalisation == Original ? ks * wo.z : ks, ax, ay, T(0))};
   }
 };
 

@@ -83,8 +83,8 @@ std::string probe_source(const Model& model, const ParamValues& choices) {
   if (!model.has_scatter()) input_error("{}: has delta terms alone, there is nothing to probe", model.info().name);
   Recorder recorder;
   const Recorded r = record_both(model, choices);
-  const std::vector<std::string> taken = {"shown_f", "shown_pdf", "shown_x", "shown_y", "shown_z", "shown_weight",
-                                          "show",    "first",     "last",    "BSDF",    "Shown"};
+  std::vector<std::string> taken;  // by parameters and what the node calls them
+  for (const ParamInfo& p : model.info().params) taken.insert(taken.end(), {p.name, "p_" + p.name});
   // Inputs of the node, because Cycles passes on only attributes that nodes ask for.
   std::string parameters = "    float show = 0,\n    vector wi = 0,\n    vector wo = 0,\n    vector numbers = 0,\n";
   std::string body;

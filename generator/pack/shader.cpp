@@ -4,61 +4,12 @@
 #include <algorithm>
 #include <set>
 
+#include "core/osl_words.h"
 #include "pack/osl_library.h"
 #include "represent/fit.h"
 
 namespace brdfc {
 namespace {
-
-/// Words a parameter may not be called in OSL: globals, keywords and the names of this generator.
-const std::set<std::string>& reserved_words() {
-  static const std::set<std::string> words = {"and",
-                                              "break",
-                                              "closure",
-                                              "color",
-                                              "continue",
-                                              "do",
-                                              "else",
-                                              "emit",
-                                              "float",
-                                              "for",
-                                              "if",
-                                              "illuminance",
-                                              "illuminate",
-                                              "int",
-                                              "matrix",
-                                              "normal",
-                                              "not",
-                                              "or",
-                                              "output",
-                                              "point",
-                                              "public",
-                                              "return",
-                                              "string",
-                                              "struct",
-                                              "vector",
-                                              "void",
-                                              "while",
-                                              "u",
-                                              "v",
-                                              "time",
-                                              "dtime",
-                                              "wi",
-                                              "wo",
-                                              "weight",
-                                              "lobe",
-                                              "sum",
-                                              "position",
-                                              "frame_n",
-                                              "frame_t",
-                                              "frame_b",
-                                              "mirror_weight",
-                                              "side",
-                                              "path_length",
-                                              "residual_weight",
-                                              "residual_colour"};
-  return words;
-}
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -119,6 +70,12 @@ std::string indented(const std::string& text, std::size_t levels = 1) {
     start = end + 1;
   }
   return out;
+}
+
+/// In a scope of their own, so that what they declare stands in no other's way.
+std::string block(const std::string& statements, std::size_t levels) {
+  const std::string edge(4 * levels, ' ');
+  return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
 }
 
 /// Statements that differ by combination of choices: equal ones are written once.
@@ -316,7 +273,7 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   };
   switch (closure.kind) {
     case ClosureKind::Diffuse:
-      return fmt::format("weight_{} * diffuse({})", i, n);
+      return fmt::format("weight_{} * brdfc_diffuse({})", i, n);
     case ClosureKind::Burley:
       return fmt::format("weight_{} * burley_diffuse_bsdf({}, color(1), 0.0)", i, n);
     case ClosureKind::DiffuseRamp:
@@ -346,9 +303,7 @@ class AimedText {
     draw_.add(choices, r.draw.statements);
     value_.add(choices, r.value.statements);
     operations_ = std::max(operations_, r.draw.operations + r.value.operations);
-    Recording base = r.base;
-    base.statements = indented(base.statements);
-    return base;
+    return r.base;
   }
 
   int operations() const {
@@ -359,12 +314,12 @@ class AimedText {
   std::string print() const {
     const AimedSteps& steps = aimed_steps(0);
     std::string out = random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float drawn_x, drawn_y, drawn_z;\n" +
-                      indented(draw_.print(0)) +
+                      block(draw_.print(0), 1) +
                       "    color rest_colour, covered = 0.0;\n    float rest_weight, met = 0.0;\n";
     if (lamps_ == 0)
       return out +
              "    color value, before = 0.0;\n    float density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
-             indented(value_.print(0)) + block(steps.rest.statements, 1);
+             block(value_.print(0), 1) + block(steps.rest.statements, 1);
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
     out += fmt::format(
         "    color lobe_value[{0}], lobe_colour[{0}];\n"
@@ -415,7 +370,7 @@ class AimedText {
         "        if (lobe_weight[lamp] > 0.0) {{\n"
         "            float level[{0}] = {{{1}}};\n"
         "            color colours[{0}];\n"
-        "            for (int k = 0; k < {0}; k++)\n                colours[k] = level[k] * lobe_colour[lamp];\n"
+        "            for (int entry = 0; entry < {0}; entry++)\n                colours[entry] = level[entry] * lobe_colour[lamp];\n"
         "            vector half_way = lobe_half[lamp];\n"
         "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
         "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], colours) + aimed;\n"
@@ -446,11 +401,6 @@ class AimedText {
                "                if (lobe_weight[earlier] > 0.0{}) {{\n",
                condition) +
            indented(statements, 5) + "                }\n";
-  }
-
-  static std::string block(const std::string& statements, std::size_t levels) {
-    const std::string edge(4 * levels, ' ');
-    return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
   }
 
   ChoiceSwitch draw_, value_;
@@ -497,7 +447,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
     kinds = r.closures;
     if ((sampled || aimed) && model.has_mirror()) {
-      const Recording m = record_mirror(model, values, 4);
+      const Recording m = record_mirror(model, values, 0);
       mirror_operations = std::max(mirror_operations, m.operations);
       mirror.add(choices, m.statements);
     }
@@ -519,7 +469,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         "    float side = backfacing() ? -1.0 : 1.0;\n";
   if (model.has_medium()) body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
   std::vector<std::string> terms;
-  if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
+  if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + block(mirror.print(0), 1);
   if (sampled) {
     body += fmt::format(
         "    color weight_0[{}] = {{ 0.0 }};\n    vector wi[{}] = {{ vector(0.0) }};\n"
@@ -558,7 +508,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
           "    vector u_all = brdfc_random(0);\n"
           "    float u_0 = u_all[0];\n    float u_1 = u_all[1];\n    float u_2 = u_all[2];\n"
           "    float wi_x, wi_y, wi_z, residual_weight;\n    color residual_colour;\n";
-    body += statements.print(4);
+    body += aimed ? block(statements.print(0), 1) : statements.print(4);
     if (aimed) {
       body += aimed_text.print();
       shader.lamps = max_lamps;
@@ -578,7 +528,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (kinds[c].division != Division::Done) {
         const std::string weight = fmt::format("weight_{}", c);
         body += fmt::format(
-            "    for (int k = 0; k < {}; k++)\n        ramp_{}[k] /= {};\n", kRampSize, c,
+            "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
             kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
@@ -638,7 +588,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const ParamInfo& p : info.params) {
     if (fixed.count(p.name)) continue;
     if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
-    if (reserved_words().count(p.name))
+    if (is_osl_word(p.name))
       input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
                   p.name);
     out += parameter(p);

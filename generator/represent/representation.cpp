@@ -19,21 +19,10 @@
 namespace brdfc {
 namespace {
 
-/// Names the statements around a recording use; a recording may not declare them.
-std::vector<std::string> frame_names() {
-  std::vector<std::string> names = {
-      "Normal", "Tangent",  "Lobes",           "BSDF",           "Albedo", "frame_n",     "frame_t", "frame_b",
-      "wi",     "weight",   "mirror_weight",   "lobe",           "side",   "path_length", "u",       "wo",
-      "sum",    "position", "residual_weight", "residual_colour",
-      // of aimed forms
-      "lamps",  "lamp",     "lamp_place",      "lamp_turn",      "lamp_scale", "lamp_shape", "centre",  "across",
-      "along",  "disk",     "drawn_x",         "drawn_y",        "drawn_z", "wi_x",       "wi_y",    "wi_z",
-      "towards_x", "towards_y", "towards_z",   "half_x",         "half_y", "half_z",      "height",  "extent",
-      "emphasis", "solid_angle", "covers",     "met",            "met_here", "room",      "covered", "before",
-      "value",  "density",  "earlier",         "lobe_value",     "lobe_weight", "lobe_colour", "lobe_towards",
-      "lobe_half", "lobe_exponent", "lobe_radius", "lobe_end",   "rest_weight", "rest_colour", "v_1",  "v_2",
-      "u_0",    "u_1",      "u_2",             "u_all",          "v_all",  "aimed",       "level",   "colours",
-      "half_way"};
+/// What a shader has for parameters: statements may not declare them, not even those that they do not read.
+std::vector<std::string> parameter_names(const Model& model) {
+  std::vector<std::string> names;
+  for (const ParamInfo& p : model.info().params) names.push_back(p.name);
   return names;
 }
 
@@ -143,8 +132,13 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
   program.output("weight", s.weight);
 }
 
-Recording finish(const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
-  return {program.print_osl(indent, frame_names()), std::move(closures), program.operations(), program.inputs()};
+Recording finish(const Program& program, int indent, const std::vector<std::string>& taken,
+                 std::vector<RecordedClosure> closures = {}) {
+  return {program.print_osl(indent, taken), std::move(closures), program.operations(), program.inputs()};
+}
+
+Recording finish(const Model& model, const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
+  return finish(program, indent, parameter_names(model), std::move(closures));
 }
 
 Vec3<Expr> input3(const std::string& name) {
@@ -395,7 +389,7 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
   if (used > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", model.info().name, name_of(kind), used,
                 kMaxClosures);
-  return finish(program, indent, std::move(closures));
+  return finish(model, program, indent, std::move(closures));
 }
 
 AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int indent) {
@@ -413,12 +407,12 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     Program program;
     std::vector<RecordedClosure> closures;
     output_closures(base, program, closures);
-    out.base = finish(program, indent, closures);
+    out.base = finish(model, program, indent, closures);
   }
   {
     Program program;
     output3(program, "drawn", turned(draw(*brdf, !base.empty(), wo, recorded_u())));
-    out.draw = finish(program, indent);
+    out.draw = finish(model, program, indent);
   }
   {
     Program program;
@@ -429,7 +423,7 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     const Excess<Expr> e = excess(*brdf, !base.empty(), given, turned(wi), wo);
     program.output("value", e.value);
     program.output("density", e.density);
-    out.value = finish(program, indent);
+    out.value = finish(model, program, indent);
   }
   return out;
 }
@@ -444,7 +438,7 @@ const AimedSteps& aimed_steps(int indent) {
   const auto record_step = [&](const auto& outputs) {
     Program program;
     outputs(program);
-    return finish(program, indent);
+    return finish(program, indent, {});
   };
   AimedLobe<Expr> earlier;
   earlier.towards = input_vector("lobe_towards[earlier]");
@@ -504,7 +498,7 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
+  return finish(model, program, indent, {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,

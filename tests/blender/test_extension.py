@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension as a user meets it: installation, nodes, menus, panels, operators, saved files."""
 
+import hashlib
 import json
 import math
 import os
@@ -749,6 +750,32 @@ def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
                 assert f"value {parameter['label']}:" in text
             assert "Open Shading Language is off" in text
             assert "operator brdfc.enable_osl" in text
+
+
+def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, empty, monkeypatch):
+    """Of each form: a panel is drawn at every movement of the mouse over it."""
+    made = [extension.api.new_material(*form) for form in forms(extension)]
+    for material in made:
+        extension.ui.draw_material(helpers.Layout(), material, empty)
+
+    def refuse(*_, **__):
+        raise AssertionError("the panel read a file or hashed one")
+
+    for module, name in ((Path, "read_text"), (Path, "read_bytes"), (hashlib, "sha256")):
+        monkeypatch.setattr(module, name, refuse)
+    for material in made:
+        layout = helpers.Layout()
+        extension.ui.draw_material(layout, material, empty)
+        assert any(line.startswith("Error:") for line in layout.log), "the group is not known"
+
+
+def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
+    """By which groups of another version are told."""
+    for model, form in forms(extension):
+        with subtests.test(model=model, form=form):
+            text = extension.pack.source(model, form)[1]
+            stated = extension.pack.representation(model, form)["sha256"]
+            assert hashlib.sha256(text.encode()).hexdigest() == stated
 
 
 def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):

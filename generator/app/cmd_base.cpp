@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc base: how much of a model its base carries, and what noise is left.
+#include "app/commands.h"
+#include "app/csv.h"
+#include "represent/base.h"
+
+namespace brdfc {
+
+void add_base_command(CLI::App& app) {
+  struct Options {
+    std::string model;
+    std::vector<std::string> values;
+    std::vector<double> angles = {10, 45, 75, 85};
+    double phi = 0;
+    int points = 1 << 16;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "base",
+      "How much of f cos the closures of a model's base carry by view angle, and the variance of one drawn direction,\n"
+      "in squares of the albedo: of all of f cos drawn from the model, and of the rest after the base, a quarter of\n"
+      "whose directions are those of a matte surface; in a white world and under a smooth sky.\n"
+      "stdout: CSV with header theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest:\n"
+      "        the integral of |f cos - base| and that of the base over the albedo, the factor of the base that would\n"
+      "        leave the least variance, the variances, and the most that one direction of the rest brings");
+  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
+  cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
+  cmd->add_option("--angles", o->angles, "Angles of the view to the normal in degrees")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 89.999));
+  cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
+  cmd->add_option("--points", o->points, "Directions for each view")->check(CLI::Range(64, 1 << 26));
+  cmd->callback([o] {
+    const Model& model = find_model(o->model);
+    if (!model.has_base()) input_error("{}: has no base: expected a model that declares one", o->model);
+    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    CsvWriter out("theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest");
+    for (const double angle : o->angles) {
+      const BaseWorth w = base_worth(bound, direction(std::cos(angle * kPi / 180), o->phi), o->points);
+      out.row({angle, w.relative_l1, w.share, w.best_scale, w.white_drawn, w.white_rest, w.sky_drawn, w.sky_rest,
+               w.largest});
+    }
+    out.finish();
+  });
+}
+
+}  // namespace brdfc

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a model's base is worth: closures meet lamps and sky with little noise, and what they lack is drawn. It is
+// measured before anything is rendered.
+#pragma once
+
+#include "analysis/albedo.h"
+
+namespace brdfc {
+
+/// Of the directions in which the rest is looked for, how many the model draws. The others are those of a matte surface:
+/// closures give light where the model draws nothing.
+inline constexpr double kModelShareOfRest = 0.75;
+
+/// One view. Variances are those of one drawn direction, in squares of the albedo; channels are averaged.
+struct BaseWorth {
+  double relative_l1 = 1;  ///< integral of |f cos(theta_i) - base| over that of f cos
+  double share = 0;        ///< integral of the base over that of f cos
+  /// The factor of the base that would leave the least variance.
+  double best_scale = 0;
+  double white_drawn = 0, white_rest = 0;  ///< in a white world: all of f cos from the model, the rest after the base
+  double sky_drawn = 0, sky_rest = 0;      ///< under a sky nineteen times as bright on one side as on the other
+  /// The largest magnitude of the rest over its density, over the albedo: what one direction may bring.
+  double largest = 0;
+};
+
+/// With `points` directions from a fixed sequence. Throws ValueError for a closure's weight that is NaN, infinite or
+/// negative.
+BaseWorth base_worth(const BoundModel&, const Vec3<double>& wo, int points);
+
+}  // namespace brdfc
