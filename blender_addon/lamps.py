@@ -132,7 +132,10 @@ def _luminance(color):
 
 def _tree(owner):
     """The node tree that shades a light, material or world, or None."""
-    return owner.node_tree if getattr(owner, "use_nodes", True) else None
+    switch = owner.bl_rna.properties.get("use_nodes")
+    if switch is None or getattr(switch, "is_deprecated", False) or owner.use_nodes:
+        return owner.node_tree
+    return None
 
 
 def _output(tree, kind):
@@ -432,6 +435,25 @@ def _reduced(luminance, limit):
     return summed / np.outer(height, width), step
 
 
+def _connected(mask, start):
+    """The part of a mask, whose columns go round, that hangs together with a pixel; gaps of a few
+    pixels don't count."""
+    block = max(1, mask.shape[1] // 256)
+    rows, columns = (np.arange(0, n, block) for n in mask.shape)
+    coarse = np.logical_or.reduceat(np.logical_or.reduceat(mask, rows, 0), columns, 1)
+    part = np.zeros_like(coarse)
+    part[start[0] // block, start[1] // block] = True
+    size = 0
+    while size < (size := np.count_nonzero(part)):
+        part |= np.roll(part, 1, 1) | np.roll(part, -1, 1)
+        grown = part.copy()
+        grown[1:] |= part[:-1]
+        grown[:-1] |= part[1:]
+        part = grown & coarse
+    whole = part.repeat(block, 0).repeat(block, 1)
+    return mask & whole[: mask.shape[0], : mask.shape[1]]
+
+
 def bright_spots(luminance, count=SLOTS):
     """The small bright places of an equirectangular picture, (height, width), row 0 at the bottom:
     [(direction, full angle, irradiance)], the brightest first.
@@ -454,8 +476,7 @@ def bright_spots(luminance, count=SLOTS):
         peak = np.unravel_index(left.argmax(), left.shape)
         if left[peak] < 20 * total / (4 * np.pi) or len(found) == count:
             break
-        near = directions @ directions[peak] > math.cos(0.25)
-        place = near & (left >= 0.1 * left[peak])
+        place = _connected(left >= 0.1 * left[peak], peak)
         carried = (light * place).sum()
         # What lies around the place is its own glow.
         middle = (directions * (light * place)[..., None]).sum((0, 1))
@@ -519,21 +540,14 @@ def _image_spots(image):
     return _spots[key]
 
 
-def _sky(world, node, strength):
-    """The sun of a Sky Texture."""
+def _sky(node, strength):
+    """The sun of a Sky Texture. The dependency graph knows sockets of nodes and no other
+    properties: a driver would print errors and miss changes, so handlers keep it current."""
     name = f"sun of {node.label or node.name}"
-    path = f'node_tree.nodes["{bpy.utils.escape_identifier(node.name)}"].'
     power = _SKY_SUN_IRRADIANCE * strength * node.sun_intensity
-    constant = node.id_data != world.node_tree
-    elevation, rotation, size = (
-        getattr(node, p) if constant else _Driven(world, path + p)
-        for p in ("sun_elevation", "sun_rotation", "sun_size")
-    )
-    values = _slot(SKY_SUN, turn=(elevation, rotation, 0.0), sizes=(size, 0.0))
-    candidate = _Candidate(name, values, lambda p: np.full(len(p), power))
-    if node.inputs["Vector"].is_linked:
-        candidate.why = "its vector is linked, so where it stands is not known"
-    return candidate
+    turn = (node.sun_elevation, node.sun_rotation, 0.0)
+    values = _slot(SKY_SUN, turn=turn, sizes=(node.sun_size, 0.0))
+    return _Candidate(name, values, lambda p: np.full(len(p), power))
 
 
 def _environment(node, strength):
@@ -580,7 +594,7 @@ def _world(world):
                 yield from _environment(node, strength)
             elif node.bl_idname == "ShaderNodeTexSky":
                 if node.sky_type in _SKIES_WITH_SUN and node.sun_disc:
-                    yield _sky(world, node, strength)
+                    yield _sky(node, strength)
 
 
 # ---- lamps that objects place ----
@@ -794,9 +808,6 @@ def _read(curve):
     return _Driven(target.id, path, factor)
 
 
-_ID_TYPES = {bpy.types.Light: "LIGHT", bpy.types.World: "WORLD", bpy.types.Object: "OBJECT"}
-
-
 def _write(socket, value):
     socket.driver_remove("default_value")
     if not isinstance(value, _Driven):
@@ -814,7 +825,7 @@ def _write(socket, value):
         target.rotation_mode = "QUATERNION"
     else:
         target = variable.targets[0]
-        target.id_type = next(v for k, v in _ID_TYPES.items() if isinstance(value.of, k))
+        target.id_type = value.of.id_type
         target.id = value.of
         target.data_path = value.path
     if value.factor != 1.0:

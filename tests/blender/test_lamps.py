@@ -230,7 +230,7 @@ def test_undo(ball, empty):
     add_lamp(empty, "POINT", "Key")
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="one")
-    add_lamp(empty, "SUN", "Fill")
+    add_lamp(empty, "SUN", "Fill", location=(1, 1, 1))
     assert len(slots(empty)) == 2
     bpy.ops.ed.undo_push(message="two")
     bpy.ops.ed.undo()
@@ -455,6 +455,12 @@ def test_sun_of_a_sky(ball, empty):
     assert slots(empty)[0][3] == pytest.approx(0.7)
     node.sun_rotation = 0.1
     assert slots(empty)[0][4] == pytest.approx(0.1)
+    for frame, elevation in ((1, 0.7), (11, 0.9)):
+        node.sun_elevation = elevation
+        node.keyframe_insert("sun_elevation", frame=frame)
+    for frame, elevation in ((1, 0.7), (6, 0.8), (11, 0.9)):
+        empty.frame_set(frame)
+        assert slots(empty, update=False)[0][3] == pytest.approx(elevation)
     node.sun_disc = False
     assert slots(empty) == []
     node.sun_disc = True
@@ -566,7 +572,7 @@ def test_emissive_meshes(extension, ball, empty, kind):
     assert slots(empty) == [ball_at((4, 3.3, 6), 0.3)]
     glow.location.z = 7
     assert slots(empty) == [ball_at((4, 3.3, 7), 0.3)]
-    glow.scale = (3, 3, 3)
+    glow.scale = (5, 5, 5)
     assert slots(empty) == []
     glow.scale = (0.3, 0.3, 0.001)
     (lamp,) = extension.api.see_lamps(empty)
