@@ -15,6 +15,8 @@ import numpy as np
 from bpy.app.handlers import persistent
 from mathutils import Euler, Matrix, Vector
 
+from . import pack
+
 #: Name of the shared group, and the custom property that tells it from another of that name.
 GROUP = "brdfc Lamps"
 TAG = "brdfc_lamps"
@@ -144,23 +146,25 @@ def _output(tree, kind):
     return next((n for n in fits if n.is_active_output), fits[0] if fits else None)
 
 
-def _upstream(socket, seen=None):
-    """Every node that a socket hangs on, the nearest first; groups are looked into."""
+def _upstream(socket, kind=None, seen=None):
+    """Every node that a socket hangs on, by links of one type of socket if it is given; groups are
+    looked into, but for those of models, which are large and no lamps."""
     seen = [] if seen is None else seen
     for link in socket.links:
         node = link.from_node
         if node in seen:
             continue
         seen.append(node)
+        ends = [node]
         inner = getattr(node, "node_tree", None)
         if inner is not None:
-            for end in inner.nodes:
-                if end.bl_idname == "NodeGroupOutput":
-                    for own in end.inputs:
-                        _upstream(own, seen)
-        for own in node.inputs:
-            if own.is_linked:
-                _upstream(own, seen)
+            if pack.TAG in inner:
+                continue
+            ends += [end for end in inner.nodes if end.bl_idname == "NodeGroupOutput"]
+        for end in ends:
+            for own in end.inputs:
+                if (kind is None or own.type == kind) and own.is_linked:
+                    _upstream(own, kind, seen)
     return seen
 
 
@@ -187,7 +191,7 @@ def _emission(material):
         return 0.0
     return sum(
         _strength(node, *_EMITTERS[node.bl_idname])
-        for node in _upstream(output.inputs["Surface"])
+        for node in _upstream(output.inputs["Surface"], "SHADER")
         if node.bl_idname in _EMITTERS
     )
 
@@ -197,7 +201,7 @@ def _power(light):
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
     if tree := _tree(light):
         output = _output(tree, "ShaderNodeOutputLight")
-        nodes = _upstream(output.inputs["Surface"]) if output else []
+        nodes = _upstream(output.inputs["Surface"], "SHADER") if output else []
         power *= sum(
             _strength(n, "Color", "Strength") for n in nodes if n.bl_idname == "ShaderNodeEmission"
         )
@@ -579,7 +583,7 @@ def _world(world):
     if output is None:
         return
     seen = []
-    for background in _upstream(output.inputs["Surface"]):
+    for background in _upstream(output.inputs["Surface"], "SHADER"):
         if background.bl_idname not in {"ShaderNodeBackground", "ShaderNodeEmission"}:
             continue
         socket = background.inputs["Strength"]
