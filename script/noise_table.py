@@ -1,0 +1,821 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Noise and CPU time of every form of every model under many kinds of light, in units of Blender's
+own Glossy node in the same scene.
+
+Runs in a Python that has `bpy`. The scenes are those of script/noise_scenes.py. Noise is the
+variance between pictures of several seeds, so it needs no truth; only what it is divided by does,
+for which the steadiest form of the model serves. What is measured is kept beside the pictures, by
+the contents of the extension, so that a run that was stopped goes on.
+"""
+
+import argparse
+import concurrent.futures
+import csv
+import dataclasses
+import hashlib
+import json
+import math
+import multiprocessing
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+FIELDS = (
+    *("model", "values", "form", "condition", "samples", "seeds", "pixels"),
+    *("noise", "noise_error", "mean", "mean_error", "apart", "apart_error", "divided_by"),
+)
+KEY = FIELDS[:5]
+COST_FIELDS = ("model", "values", "form", "condition", "cost", "cost_min", "cost_max")
+
+#: Blender's own nodes, of the roughness that most models have by default. The first is the unit.
+NATIVE = {
+    "Glossy": ("ShaderNodeBsdfAnisotropic", {"Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.4}),
+    "Diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.8, 0.8, 1)}),
+}
+UNIT, NODE = "Glossy", "node"
+
+#: Beside the default values of every model: rough, stiff and stretched ones of some.
+BESIDE = {
+    "ashikhmin_shirley": [
+        {"nu": 100, "nv": 1000},
+        {"nu": 10, "nv": 10},
+        {"nu": 10000, "nv": 10000},
+    ],
+    "cook_torrance": [{"m": 0.1}, {"m": 0.6}],
+    "phong": [{"e": 3}, {"e": 1000}],
+    "radziszewski_alda": [{"n": 1}, {"n": 12}],
+    "schlick": [{"rough": 0.02}],
+    "ward": [{"ax": 0.05, "ay": 0.3}],
+}
+
+#: What conditions are for that are too dear for all.
+PICKED = (
+    "Glossy",
+    "ashikhmin_shirley",
+    "cook_torrance",
+    "coupled",
+    "phong",
+    "radziszewski_alda",
+    "schlick",
+    "ward",
+)
+
+#: Which form's picture noise is divided by, where a model has several: the one with least noise.
+STEADY = ("exact", "aimed", "controlled", "fitted", "twin")
+#: Which form is right on average without an assumption about lamps.
+RIGHT = ("exact", "sampled")
+#: Side of the squares of pixels whose means are compared.
+BLOCK = 6
+#: Mean of (f - f0)^2 / (f0^2 + this), as in README.md.
+FLOOR = 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A model and what of its parameters differs from the defaults, or a node of Blender's."""
+
+    model: str
+    values: str = ""
+
+    @property
+    def parameters(self):
+        pairs = (pair.split("=") for pair in self.values.split())
+        return {name: float(value) for name, value in pairs}
+
+    def __str__(self):
+        return f"{self.model} {self.values}".strip()
+
+
+def case_of(model, values):
+    return Case(model, " ".join(f"{k}={v:g}" for k, v in values.items()))
+
+
+# ---- in processes that have Blender --------------------------------------------------------------
+
+_blender = {}
+
+
+def start(extension, cache):
+    """Of each process: Blender with the extension; what it prints goes to a file."""
+    # Imported here: this process may be one that never renders.
+    from render_scene import start_blender
+
+    log = os.open(cache / "blender.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    os.dup2(log, 1)
+    resources = tempfile.TemporaryDirectory(prefix="brdfc-noise-")
+    bpy, loader = start_blender(extension, resources.name)
+    import noise_scenes
+
+    _blender.update(
+        bpy=bpy,
+        loader=loader,
+        scenes=noise_scenes,
+        cache=cache,
+        resources=resources,
+        folder=Path(resources.name),
+    )
+
+
+def material_of(case, form):
+    if case.model in NATIVE:
+        kind, inputs = NATIVE[case.model]
+        return _blender["scenes"].node_material(case.model, kind, **inputs)
+    return _blender["loader"].api.new_material(case.model, form, **case.parameters)
+
+
+def set_up(condition, size, pack):
+    """(scene, object, mask) of a condition, lit by OSL."""
+    loader = _blender["loader"]
+    loader.pack.use(pack)
+    scene, ball, mask = _blender["scenes"].build(condition, _blender["folder"], size)
+    loader.api.enable_osl(scene)
+    return scene, ball, mask
+
+
+def dress(scene, ball, material):
+    ball.data.materials.clear()
+    ball.data.materials.append(material)
+    _blender["bpy"].context.view_layer.update()
+    # Forms that know where lamps are ask for it once these stand.
+    if see_lamps := getattr(_blender["loader"].api, "see_lamps", None):
+        see_lamps(scene)
+        _blender["bpy"].context.view_layer.update()
+
+
+def render(scene, samples, seed, read=True):
+    """Seconds of CPU time, and pixels, (height, width, 3), row 0 at the bottom.
+
+    The first sample of a pixel goes through its centre whatever the seed, where a drawn form would
+    draw the same in every picture. The second half of twice as many is as evenly spread as the
+    first.
+    """
+    bpy, cycles = _blender["bpy"], scene.cycles
+    cycles.seed = seed
+    cycles.samples, cycles.sample_offset = 2 * samples, samples
+    cycles.use_sample_subset, cycles.sample_subset_length = True, samples
+    path = _blender["folder"] / "picture.exr"
+    scene.render.filepath = str(path)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_utime
+    bpy.ops.render.render(write_still=read)
+    seconds = resource.getrusage(resource.RUSAGE_SELF).ru_utime - before
+    if not read:
+        return seconds, None
+    image = bpy.data.images.load(str(path))
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        return seconds, pixels.reshape(image.size[1], image.size[0], 4)[..., :3].astype(np.float64)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def picture_file(case, form, condition, samples, size):
+    name = f"{case} {form} {samples} {size}".replace(" ", "_")
+    return _blender["cache"] / "pictures" / condition / f"{name}.npz"
+
+
+def pictures(case, form, job):
+    """{mask, mean, variance of one picture, seeds} of the condition with this form. None where the
+    form refuses the values."""
+    condition, samples, size, seeds = (job[k] for k in ("condition", "samples", "size", "seeds"))
+    file = picture_file(case, form, condition, samples, size)
+    if file.exists():
+        with np.load(file) as kept:
+            if kept["seeds"] >= seeds:
+                return dict(kept)
+    scene, ball, mask = set_up(condition, size, pack_of(case, form, job))
+    try:
+        material = material_of(case, form)
+    except ValueError:
+        return None
+    dress(scene, ball, material)
+    made = np.stack([render(scene, samples, seed)[1] for seed in range(1, seeds + 1)])
+    if not np.isfinite(made).all():
+        raise RuntimeError(f"{case} {form}, {condition}: a pixel is not finite")
+    found = {
+        "mask": mask,
+        "mean": made.mean(0),
+        "variance": made.var(0, ddof=1),
+        "seeds": np.array(seeds),
+    }
+    file.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(partial := file.with_suffix(f".{os.getpid()}.npz"), **found)
+    os.replace(partial, file)
+    return found
+
+
+def pack_of(case, form, job):
+    """The pack that has the form: None for the extension's own."""
+    return job["pack"] if form in job["from_pack"] else None
+
+
+def smoothed(mean, mask, radius=3):
+    """Means over squares, of pixels in the mask alone."""
+
+    def total(a):
+        a = np.pad(a, ((radius + 1, radius), (radius + 1, radius), (0, 0))).cumsum(0).cumsum(1)
+        n = 2 * radius + 1
+        return a[n:, n:] - a[:-n, n:] - a[n:, :-n] + a[:-n, :-n]
+
+    inside = mask[..., None].astype(np.float64)
+    return total(mean * inside) / np.maximum(total(inside), 1)
+
+
+def blocks(values, mask):
+    """Sums over squares of pixels of the mask, grey."""
+    grey = np.where(mask, values.mean(-1), 0)
+    side = -(-grey.shape[0] // BLOCK) * BLOCK
+    grey = np.pad(grey, ((0, side - grey.shape[0]), (0, side - grey.shape[1])))
+    return grey.reshape(side // BLOCK, BLOCK, -1, BLOCK).sum((1, 3))
+
+
+def measure(job):
+    """Rows of a case and condition: every form that is asked for."""
+    case, forms = Case(*job["case"]), job["forms"]
+    steady = next((f for f in STEADY if f in forms), forms[0])
+    right = next((f for f in RIGHT if f in forms), forms[0])
+    found = {}
+    for form in dict.fromkeys((steady, right, *job["wanted"])):
+        if (made := pictures(case, form, job)) is not None:
+            found[form] = made
+    if not found:
+        return []
+    by = steady if steady in found else next(iter(found))
+    mask, divide = found[by]["mask"], found[by]["mean"]
+    if by not in STEADY and by != NODE:
+        # What is met now and then by chance tells where light is only with its neighbourhood.
+        divide = smoothed(divide, mask)
+    rows = []
+    for form, made in found.items():
+        variance, seeds = made["variance"], int(made["seeds"])
+        relative = (variance / (divide**2 + FLOOR))[mask].mean(-1)
+        # Channels of a path are alike, so their errors add up.
+        spread = np.sqrt(variance[mask]).mean(-1) ** 2 / seeds
+        count = int(mask.sum())
+        row = {"model": case.model, "values": case.values, "form": form}
+        row |= {k: job[k] for k in ("condition", "samples")} | {"seeds": seeds, "pixels": count}
+        row |= {
+            "noise": relative.mean(),
+            "noise_error": relative.std() / math.sqrt(count),
+            "mean": made["mean"][mask].mean(),
+            "mean_error": math.sqrt(spread.sum()) / count,
+            "divided_by": by,
+        }
+        if right in found and form != right:
+            row |= apart(made, found[right], mask)
+        rows.append({k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()})
+    return rows
+
+
+def apart(made, right, mask):
+    """Relative L1 of the squares of two pictures, and what noise alone would make of it."""
+    off = blocks(made["mean"] - right["mean"], mask)
+    light = blocks(right["mean"], mask).sum()
+    variance = sum(
+        blocks(np.sqrt(p["variance"]).mean(-1, keepdims=True) ** 2, mask) / int(p["seeds"])
+        for p in (made, right)
+    )
+    by_noise = math.sqrt(2 / math.pi) * np.sqrt(variance).sum()
+    return {"apart": float(np.abs(off).sum() / light), "apart_error": float(by_noise / light)}
+
+
+def time_forms(job):
+    """Rows of costs: forms of a case and the Glossy node take turns in one process."""
+    case, condition = Case(*job["case"]), job["condition"]
+    unit = (Case(UNIT), NODE)
+    turns = [unit] + [(case, form) for form in job["forms"]]
+    taken = {turn: [] for turn in turns}
+    for _ in range(job["repeat"]):
+        for turn in turns:
+            scene, ball, _ = set_up(condition, job["size"], pack_of(*turn, job))
+            try:
+                material = material_of(*turn)
+            except ValueError:
+                continue
+            dress(scene, ball, material)
+            render(scene, 1, 1, read=False)  # compiles
+            one, _ = render(scene, 1, 2, read=False)
+            many, _ = render(scene, job["samples"], 3, read=False)
+            taken[turn].append(max(many - one, 0.0))
+    rows = []
+    for turn in turns[1:]:
+        costs = [t / u for t, u in zip(taken[turn], taken[unit], strict=False)]
+        if costs:
+            row = {"model": case.model, "values": case.values, "form": turn[1]}
+            row |= {"condition": condition, "cost": f"{statistics.median(costs):.3f}"}
+            rows.append(row | {"cost_min": f"{min(costs):.3f}", "cost_max": f"{max(costs):.3f}"})
+    return rows
+
+
+def titles():
+    """What the page says of conditions, without Blender in the process that asks."""
+    scenes = _blender["scenes"]
+    return {
+        name: {
+            "title": c.title,
+            "timed_as": c.timed_as,
+            "samples": list(c.samples),
+            "picked": c.picked,
+        }
+        for name, c in scenes.CONDITIONS.items()
+    }
+
+
+# ---- what to measure -----------------------------------------------------------------------------
+
+
+def cases_of(entries, options):
+    wanted = options.model
+    known = [*NATIVE, *entries]
+    for name in wanted or []:
+        if name not in known:
+            raise SystemExit(f"--model: expected one of {', '.join(known)}; got {name!r}")
+    cases = [Case(name) for name in NATIVE]
+    for name in entries:
+        if not wanted or name in wanted:
+            cases += [case_of(name, values) for values in ({}, *BESIDE.get(name, []))]
+    return cases
+
+
+def packs(options, cases, entries, cache):
+    """Packs with forms made of a fit, by case: {case: (folder, forms)}. Empty without --tool."""
+    if options.tool is None:
+        return {}
+    made = {}
+    for case in cases:
+        if case.model in NATIVE:
+            continue
+        folder = cache / "packs" / str(case).replace(" ", "_")
+        manifest = folder / "brdfc_shaders" / "manifest.json"
+        if not manifest.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            drawn = "sampled" in entries[case.model]["representations"]
+            material = {"model": case.model, "representation": "sampled" if drawn else "auto"}
+            material["parameters"] = case.parameters
+            file = folder / "materials.json"
+            file.write_text(json.dumps({"materials": {"m": material}}), encoding="utf-8")
+            # Any error will do: the fit comes beside the sampled form.
+            command = [options.tool, "build", "--materials", file, "--error", "100"]
+            command += ["--controlled", "--twin", "--out", folder]
+            subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
+        forms = json.loads(manifest.read_text("utf-8"))["models"][case.model]["representations"]
+        made[case] = (str(folder / "brdfc_shaders"), [f for f in forms if f in MADE_OF_A_FIT])
+    return made
+
+
+#: Forms that packs of a scene or a .blend have and the extension may lack.
+MADE_OF_A_FIT = ("fitted", "controlled", "twin")
+
+
+def jobs_of(cases, entries, conditions, fitted, options):
+    """A job a case, condition and number of samples, conditions first."""
+    for condition, entry in conditions.items():
+        if options.condition and condition not in options.condition:
+            continue
+        for samples in options.samples or entry["samples"]:
+            for case in cases:
+                named = options.model and case.model in options.model
+                if entry["picked"] and not named and case.model not in PICKED:
+                    continue
+                if case.model in NATIVE:
+                    forms, pack, from_pack = [NODE], None, []
+                else:
+                    forms = list(entries[case.model]["representations"])
+                    pack, made = fitted.get(case, (None, []))
+                    # A fit of these very values is better than one along a parameter.
+                    from_pack = made
+                    forms += [f for f in made if f not in forms]
+                wanted = [f for f in forms if not options.form or f in options.form]
+                if case.model in NATIVE:
+                    wanted = forms
+                if not wanted:
+                    continue
+                yield {
+                    "case": (case.model, case.values),
+                    "condition": condition,
+                    "samples": samples,
+                    # Many samples take long, and their noise needs fewer pixels to be known.
+                    "size": options.size
+                    if samples <= 256 or entry["picked"]
+                    else options.size // 2,
+                    "seeds": options.seeds if samples <= 256 else 2,
+                    "forms": forms,
+                    "wanted": wanted,
+                    "pack": pack,
+                    "from_pack": from_pack,
+                }
+
+
+class Table:
+    """Rows of a CSV by key; added ones are in the file at once."""
+
+    def __init__(self, path, fields, key):
+        self.path, self.fields, self.key, self.rows = path, fields, key, {}
+        if path.exists():
+            with path.open(newline="", encoding="utf-8") as file:
+                for row in csv.DictReader(file):
+                    self.rows[self.of(row)] = {f: row.get(f, "") for f in fields}
+
+    def of(self, row):
+        return tuple(str(row[k]) for k in self.key)
+
+    def add(self, rows):
+        for row in rows:
+            self.rows[self.of(row)] = {f: str(row.get(f, "")) for f in self.fields}
+        self.write()
+
+    def write(self):
+        partial = self.path.with_suffix(".partial")
+        with partial.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, self.fields, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(self.rows.values())
+        os.replace(partial, self.path)
+
+
+def run(jobs, work, table, options, cache, processes):
+    """Does what the table lacks, several processes side by side."""
+    if not jobs:
+        return
+    pool = concurrent.futures.ProcessPoolExecutor(
+        processes,
+        multiprocessing.get_context("spawn"),
+        initializer=start,
+        initargs=(options.extension, cache),
+    )
+    with pool:
+        pending = {pool.submit(work, job): job for job in jobs}
+        for done, future in enumerate(concurrent.futures.as_completed(pending), 1):
+            job = pending[future]
+            table.add(future.result())
+            case = Case(*job["case"])
+            print(f"[{done}/{len(jobs)}] {job['condition']}: {case}", file=sys.stderr, flush=True)
+
+
+def is_missing(job, table):
+    model, values = job["case"]
+    for form in job["wanted"]:
+        row = table.rows.get((model, values, form, job["condition"], str(job["samples"])))
+        if row is None or int(row["seeds"]) < job["seeds"]:
+            return True
+    return False
+
+
+def cost_jobs(jobs, table, options):
+    """Costs of all models with their defaults, where the lamps are none, one and four."""
+    for job in jobs:
+        model, values = job["case"]
+        if values or model == UNIT or job["condition"] not in options.timed:
+            continue
+        if job["samples"] != 64:
+            continue
+        forms = job["wanted"]
+        if all((model, "", f, job["condition"]) in table.rows for f in forms):
+            continue
+        yield job | {"forms": forms, "repeat": options.repeat, "samples": 64}
+
+
+# ---- the page ------------------------------------------------------------------------------------
+
+INTRODUCTION = """\
+# Noise and CPU time by model and lamp
+
+Made by `script/noise` in Blender 4.5; the figures, with their errors, are in [noise.csv](noise.csv)
+and [noise-cost.csv](noise-cost.csv). A ball with the model lies on a grey floor under one kind of
+light and, where that is a lamp, the dim grey world of a new file. Settings are those of a new file
+(indirect light clamped at 10, Filter Glossy 1, light tree, caustics) with adaptive sampling and
+denoising off, so that samples are equal, OSL on, and one thread. Parameters have their defaults but
+for those named.
+
+**Noise** is the mean over the ball's pixels of the variance over the squared radiance + 0.01:
+relMSE, 64 samples a pixel unless said otherwise. The variance is that between pictures of {seeds}
+seeds (2 where there are 1,024 samples). The radiance is that of the form of the model with least
+noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. What is met once in
+thousands of samples may not be met at all: where noise is thousands, take it as rough. The unit is
+the noise of Blender's own Glossy node (GGX, colour 0.8, roughness 0.4) in the same scene. Grain, as
+the eye sees it, is the square root.
+
+**Cost** is CPU time a sample in units of that node, forms and node taking turns in one process;
+compiling is left out. **Noise x cost** is how much longer than with the Glossy node a picture of
+the same noise takes.
+"""
+
+
+def number(x):
+    if x is None or not math.isfinite(x):
+        return "-"
+    if x >= 100:
+        return f"{float(f'{x:.2g}'):.0f}" if x < 1e5 else f"{x:.0e}".replace("e+0", "e")
+    return f"{x:.2g}" if x >= 0.01 else f"{x:.1g}"
+
+
+def line(*cells):
+    return f"| {' | '.join(str(c) for c in cells)} |"
+
+
+def heading(*cells):
+    return [line(*cells), "|---" * len(cells) + "|"]
+
+
+def percentile_rows(columns):
+    """Median and worst of each column of numbers."""
+    some = [[x for x in column if x is not None] for column in columns]
+    yield line("**median**", *(number(statistics.median(c)) if c else "" for c in some))
+    yield line("**worst**", *(number(max(c)) if c else "" for c in some))
+
+
+class Page:
+    def __init__(self, rows, costs, conditions):
+        self.rows, self.conditions = rows, conditions
+        self.noise = {}
+        for row in rows:
+            place = row["condition"], int(row["samples"])
+            self.noise.setdefault(row["form"], {}).setdefault(case_key(row), {})[place] = row
+        self.costs = {
+            (r["model"], r["values"], r["form"], r["condition"]): float(r["cost"]) for r in costs
+        }
+        order = list(conditions)
+        places = {(r["condition"], int(r["samples"])) for r in rows if r["condition"] in order}
+        self.places = sorted(places, key=lambda p: (order.index(p[0]), p[1]))
+        self.by_default = {
+            (name, n) for name, entry in conditions.items() for n in entry["samples"]
+        }
+        self.forms = [f for f in dict.fromkeys((*STEADY, "sampled")) if f in self.noise]
+        self.forms += [f for f in self.noise if f not in (*self.forms, NODE)]
+
+    def title(self, place):
+        name, samples = place
+        many = "" if samples == 64 else f", {samples:,} samples"
+        return self.conditions[name]["title"] + many
+
+    def unit(self, place):
+        row = self.noise.get(NODE, {}).get((UNIT, ""), {}).get(place)
+        return float(row["noise"]) if row else None
+
+    def relative(self, form, case, place):
+        row, unit = self.noise[form].get(case, {}).get(place), self.unit(place)
+        return float(row["noise"]) / unit if row and unit else None
+
+    def cost(self, form, case, place):
+        """That of the model's defaults, where lamps are as many."""
+        timed = self.conditions[place[0]]["timed_as"]
+        return self.costs.get((case[0], "", form, timed))
+
+    def common(self):
+        """Places that tables of all models have: what few models are measured in is apart."""
+        return [
+            p for p in self.places if p in self.by_default and not self.conditions[p[0]]["picked"]
+        ]
+
+    def table(self, form, value):
+        places = self.common()
+        lines = heading("Model", *(self.title(p) for p in places))
+        columns = [[] for _ in places]
+        for case in self.noise[form]:
+            cells = [value(form, case, p) for p in places]
+            if not any(c is not None for c in cells):
+                continue
+            for column, cell in zip(columns, cells, strict=True):
+                column.append(cell)
+            lines.append(line(name_of(case), *("" if c is None else number(c) for c in cells)))
+        return [*lines, *percentile_rows(columns), ""]
+
+    def dear(self, form, case, place):
+        noise, cost = self.relative(form, case, place), self.cost(form, case, place)
+        return None if noise is None or cost is None else noise * cost
+
+    def summary(self):
+        places = self.common()
+        lines = ["## Median and worst by form", ""]
+        lines += heading("Form", "", *(self.title(p) for p in places))
+        for form in self.forms:
+            found = [
+                [x for c in self.noise[form] if (x := self.relative(form, c, p)) is not None]
+                for p in places
+            ]
+            for what, of in (("median", statistics.median), ("worst", max)):
+                cells = (number(of(f)) if f else "" for f in found)
+                lines.append(line(f"{form}" if what == "median" else "", what, *cells))
+        return [*lines, ""]
+
+    def nodes(self):
+        lines = [
+            "## Blender's own nodes",
+            "",
+            "Noise as it is, of which the first row is the unit.",
+        ]
+        lines += ["", *heading("Node", *(self.title(p) for p in self.common()))]
+        for case, found in self.noise.get(NODE, {}).items():
+            cells = (number(float(found[p]["noise"])) if p in found else "" for p in self.common())
+            lines.append(line(case[0], *cells))
+        return [*lines, ""]
+
+    def cost_table(self):
+        timed = [c for c in self.conditions if any(k[3] == c for k in self.costs)]
+        if not timed:
+            return []
+        lines = ["## Cost", "", "CPU time a sample in units of the Glossy node."]
+        titles = [self.conditions[c]["title"] for c in timed]
+        lines += ["", *heading("Model", "form", *titles)]
+        for model, form in dict.fromkeys((k[0], k[2]) for k in self.costs):
+            cells = (self.costs.get((model, "", form, c)) for c in timed)
+            lines.append(
+                line(f"`{model}`", form, *("" if c is None else f"{c:.2f}" for c in cells))
+            )
+        return [*lines, ""]
+
+    def right(self, case, place):
+        """(form, row) of what is right on average there, of the most samples."""
+        for form in RIGHT:
+            found = self.noise.get(form, {}).get(case, {})
+            of = [p for p in found if p[0] == place[0]]
+            if of:
+                most = max(of, key=lambda p: p[1])
+                return form, found[most]
+        return None, None
+
+    def off(self, form, case, place):
+        """Relative difference of the means and its standard error."""
+        row = self.noise[form].get(case, {}).get(place)
+        name, right = self.right(case, place)
+        if row is None or right is None or name == form:
+            return None
+        mean, of = float(row["mean"]), float(right["mean"])
+        error = math.hypot(float(row["mean_error"]), float(right["mean_error"]))
+        return ((mean - of) / of, error / of) if of > 0 else None
+
+    def means(self):
+        lines = ["## Means", ""]
+        lines += [
+            "Mean radiance of the ball against that of the exact form, or of the sampled form where",
+            "there is no exact one: difference and its standard error in percent. Of the other form",
+            "the most samples count that were measured. Bold is what exceeds 1 % and 5 standard",
+            "errors. The error comes from the spread of a few pictures: where light is met as rare",
+            "dots alone, it is larger than it says.",
+            "",
+        ]
+        for form in self.forms:
+            places = self.common()
+            rows = []
+            for case in self.noise[form]:
+                found = [self.off(form, case, p) for p in places]
+                if any(found):
+                    rows.append(line(name_of(case), *(percent(f) for f in found)))
+            if rows:
+                lines += [f"### {form}", "", *heading("Model", *(self.title(p) for p in places))]
+                lines += [*rows, ""]
+        return lines if len(lines) > 7 else []
+
+    def penumbras(self):
+        places = [p for p in self.places if self.conditions[p[0]]["picked"]]
+        rows = []
+        for place in places:
+            for form in self.forms:
+                for case in self.noise[form]:
+                    if not (off := self.off(form, case, place)):
+                        continue
+                    row = self.noise[form][case][place]
+                    apart = [f"{100 * float(row[k]):.2f}" if row[k] else "" for k in APART]
+                    rows.append(line(name_of(case), form, f"{place[1]:,}", percent(off), *apart))
+        if not rows:
+            return []
+        return [
+            "## In a penumbra",
+            "",
+            "A floor that has the model where the edge of a ball's shadow crosses it, under a 1 m",
+            "area lamp, seen from the mirror direction; only pixels that see part of the lamp count.",
+            "Difference of the mean from that of the exact or sampled form, and relative L1 of squares",
+            f"of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in percent.",
+            "",
+            *heading("Model", "form", "samples", "mean", "squares", "by noise"),
+            *rows,
+            "",
+        ]
+
+    def text(self, seeds):
+        lines = [INTRODUCTION.format(seeds=seeds)]
+        lines += self.summary() + self.nodes()
+        for form in self.forms:
+            lines += [f"## {form}", "", "Noise in units of the Glossy node.", ""]
+            lines += self.table(form, self.relative)
+            if any(k[2] == form for k in self.costs):
+                lines += ["Noise x cost.", "", *self.table(form, self.dear)]
+        lines += self.cost_table() + self.means() + self.penumbras()
+        return "\n".join(lines)
+
+
+APART = ("apart", "apart_error")
+
+
+def case_key(row):
+    return row["model"], row["values"]
+
+
+def name_of(case):
+    return f"`{' '.join(case).strip()}`"
+
+
+def percent(off):
+    if off is None:
+        return ""
+    value, error = (100 * x for x in off)
+    text = f"{value:+.1f} ± {error:.1f}" if error >= 0.05 else f"{value:+.2f} ± {error:.2f}"
+    return f"**{text}**" if abs(value) > 1 and abs(value) > 5 * error else text
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--extension", required=True, type=Path, help="brdfc_shaders-<version>.zip")
+    parser.add_argument(
+        "--tool", type=Path, help="the program brdfc, which makes forms that the extension lacks"
+    )
+    parser.add_argument("--docs", required=True, type=Path, help="where noise.md and .csv are")
+    parser.add_argument("--cache", required=True, type=Path, help="what is kept between runs")
+    parser.add_argument("--form", action="append", help="only this form; may be repeated")
+    parser.add_argument("--model", action="append", help="only this model; may be repeated")
+    parser.add_argument("--condition", action="append", help="only this light; may be repeated")
+    parser.add_argument("--samples", action="append", type=int, help="instead of 64 (and 1024)")
+    parser.add_argument("--seeds", type=int, default=4, help="pictures of each (4)")
+    parser.add_argument("--size", type=int, default=42, help="side of the pictures in pixels (42)")
+    parser.add_argument("--repeat", type=int, default=3, help="times that a cost is measured (3)")
+    parser.add_argument("--processes", type=int, default=2, help="side by side, for noise (2)")
+    parser.add_argument("--no-costs", action="store_true", help="leave run times as they are")
+    parser.add_argument(
+        "--quick", action="store_true", help="a rough look, not written into the documents"
+    )
+    parser.add_argument("--page", action="store_true", help="only write the page of the CSV again")
+    options = parser.parse_args()
+    if options.quick:
+        options.size, options.seeds, options.repeat = 28, 2, 1
+    if min(options.seeds - 1, options.repeat, options.processes, options.size - 15) < 1:
+        parser.error(
+            "expected --seeds of at least 2, --repeat and --processes of at least 1 and --size of "
+            "at least 16"
+        )
+    for path in (options.extension, options.tool):
+        if path is not None and not path.is_file():
+            parser.error(f"{path}: no such file")
+    options.extension = options.extension.resolve()
+    if any(n < 2 or n & (n - 1) for n in options.samples or []):
+        # Cycles' sequence is even over blocks of that length.
+        parser.error("--samples: expected powers of two from 2 on")
+
+    with zipfile.ZipFile(options.extension) as archive:
+        entries = json.loads(archive.read("manifest.json"))["models"]
+        # Names and checksums: the time stamps of an archive say nothing.
+        contents = sorted((i.filename, i.CRC) for i in archive.infolist())
+    digest = hashlib.sha256(json.dumps(contents).encode()).hexdigest()[:12]
+    cache = options.cache.resolve() / (digest + ("-quick" if options.quick else ""))
+    cache.mkdir(parents=True, exist_ok=True)
+
+    with concurrent.futures.ProcessPoolExecutor(
+        1,
+        multiprocessing.get_context("spawn"),
+        initializer=start,
+        initargs=(options.extension, cache),
+    ) as pool:
+        conditions = pool.submit(titles).result()
+    for name in options.condition or []:
+        if name not in conditions:
+            parser.error(f"--condition: expected one of {', '.join(conditions)}; got {name!r}")
+    options.timed = {entry["timed_as"] for entry in conditions.values()}
+
+    measured = Table(cache / "noise.csv", FIELDS, KEY)
+    costs = Table(cache / "noise-cost.csv", COST_FIELDS, COST_FIELDS[:4])
+    if not options.page:
+        cases = cases_of(entries, options)
+        fitted = packs(options, cases, entries, cache)
+        jobs = list(jobs_of(cases, entries, conditions, fitted, options))
+        known = {f for job in jobs for f in job["forms"]}
+        for form in options.form or []:
+            if form not in known:
+                parser.error(f"--form: expected one of {', '.join(sorted(known))}; got {form!r}")
+        missing = [job for job in jobs if is_missing(job, measured)]
+        run(missing, measure, measured, options, cache, options.processes)
+        if not options.no_costs:
+            # One process: what runs beside it would be measured too.
+            run(list(cost_jobs(jobs, costs, options)), time_forms, costs, options, cache, 1)
+
+    docs = cache if options.quick else options.docs
+    for made in (measured, costs):
+        kept = Table(docs / made.path.name, made.fields, made.key)
+        kept.add(made.rows.values())
+        made.all = list(kept.rows.values())
+    page = Page(measured.all, costs.all, conditions).text(options.seeds)
+    (docs / "noise.md").write_text(page + "\n", encoding="utf-8")
+    print(docs / "noise.md")
+
+
+if __name__ == "__main__":
+    main()
