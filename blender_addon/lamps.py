@@ -652,9 +652,9 @@ def _subject(scene, meshes, matrices):
     and in its view, else of all meshes."""
     if not meshes:
         return np.zeros((1, 3))
-    centres = np.array(
-        [matrices(o) @ (sum((Vector(c) for c in o.bound_box), Vector()) / 8) for o in meshes]
-    )
+    boxes = [o.bound_box for o in meshes]
+    middles = [(Vector(box[0]) + Vector(box[6])) / 2 for box in boxes]  # opposite corners
+    centres = np.array([matrices(o) @ m for o, m in zip(meshes, middles, strict=True)])
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA":
         matrix, data = matrices(camera), camera.data
@@ -1018,6 +1018,8 @@ def _after_update(scene, depsgraph):
     if not any(_concerns(update, scene) for update in updates):
         return
     structural = any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
+    if structural and len(updates) == 1:  # what was selected; objects come with what else changes
+        return
     _quietly(scene, depsgraph, subject=None if structural else _memory.survey.subject)
 
 

@@ -607,6 +607,38 @@ def test_nothing_is_written_when_nothing_changed(lamps, ball, empty, monkeypatch
     assert_lamp(slots(empty)[[s[9] for s in slots(empty)].index(3)], bpy.data.objects["Area"])
 
 
+def test_selecting_is_no_reason_to_look(lamps, ball, empty, monkeypatch):
+    add_lamp(empty, "POINT", "Key")
+    assert len(slots(empty)) == 1
+    looked, look = [], lamps._look
+    monkeypatch.setattr(lamps, "_look", lambda *a: (looked.append(1), look(*a))[1])
+    ball.select_set(not ball.select_get())
+    bpy.context.view_layer.update()
+    ball.location.x = 0.1
+    bpy.context.view_layer.update()
+    assert not looked
+    bpy.data.objects["Key"].data.energy = 5
+    bpy.context.view_layer.update()
+    assert looked
+
+
+def test_a_sun_without_a_size_is_seen(extension, ball, empty):
+    """Drawn directions meet it by chance alone, aimed closures in every sample: and that from a
+    script that never updates anything."""
+    extension.api.enable_osl(empty)
+    add_lamp(empty, "SUN", turn=(0.9, 0, 0), angle=0.0)
+    helpers.add_camera(empty)
+    empty.render.resolution_x = empty.render.resolution_y = 16
+    empty.cycles.samples, empty.cycles.use_denoising = 8, False
+    pictures = []
+    for seed in (1, 2):
+        empty.cycles.seed = seed
+        pictures.append(helpers.render(empty)[5:11, 5:11, :3])
+    # Pixels on the edges of the coarse ball's faces differ more.
+    assert min(p.min() for p in pictures) > 0
+    assert np.median(np.abs(pictures[0] / pictures[1] - 1)) < 0.05
+
+
 def test_handlers_come_and_go(extension, lamps, empty, monkeypatch):
     def ours():
         return [
