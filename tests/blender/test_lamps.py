@@ -629,12 +629,12 @@ def test_a_sun_without_a_size_is_seen(extension, ball, empty):
     add_lamp(empty, "SUN", turn=(0.9, 0, 0), angle=0.0)
     helpers.add_camera(empty)
     empty.render.resolution_x = empty.render.resolution_y = 16
-    empty.cycles.samples, empty.cycles.use_denoising = 8, False
+    empty.cycles.samples, empty.cycles.use_denoising = 64, False
     pictures = []
     for seed in (1, 2):
         empty.cycles.seed = seed
         pictures.append(helpers.render(empty)[5:11, 5:11, :3])
-    # Pixels on the edges of the coarse ball's faces differ more.
+    # What is left is the noise of edges of the coarse ball's faces, as Lambert's exact form has it.
     assert min(p.min() for p in pictures) > 0
     assert np.median(np.abs(pictures[0] / pictures[1] - 1)) < 0.05
 
