@@ -15,6 +15,8 @@ import numpy as np
 from bpy.app.handlers import persistent
 from mathutils import Euler, Matrix, Vector
 
+from . import pack
+
 #: Name of the shared group, and the custom property that tells it from another of that name.
 GROUP = "brdfc Lamps"
 TAG = "brdfc_lamps"
@@ -132,7 +134,10 @@ def _luminance(color):
 
 def _tree(owner):
     """The node tree that shades a light, material or world, or None."""
-    return owner.node_tree if getattr(owner, "use_nodes", True) else None
+    switch = owner.bl_rna.properties.get("use_nodes")
+    if switch is None or getattr(switch, "is_deprecated", False) or owner.use_nodes:
+        return owner.node_tree
+    return None
 
 
 def _output(tree, kind):
@@ -141,23 +146,25 @@ def _output(tree, kind):
     return next((n for n in fits if n.is_active_output), fits[0] if fits else None)
 
 
-def _upstream(socket, seen=None):
-    """Every node that a socket hangs on, the nearest first; groups are looked into."""
+def _upstream(socket, kind=None, seen=None):
+    """Every node that a socket hangs on, by links of one type of socket if it is given; groups are
+    looked into, but for those of models, which are large and no lamps."""
     seen = [] if seen is None else seen
     for link in socket.links:
         node = link.from_node
         if node in seen:
             continue
         seen.append(node)
+        ends = [node]
         inner = getattr(node, "node_tree", None)
         if inner is not None:
-            for end in inner.nodes:
-                if end.bl_idname == "NodeGroupOutput":
-                    for own in end.inputs:
-                        _upstream(own, seen)
-        for own in node.inputs:
-            if own.is_linked:
-                _upstream(own, seen)
+            if pack.TAG in inner:
+                continue
+            ends += [end for end in inner.nodes if end.bl_idname == "NodeGroupOutput"]
+        for end in ends:
+            for own in end.inputs:
+                if (kind is None or own.type == kind) and own.is_linked:
+                    _upstream(own, kind, seen)
     return seen
 
 
@@ -184,7 +191,7 @@ def _emission(material):
         return 0.0
     return sum(
         _strength(node, *_EMITTERS[node.bl_idname])
-        for node in _upstream(output.inputs["Surface"])
+        for node in _upstream(output.inputs["Surface"], "SHADER")
         if node.bl_idname in _EMITTERS
     )
 
@@ -194,7 +201,7 @@ def _power(light):
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
     if tree := _tree(light):
         output = _output(tree, "ShaderNodeOutputLight")
-        nodes = _upstream(output.inputs["Surface"]) if output else []
+        nodes = _upstream(output.inputs["Surface"], "SHADER") if output else []
         power *= sum(
             _strength(n, "Color", "Strength") for n in nodes if n.bl_idname == "ShaderNodeEmission"
         )
@@ -432,6 +439,25 @@ def _reduced(luminance, limit):
     return summed / np.outer(height, width), step
 
 
+def _connected(mask, start):
+    """The part of a mask, whose columns go round, that hangs together with a pixel; gaps of a few
+    pixels don't count."""
+    block = max(1, mask.shape[1] // 256)
+    rows, columns = (np.arange(0, n, block) for n in mask.shape)
+    coarse = np.logical_or.reduceat(np.logical_or.reduceat(mask, rows, 0), columns, 1)
+    part = np.zeros_like(coarse)
+    part[start[0] // block, start[1] // block] = True
+    size = 0
+    while size < (size := np.count_nonzero(part)):
+        part |= np.roll(part, 1, 1) | np.roll(part, -1, 1)
+        grown = part.copy()
+        grown[1:] |= part[:-1]
+        grown[:-1] |= part[1:]
+        part = grown & coarse
+    whole = part.repeat(block, 0).repeat(block, 1)
+    return mask & whole[: mask.shape[0], : mask.shape[1]]
+
+
 def bright_spots(luminance, count=SLOTS):
     """The small bright places of an equirectangular picture, (height, width), row 0 at the bottom:
     [(direction, full angle, irradiance)], the brightest first.
@@ -454,8 +480,7 @@ def bright_spots(luminance, count=SLOTS):
         peak = np.unravel_index(left.argmax(), left.shape)
         if left[peak] < 20 * total / (4 * np.pi) or len(found) == count:
             break
-        near = directions @ directions[peak] > math.cos(0.25)
-        place = near & (left >= 0.1 * left[peak])
+        place = _connected(left >= 0.1 * left[peak], peak)
         carried = (light * place).sum()
         # What lies around the place is its own glow.
         middle = (directions * (light * place)[..., None]).sum((0, 1))
@@ -519,21 +544,14 @@ def _image_spots(image):
     return _spots[key]
 
 
-def _sky(world, node, strength):
-    """The sun of a Sky Texture."""
+def _sky(node, strength):
+    """The sun of a Sky Texture. The dependency graph knows sockets of nodes and no other
+    properties: a driver would print errors and miss changes, so handlers keep it current."""
     name = f"sun of {node.label or node.name}"
-    path = f'node_tree.nodes["{bpy.utils.escape_identifier(node.name)}"].'
     power = _SKY_SUN_IRRADIANCE * strength * node.sun_intensity
-    constant = node.id_data != world.node_tree
-    elevation, rotation, size = (
-        getattr(node, p) if constant else _Driven(world, path + p)
-        for p in ("sun_elevation", "sun_rotation", "sun_size")
-    )
-    values = _slot(SKY_SUN, turn=(elevation, rotation, 0.0), sizes=(size, 0.0))
-    candidate = _Candidate(name, values, lambda p: np.full(len(p), power))
-    if node.inputs["Vector"].is_linked:
-        candidate.why = "its vector is linked, so where it stands is not known"
-    return candidate
+    turn = (node.sun_elevation, node.sun_rotation, 0.0)
+    values = _slot(SKY_SUN, turn=turn, sizes=(node.sun_size, 0.0))
+    return _Candidate(name, values, lambda p: np.full(len(p), power))
 
 
 def _environment(node, strength):
@@ -565,7 +583,7 @@ def _world(world):
     if output is None:
         return
     seen = []
-    for background in _upstream(output.inputs["Surface"]):
+    for background in _upstream(output.inputs["Surface"], "SHADER"):
         if background.bl_idname not in {"ShaderNodeBackground", "ShaderNodeEmission"}:
             continue
         socket = background.inputs["Strength"]
@@ -580,7 +598,7 @@ def _world(world):
                 yield from _environment(node, strength)
             elif node.bl_idname == "ShaderNodeTexSky":
                 if node.sky_type in _SKIES_WITH_SUN and node.sun_disc:
-                    yield _sky(world, node, strength)
+                    yield _sky(node, strength)
 
 
 # ---- lamps that objects place ----
@@ -634,9 +652,9 @@ def _subject(scene, meshes, matrices):
     and in its view, else of all meshes."""
     if not meshes:
         return np.zeros((1, 3))
-    centres = np.array(
-        [matrices(o) @ (sum((Vector(c) for c in o.bound_box), Vector()) / 8) for o in meshes]
-    )
+    boxes = [o.bound_box for o in meshes]
+    middles = [(Vector(box[0]) + Vector(box[6])) / 2 for box in boxes]  # opposite corners
+    centres = np.array([matrices(o) @ m for o, m in zip(meshes, middles, strict=True)])
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA":
         matrix, data = matrices(camera), camera.data
@@ -794,9 +812,6 @@ def _read(curve):
     return _Driven(target.id, path, factor)
 
 
-_ID_TYPES = {bpy.types.Light: "LIGHT", bpy.types.World: "WORLD", bpy.types.Object: "OBJECT"}
-
-
 def _write(socket, value):
     socket.driver_remove("default_value")
     if not isinstance(value, _Driven):
@@ -814,7 +829,7 @@ def _write(socket, value):
         target.rotation_mode = "QUATERNION"
     else:
         target = variable.targets[0]
-        target.id_type = next(v for k, v in _ID_TYPES.items() if isinstance(value.of, k))
+        target.id_type = value.of.id_type
         target.id = value.of
         target.data_path = value.path
     if value.factor != 1.0:
@@ -1003,6 +1018,8 @@ def _after_update(scene, depsgraph):
     if not any(_concerns(update, scene) for update in updates):
         return
     structural = any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
+    if structural and len(updates) == 1:  # what was selected; objects come with what else changes
+        return
     _quietly(scene, depsgraph, subject=None if structural else _memory.survey.subject)
 
 

@@ -16,8 +16,7 @@ import bpy
 
 from . import lamps, pack, twin
 
-#: Custom property of a group: which model and representation it is, and its sockets' identifiers.
-TAG = "brdfc"
+TAG = pack.TAG
 OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
 _SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
 

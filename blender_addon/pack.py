@@ -13,6 +13,9 @@ _INSTALLED = Path(__file__).parent
 root = _INSTALLED
 FORMAT = 1
 
+#: Custom property of a node group: which model and representation it is, and its sockets'
+#: identifiers.
+TAG = "brdfc"
 #: Sockets that every group has beside the model's parameters.
 NORMAL = "Normal"
 TANGENT = "Tangent"

@@ -1011,6 +1011,11 @@ def test_disable_leaves_nothing_behind(extension, empty):
         for name in dir(bpy.app.handlers)
         if isinstance(getattr(bpy.app.handlers, name), list)
     }
+    others = {
+        name: [f for f in found if not f.__module__.startswith(extension.package)]
+        for name, found in handlers.items()
+    }
+    assert others != handlers
     menus = ("NODE_MT_category_shader_shader", "MATERIAL_MT_context_menu")
     with_extension = [draw_functions(menu) for menu in menus]
     try:
@@ -1019,8 +1024,10 @@ def test_disable_leaves_nothing_behind(extension, empty):
             assert not {"draw_add_menu", "draw_material_menu"} & set(draw_functions(menu))
         assert not any(c.is_registered for c in classes)
         assert not hasattr(bpy.types, "BRDFC_OT_add_node")
-        assert handlers == {name: list(getattr(bpy.app.handlers, name)) for name in handlers}
+        assert others == {name: list(getattr(bpy.app.handlers, name)) for name in handlers}
     finally:
         bpy.ops.preferences.addon_enable(module=extension.package)
     assert [draw_functions(menu) for menu in menus] == with_extension
+    now = {name: list(getattr(bpy.app.handlers, name)) for name in handlers}
+    assert {n: len(f) for n, f in now.items()} == {n: len(f) for n, f in handlers.items()}
     assert all(c.is_registered for c in classes)

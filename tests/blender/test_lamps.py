@@ -230,7 +230,7 @@ def test_undo(ball, empty):
     add_lamp(empty, "POINT", "Key")
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="one")
-    add_lamp(empty, "SUN", "Fill")
+    add_lamp(empty, "SUN", "Fill", location=(1, 1, 1))
     assert len(slots(empty)) == 2
     bpy.ops.ed.undo_push(message="two")
     bpy.ops.ed.undo()
@@ -455,6 +455,12 @@ def test_sun_of_a_sky(ball, empty):
     assert slots(empty)[0][3] == pytest.approx(0.7)
     node.sun_rotation = 0.1
     assert slots(empty)[0][4] == pytest.approx(0.1)
+    for frame, elevation in ((1, 0.7), (11, 0.9)):
+        node.sun_elevation = elevation
+        node.keyframe_insert("sun_elevation", frame=frame)
+    for frame, elevation in ((1, 0.7), (6, 0.8), (11, 0.9)):
+        empty.frame_set(frame)
+        assert slots(empty, update=False)[0][3] == pytest.approx(elevation)
     node.sun_disc = False
     assert slots(empty) == []
     node.sun_disc = True
@@ -566,7 +572,7 @@ def test_emissive_meshes(extension, ball, empty, kind):
     assert slots(empty) == [ball_at((4, 3.3, 6), 0.3)]
     glow.location.z = 7
     assert slots(empty) == [ball_at((4, 3.3, 7), 0.3)]
-    glow.scale = (3, 3, 3)
+    glow.scale = (5, 5, 5)
     assert slots(empty) == []
     glow.scale = (0.3, 0.3, 0.001)
     (lamp,) = extension.api.see_lamps(empty)
@@ -599,6 +605,38 @@ def test_nothing_is_written_when_nothing_changed(lamps, ball, empty, monkeypatch
         bpy.context.view_layer.update()
     assert not written
     assert_lamp(slots(empty)[[s[9] for s in slots(empty)].index(3)], bpy.data.objects["Area"])
+
+
+def test_selecting_is_no_reason_to_look(lamps, ball, empty, monkeypatch):
+    add_lamp(empty, "POINT", "Key")
+    assert len(slots(empty)) == 1
+    looked, look = [], lamps._look
+    monkeypatch.setattr(lamps, "_look", lambda *a: (looked.append(1), look(*a))[1])
+    ball.select_set(not ball.select_get())
+    bpy.context.view_layer.update()
+    ball.location.x = 0.1
+    bpy.context.view_layer.update()
+    assert not looked
+    bpy.data.objects["Key"].data.energy = 5
+    bpy.context.view_layer.update()
+    assert looked
+
+
+def test_a_sun_without_a_size_is_seen(extension, ball, empty):
+    """Drawn directions meet it by chance alone, aimed closures in every sample: and that from a
+    script that never updates anything."""
+    extension.api.enable_osl(empty)
+    add_lamp(empty, "SUN", turn=(0.9, 0, 0), angle=0.0)
+    helpers.add_camera(empty)
+    empty.render.resolution_x = empty.render.resolution_y = 16
+    empty.cycles.samples, empty.cycles.use_denoising = 64, False
+    pictures = []
+    for seed in (1, 2):
+        empty.cycles.seed = seed
+        pictures.append(helpers.render(empty)[5:11, 5:11, :3])
+    # What is left is the noise of edges of the coarse ball's faces, as Lambert's exact form has it.
+    assert min(p.min() for p in pictures) > 0
+    assert np.median(np.abs(pictures[0] / pictures[1] - 1)) < 0.05
 
 
 def test_handlers_come_and_go(extension, lamps, empty, monkeypatch):
