@@ -315,17 +315,17 @@ class AimedText {
     const AimedSteps& steps = aimed_steps(0);
     std::string out = random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float drawn_x, drawn_y, drawn_z;\n" +
                       block(draw_.print(0), 1) +
-                      "    color rest_colour, covered = 0.0;\n    float rest_weight, met = 0.0;\n";
+                      "    color rest_colour, covered = 0.0;\n    float rest_weight, lamp_met = 0.0;\n";
     if (lamps_ == 0)
       return out +
-             "    color value, before = 0.0;\n    float density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
+             "    color excess, covered_before = 0.0;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
              block(value_.print(0), 1) + block(steps.rest.statements, 1);
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
     out += fmt::format(
         "    color lobe_value[{0}], lobe_colour[{0}];\n"
         "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}];\n"
         "    vector lobe_towards[{0}], lobe_half[{0}];\n"
-        "    color before = 0.0;\n    int lamps = 0;\n"
+        "    color covered_before = 0.0;\n    int lamps = 0;\n"
         "    for (int lamp = 0; lamp < {0}; lamp++)\n"
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);
@@ -334,27 +334,27 @@ class AimedText {
         "    // The lamps, and at last the direction that was drawn.\n"
         "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
         "        float wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n"
-        "        float height, extent, emphasis, solid_angle, covers, met_here;\n"
+        "        float lobe_height, lobe_extent, lamp_emphasis, lamp_solid_angle, lamp_covers, lamp_met_here;\n"
         "        if (lamp < lamps) {\n"
-        "            vector centre, across, along;\n            float disk, room = 1.0;\n"
+        "            vector lamp_centre, lamp_across, lamp_along;\n            float lamp_disk, lobe_room = 1.0;\n"
         "            lobe_weight[lamp] = 0.0;\n"
-        "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], centre, across,\n"
-        "                           along, disk) == 0)\n"
+        "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], lamp_centre, lamp_across,\n"
+        "                           lamp_along, lamp_disk) == 0)\n"
         "                continue;\n"
-        "            centre = brdfc_local(centre, frame_t, frame_b, frame_n);\n"
-        "            across = brdfc_local(across, frame_t, frame_b, frame_n);\n"
-        "            along = brdfc_local(along, frame_t, frame_b, frame_n);\n";
+        "            lamp_centre = brdfc_local(lamp_centre, frame_t, frame_b, frame_n);\n"
+        "            lamp_across = brdfc_local(lamp_across, frame_t, frame_b, frame_n);\n"
+        "            lamp_along = brdfc_local(lamp_along, frame_t, frame_b, frame_n);\n";
     out += earlier_lobes("", steps.room.statements);
-    out += "            float towards_x, towards_y, towards_z, half_x, half_y, half_z;\n";
+    out += "            float to_lamp_x, to_lamp_y, to_lamp_z, to_half_x, to_half_y, to_half_z;\n";
     out += indented(steps.aim.statements, 3);
     out +=
-        "            if (emphasis == 0.0)\n                continue;\n"
-        "            lobe_towards[lamp] = vector(towards_x, towards_y, towards_z);\n"
-        "            lobe_half[lamp] = vector(half_x, half_y, half_z);\n"
-        "            if (met_here > 0.0) {\n                met = solid_angle;\n                before = covered;\n"
+        "            if (lamp_emphasis == 0.0)\n                continue;\n"
+        "            lobe_towards[lamp] = vector(to_lamp_x, to_lamp_y, to_lamp_z);\n"
+        "            lobe_half[lamp] = vector(to_half_x, to_half_y, to_half_z);\n"
+        "            if (lamp_met_here > 0.0) {\n                lamp_met = lamp_solid_angle;\n                covered_before = covered;\n"
         "            }\n"
         "        }\n"
-        "        color value;\n        float density;\n";
+        "        color excess;\n        float drawn_density;\n";
     out += indented(value_.print(0), 2);
     out += "        if (lamp < lamps) {\n" +
            earlier_lobes(" && dot(lobe_towards[earlier], vector(wi_x, wi_y, wi_z)) > lobe_end[earlier]",
@@ -368,12 +368,12 @@ class AimedText {
         "    closure color aimed = 0;\n"
         "    for (int lamp = 0; lamp < lamps; lamp++)\n"
         "        if (lobe_weight[lamp] > 0.0) {{\n"
-        "            float level[{0}] = {{{1}}};\n"
-        "            color colours[{0}];\n"
-        "            for (int entry = 0; entry < {0}; entry++)\n                colours[entry] = level[entry] * lobe_colour[lamp];\n"
+        "            float lobe_level[{0}] = {{{1}}};\n"
+        "            color lobe_colours[{0}];\n"
+        "            for (int entry = 0; entry < {0}; entry++)\n                lobe_colours[entry] = lobe_level[entry] * lobe_colour[lamp];\n"
         "            vector half_way = lobe_half[lamp];\n"
         "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
-        "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], colours) + aimed;\n"
+        "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], lobe_colours) + aimed;\n"
         "        }}\n",
         kRampSize, ramp);
     return out;

@@ -421,8 +421,8 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     // Closures are on the viewer's side, where the model's frame is the shader's.
     for (const Closure<Expr>& c : input_closures(base)) given += evaluate(c, wi, wo);
     const Excess<Expr> e = excess(*brdf, !base.empty(), given, turned(wi), wo);
-    program.output("value", e.value);
-    program.output("density", e.density);
+    program.output("excess", e.value);
+    program.output("drawn_density", e.density);
     out.value = finish(model, program, indent);
   }
   return out;
@@ -446,38 +446,38 @@ const AimedSteps& aimed_steps(int indent) {
   earlier.exponent = Expr::input("lobe_exponent[earlier]");
   earlier.sinRadius = Expr::input("lobe_radius[earlier]");
   earlier.cosEnd = Expr::input("lobe_end[earlier]");
-  const Vec3<Expr> centre = input_vector("centre");
-  steps.room = record_step([&](Program& p) { p.output("room", minimum(Expr::input("room"), room_beside(centre, earlier))); });
+  const Vec3<Expr> centre = input_vector("lamp_centre");
+  steps.room = record_step([&](Program& p) { p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(centre, earlier))); });
   steps.aim = record_step([&](Program& p) {
-    const LampPatch<Expr> patch{centre, input_vector("across"), input_vector("along"), Expr::input("disk")};
-    const AimedLamp<Expr> lamp = aim_at(patch, Expr::input("room"), Expr::input("v_1"), Expr::input("v_2"),
+    const LampPatch<Expr> patch{centre, input_vector("lamp_across"), input_vector("lamp_along"), Expr::input("lamp_disk")};
+    const AimedLamp<Expr> lamp = aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"),
                                         input3("drawn"), input3("wo"));
     output3(p, "wi", lamp.wi);
-    output3(p, "towards", lamp.lobe.towards);
-    output3(p, "half", lamp.lobe.half);
+    output3(p, "to_lamp", lamp.lobe.towards);
+    output3(p, "to_half", lamp.lobe.half);
     p.output("lobe_exponent[lamp]", lamp.lobe.exponent);
     p.output("lobe_radius[lamp]", lamp.lobe.sinRadius);
     p.output("lobe_end[lamp]", lamp.lobe.cosEnd);
-    p.output("height", lamp.height);
-    p.output("extent", lamp.extent);
-    p.output("emphasis", lamp.emphasis);
-    p.output("solid_angle", lamp.solid_angle);
-    p.output("covers", lamp.covers);
-    p.output("met_here", lamp.met);
+    p.output("lobe_height", lamp.height);
+    p.output("lobe_extent", lamp.extent);
+    p.output("lamp_emphasis", lamp.emphasis);
+    p.output("lamp_solid_angle", lamp.solid_angle);
+    p.output("lamp_covers", lamp.covers);
+    p.output("lamp_met_here", lamp.met);
   });
-  const Rgb<Expr> value = Rgb<Expr>::input("value");
-  const Expr density = Expr::input("density");
+  const Rgb<Expr> value = Rgb<Expr>::input("excess");
+  const Expr density = Expr::input("drawn_density");
   steps.less = record_step([&](Program& p) {
-    p.output("value", value - Rgb<Expr>::input("lobe_value[earlier]") * evaluate(earlier, input3("wi")));
+    p.output("excess", value - Rgb<Expr>::input("lobe_value[earlier]") * evaluate(earlier, input3("wi")));
   });
   steps.send = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;
-    lamp.height = Expr::input("height");
-    lamp.extent = Expr::input("extent");
-    lamp.emphasis = Expr::input("emphasis");
-    lamp.solid_angle = Expr::input("solid_angle");
-    lamp.covers = Expr::input("covers");
-    lamp.met = Expr::input("met_here");
+    lamp.height = Expr::input("lobe_height");
+    lamp.extent = Expr::input("lobe_extent");
+    lamp.emphasis = Expr::input("lamp_emphasis");
+    lamp.solid_angle = Expr::input("lamp_solid_angle");
+    lamp.covers = Expr::input("lamp_covers");
+    lamp.met = Expr::input("lamp_met_here");
     const Sent<Expr> sent = send(lamp, value, density);
     p.output("covered", Rgb<Expr>::input("covered") + sent.covered);
     p.output("lobe_value[lamp]", sent.value);
@@ -486,7 +486,7 @@ const AimedSteps& aimed_steps(int indent) {
   });
   steps.rest = record_step([&](Program& p) {
     const Rest<Expr> left =
-        rest(value, density, Rgb<Expr>::input("covered"), Expr::input("met"), Rgb<Expr>::input("before"));
+        rest(value, density, Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"));
     p.output("rest_weight", left.weight);
     p.output("rest_colour", left.colour);
   });
