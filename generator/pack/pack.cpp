@@ -106,6 +106,8 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   }
   if (kind == RepresentationKind::Controlled)
     codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "zero_size_lights_fit", "orthographic_far"});
+  else if (kind == RepresentationKind::Aimed)
+    codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "orthographic_far", "normal_pass"});
   else if (kind == RepresentationKind::Sampled)
     codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
   else if (mirror)
@@ -113,7 +115,8 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   // Cycles drops glossy closures behind a diffuse surface; ramps it does not.
   if (shader.facets) codes.push_back("caustics");
   if (mirror || shader.facets) codes.push_back("filter_glossy");
-  if (mirror && kind == RepresentationKind::Sampled) codes.push_back("albedo_passes_mirror");
+  if (mirror && (kind == RepresentationKind::Sampled || kind == RepresentationKind::Aimed))
+    codes.push_back("albedo_passes_mirror");
   // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
   // do not see.
   if (kind == RepresentationKind::Exact && shader.slots > shader.closures) codes.push_back("albedo_passes");

@@ -499,7 +499,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         body += fmt::format("    float tangent_{0}_x, tangent_{0}_y, tangent_{0}_z;\n", c);
       if (closure == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
       if (kinds[c].turned) body += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
-      shader.facets = shader.facets || has_facets(closure);
+      shader.facets = shader.facets || (has_facets(closure) && !aimed);
       terms.push_back(closure_text(kinds[c], c));
       shader.slots += slots(closure);
     }
@@ -510,6 +510,11 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
           "    float wi_x, wi_y, wi_z, residual_weight;\n    color residual_colour;\n";
     body += aimed ? block(statements.print(0), 1) : statements.print(4);
     if (aimed) {
+      // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then the
+      // rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
+      for (std::size_t c = 0; c < kinds.size(); ++c)
+        if (has_facets(kinds[c].kind))
+          body += fmt::format("    if (raytype(\"camera\") == 0)\n        weight_{} = 0.0;\n", c);
       body += aimed_text.print();
       shader.lamps = max_lamps;
       shader.operations += aimed_text.operations();
