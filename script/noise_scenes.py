@@ -86,7 +86,8 @@ def sphere(scene, name, material, radius, location, segments=128):
     build.free()
     for polygon in mesh.polygons:
         polygon.use_smooth = True
-    mesh.materials.append(material)
+    if material is not None:
+        mesh.materials.append(material)
     return link(scene, name, mesh, location)
 
 
@@ -95,7 +96,8 @@ def quads(scene, name, material, corners):
     mesh = bpy.data.meshes.new(name)
     faces = [range(4 * i, 4 * i + 4) for i in range(len(corners))]
     mesh.from_pydata([c for quad in corners for c in quad], [], faces)
-    mesh.materials.append(material)
+    if material is not None:
+        mesh.materials.append(material)
     return link(scene, name, mesh)
 
 

@@ -13,6 +13,7 @@ import argparse
 import concurrent.futures
 import csv
 import dataclasses
+import functools
 import hashlib
 import json
 import math
@@ -132,22 +133,31 @@ def material_of(case, form):
 
 
 def set_up(condition, size, pack):
-    """(scene, object, mask) of a condition, lit by OSL."""
-    loader = _blender["loader"]
-    loader.pack.use(pack)
-    scene, ball, mask = _blender["scenes"].build(condition, _blender["folder"], size)
-    loader.api.enable_osl(scene)
-    return scene, ball, mask
+    """(scene, object, mask) of a condition, lit by OSL. The last one serves again: importance maps
+    of skies, which take seconds, are then kept."""
+    wanted = condition, size, pack
+    if _blender.get("set_up") != wanted:
+        loader = _blender["loader"]
+        loader.pack.use(pack)
+        _blender["scene"] = _blender["scenes"].build(condition, _blender["folder"], size)
+        loader.api.enable_osl(_blender["scene"][0])
+        _blender["set_up"] = wanted
+    return _blender["scene"]
 
 
-def dress(scene, ball, material):
+def dress(scene, ball, make):
+    """Gives the object the material that `make` returns in place of its last one."""
+    bpy = _blender["bpy"]
+    last = list(ball.data.materials)
     ball.data.materials.clear()
-    ball.data.materials.append(material)
-    _blender["bpy"].context.view_layer.update()
+    for material in last:
+        bpy.data.materials.remove(material)
+    ball.data.materials.append(make())
+    bpy.context.view_layer.update()
     # Forms that know where lamps are ask for it once these stand.
     if see_lamps := getattr(_blender["loader"].api, "see_lamps", None):
         see_lamps(scene)
-        _blender["bpy"].context.view_layer.update()
+        bpy.context.view_layer.update()
 
 
 def render(scene, samples, seed, read=True):
@@ -194,10 +204,9 @@ def pictures(case, form, job):
                 return dict(kept)
     scene, ball, mask = set_up(condition, size, pack_of(case, form, job))
     try:
-        material = material_of(case, form)
+        dress(scene, ball, lambda: material_of(case, form))
     except ValueError:
         return None
-    dress(scene, ball, material)
     made = np.stack([render(scene, samples, seed)[1] for seed in range(1, seeds + 1)])
     if not np.isfinite(made).all():
         raise RuntimeError(f"{case} {form}, {condition}: a pixel is not finite")
@@ -298,10 +307,9 @@ def time_forms(job):
         for turn in turns:
             scene, ball, _ = set_up(condition, job["size"], pack_of(*turn, job))
             try:
-                material = material_of(*turn)
+                dress(scene, ball, functools.partial(material_of, *turn))
             except ValueError:
                 continue
-            dress(scene, ball, material)
             render(scene, 1, 1, read=False)  # compiles
             one, _ = render(scene, 1, 2, read=False)
             many, _ = render(scene, job["samples"], 3, read=False)
@@ -656,11 +664,11 @@ class Page:
     def means(self):
         lines = ["## Means", ""]
         lines += [
-            "Mean radiance of the ball against that of the exact form, or of the sampled form where",
-            "there is no exact one: difference and its standard error in percent. Of the other form",
-            "the most samples count that were measured. Bold is what exceeds 1 % and 5 standard",
-            "errors. The error comes from the spread of a few pictures: where light is met as rare",
-            "dots alone, it is larger than it says.",
+            "Mean radiance of the ball against that of the exact form, or of the sampled form",
+            "where there is no exact one: difference and its standard error in percent. Of the",
+            "other form the most samples count that were measured. Bold is what exceeds 1 % and 5",
+            "standard errors. The error comes from the spread of a few pictures: where light is",
+            "met as rare dots alone, it is larger than it says.",
             "",
         ]
         for form in self.forms:
@@ -692,9 +700,10 @@ class Page:
             "## In a penumbra",
             "",
             "A floor that has the model where the edge of a ball's shadow crosses it, under a 1 m",
-            "area lamp, seen from the mirror direction; only pixels that see part of the lamp count.",
-            "Difference of the mean from that of the exact or sampled form, and relative L1 of squares",
-            f"of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in percent.",
+            "area lamp, seen from the mirror direction; only pixels that see part of the lamp",
+            "count. Difference of the mean from that of the exact or sampled form, and relative L1",
+            f"of squares of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in",
+            "percent.",
             "",
             *heading("Model", "form", "samples", "mean", "squares", "by noise"),
             *rows,
