@@ -338,7 +338,7 @@ def _penumbra(scene, size):
     bpy.context.view_layer.update()
 
     # Where each pixel's ray meets the floor, and how much of the lamp is seen from there.
-    x, y = _screen()
+    x, y = _screen(size)
     turn = np.array(scene.camera.matrix_world.to_3x3())
     rays = np.stack([x * math.tan(half), y * math.tan(half), -np.ones_like(x)], -1) @ turn.T
     places = np.array(eye) - rays * (eye.z / rays[..., 2:])
