@@ -4,14 +4,16 @@
 Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 """
 
-from . import operators, ui
+from . import lamps, operators, ui
 
 
 def register():
     operators.register()
     ui.register()
+    lamps.register()
 
 
 def unregister():
+    lamps.unregister()
     ui.unregister()
     operators.unregister()

@@ -16,8 +16,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, lean, nodes, pack
+from . import checks, lamps, lean, nodes, pack
 from .checks import Finding, enable_osl, warnings
+from .lamps import Lamp
 from .lean import PlanError
 from .nodes import CompileError
 from .pack import PackError
@@ -27,6 +28,7 @@ __all__ = [
     "PackError",
     "PlanError",
     "Finding",
+    "Lamp",
     "add_twin",
     "albedo",
     "bake",
@@ -36,6 +38,7 @@ __all__ = [
     "new_material",
     "plan",
     "prepare_material",
+    "see_lamps",
     "set_kernel",
     "set_parameters",
     "switch_representation",
@@ -327,6 +330,16 @@ def bake(made):
         if material.library is None:
             prepare_material(material)
     return count
+
+
+def see_lamps(scene):
+    """Tells the materials that aim at lamps where those of a scene are. The extension does so by
+    itself where something changes; painted environment images and suns it looks at here alone.
+
+    Returns every lamp as a Lamp: name, slot from 1 or None, irradiance at the subject by which
+    they are ranked, and why one is left out.
+    """
+    return lamps.see(scene)
 
 
 def scene_warnings(scene):

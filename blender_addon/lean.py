@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from . import checks, nodes, pack
+from . import checks, lamps, nodes, pack
 
 #: Forms that a budget does not choose: they are for who asks for them.
 ASKED_FOR = ("controlled", "twin")
@@ -47,9 +47,14 @@ def program():
 
 def needs(materials):
     """Content of a file for `brdfc build --materials`: `materials` as those of a scene file, and
-    the lamps of the open file that its forms are chosen by."""
-    lamps = checks.sizeless_lamps()
-    return {"materials": materials} | ({"sizeless_lamps": lamps} if lamps else {})
+    what of the lamps of the open file its forms hang on: which have no size, and how many there
+    are to aim at."""
+    found = {"materials": materials}
+    if sizeless := checks.sizeless_lamps():
+        found["sizeless_lamps"] = sizeless
+    if pack.has_aimed():
+        found["lamps"] = lamps.count()
+    return found
 
 
 class Plan:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from . import pack, twin
+from . import lamps, pack, twin
 
 #: Custom property of a group: which model and representation it is, and its sockets' identifiers.
 TAG = "brdfc"
@@ -93,7 +93,18 @@ def expected_inputs(model_name, representation):
     inputs |= {pack.NORMAL: "VECTOR", pack.TANGENT: "VECTOR"}
     if pack.representation(model_name, representation).get("lobes"):
         inputs[pack.LOBES] = "INT"
+    inputs |= dict.fromkeys(_lamp_inputs(model_name, representation), "VECTOR")
     return inputs
+
+
+def _lamp_inputs(model_name, representation):
+    """Inputs of a form that the shared group of lamps feeds; a form may have fewer slots."""
+    slots = pack.representation(model_name, representation).get("lamps") or 0
+    if slots > lamps.SLOTS:
+        raise pack.PackError(
+            f"{model_name} ({representation}): expected at most {lamps.SLOTS} lamps, got {slots}"
+        )
+    return lamps.part_names(slots)
 
 
 def script_problem(group):
@@ -297,6 +308,12 @@ def _fill_group(group, model_name, representation, text):
     for name, text_ in _VECTORS.items():
         sockets[name] = _vector_socket(group, name, text_)
         group.links.new(group_input.outputs[-2], inputs[name])
+    if lamp_inputs := _lamp_inputs(model_name, representation):
+        shared = group.nodes.new("ShaderNodeGroup")
+        shared.node_tree = lamps.ensure_group()
+        shared.location = (-500, -400)
+        for name in lamp_inputs:
+            group.links.new(shared.outputs[name], inputs[name])
     for output in OUTPUTS:
         group.links.new(script.outputs[output], group_output.inputs[output])
     tag["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
@@ -365,6 +382,7 @@ def ensure_group(model_name, representation="auto", baked=None):
         bpy.data.node_groups.remove(group)
         if text is not None:
             bpy.data.texts.remove(text)
+        lamps.remove_unused_group()
         raise
     return group
 
@@ -490,6 +508,7 @@ def remove_group(group):
     for text in texts:
         if text not in used:
             bpy.data.texts.remove(text)
+    lamps.remove_unused_group()
 
 
 def remove_unused_groups():

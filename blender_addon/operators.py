@@ -189,6 +189,20 @@ class BRDFC_OT_switch(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_find_lamps(Operator):
+    """Look again for the lamps that materials aim at, the brightest first"""
+
+    bl_idname = "brdfc.find_lamps"
+    bl_label = "Find Lamps"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        found = api.see_lamps(context.scene)
+        taken = sum(lamp.slot is not None for lamp in found)
+        self.report({"INFO"}, f"Lamps aimed at: {taken} of {len(found)}")
+        return {"FINISHED"}
+
+
 class BRDFC_OT_add_twin(Operator):
     """Give the active material an output for EEVEE, made of Blender's own nodes"""
 
@@ -347,6 +361,7 @@ _CLASSES = (
     BrdfcPreferences,
     BRDFC_OT_bake,
     BRDFC_OT_add_twin,
+    BRDFC_OT_find_lamps,
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,
     BRDFC_OT_new_material,

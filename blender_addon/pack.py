@@ -147,6 +147,12 @@ def socket_parameters(model_name, name):
     }
 
 
+def has_aimed():
+    """Whether any form of this pack aims at lamps."""
+    models = manifest()["models"].values()
+    return any(form.get("lamps") for m in models for form in m["representations"].values())
+
+
 def _file(relative):
     path = root / relative
     if not path.is_file():

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from . import api, nodes, pack
+from . import api, lamps, nodes, pack
 
 #: Representation name that stands for Blender's own Glossy node, to compare run times with.
 GLOSSY = "glossy"
@@ -509,4 +509,6 @@ def load_scene(path, representation=None, name=None, native=None):
             _light(scene, index, entry)
     _environment(scene, view.get("environment") if view.has("environment") else None)
     bpy.context.view_layer.update()
+    if lamps.find_group() is not None:
+        api.see_lamps(scene)
     return scene

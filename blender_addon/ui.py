@@ -6,7 +6,7 @@ import math
 import bpy
 from bpy.types import Menu, Panel
 
-from . import api, checks, energy, nodes, pack
+from . import api, checks, energy, lamps, nodes, pack
 
 _WRAP = 46  # characters of a panel's line; Blender does not wrap labels
 
@@ -164,6 +164,22 @@ def draw_node(layout, node, material, editable=True):
         layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
 
 
+def draw_lamps(layout, material, scene):
+    """Which lamps the material's models aim at, where a model does."""
+    forms = [made[0] for n in nodes.group_nodes(material) if (made := nodes.manifest_entry(n))]
+    slots = max((form.get("lamps") or 0 for form in forms), default=0)
+    if slots == 0:
+        return
+    box = layout.box()
+    found = lamps.seen(scene)
+    taken = [lamp.name for lamp in found if lamp.slot is not None and lamp.slot <= slots]
+    left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > slots]
+    _wrapped(box, f"Free of noise under {', '.join(taken) or 'no lamp yet'}", "LIGHT")
+    for lamp in left_out:
+        _wrapped(box, f"{lamp.name} may be noisy: {lamp.why or lamps.too_many(slots)}")
+    box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
+
+
 def draw_warnings(layout, material, scene):
     """The findings for a material, with buttons that mend what can be mended."""
     found = checks.warnings(material, scene)
@@ -186,6 +202,7 @@ def draw_material(layout, material, scene):
     draw_warnings(layout, material, scene)
     for node in nodes.group_nodes(material):
         draw_node(layout.box(), node, material)
+    draw_lamps(layout, material, scene)
     layout.operator("brdfc.write_materials", icon="EXPORT")
     layout.operator("brdfc.bake", icon="MOD_DECIM")
 

@@ -203,6 +203,8 @@ void run(const Options& options) {
     for (const Light& l : scene.lights)
       if ((l.kind == Light::Kind::Point || l.kind == Light::Kind::Sun) && l.radius == 0)
         budget.sizeless.push_back(l.key);
+    // The extension finds bright spots of an image as well, and aims at them if there is room.
+    budget.lamps = scene.environment.image ? kMaxLamps : int(scene.lights.size());
     std::vector<MaterialNeed> needs = needs_of(scene.materials);
     const std::vector<Cosines> views = seen_cosines(scene);
     for (std::size_t i = 0; i < needs.size(); ++i) needs[i].views = views[i];
@@ -210,6 +212,7 @@ void run(const Options& options) {
   } else if (!options.materials.empty()) {
     const UsedMaterials used = load_materials(options.materials);
     budget.sizeless = used.sizeless_lamps;
+    budget.lamps = used.lamps;
     plan = plan_scene(needs_of(used.materials), budget);
   } else {
     plan = plan_models(options.models);

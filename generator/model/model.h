@@ -121,6 +121,9 @@ template <class T> class Brdf {
   virtual bool scatters_through() const = 0;
   /// The closures that equal the model, or nothing if no such sum is known. Delta terms alone are always known.
   virtual std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const = 0;
+  /// Closures that carry most of f cos(theta_i) for any parameters, none for a model that declares no such sum. No error
+  /// is claimed: who uses them adds what they lack. Weights are not negative, nor is there a delta term among them.
+  virtual ClosureSum<T> base(const Vec3<T>& wo) const = 0;
 };
 
 /// A registered model.
@@ -132,6 +135,8 @@ class Model {
   virtual bool has_scatter() const = 0;
   virtual bool has_mirror() const = 0;
   virtual bool has_exact() const = 0;
+  /// The kinds of a base's closures, and what they are turned and stretched by, are the same for all choices.
+  virtual bool has_base() const { return false; }
   virtual bool has_transmit() const { return false; }
   /// Does the inside absorb?
   virtual bool has_medium() const { return false; }
@@ -280,6 +285,10 @@ template <class M>
 concept HasExact = requires(const M& m, const Vec3<double>& w) {
   m.exact(w);
 };
+template <class M>
+concept HasBase = requires(const M& m, const Vec3<double>& w) {
+  m.base(w);
+};
 
 template <template <class> class M, class T> class BrdfOf final : public Brdf<T> {
   static constexpr bool kScatters = HasScatter<M<double>>;
@@ -344,6 +353,12 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
     else
       return std::nullopt;
   }
+  ClosureSum<T> base(const Vec3<T>& wo) const override {
+    if constexpr (HasBase<M<double>>)
+      return m_.base(wo);
+    else
+      return {};
+  }
 
  private:
   ClosureSum<T> delta_terms(const Vec3<T>& wo) const {
@@ -369,6 +384,7 @@ template <template <class> class M> class ModelOf final : public Model {
   bool has_scatter() const override { return HasScatter<M<double>>; }
   bool has_mirror() const override { return HasMirror<M<double>>; }
   bool has_exact() const override { return HasExact<M<double>> || !has_scatter(); }
+  bool has_base() const override { return HasBase<M<double>>; }
   bool has_transmit() const override { return HasTransmit<M<double>>; }
   bool has_medium() const override { return HasMedium<M<double>>; }
   bool has_through() const override { return HasThrough<M<double>>; }

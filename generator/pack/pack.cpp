@@ -333,7 +333,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
                       of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
     const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
     const Shader shader =
-        twin ? write_nodes(model, fixed) : write_shader(model, kind, of_form, fixed, plan.max_lobes, plan.views);
+        twin ? write_nodes(model, fixed)
+             : write_shader(model, kind, of_form, fixed, plan.max_lobes, plan.views, plan.max_lamps);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
     const ParamValues whole_fixed = is_fit(kind) ? fixed : ParamValues{};
@@ -356,6 +357,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"operations", shader.operations},
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
+        {"lamps", shader.lamps},
         {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
         {"axis", axis_json(fit)},

@@ -145,22 +145,19 @@ Chosen within_time(const Needs& needs, const std::vector<RepresentationKind>& or
   return {*cheapest, fmt::format("no form is known to keep {:g}x, this is the cheapest", *budget.time)};
 }
 
-/// Whether a fitted form that the budget allows comes before the sampled one. Without an error the one is off by any
-/// amount and the other right on average, but not in a picture where a lamp is met by chance alone.
-bool fitted_first(const Budget& budget) { return budget.error || !budget.sizeless.empty(); }
-
-/// In place of a form that samples the model: that one, and where the budget allows it the fitted one.
-std::vector<RepresentationKind> sampled_or_fitted(const Needs& needs, const Budget& budget) {
+/// In place of an aimed form: that one, and where the budget allows it the fitted one.
+std::vector<RepresentationKind> aimed_or_fitted(const Needs& needs, const Budget& budget) {
   const bool allowed =
       fits(needs, budget) || (budget.time && !budget.error && !unfit(needs, RepresentationKind::Fitted));
-  if (!allowed) return {RepresentationKind::Sampled};
-  if (fitted_first(budget)) return {RepresentationKind::Fitted, RepresentationKind::Sampled};
-  return {RepresentationKind::Sampled, RepresentationKind::Fitted};
+  if (!allowed) return {RepresentationKind::Aimed};
+  if (budget.error) return {RepresentationKind::Fitted, RepresentationKind::Aimed};
+  return {RepresentationKind::Aimed, RepresentationKind::Fitted};
 }
 
 /// What lamps without a size make of a form, as script/conditions measured it; empty where they do nothing to it.
 std::string under_lamps(RepresentationKind kind, const Budget& budget) {
-  const char* shine = kind == RepresentationKind::Sampled  ? "as rare bright dots"
+  const char* shine = kind == RepresentationKind::Aimed    ? "as on Blender's own nodes"
+                      : kind == RepresentationKind::Sampled  ? "as rare bright dots"
                       : kind == RepresentationKind::Fitted ? "as on Blender's own nodes, on drawn directions as rare "
                                                              "bright dots"
                       : kind == RepresentationKind::Controlled ? "on its closures alone"
@@ -177,8 +174,8 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
       if (is_fit(kind) || !lacking(need, kind).empty()) continue;
       // Nothing has to be fitted for a material that has what comes first.
       if (!order.empty() && over_time(needs, order.front(), budget).empty()) break;
-      if (kind == RepresentationKind::Sampled)
-        for (const RepresentationKind k : sampled_or_fitted(needs, budget)) order.push_back(k);
+      if (kind == RepresentationKind::Aimed)
+        for (const RepresentationKind k : aimed_or_fitted(needs, budget)) order.push_back(k);
       else
         order.push_back(kind);
     }
@@ -212,10 +209,19 @@ std::string why_not(RepresentationKind kind, const Needs& needs, const std::vect
   if (open == needs.end() && !(fitted && budget.offer)) return "the materials ask for another";
   // Of what comes after a form that keeps the budget nothing has to be known.
   const auto rank = [&](RepresentationKind k) {
-    return k == RepresentationKind::Exact ? 0 : k == RepresentationKind::Sampled ? 2 : fitted_first(budget) ? 1 : 3;
+    switch (k) {
+      case RepresentationKind::Exact:
+        return 0;
+      case RepresentationKind::Aimed:
+        return 2;
+      case RepresentationKind::Sampled:
+        return 4;
+      default:
+        return budget.error ? 1 : 3;
+    }
   };
   const RepresentationKind first =
-      open == needs.end() ? RepresentationKind::Sampled : chosen[std::size_t(open - needs.begin())].form;
+      open == needs.end() ? RepresentationKind::Aimed : chosen[std::size_t(open - needs.begin())].form;
   if (rank(kind) < rank(first) || !over_time(needs, first, budget).empty()) {
     if (fitted && budget.error && !fits(needs, budget))
       return fmt::format("off by {:.2g} of the light, and {:g} is allowed", fitted_error(needs), *budget.error);
@@ -259,11 +265,12 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
     consider(kind, missing, false);
   }
   const std::optional<std::string> missing = unfit(needs, RepresentationKind::Fitted);
-  const bool drawn =
-      std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) { return c.form == RepresentationKind::Sampled; });
+  const bool drawn = std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) {
+    return c.form == RepresentationKind::Aimed || c.form == RepresentationKind::Sampled;
+  });
   consider(RepresentationKind::Fitted, missing,
            budget.offer && drawn &&
-               within_time(needs, sampled_or_fitted(needs, budget), budget).form == RepresentationKind::Fitted);
+               within_time(needs, aimed_or_fitted(needs, budget), budget).form == RepresentationKind::Fitted);
   // Telling takes a fit.
   const bool tell = budget.controlled || budget.error || budget.time;
   consider(RepresentationKind::Controlled, tell ? not_controlled(needs) : missing, budget.controlled);
@@ -299,6 +306,12 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   });
   if (drawn && plan.max_lobes < kMaxLobes)
     plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
+  plan.max_lamps = std::min(budget.lamps.value_or(kMaxLamps), kMaxLamps);
+  if (std::find(plan.forms.begin(), plan.forms.end(), RepresentationKind::Aimed) != plan.forms.end() &&
+      plan.max_lamps < kMaxLamps)
+    plan.reasons.push_back(plan.max_lamps == 0
+                               ? std::string("slots for lamps: the scene has none")
+                               : fmt::format("slots for lamps beyond {}: the scene has no more", plan.max_lamps));
   plan.views = views_of(needs);
   std::vector<std::string> unseen;
   const auto degrees = [](double cosine) { return std::acos(cosine) * 180 / kPi; };

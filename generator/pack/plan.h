@@ -9,6 +9,7 @@
 
 #include "analysis/albedo_table.h"
 #include "pack/costs.h"
+#include "represent/aimed.h"
 #include "represent/representation.h"
 
 namespace brdfc {
@@ -49,6 +50,7 @@ struct PlannedModel {
   ParamValues fixed;                       ///< folded into shaders and tables: no sockets
   std::vector<RepresentationKind> forms;   ///< preferred first
   int max_lobes = kMaxLobes;               ///< of sampled forms
+  int max_lamps = kMaxLamps;               ///< that aimed forms can be told of
   Cosines views;                           ///< that one of the materials can be seen from; tables have no others
   std::vector<FormChoice> choices;         ///< every form, where materials were planned for
   std::vector<FormChange> material_forms;  ///< of `materials`
@@ -68,13 +70,15 @@ struct Budget {
   Costs costs = {};
   /// Lamps that no drawn direction meets, for they have no size: their places in the file, or names.
   std::vector<std::string> sizeless = {};
+  /// How many lamps there are to aim at; none where that is not known.
+  std::optional<int> lamps = {};
 };
 
 /// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same
 /// constant is fixed, a form that none uses is left out. Throws InputError naming the material for a representation
 /// that its model does not have.
 /// Where a material leaves its form open, forms stand in this order: exact; fitted, if the budget has an error and the
-/// fit keeps it, or a time and no error and lamps have no size; sampled; fitted, if the budget has a time and no error.
+/// fit keeps it; aimed; fitted, if the budget has a time and no error; sampled.
 /// The first is taken that keeps the time, or where none does the one of the least cost that is known.
 std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Budget& = {});
 

@@ -110,6 +110,17 @@ std::string comment(const std::string& text) {
   return out + "\n";
 }
 
+std::string indented(const std::string& text, std::size_t levels = 1) {
+  std::string out;
+  std::size_t start = 0;
+  while (start < text.size()) {
+    const std::size_t end = text.find('\n', start);
+    out += std::string(4 * levels, ' ') + text.substr(start, end + 1 - start);
+    start = end + 1;
+  }
+  return out;
+}
+
 /// Statements that differ by combination of choices: equal ones are written once.
 class ChoiceSwitch {
  public:
@@ -168,17 +179,6 @@ class ChoiceSwitch {
       if (std::find(combinations.begin(), combinations.end(), c) == combinations.end()) return false;
     }
     return true;
-  }
-
-  static std::string indented(const std::string& text) {
-    std::string out;
-    std::size_t start = 0;
-    while (start < text.size()) {
-      const std::size_t end = text.find('\n', start);
-      out += "    " + text.substr(start, end + 1 - start);
-      start = end + 1;
-    }
-    return out;
   }
 
   const ModelInfo& info_;
@@ -306,10 +306,13 @@ class AlbedoText {
 std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
   const auto microfacet = [&](const char* distribution) {
-    // The viewer's direction lies in the plane that facets are stretched in. Along the normal, where it is no tangent,
-    // they are not, and Cycles takes none.
+    // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
+    // stretched by it, and Cycles takes none.
+    const std::string tangent = closure.stretched == Tangent::View      ? "I"
+                                : closure.stretched == Tangent::Surface ? fmt::format("tangent_{}", i)
+                                                                        : "vector(0.0)";
     return fmt::format("weight_{0} * microfacet(\"{1}\", {2}, {3}, alpha_{0}, {4}_{0}, 1.0, 0)", i, distribution, n,
-                       closure.stretched ? "I" : "vector(0.0)", closure.stretched ? "alpha_across" : "alpha");
+                       tangent, closure.stretched == Tangent::None ? "alpha" : "alpha_across");
   };
   switch (closure.kind) {
     case ClosureKind::Diffuse:
@@ -332,6 +335,128 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   throw std::logic_error("no OSL for this closure");
 }
 
+/// Lamps and rest of an aimed form: one evaluation of the model, in a loop over the lamps and the drawn direction.
+class AimedText {
+ public:
+  AimedText(const ModelInfo& info, const ParamValues& fixed, int lamps)
+      : draw_(info, fixed), value_(info, fixed), lamps_(lamps) {}
+
+  /// The base's recording.
+  Recording add(const Choices& choices, const AimedRecording& r) {
+    draw_.add(choices, r.draw.statements);
+    value_.add(choices, r.value.statements);
+    operations_ = std::max(operations_, r.draw.operations + r.value.operations);
+    Recording base = r.base;
+    base.statements = indented(base.statements);
+    return base;
+  }
+
+  int operations() const {
+    const AimedSteps& steps = aimed_steps(0);
+    return operations_ + steps.rest.operations + (lamps_ > 0 ? steps.room.operations + steps.aim.operations + steps.less.operations + steps.send.operations : 0);
+  }
+
+  std::string print() const {
+    const AimedSteps& steps = aimed_steps(0);
+    std::string out = random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float drawn_x, drawn_y, drawn_z;\n" +
+                      indented(draw_.print(0)) +
+                      "    color rest_colour, covered = 0.0;\n    float rest_weight, met = 0.0;\n";
+    if (lamps_ == 0)
+      return out +
+             "    color value, before = 0.0;\n    float density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
+             indented(value_.print(0)) + block(steps.rest.statements, 1);
+    for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
+    out += fmt::format(
+        "    color lobe_value[{0}], lobe_colour[{0}];\n"
+        "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}];\n"
+        "    vector lobe_towards[{0}], lobe_half[{0}];\n"
+        "    color before = 0.0;\n    int lamps = 0;\n"
+        "    for (int lamp = 0; lamp < {0}; lamp++)\n"
+        "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
+        lamps_);
+    out += random("v_all", 1, {"v_1", "v_2"});
+    out +=
+        "    // The lamps, and at last the direction that was drawn.\n"
+        "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
+        "        float wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n"
+        "        float height, extent, emphasis, solid_angle, covers, met_here;\n"
+        "        if (lamp < lamps) {\n"
+        "            vector centre, across, along;\n            float disk, room = 1.0;\n"
+        "            lobe_weight[lamp] = 0.0;\n"
+        "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], centre, across,\n"
+        "                           along, disk) == 0)\n"
+        "                continue;\n"
+        "            centre = brdfc_local(centre, frame_t, frame_b, frame_n);\n"
+        "            across = brdfc_local(across, frame_t, frame_b, frame_n);\n"
+        "            along = brdfc_local(along, frame_t, frame_b, frame_n);\n";
+    out += earlier_lobes("", steps.room.statements);
+    out += "            float towards_x, towards_y, towards_z, half_x, half_y, half_z;\n";
+    out += indented(steps.aim.statements, 3);
+    out +=
+        "            if (emphasis == 0.0)\n                continue;\n"
+        "            lobe_towards[lamp] = vector(towards_x, towards_y, towards_z);\n"
+        "            lobe_half[lamp] = vector(half_x, half_y, half_z);\n"
+        "            if (met_here > 0.0) {\n                met = solid_angle;\n                before = covered;\n"
+        "            }\n"
+        "        }\n"
+        "        color value;\n        float density;\n";
+    out += indented(value_.print(0), 2);
+    out += "        if (lamp < lamps) {\n" +
+           earlier_lobes(" && dot(lobe_towards[earlier], vector(wi_x, wi_y, wi_z)) > lobe_end[earlier]",
+                         steps.less.statements) +
+           indented(steps.send.statements, 3) + "        } else {\n" + indented(steps.rest.statements, 3) +
+           "        }\n    }\n";
+    // Each joins the sum from the left: Cycles walks it without a stack.
+    std::string ramp;
+    for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
+    out += fmt::format(
+        "    closure color aimed = 0;\n"
+        "    for (int lamp = 0; lamp < lamps; lamp++)\n"
+        "        if (lobe_weight[lamp] > 0.0) {{\n"
+        "            float level[{0}] = {{{1}}};\n"
+        "            color colours[{0}];\n"
+        "            for (int k = 0; k < {0}; k++)\n                colours[k] = level[k] * lobe_colour[lamp];\n"
+        "            vector half_way = lobe_half[lamp];\n"
+        "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
+        "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], colours) + aimed;\n"
+        "        }}\n",
+        kRampSize, ramp);
+    return out;
+  }
+
+ private:
+  static std::string random(const char* all, int index, const std::vector<const char*>& parts) {
+    std::string out = fmt::format("    vector {} = brdfc_random({});\n", all, index);
+    for (std::size_t i = 0; i < parts.size(); ++i) out += fmt::format("    float {} = {}[{}];\n", parts[i], all, i);
+    return out;
+  }
+
+  std::string slots_array(const std::string& what) const {
+    std::string list;
+    for (int i = 1; i <= lamps_; ++i) list += fmt::format("{}Lamp{}{}", i > 1 ? ", " : "", what, i);
+    std::string name = what;
+    name[0] = char(std::tolower(name[0]));
+    return fmt::format("    vector lamp_{}[{}] = {{{}}};\n", name, lamps_, list);
+  }
+
+  /// Done with every lobe before this one, in the loop's branch for lamps.
+  static std::string earlier_lobes(const char* condition, const std::string& statements) {
+    return fmt::format(
+               "            for (int earlier = 0; earlier < lamp; earlier++)\n"
+               "                if (lobe_weight[earlier] > 0.0{}) {{\n",
+               condition) +
+           indented(statements, 5) + "                }\n";
+  }
+
+  static std::string block(const std::string& statements, std::size_t levels) {
+    const std::string edge(4 * levels, ' ');
+    return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
+  }
+
+  ChoiceSwitch draw_, value_;
+  int lamps_, operations_ = 0;
+};
+
 }  // namespace
 
 std::string balanced_sum(const std::vector<std::string>& terms) {
@@ -344,33 +469,34 @@ std::string balanced_sum(const std::vector<std::string>& terms) {
 }
 
 Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
-                    int max_lobes, const Cosines& views) {
+                    int max_lobes, const Cosines& views, int max_lamps) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
   for (const auto& [name, value] : form_values(model, kind, given))
     if (fixed.emplace(name, value).first->second != value)
       input_error("{}: the {} form exists only for {}", info.name, name_of(kind), format_values(info, {{name, value}}));
-  const bool sampled = kind == RepresentationKind::Sampled, controlled = kind == RepresentationKind::Controlled;
+  const bool sampled = kind == RepresentationKind::Sampled, controlled = kind == RepresentationKind::Controlled,
+             aimed = kind == RepresentationKind::Aimed;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
   shader.lobes = sampled && max_lobes > 1;
 
   std::vector<RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
-  std::set<std::string> inputs;
+  AimedText aimed_text(info, fixed, max_lamps);
   int operations = 0, mirror_operations = 0;
   const int indent = sampled ? 8 : 4;
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    const Recording r = record(model, kind, values, indent, views);
+    const Recording r =
+        aimed ? aimed_text.add(choices, record_aimed(model, values, 0)) : record(model, kind, values, indent, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, r.statements);
-    inputs.insert(r.inputs.begin(), r.inputs.end());
     if (!kinds.empty() && kinds != r.closures)
       throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
     kinds = r.closures;
-    if (sampled && model.has_mirror()) {
+    if ((sampled || aimed) && model.has_mirror()) {
       const Recording m = record_mirror(model, values, 4);
       mirror_operations = std::max(mirror_operations, m.operations);
       mirror.add(choices, m.statements);
@@ -393,6 +519,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         "    float side = backfacing() ? -1.0 : 1.0;\n";
   if (model.has_medium()) body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
   std::vector<std::string> terms;
+  if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
   if (sampled) {
     body += fmt::format(
         "    color weight_0[{}] = {{ 0.0 }};\n    vector wi[{}] = {{ vector(0.0) }};\n"
@@ -406,15 +533,10 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     body +=
         "        weight_0[lobe] = weight / float(count);\n"
         "        wi[lobe] = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n    }\n";
-    if (model.has_mirror()) body += "    color mirror_weight;\n" + mirror.print(4);
     for (int i = 0; i < max_lobes; ++i)
       terms.push_back(model.has_through() ? fmt::format("brdfc_ray_anywhere(weight_0[{}], wi[{}], I, frame_n)", i, i)
                                           : fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
     shader.slots = max_lobes * slots(ClosureKind::PhongRamp);
-    if (model.has_mirror()) {
-      terms.push_back("mirror_weight * reflection(frame_n)");
-      shader.slots += slots(ClosureKind::Reflection);
-    }
   } else {
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       const ClosureKind closure = kinds[c].kind;
@@ -422,7 +544,9 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (has_ramp(closure)) body += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
       if (closure == ClosureKind::PhongRamp) body += fmt::format("    float exponent_{};\n", c);
       if (has_facets(closure)) body += fmt::format("    float alpha_{};\n", c);
-      if (kinds[c].stretched) body += fmt::format("    float alpha_across_{};\n", c);
+      if (kinds[c].stretched != Tangent::None) body += fmt::format("    float alpha_across_{};\n", c);
+      if (kinds[c].stretched == Tangent::Surface)
+        body += fmt::format("    float tangent_{0}_x, tangent_{0}_y, tangent_{0}_z;\n", c);
       if (closure == ClosureKind::Refraction) body += fmt::format("    float ior_{};\n", c);
       if (kinds[c].turned) body += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
       shader.facets = shader.facets || has_facets(closure);
@@ -435,6 +559,16 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
           "    float u_0 = u_all[0];\n    float u_1 = u_all[1];\n    float u_2 = u_all[2];\n"
           "    float wi_x, wi_y, wi_z, residual_weight;\n    color residual_colour;\n";
     body += statements.print(4);
+    if (aimed) {
+      body += aimed_text.print();
+      shader.lamps = max_lamps;
+      shader.operations += aimed_text.operations();
+      shader.slots += (max_lamps + 1) * slots(ClosureKind::PhongRamp);
+      if (max_lamps > 0) terms.push_back("aimed");
+      const char* ray = model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, {}, I, frame_n)"
+                                            : "rest_weight * brdfc_ray_coloured({}, I, rest_colour)";
+      terms.push_back(fmt::format(fmt::runtime(ray), "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
+    }
     if (controlled) {
       terms.push_back(
           "residual_weight * brdfc_ray_coloured(frame_t * wi_x + frame_b * wi_y + frame_n * wi_z, I, residual_colour)");
@@ -448,12 +582,20 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
             kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
-    for (std::size_t c = 0; c < kinds.size(); ++c)
+    for (std::size_t c = 0; c < kinds.size(); ++c) {
+      if (kinds[c].stretched == Tangent::Surface)
+        body += fmt::format(
+            "    vector tangent_{0} = frame_t * tangent_{0}_x + frame_b * tangent_{0}_y + frame_n * tangent_{0}_z;\n", c);
       if (kinds[c].turned)
         body += fmt::format(
             "    normal normal_{0} = normalize(frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * "
             "normal_{0}_z);\n",
             c);
+    }
+  }
+  if ((sampled || aimed) && model.has_mirror()) {
+    terms.push_back("mirror_weight * reflection(frame_n)");
+    shader.slots += slots(ClosureKind::Reflection);
   }
   if (is_fit(kind))
     for (const std::string& name : factors(model, fixed)) {
@@ -471,7 +613,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     input_error(
         "{}: the controlled form has {} operations with these parameters, and may have {}: take fitted or sampled",
         info.name, shader.operations, kMaxOperations);
-  shader.closures = int(terms.size());
+  shader.closures = int(terms.size()) + std::max(shader.lamps - 1, 0);
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,
                 kMaxClosures);
@@ -506,6 +648,9 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         "    int Lobes = {} [[ string label = \"Lobes\", string help = \"Directions traced per shading "
         "point, 1 to {}\" ]],\n",
         kDefaultLobes, max_lobes);
+  for (int i = 1; i <= shader.lamps; ++i)
+    for (const char* what : {"Place", "Turn", "Scale", "Shape"})
+      out += fmt::format("    vector Lamp{}{} = vector(0.0),\n", what, i);
   out +=
       "    normal Normal = N,\n    vector Tangent = vector(0, 0, 0),\n"
       "    output closure color BSDF = 0,\n    output color Albedo = 0)\n{\n";

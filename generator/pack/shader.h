@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/albedo_table.h"
+#include "represent/aimed.h"
 #include "represent/representation.h"
 
 namespace brdfc {
@@ -19,15 +20,17 @@ struct Shader {
   int statements = 0;   ///< of the shader for all combinations of choices, without the library it calls
   bool lobes = false;   ///< has the Lobes parameter
   bool facets = false;  ///< has closures of facets
+  int lamps = 0;        ///< slots of lamps that it aims at
 };
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
-/// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. The form is
+/// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. An aimed form
+/// has parameters for `max_lamps` lamps. The form is
 /// right for these `views`. Throws
 /// InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
 /// kMaxOperations.
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
-                    int max_lobes = kMaxLobes, const Cosines& views = {});
+                    int max_lobes = kMaxLobes, const Cosines& views = {}, int max_lamps = kMaxLamps);
 
 /// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
 std::string balanced_sum(const std::vector<std::string>& terms);

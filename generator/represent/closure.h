@@ -23,6 +23,13 @@ enum class ClosureKind {
   Refraction,   ///< refraction(N, ior): delta in the direction of ideal refraction, none beyond the critical angle
 };
 
+/// What the facets of a closure are stretched along, if they have two roughnesses.
+enum class Tangent {
+  None,    ///< nothing: they are round
+  View,    ///< the plane of incidence: Cycles is given the viewer's direction
+  Surface  ///< a direction fixed to the surface
+};
+
 /// How many entries a ramp has.
 inline constexpr int kRampSize = 8;
 inline bool has_ramp(ClosureKind kind) { return kind == ClosureKind::DiffuseRamp || kind == ClosureKind::PhongRamp; }
@@ -35,12 +42,12 @@ template <class T> struct Closure {
   Vec3<T> normal;
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
   T exponent;                          ///< PhongRamp
-  T alpha;                             ///< Ggx, Beckmann: roughness, of stretched facets in the plane of incidence
-  T alpha_across;                      ///< of stretched facets: across that plane
-  Vec3<T> across;                      ///< of stretched facets: unit, perpendicular to that plane, and so to the normal
+  T alpha;                             ///< Ggx, Beckmann: roughness, of stretched facets along `tangent`
+  T alpha_across;                      ///< of stretched facets: across it
+  Vec3<T> tangent;                     ///< of stretched facets: unit, perpendicular to the normal
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
   bool turned = false;                 ///< `normal` is not the surface's; it is not below it
-  bool stretched = false;              ///< facets that are rougher or smoother in the plane of incidence than across it
+  Tangent stretched = Tangent::None;   ///< what `tangent` is
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
       : kind(kind_),
@@ -49,7 +56,7 @@ template <class T> struct Closure {
         exponent(0),
         alpha(1),
         alpha_across(1),
-        across{T(0), T(1), T(0)},
+        tangent{T(1), T(0), T(0)},
         ior(1) {}
 };
 
@@ -94,10 +101,10 @@ T microfacet(ClosureKind kind, const T& alpha, const Vec3<T>& normal, const Vec3
                     slope(cosTheta_o), cosTheta_o);
 }
 
-/// The same of stretched facets, whose y axis is perpendicular to the normal. Cycles builds it from a tangent.
+/// The same of stretched facets, whose x axis is perpendicular to the normal. Cycles makes it so.
 template <class T> T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& normal,
-                                const Vec3<T>& y, const Vec3<T>& wi, const Vec3<T>& wo) {
-  const Vec3<T> x = cross(y, normal);
+                                const Vec3<T>& x, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const Vec3<T> y = cross(normal, x);
   const auto in_frame = [&](const Vec3<T>& v) { return Vec3<T>{dot(x, v), dot(y, v), dot(normal, v)}; };
   return microfacet(kind, alpha_x, alpha_y, in_frame(wi), in_frame(wo));
 }
@@ -128,7 +135,8 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     case ClosureKind::Ggx:
     case ClosureKind::Beckmann: {
       const auto of_facets = [&] {
-        if (c.stretched) return microfacet(c.kind, c.alpha, c.alpha_across, c.normal, c.across, wi, wo);
+        if (c.stretched != Tangent::None)
+          return microfacet(c.kind, c.alpha, c.alpha_across, c.normal, c.tangent, wi, wo);
         if (c.turned) return microfacet(c.kind, c.alpha, c.normal, wi, wo);
         return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
       };
@@ -141,7 +149,26 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
   throw std::logic_error("closure of unknown kind");
 }
 
+/// Linear look-up of a ramp at a position in [0, 1], outside which it keeps its ends: each piece begins where the one
+/// before ends, so that a recording needs no index. Pieces between equal constants cost nothing.
+template <class T> Rgb<T> ramp8(const std::array<Rgb<T>, kRampSize>& ramp, const T& position) {
+  const T scaled = position * T(kRampSize - 1);
+  Rgb<T> colour = ramp[0];
+  for (int i = 0; i + 1 < kRampSize; ++i)
+    colour += (ramp[std::size_t(i + 1)] - ramp[std::size_t(i)]) * clamp01(scaled - T(i));
+  return colour;
+}
+
 /// With the colours of its own ramp.
+template <class T> Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo) {
+  return evaluate(c, wi, wo, [&](const T& position) { return ramp8(c.ramp, position); });
+}
+template <class T> Rgb<T> evaluate(const ClosureSum<T>& sum, const Vec3<T>& wi, const Vec3<T>& wo) {
+  Rgb<T> total(T(0));
+  for (const Closure<T>& c : sum) total += evaluate(c, wi, wo);
+  return total;
+}
+/// The same with an index into the ramp, for the many evaluations of a fit.
 Rgb<double> evaluate(const Closure<double>&, const Vec3<double>& wi, const Vec3<double>& wo);
 Rgb<double> evaluate(const ClosureSum<double>&, const Vec3<double>& wi, const Vec3<double>& wo);
 

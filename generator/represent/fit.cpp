@@ -134,8 +134,8 @@ Closure<T> facet_closure(ClosureKind kind, const Vec3<T>& side, const T& offset,
   c.turned = true;
   c.alpha = alpha * stretch;
   c.alpha_across = alpha / stretch;
-  c.across = {-side.y, side.x, T(0)};
-  c.stretched = true;
+  c.tangent = cross(Vec3<T>{-side.y, side.x, T(0)}, c.normal);
+  c.stretched = Tangent::View;
   return c;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <random>
 #include <set>
 
@@ -10,6 +11,7 @@
 #include "analysis/probes.h"
 #include "model/horizon.h"
 #include "model/sampling.h"
+#include "represent/aimed.h"
 #include "represent/controlled.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
@@ -22,7 +24,16 @@ std::vector<std::string> frame_names() {
   std::vector<std::string> names = {
       "Normal", "Tangent",  "Lobes",           "BSDF",           "Albedo", "frame_n",     "frame_t", "frame_b",
       "wi",     "weight",   "mirror_weight",   "lobe",           "side",   "path_length", "u",       "wo",
-      "sum",    "position", "residual_weight", "residual_colour"};
+      "sum",    "position", "residual_weight", "residual_colour",
+      // of aimed forms
+      "lamps",  "lamp",     "lamp_place",      "lamp_turn",      "lamp_scale", "lamp_shape", "centre",  "across",
+      "along",  "disk",     "drawn_x",         "drawn_y",        "drawn_z", "wi_x",       "wi_y",    "wi_z",
+      "towards_x", "towards_y", "towards_z",   "half_x",         "half_y", "half_z",      "height",  "extent",
+      "emphasis", "solid_angle", "covers",     "met",            "met_here", "room",      "covered", "before",
+      "value",  "density",  "earlier",         "lobe_value",     "lobe_weight", "lobe_colour", "lobe_towards",
+      "lobe_half", "lobe_exponent", "lobe_radius", "lobe_end",   "rest_weight", "rest_colour", "v_1",  "v_2",
+      "u_0",    "u_1",      "u_2",             "u_all",          "v_all",  "aimed",       "level",   "colours",
+      "half_way"};
   return names;
 }
 
@@ -91,7 +102,12 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
     if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
-    if (sum[c].stretched) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
+    if (sum[c].stretched != Tangent::None) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
+    if (sum[c].stretched == Tangent::Surface) {
+      program.output(fmt::format("tangent_{}_x", c), sum[c].tangent.x);
+      program.output(fmt::format("tangent_{}_y", c), sum[c].tangent.y);
+      program.output(fmt::format("tangent_{}_z", c), sum[c].tangent.z);
+    }
     if (sum[c].turned) {
       program.output(fmt::format("normal_{}_x", c), sum[c].normal.x);
       program.output(fmt::format("normal_{}_y", c), sum[c].normal.y);
@@ -129,6 +145,39 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
 
 Recording finish(const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
   return {program.print_osl(indent, frame_names()), std::move(closures), program.operations(), program.inputs()};
+}
+
+Vec3<Expr> input3(const std::string& name) {
+  return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
+}
+/// An OSL vector.
+Vec3<Expr> input_vector(const std::string& name) {
+  return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
+}
+void output3(Program& program, const std::string& name, const Vec3<Expr>& v) {
+  program.output(name + "_x", v.x);
+  program.output(name + "_y", v.y);
+  program.output(name + "_z", v.z);
+}
+
+/// Closures whose numbers are the variables that output_closures() assigned.
+ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
+  for (std::size_t c = 0; c < sum.size(); ++c) {
+    sum[c].weight = Rgb<Expr>::input(fmt::format("weight_{}", c));
+    if (has_ramp(sum[c].kind))
+      for (std::size_t i = 0; i < kRampSize; ++i) sum[c].ramp[i] = Rgb<Expr>::input(ramp_entry(c, i));
+    if (sum[c].kind == ClosureKind::PhongRamp) sum[c].exponent = Expr::input(fmt::format("exponent_{}", c));
+    if (has_facets(sum[c].kind)) sum[c].alpha = Expr::input(fmt::format("alpha_{}", c));
+    if (sum[c].stretched != Tangent::None) sum[c].alpha_across = Expr::input(fmt::format("alpha_across_{}", c));
+    if (sum[c].stretched == Tangent::Surface) sum[c].tangent = input3(fmt::format("tangent_{}", c));
+    if (sum[c].turned) sum[c].normal = input3(fmt::format("normal_{}", c));
+  }
+  return sum;
+}
+
+/// The base of an aimed form; none for what lies on both sides of the surface.
+ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf) {
+  return two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(recorded_wo(model, brdf));
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
@@ -264,6 +313,8 @@ const char* name_of(RepresentationKind kind) {
   switch (kind) {
     case RepresentationKind::Exact:
       return "exact";
+    case RepresentationKind::Aimed:
+      return "aimed";
     case RepresentationKind::Sampled:
       return "sampled";
     case RepresentationKind::Fitted:
@@ -277,16 +328,21 @@ const char* name_of(RepresentationKind kind) {
 }
 
 RepresentationKind representation_named(const std::string& name) {
-  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled, RepresentationKind::Fitted,
-                                  RepresentationKind::Controlled, RepresentationKind::Twin})
+  for (RepresentationKind kind :
+       {RepresentationKind::Exact, RepresentationKind::Aimed, RepresentationKind::Sampled, RepresentationKind::Fitted,
+        RepresentationKind::Controlled, RepresentationKind::Twin})
     if (name == name_of(kind)) return kind;
-  input_error("unknown representation '{}': expected one of exact, sampled, fitted, controlled, twin", name);
+  input_error("unknown representation '{}': expected one of exact, aimed, sampled, fitted, controlled, twin", name);
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
   if (!model.has_scatter()) return {RepresentationKind::Exact};
   std::vector<RepresentationKind> kinds = {RepresentationKind::Sampled};
-  if (model.has_exact()) kinds.insert(kinds.begin(), RepresentationKind::Exact);
+  // An exact form for all choices leaves nothing to aim.
+  const bool exact = model.has_exact();
+  if (!exact || !form_values(model, RepresentationKind::Exact).empty())
+    kinds.insert(kinds.begin(), RepresentationKind::Aimed);
+  if (exact) kinds.insert(kinds.begin(), RepresentationKind::Exact);
   if (!model.info().properties.fit_axis.empty()) kinds.push_back(RepresentationKind::Fitted);
   return kinds;
 }
@@ -342,12 +398,113 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
   return finish(program, indent, std::move(closures));
 }
 
+AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int indent) {
+  Recorder recorder;
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  const Vec3<Expr> wo = recorded_wo(model, *brdf);
+  // The side that a model of two sides calls z > 0.
+  const auto turned = [&](Vec3<Expr> w) {
+    if (two_sided(model, *brdf)) w.z = w.z * Expr::input("side");
+    return w;
+  };
+  AimedRecording out;
+  const ClosureSum<Expr> base = recorded_base(model, *brdf);
+  {
+    Program program;
+    std::vector<RecordedClosure> closures;
+    output_closures(base, program, closures);
+    out.base = finish(program, indent, closures);
+  }
+  {
+    Program program;
+    output3(program, "drawn", turned(draw(*brdf, !base.empty(), wo, recorded_u())));
+    out.draw = finish(program, indent);
+  }
+  {
+    Program program;
+    const Vec3<Expr> wi = input3("wi");
+    Rgb<Expr> given(Expr(0));
+    // Closures are on the viewer's side, where the model's frame is the shader's.
+    for (const Closure<Expr>& c : input_closures(base)) given += evaluate(c, wi, wo);
+    const Excess<Expr> e = excess(*brdf, !base.empty(), given, turned(wi), wo);
+    program.output("value", e.value);
+    program.output("density", e.density);
+    out.value = finish(program, indent);
+  }
+  return out;
+}
+
+const AimedSteps& aimed_steps(int indent) {
+  static std::mutex mutex;
+  static std::map<int, AimedSteps> made;
+  const std::lock_guard lock(mutex);
+  if (const auto it = made.find(indent); it != made.end()) return it->second;
+  Recorder recorder;
+  AimedSteps steps;
+  const auto record_step = [&](const auto& outputs) {
+    Program program;
+    outputs(program);
+    return finish(program, indent);
+  };
+  AimedLobe<Expr> earlier;
+  earlier.towards = input_vector("lobe_towards[earlier]");
+  earlier.half = input_vector("lobe_half[earlier]");
+  earlier.exponent = Expr::input("lobe_exponent[earlier]");
+  earlier.sinRadius = Expr::input("lobe_radius[earlier]");
+  earlier.cosEnd = Expr::input("lobe_end[earlier]");
+  const Vec3<Expr> centre = input_vector("centre");
+  steps.room = record_step([&](Program& p) { p.output("room", minimum(Expr::input("room"), room_beside(centre, earlier))); });
+  steps.aim = record_step([&](Program& p) {
+    const LampPatch<Expr> patch{centre, input_vector("across"), input_vector("along"), Expr::input("disk")};
+    const AimedLamp<Expr> lamp = aim_at(patch, Expr::input("room"), Expr::input("v_1"), Expr::input("v_2"),
+                                        input3("drawn"), input3("wo"));
+    output3(p, "wi", lamp.wi);
+    output3(p, "towards", lamp.lobe.towards);
+    output3(p, "half", lamp.lobe.half);
+    p.output("lobe_exponent[lamp]", lamp.lobe.exponent);
+    p.output("lobe_radius[lamp]", lamp.lobe.sinRadius);
+    p.output("lobe_end[lamp]", lamp.lobe.cosEnd);
+    p.output("height", lamp.height);
+    p.output("extent", lamp.extent);
+    p.output("emphasis", lamp.emphasis);
+    p.output("solid_angle", lamp.solid_angle);
+    p.output("covers", lamp.covers);
+    p.output("met_here", lamp.met);
+  });
+  const Rgb<Expr> value = Rgb<Expr>::input("value");
+  const Expr density = Expr::input("density");
+  steps.less = record_step([&](Program& p) {
+    p.output("value", value - Rgb<Expr>::input("lobe_value[earlier]") * evaluate(earlier, input3("wi")));
+  });
+  steps.send = record_step([&](Program& p) {
+    AimedLamp<Expr> lamp;
+    lamp.height = Expr::input("height");
+    lamp.extent = Expr::input("extent");
+    lamp.emphasis = Expr::input("emphasis");
+    lamp.solid_angle = Expr::input("solid_angle");
+    lamp.covers = Expr::input("covers");
+    lamp.met = Expr::input("met_here");
+    const Sent<Expr> sent = send(lamp, value, density);
+    p.output("covered", Rgb<Expr>::input("covered") + sent.covered);
+    p.output("lobe_value[lamp]", sent.value);
+    p.output("lobe_weight[lamp]", sent.weight);
+    p.output("lobe_colour[lamp]", sent.colour);
+  });
+  steps.rest = record_step([&](Program& p) {
+    const Rest<Expr> left =
+        rest(value, density, Rgb<Expr>::input("covered"), Expr::input("met"), Rgb<Expr>::input("before"));
+    p.output("rest_weight", left.weight);
+    p.output("rest_colour", left.colour);
+  });
+  return made.emplace(indent, std::move(steps)).first->second;
+}
+
 Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
   Recorder recorder;
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return finish(program, indent, {{ClosureKind::Reflection, false, false, Division::Done}});
+  return finish(program, indent, {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
 }
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,

@@ -13,6 +13,7 @@ namespace brdfc {
 
 enum class RepresentationKind {
   Exact,       ///< closures that equal the model
+  Aimed,       ///< closures aimed at lamps that carry the model there, and one drawn direction for the rest (aimed.h)
   Sampled,     ///< the shader samples the model itself, one narrow lobe per sample
   Fitted,      ///< closures that come close to the model, for one set of parameters or along a number (fit.h)
   Controlled,  ///< those and a sample of what they lack (controlled.h)
@@ -48,7 +49,7 @@ enum class Division { Done, ByLargest, ByChannel };
 struct RecordedClosure {
   ClosureKind kind;
   bool turned;     ///< has a normal of its own
-  bool stretched;  ///< facets of two roughnesses
+  Tangent stretched;  ///< facets of two roughnesses, and along what
   Division division;
   bool operator==(const RecordedClosure&) const = default;
 };
@@ -62,12 +63,30 @@ struct Recording {
 };
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
-/// alpha_i, ior_i, and if it is turned normal_i_x, normal_i_y, normal_i_z; Controlled: these, wi_x, wi_y, wi_z,
+/// alpha_i, alpha_across_i, ior_i, and of its normal and tangent, if they are its own, normal_i_x and so on; Controlled: these, wi_x, wi_y, wi_z,
 /// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number and what it has
 /// terms by, which it reads, and factors(), which its weights still have to be multiplied by, the mirror's excepted; it
 /// is right for these `views`.
 /// Throws InputError if more closures than Cycles keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent, const Cosines& views = {});
+/// The statements of an aimed form, for one combination of choices. All read the parameters and wo_x, wo_y, wo_z.
+struct AimedRecording {
+  Recording base;   ///< assigns what its closures take, as an exact form's
+  Recording draw;   ///< reads u_0, u_1, u_2; assigns drawn_x, drawn_y, drawn_z
+  Recording value;  ///< reads wi_x, wi_y, wi_z and the base's closures; assigns value and density
+};
+AimedRecording record_aimed(const Model&, const ParamValues& fixed, int indent);
+/// What is done with each lamp and at the end, which is the same for all models (aimed.h).
+struct AimedSteps {
+  Recording room;  ///< of lamp `earlier` and centre: assigns room_here
+  Recording aim;   ///< reads centre, across, along, disk, room, v_1, v_2, drawn_*; assigns wi_*, emphasis, solid_angle,
+                   ///< height, extent, covers, met_here and of the lobe towards_*, half_*, exponent, radius and cosine
+  Recording less;  ///< reads the lobe `earlier` and wi_*; assigns covers_here
+  Recording send;  ///< reads value, density and what aim assigned; assigns sent, covered_here, weight and colour
+  Recording rest;  ///< reads value, density, covered, met, before; assigns rest_weight and rest_colour
+};
+const AimedSteps& aimed_steps(int indent);
+
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
 

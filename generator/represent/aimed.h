@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The aimed form: base + lamps + rest. Equal to the model in expectation, whatever the base and wherever the lamps.
+//
+//   base   closures that carry most of the model (Brdf::base), or none
+//   lamps  one closure a lamp, aimed at it, whose value there is the model's own f cos less the base, so that light
+//          sampling meets the model itself
+//   rest   a direction that the shader draws, as a lobe as narrow as those of a sampled form, which carries what the
+//          other two leave of f cos, over the density of drawing it
+//
+// Where a drawn direction meets a lamp, lamp and rest share f cos - base by the balance heuristic (E. Veach, L. Guibas:
+// Optimally Combining Sampling Techniques for Monte Carlo Rendering, 1995): a lobe wins for lamps that are small beside
+// the model's lobe, the drawn direction for those that are large. Elsewhere the rest takes off what lobes give beside
+// their lamps. The one approximation: over a lamp f and the lamp's visibility are averaged apart.
+//
+// Directions and lamps are in the local frame of the shader: z is the normal on the viewer's side.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "model/sampling.h"
+#include "represent/closure.h"
+
+namespace brdfc {
+
+/// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample; empty
+/// ones cost nothing.
+inline constexpr int kMaxLamps = 8;
+
+/// A lamp as a flat patch, in units of any length: a disk or ellipse with these half axes, or a rectangle. A sun has its
+/// centre at distance 1.
+template <class T> struct LampPatch {
+  Vec3<T> centre;         ///< from the shading point
+  Vec3<T> across, along;  ///< half axes, perpendicular to each other and longer than 0
+  T disk;                 ///< 1: disk or ellipse, 0: rectangle
+
+  /// A point by two coordinates from -1 to 1, of a disk within the unit circle.
+  Vec3<T> at(const T& x, const T& y) const { return centre + across * x + along * y; }
+};
+
+/// How much of a ramp's flank, from 1 down, an aimed lobe is level over: colours of 7/k at its entries k >= kLevel make
+/// colour times cos^e equal 1 (to 2 %) where cos^e >= kLevel / 7.
+inline constexpr int kLevel = 3;
+/// Colours of the ramp of an aimed lobe whose height is 1, from cos^e = 0 to cos^e = 1.
+constexpr std::array<double, kRampSize> aimed_ramp() {
+  std::array<double, kRampSize> ramp{};
+  for (int k = kLevel; k < kRampSize; ++k) ramp[std::size_t(k)] = double(kRampSize - 1) / k;
+  return ramp;
+}
+
+/// phong_ramp(half, exponent, height * aimed_ramp()): f cos is 1 over the lamp and falls to 0 beside it.
+template <class T> struct AimedLobe {
+  Vec3<T> towards;  ///< the lamp's centre
+  Vec3<T> half;     ///< the closure's normal
+  T exponent;
+  T sinRadius;  ///< of the lamp
+  T cosEnd;     ///< from its centre on the lobe is 0
+};
+
+/// What a shading point makes of a lamp.
+template <class T> struct AimedLamp {
+  AimedLobe<T> lobe;
+  Vec3<T> wi;     ///< to a point of the lamp, unit
+  T emphasis;     ///< what the point stands for, over the mean of all points; 0 where the lamp is left to the rest
+  T solid_angle;  ///< of the lamp
+  T height;       ///< of the closure's colours over aimed_ramp() where f cos is 1
+  T extent;       ///< solid angle under the lobe, roughly
+  T covers;       ///< the lobe's f cos in the drawn direction
+  T met;          ///< 1 where the drawn direction meets the lamp, else 0
+};
+
+/// cos^e -> f cos of an aimed lobe over its height and (half.wi): ramp times cos^e.
+template <class T> T aimed_profile(const T& lobe) {
+  const T position = T(kRampSize - 1) * lobe;
+  // The entry below the position: its colour and the step to the next are 7/k and 7/(k (k + 1)).
+  T k(kLevel);
+  for (int i = kLevel + 1; i < kRampSize - 1; ++i) k = select(position < T(i), k, T(i));
+  const T level = (T(kRampSize - 1) / k) * (T(1) - (position - k) / (k + T(1)));
+  const T flank = (position - T(kLevel - 1)) * T(double(kRampSize - 1) / kLevel);
+  return lobe * select(position < T(kLevel), maximum(flank, T(0)), level);
+}
+
+/// f cos of the lobe of an aimed closure.
+template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
+  const T cosAlpha = dot(lobe.towards, wi), rise = dot(lobe.half, wi);
+  const T profile = aimed_profile(pow(maximum(cosAlpha, lobe.cosEnd), lobe.exponent));
+  return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
+}
+
+/// How far a lobe towards `centre` may reach, as a sine, without covering the lamp of an earlier one: what it gave there
+/// the drawn directions would have to take off again, bright as the lamp is.
+template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earlier) {
+  return length(normalize(centre) - earlier.towards) - earlier.sinRadius;
+}
+
+/// A closure aimed at a lamp whose bounding sphere has the radius of this sine. wo: towards the viewer, unit.
+template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, const T& room, const Vec3<T>& wo) {
+  // Room for the drawn directions' own lobes, 5e-3 wide; and cos^e of a narrower lobe loses digits in single precision.
+  constexpr double kRoom = 1.1, kLeast = 0.02, kTight = 0.005, kMost = 0.95;
+  // The flank ends where cos^e = (kLevel - 1) / 7; sines of small angles are as the roots of the logarithms.
+  const double level = std::log(double(kLevel) / (kRampSize - 1)), end = std::log(double(kLevel - 1) / (kRampSize - 1));
+  const T wide = minimum(T(kRoom) * sinRadius + T(kLeast), T(std::sqrt(level / end)) * room);
+  const T sinWidth = minimum(maximum(wide, sinRadius + T(kTight)), T(kMost));
+  AimedLobe<T> lobe;
+  lobe.towards = towards;
+  lobe.half = normalize(towards + wo);
+  // cos^e = kLevel / 7 at the width
+  lobe.exponent = T(2 * level) / log1p(-sqr(sinWidth));
+  lobe.sinRadius = sinRadius;
+  lobe.cosEnd = exp(T(end) / lobe.exponent);
+  return lobe;
+}
+
+/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that the
+/// rest carries.
+template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2,
+                                       const Vec3<T>& drawn, const Vec3<T>& wo) {
+  /// Sine of the radius beyond which a lamp is so near that drawn directions meet it well.
+  constexpr double kNearest = 0.85;
+  /// Cosine of half the angle between lamp and viewer below which the closure would shine through the surface.
+  constexpr double kLeastHalf = 0.07;
+  const auto disk = patch.disk > T(0.5);
+  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
+  const T distance2 = dot(patch.centre, patch.centre);
+  const T radius2 = select(disk, maximum(a2, b2), a2 + b2);
+  AimedLamp<T> lamp;
+  const Vec3<T> towards = patch.centre / sqrt(distance2);
+  lamp.lobe = aim(towards, sqrt(minimum(radius2 / distance2, T(1))), room, wo);
+  const T rise = dot(lamp.lobe.half, towards);
+  lamp.height = T(2) * pi<T>() / (rise * (lamp.lobe.exponent + T(2)));
+  lamp.extent = T(2) * pi<T>() * (T(1) - lamp.lobe.cosEnd);
+
+  const T radius = sqrt(v1), angle = T(2) * pi<T>() * v2;
+  const Vec3<T> point = patch.at(select(disk, radius * cos(angle), T(2) * v1 - T(1)),
+                                 select(disk, radius * sin(angle), T(2) * v2 - T(1)));
+  lamp.wi = normalize(point);
+  // Solid angle over area, up to the length of `normal`, which is the area up to 4 or pi.
+  const Vec3<T> normal = cross(patch.across, patch.along);
+  const auto density = [&](const Vec3<T>& p) {
+    const T d2 = dot(p, p);
+    return abs(dot(normal, p)) / (d2 * sqrt(d2));
+  };
+  // Its mean over the lamp by four points, which is right to third degree (A. Stroud: Approximate Calculation of Multiple
+  // Integrals, 1971, C2: 3-1 and S2: 3-1).
+  const T node = select(disk, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(disk, T(0), node);
+  const T mean = (density(patch.at(node, other)) + density(patch.at(-node, other * T(-1))) +
+                  density(patch.at(other * T(-1), node)) + density(patch.at(other, -node))) /
+                 T(4);
+  lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
+  const auto usable = radius2 < T(kNearest * kNearest) * distance2 && rise > T(kLeastHalf);
+  lamp.emphasis = select(usable, density(point) / maximum(mean, tiny<T>()), T(0));
+
+  lamp.covers = evaluate(lamp.lobe, drawn);
+  const T facing = dot(normal, drawn);
+  const T reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const Vec3<T> offset = drawn * reach - patch.centre;
+  const T x2 = sqr(dot(offset, patch.across) / a2), y2 = sqr(dot(offset, patch.along) / b2);
+  const auto inside = reach > T(0) && select(disk, x2 + y2, maximum(x2, y2)) < T(1);
+  lamp.met = select(usable && inside, T(1), T(0));
+  return lamp;
+}
+
+/// What a lamp's lobe carries and the rest has to take off.
+template <class T> struct Sent {
+  Rgb<T> value;    ///< f cos over the lamp
+  Rgb<T> covered;  ///< less than that where the drawn direction meets the lamp, f cos of the lobe elsewhere
+  T weight;        ///< of the closure: what Cycles follows it by
+  Rgb<T> colour;   ///< aimed_ramp() times this are the closure's colours
+};
+
+/// `value`: f cos - base towards AimedLamp::wi, less what the lobes of earlier lamps give there; `density` that of
+/// drawing it.
+template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, const T& density) {
+  // Cycles drops closures of small weight.
+  constexpr double kLeastWeight = 1e-3;
+  Sent<T> out;
+  out.value = value * (lamp.emphasis / (T(1) + lamp.solid_angle * density));
+  out.covered = out.value * (lamp.covers - lamp.met);
+  const T size = maximum(max_component(out.value), max_component(out.value * T(-1)));
+  out.weight = select(size > T(0), minimum(maximum(size * lamp.extent, T(kLeastWeight)), T(1)), T(0));
+  out.colour = out.value * (lamp.height / maximum(out.weight, T(kLeastWeight)));
+  return out;
+}
+
+/// The drawn direction's weight without its sign, and sign and colour.
+template <class T> struct Rest {
+  T weight;
+  Rgb<T> colour;
+};
+
+/// `value`: f cos - base in the drawn direction, `density` that of drawing it, `covered` the sum over the lamps. `met`:
+/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one.
+template <class T>
+Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met, const Rgb<T>& before) {
+  const auto drawn = density > T(0);
+  const T p = select(drawn, density, T(1));
+  const Rgb<T> left = value - before;
+  const Rgb<T> kept = select(met > T(0), left * (met / (T(1) + met * p)), left / p);
+  const Rgb<T> all = select(drawn, kept - (covered - before) / p, Rgb<T>(T(0)));
+  Rest<T> out;
+  out.weight = maximum(max_component(all), max_component(all * T(-1)));
+  out.colour = all / maximum(out.weight, tiny<T>());
+  return out;
+}
+
+/// f cos - base, with the density of the direction in draw().
+template <class T> struct Excess {
+  Rgb<T> value;
+  T density;
+};
+
+/// How often the drawn direction comes from everywhere, where a base may give light that the model has none of.
+inline constexpr double kFromEverywhere = 0.1;
+
+/// u: three numbers in [0, 1). `with_base`: whether there is a base.
+template <class T> Vec3<T> draw(const Brdf<T>& brdf, bool with_base, const Vec3<T>& wo, const Vec3<T>& u) {
+  if (!with_base) return brdf.sample(wo, u).wi;
+  const T share = T(1 - kFromEverywhere);
+  // The number that chooses serves again, stretched.
+  const Sample<T> s = brdf.sample(wo, {minimum(u.x / share, T(1 - 1e-7)), u.y, u.z});
+  return select(u.x < share, s.wi, sample_cosine(u.y, u.z));
+}
+
+template <class T>
+Excess<T> excess(const Brdf<T>& brdf, bool with_base, const Rgb<T>& base, const Vec3<T>& wi, const Vec3<T>& wo) {
+  Excess<T> out;
+  const Rgb<T> f_cos = brdf.eval(wi, wo) * abs(wi.z);
+  out.value = with_base ? f_cos - base : f_cos;
+  out.density = brdf.pdf(wi, wo);
+  if (with_base) out.density = T(1 - kFromEverywhere) * out.density + T(kFromEverywhere) * cosine_pdf(wi);
+  return out;
+}
+
+/// All that one sample hands to the renderer beside the base.
+struct AimedSum {
+  std::vector<AimedLobe<double>> lobes;
+  std::vector<Rgb<double>> values;  ///< of the lobes: f cos is value times evaluate(lobe, wi)
+  Vec3<double> wi;                  ///< the drawn direction
+  Rgb<double> rest;                 ///< its weight
+};
+
+/// As the shader goes about it (pack/shader.cpp). u: three numbers that draw the direction, v1, v2: that choose points of
+/// the lamps.
+AimedSum aimed_sum(const Brdf<double>&, const std::vector<LampPatch<double>>&, const Vec3<double>& wo,
+                   const Vec3<double>& u, double v1, double v2);
+
+}  // namespace brdfc

@@ -1,0 +1,632 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How forms that aim at lamps learn of them: the shared node group and what keeps it current."""
+
+import math
+import subprocess
+import sys
+from importlib import import_module
+
+import bpy
+import helpers
+import numpy as np
+import pytest
+from mathutils import Matrix, Quaternion
+
+
+@pytest.fixture(scope="module")
+def lamps(extension):
+    return import_module(f"{extension.package}.lamps")
+
+
+@pytest.fixture(scope="module")
+def aimed(extension):
+    """A model and a form of it that aims at lamps."""
+    return next(
+        (model, form)
+        for model, entry in extension.api.models().items()
+        for form, made in entry["representations"].items()
+        if made.get("lamps")
+    )
+
+
+@pytest.fixture
+def ball(extension, empty, aimed):
+    """A ball at the origin of a material that aims at lamps, in the empty file."""
+    return helpers.add_sphere(empty, extension.api.new_material(*aimed), segments=8)
+
+
+def add_lamp(scene, kind, name=None, location=(0, 0, 4), turn=(0.3, -0.5, 0.9), **settings):
+    data = bpy.data.lights.new(name or kind, kind)
+    for key, value in settings.items():
+        setattr(data, key, value)
+    item = bpy.data.objects.new(name or kind, data)
+    item.location, item.rotation_euler = location, turn
+    scene.collection.objects.link(item)
+    return item
+
+
+def slots(scene, update=True):
+    """The twelve numbers of each filled slot, as Cycles gets them from the evaluated group."""
+    layer = scene.view_layers[0]
+    if update:
+        layer.update()
+        layer.update()  # what a handler changed
+    group = bpy.data.node_groups["brdfc Lamps"].evaluated_get(layer.depsgraph)
+    assert group.is_evaluated
+    numbers = []
+    for i in range(1, 9):
+        numbers.append([])
+        for part in ("LampPlace", "LampTurn", "LampScale", "LampShape"):
+            numbers[-1] += [s.default_value for s in group.nodes[f"{part}{i}"].inputs]
+    kinds = [n[9] for n in numbers]
+    filled = next((i for i, k in enumerate(kinds) if k == 0), 8)
+    assert not any(np.any(n) for n in numbers[filled:]), "empty slots hold nothing"
+    return [np.array(n) for n in numbers[:filled]]
+
+
+def axes(slot):
+    """Axes of the lamp as the shader makes them of its quaternion, as columns."""
+    quaternion = Quaternion((slot[8], *slot[3:6]))
+    assert quaternion.magnitude == pytest.approx(1, abs=1e-5)
+    return np.array(quaternion.to_matrix())
+
+
+def expected(item):
+    """(kind, a, b) of a lamp, its place, axes of unit length and scales."""
+    light, matrix = item.data, np.array(item.matrix_world)
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    shape = {
+        "POINT": lambda: (1, light.shadow_soft_size, 0),
+        "SPOT": lambda: (1, light.shadow_soft_size, 0),
+        "SUN": lambda: (2, light.angle, 0),
+        "AREA": lambda: (
+            3 if light.shape in {"SQUARE", "RECTANGLE"} else 4,
+            light.size,
+            light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size,
+        ),
+    }[light.type]()
+    return shape, matrix[:3, 3], matrix[:3, :3] / scale, scale
+
+
+def assert_lamp(slot, item):
+    shape, place, turn, scale = expected(item)
+    assert slot[9:] == pytest.approx(shape, rel=1e-5)
+    assert slot[:3] == pytest.approx(place, abs=1e-5)
+    assert slot[6:8] == pytest.approx(scale[:2], rel=1e-4)
+    found = axes(slot)
+    assert found[:, 2] == pytest.approx(turn[:, 2], abs=1e-4), "it shines along -z"
+    # A rectangle turned round is the same one.
+    for axis in (0, 1):
+        assert abs(found[:, axis] @ turn[:, axis]) == pytest.approx(1, abs=1e-4)
+
+
+def assert_lamps(found, items):
+    assert len(found) == len(items)
+    for item in items:
+        place = np.array(item.matrix_world.translation)
+        near = [s for s in found if np.allclose(s[:3], place, atol=1e-4)]
+        assert near, f"no slot holds {item.name}"
+        assert_lamp(near[0], item)
+
+
+def test_model_groups_are_fed_by_the_one_group(extension, ball, aimed):
+    model, form = aimed
+    others = [m for m, e in extension.api.models().items() if form in e["representations"]]
+    extension.api.new_material(others[-1], form)
+    (shared,) = [g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]
+    count = extension.pack.representation(*aimed)["lamps"]
+    node = extension.nodes.group_nodes(ball.active_material)[0]
+    script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
+    fed = {s.identifier: s.links[0] for s in script.inputs if s.identifier.startswith("Lamp")}
+    assert len(fed) == 4 * count
+    for name, link in fed.items():
+        assert link.from_node.node_tree == shared and link.from_socket.name == name
+    assert not extension.nodes.script_problem(node.node_tree)
+    assert slots(bpy.context.scene) == []
+    # It goes with the last that has it.
+    for material in list(bpy.data.materials):
+        bpy.data.materials.remove(material)
+    extension.nodes.remove_unused_groups()
+    assert helpers.counts() == dict.fromkeys(helpers.counts(), 0)
+
+
+LAMPS = {
+    "point": ("POINT", {"shadow_soft_size": 0.25}),
+    "spot": ("SPOT", {"shadow_soft_size": 0.0}),
+    "sun": ("SUN", {"angle": 0.03}),
+    "square": ("AREA", {"shape": "SQUARE", "size": 0.5, "size_y": 3.0}),
+    "rectangle": ("AREA", {"shape": "RECTANGLE", "size": 0.5, "size_y": 2.0}),
+    "disk": ("AREA", {"shape": "DISK", "size": 0.5, "size_y": 3.0}),
+    "ellipse": ("AREA", {"shape": "ELLIPSE", "size": 0.5, "size_y": 2.0}),
+}
+
+
+def test_every_type_of_lamp(ball, empty, subtests):
+    for name, (kind, settings) in LAMPS.items():
+        with subtests.test(name):
+            lamp = add_lamp(empty, kind, location=(1, 2, 3), **settings)
+            for scale in ((1, 1, 1), (2, 0.5, 3), (-2, 0.5, 1), (-1, -1, -1)):
+                lamp.scale = scale
+                (slot,) = slots(empty)
+                assert_lamp(slot, lamp)
+            bpy.data.objects.remove(lamp)
+            assert slots(empty) == []
+
+
+def test_quaternions_are_of_one_sign(ball, empty):
+    """Blender works out the four numbers apart from each other."""
+    random = np.random.default_rng(1)
+    lamp = add_lamp(empty, "SUN")
+    for _ in range(40):
+        lamp.rotation_euler = random.uniform(-7, 7, 3)
+        lamp.scale = random.choice([-1, 1], 3) * random.uniform(0.2, 3, 3)
+        assert_lamp(slots(empty)[0], lamp)
+
+
+def test_parents_and_constraints(ball, empty):
+    parent = bpy.data.objects.new("Parent", None)
+    empty.collection.objects.link(parent)
+    parent.location, parent.rotation_euler, parent.scale = (1, 2, 3), (1, 0.2, 0.4), (2, 2, 2)
+    child = add_lamp(empty, "AREA", "Child", shape="RECTANGLE", size=0.5, size_y=2)
+    child.parent = parent
+    tracked = add_lamp(empty, "SPOT", "Tracked", location=(-3, 1, 5))
+    tracked.constraints.new("TRACK_TO").target = parent
+    assert_lamps(slots(empty), [child, tracked])
+    # A parent that is stretched makes the child oblique; where it shines is kept.
+    parent.scale = (3, 1, 1)
+    found = slots(empty)
+    oblique = next(s for s in found if s[9] == 3)
+    direction = child.matrix_world.col[2].to_3d().normalized()
+    assert axes(oblique)[:, 2] == pytest.approx(direction, abs=1e-4)
+    parent.scale = (1, 1, 1)
+    assert_lamps(slots(empty), [child, tracked])
+
+
+def animate(lamp):
+    for frame, place, turn, radius in ((1, (0, 0, 4), 0.0, 0.1), (11, (2, -1, 5), 1.0, 0.6)):
+        lamp.location, lamp.rotation_euler.x = place, turn
+        lamp.data.shadow_soft_size = radius
+        lamp.keyframe_insert("location", frame=frame)
+        lamp.keyframe_insert("rotation_euler", frame=frame)
+        lamp.data.keyframe_insert("shadow_soft_size", frame=frame)
+
+
+def test_animation_renaming_and_removing(ball, empty):
+    lamp, other = (
+        add_lamp(empty, "POINT", "Key"),
+        add_lamp(empty, "SUN", "Fill", location=(1, 1, 1)),
+    )
+    animate(lamp)
+    seen = set()
+    for frame in (1, 6, 11):
+        empty.frame_set(frame)
+        found = slots(empty, update=False)
+        assert_lamps(found, [lamp, other])
+        seen.add(round(float(next(s for s in found if s[9] == 1)[10]), 4))
+    assert len(seen) == 3
+    lamp.name, lamp.data.name, other.name = "Renamed", "Too", "Key"
+    assert_lamps(slots(empty), [lamp, other])
+    bpy.data.objects.remove(lamp)
+    assert_lamps(slots(empty), [other])
+    add_lamp(empty, "POINT", "New", location=(3, 0, 0))
+    assert len(slots(empty)) == 2
+    other.hide_render = True
+    assert len(slots(empty)) == 1
+    other.hide_render = False
+    other.data.energy = 0
+    assert len(slots(empty)) == 1
+    other.data.energy = 1
+    assert len(slots(empty)) == 2
+    collection = bpy.data.collections.new("Hidden")
+    empty.collection.children.link(collection)
+    empty.collection.objects.unlink(other)
+    collection.objects.link(other)
+    assert len(slots(empty)) == 2
+    collection.hide_render = True
+    assert len(slots(empty)) == 1
+
+
+def test_undo(ball, empty):
+    add_lamp(empty, "POINT", "Key")
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="one")
+    add_lamp(empty, "SUN", "Fill")
+    assert len(slots(empty)) == 2
+    bpy.ops.ed.undo_push(message="two")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    assert [o.name for o in scene.objects if o.type == "LIGHT"] == ["Key"]
+    assert_lamps(slots(scene), [bpy.data.objects["Key"]])
+    bpy.ops.ed.redo()
+    scene = bpy.context.scene
+    assert_lamps(slots(scene), [o for o in scene.objects if o.type == "LIGHT"])
+    assert len(slots(scene)) == 2
+
+
+def test_two_scenes(lamps, ball, empty, extension):
+    here = add_lamp(empty, "POINT", "Here")
+    other = bpy.data.scenes.new("Other")
+    other.collection.objects.link(ball)
+    there = [add_lamp(other, "POINT", "There"), add_lamp(other, "SUN", "Sun", location=(5, 5, 5))]
+    assert_lamps(slots(empty), [here])
+    other.view_layers[0].update()
+    assert_lamps(slots(empty), [here])
+    window = bpy.context.window
+    window.scene = other
+    assert_lamps(slots(other), there)
+    window.scene = empty
+    assert_lamps(slots(empty), [here])
+    # A picture of a scene that no window shows has that scene's lamps.
+    met = []
+
+    def note(scene, *_):
+        met.append((scene.name, len([s for s in written() if s[9] != 0])))
+
+    def written():
+        group = lamps.find_group()
+        values = lamps._written(group, lamps._sockets(group))
+        return [values[12 * i : 12 * i + 12] for i in range(8)]
+
+    bpy.app.handlers.render_pre.append(note)
+    try:
+        other.render.engine = "CYCLES"
+        other.cycles.samples = 1
+        other.render.resolution_x = other.render.resolution_y = 8
+        helpers.add_camera(other)
+        helpers.render(other)
+    finally:
+        bpy.app.handlers.render_pre.remove(note)
+    assert met == [("Other", 2)]
+    assert_lamps(slots(empty), [here])
+
+
+def test_copies_of_the_group_give_way(extension, lamps, ball, empty, aimed, tmp_path):
+    lamp = add_lamp(empty, "POINT", "Key")
+    name = ball.active_material.name
+    bpy.context.view_layer.update()
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    # Appended to a file that has a group of its own.
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    own = extension.api.new_material(*aimed)
+    lamp = add_lamp(scene, "SUN", "Own")
+    with bpy.data.libraries.load(str(path)) as (_, to):
+        to.materials = [name]
+    helpers.add_sphere(scene, to.materials[0], segments=8)
+    helpers.add_sphere(scene, own, segments=8)
+    assert_lamps(slots(scene), [lamp])
+    (group,) = [g for g in bpy.data.node_groups if lamps.TAG in g]
+    for material in (own, to.materials[0]):
+        (node,) = extension.nodes.group_nodes(material)
+        inner = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
+        assert [n.node_tree for n in inner] == [group]
+    copy = group.copy()
+    next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup").node_tree = copy
+    lamp.data.angle = 0.5
+    assert_lamps(slots(scene), [lamp])
+    assert len([g for g in bpy.data.node_groups if lamps.TAG in g]) == 1
+
+
+def test_linked_lamps(extension, empty, aimed, tmp_path):
+    add_lamp(empty, "POINT", "Key", location=(1, 2, 3))
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    with bpy.data.libraries.load(str(path), link=True) as (_, to):
+        to.objects = ["Key"]
+    scene.collection.objects.link(to.objects[0])
+    helpers.add_sphere(scene, extension.api.new_material(*aimed), segments=8)
+    assert_lamps(slots(scene), [to.objects[0]])
+
+
+REOPENED = """
+import sys, os, bpy
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+assert not any("brdfc" in key for key in bpy.context.preferences.addons.keys())
+assert not bpy.app.autoexec_fail
+scene = bpy.context.scene
+bpy.data.objects["Sun"].rotation_euler.y += 0.4
+bpy.data.objects["Area"].data.size = 1.5
+scene.frame_set(6)
+layer = bpy.context.view_layer
+layer.update()
+group = bpy.data.node_groups["brdfc Lamps"].evaluated_get(layer.depsgraph)
+for lamp in ("Key", "Sun", "Area"):
+    item = bpy.data.objects[lamp]
+    light, matrix = item.data, item.matrix_world
+    print("LAMP", lamp, *matrix.translation, *matrix.col[2][:3])
+for i in (1, 2, 3):
+    values = [s.default_value for part in ("Place", "Turn", "Scale", "Shape")
+              for s in group.nodes[f"Lamp{part}{i}"].inputs]
+    print("SLOT", *values)
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+def test_a_file_needs_no_extension(ball, empty, tmp_path):
+    """In a process of its own, with Blender's factory settings: scripts in files may not run."""
+    animate(add_lamp(empty, "POINT", "Key"))
+    add_lamp(empty, "SUN", "Sun", location=(1, 0, 7))
+    add_lamp(empty, "AREA", "Area", location=(3, 3, 3), size=0.5)
+    path = tmp_path / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    script = tmp_path / "reopened.py"
+    script.write_text(REOPENED)
+    done = subprocess.run(
+        [sys.executable, str(script), str(path)],
+        capture_output=True,
+        text=True,
+        env={"BLENDER_USER_RESOURCES": str(tmp_path), "PATH": "/usr/bin:/bin"},
+    )
+    lines = [line.split() for line in done.stdout.splitlines()]
+    found = [np.array(line[1:], float) for line in lines if line and line[0] == "SLOT"]
+    items = {line[1]: np.array(line[2:], float) for line in lines if line and line[0] == "LAMP"}
+    assert len(items) == 3, done.stdout + done.stderr
+    shapes = {"Key": (1, 0.35, 0), "Sun": (2, None, 0), "Area": (3, 1.5, 1.5)}
+    for name, numbers in items.items():
+        (slot,) = [s for s in found if s[:3] == pytest.approx(numbers[:3], abs=1e-4)]
+        assert axes(slot)[:, 2] == pytest.approx(numbers[3:], abs=1e-4)
+        for got, want in zip(slot[9:], shapes[name], strict=True):
+            assert want is None or got == pytest.approx(want, rel=1e-4)
+
+
+def test_more_lamps_than_slots(extension, lamps, ball, empty):
+    for i in range(11):
+        place = (4 * math.cos(i), 4 * math.sin(i), 3)
+        add_lamp(empty, "POINT", f"Lamp{i}", location=place, energy=10 * (i + 1))
+    found = extension.api.see_lamps(empty)
+    assert [lamp.slot for lamp in found] == [*range(1, 9), None, None, None]
+    assert [lamp.name for lamp in found] == [f"Lamp{i}" for i in range(10, -1, -1)]
+    assert found[0].irradiance > found[7].irradiance > found[8].irradiance > 0
+    assert "fainter" in found[8].why and not found[7].why
+    assert_lamps(slots(empty), [bpy.data.objects[f"Lamp{i}"] for i in range(3, 11)])
+    # A lamp that becomes bright takes the slot of the faintest, and the others stay where they are.
+    before = slots(empty)
+    bpy.data.objects["Lamp0"].data.energy = 1000
+    after = slots(empty)
+    kept = [np.array_equal(a, b) for a, b in zip(before, after, strict=True)]
+    assert kept == [True] * 7 + [False]
+    assert_lamp(after[7], bpy.data.objects["Lamp0"])
+    # What counts is the light where the camera looks.
+    far = add_lamp(empty, "POINT", "Far", location=(0, 0, 500), energy=5000)
+    assert all(not np.allclose(s[:3], far.location) for s in slots(empty))
+    lines = helpers.Layout()
+    extension.ui.draw_lamps(lines, ball.active_material, empty)
+    text = " ".join(lines.log)
+    assert "Free of noise under" in text and "Far may be noisy" in text
+    assert "operator brdfc.find_lamps" in text
+    assert bpy.ops.brdfc.find_lamps() == {"FINISHED"}
+    assert_lamp(slots(empty)[0], bpy.data.objects["Lamp0"])
+
+
+def test_copies_of_collections(ball, empty):
+    collection = bpy.data.collections.new("Lamps")
+    lamp = add_lamp(empty, "AREA", "Inner", location=(1, 0, 0), shape="RECTANGLE", size=0.5)
+    empty.collection.objects.unlink(lamp)
+    collection.objects.link(lamp)
+    collection.instance_offset = (0, 0, 1)
+    places = []
+    for i in range(2):
+        item = bpy.data.objects.new(f"Copy{i}", None)
+        item.instance_type, item.instance_collection = "COLLECTION", collection
+        item.location, item.rotation_euler.x = (3 * i, 2, 4), i * 0.5
+        item.keyframe_insert("location", frame=1)
+        item.location.z += 2
+        item.keyframe_insert("location", frame=11)
+        empty.collection.objects.link(item)
+        places.append(item)
+    own = lamp.matrix_basis.copy()
+
+    def check(found):
+        assert len(found) == 2
+        for item in places:
+            matrix = item.matrix_world @ Matrix.Translation((0, 0, -1)) @ own
+            (slot,) = [s for s in found if np.allclose(s[:3], matrix.translation, atol=1e-4)]
+            assert slot[9:11] == pytest.approx((3, 0.5))
+            direction = matrix.col[2].to_3d().normalized()
+            assert axes(slot)[:, 2] == pytest.approx(direction, abs=1e-4)
+
+    for frame in (1, 6, 11):
+        empty.frame_set(frame)
+        check(slots(empty, update=False))
+    places[0].animation_data_clear()
+    places[0].location.x = 7
+    check(slots(empty))
+
+
+def sky(scene, **settings):
+    tree, background = helpers.add_world(scene)
+    node = tree.nodes.new("ShaderNodeTexSky")
+    if bpy.app.version < (5, 0, 0):
+        node.sky_type = "NISHITA"
+    for key, value in settings.items():
+        setattr(node, key, value)
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    return node
+
+
+def test_sun_of_a_sky(ball, empty):
+    node = sky(empty, sun_elevation=0.4, sun_rotation=1.2, sun_size=0.02)
+    assert slots(empty) == [pytest.approx([0, 0, 0, 0.4, 1.2, 0, 1, 1, 1, 5, 0.02, 0])]
+    node.sun_elevation, node.name = 0.7, 'A "name" of its own'
+    assert slots(empty)[0][3] == pytest.approx(0.7)
+    node.sun_rotation = 0.1
+    assert slots(empty)[0][4] == pytest.approx(0.1)
+    node.sun_disc = False
+    assert slots(empty) == []
+    node.sun_disc = True
+    assert len(slots(empty)) == 1
+    node.sky_type = "PREETHAM"
+    assert slots(empty) == []
+
+
+def environment(scene, pixels):
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new("sky", width, height, float_buffer=True)
+    image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+    image.update()
+    tree, background = helpers.add_world(scene)
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    return tree, background, node
+
+
+def spotted(direction, half_angle, radiance, width=512):
+    """A dim picture with a bright disc in a direction, and the directions of its pixels."""
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(width // 2) + 0.5) * 2 / width)
+    phi, theta = (0.5 - u) * 2 * np.pi, (v - 0.5) * np.pi
+    to = [np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)]
+    inside = np.stack(to, -1) @ np.array(direction) > math.cos(half_angle)
+    pixels = np.ones((width // 2, width, 4))
+    pixels[..., :3] = np.where(inside, radiance, 0.2)[..., None]
+    return pixels
+
+
+def test_bright_spots_are_found(lamps, subtests):
+    for direction in ((1, 0, 0), (-1, 0.001, 0.2), (0.3, -0.8, 0.5), (0, 0.1, 1), (0, 0, -1)):
+        with subtests.test(direction=direction):
+            to = np.array(direction) / np.linalg.norm(direction)
+            pixels = spotted(to, 0.05, 5000.0)[..., 0]
+            (spot,) = lamps.bright_spots(pixels)
+            assert spot[0] @ to > math.cos(0.01)
+            assert 0.1 <= spot[1] < 0.13
+            assert spot[2] == pytest.approx(5000 * math.pi * 0.05**2, rel=0.05)
+    plain = np.ones((64, 128))
+    assert lamps.bright_spots(plain) == [] == lamps.bright_spots(0 * plain)
+    window = spotted(np.array([1.0, 0, 0]), 0.3, 100.0)[..., 0]
+    assert lamps.bright_spots(window) == []  # drawn directions meet that
+    large = spotted(np.array([0.6, 0, 0.8]), 0.01, 1e5, width=2048)[..., 0]
+    (spot,) = lamps.bright_spots(large)
+    assert 0.02 <= spot[1] < 0.026
+
+
+def test_spot_of_an_environment_image(extension, ball, empty):
+    direction = np.array([0.48, -0.6, 0.64])
+    tree, background, node = environment(empty, spotted(direction, 0.03, 5000.0))
+    (slot,) = slots(empty)
+    assert slot[9] == 2 and 0.06 <= slot[10] < 0.09
+    assert axes(slot)[:, 2] == pytest.approx(direction, abs=5e-3)
+    # What the ray's direction is turned by, the spot is turned back by.
+    coordinate = tree.nodes.new("ShaderNodeTexCoord")
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    tree.links.new(coordinate.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+    rotation = mapping.inputs["Rotation"].default_value
+    rotation[:] = (0.2, 0.1, 0.8)
+    for kind in ("POINT", "TEXTURE"):
+        mapping.vector_type = kind
+        turn = np.array(rotation.to_matrix())
+        turn = turn if kind == "POINT" else turn.T
+        (slot,) = slots(empty)
+        assert turn @ axes(slot)[:, 2] == pytest.approx(direction, abs=5e-3)
+    bright = extension.api.see_lamps(empty)[0].irradiance
+    background.inputs["Strength"].default_value = 3.0
+    assert extension.api.see_lamps(empty)[0].irradiance == pytest.approx(3 * bright)
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs["Color"], node.inputs["Vector"])
+    assert slots(empty) == []
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and "vector" in lamp.why
+
+
+def emissive(strength=50.0, kind="ShaderNodeEmission"):
+    material = bpy.data.materials.new("Glow")
+    tree = helpers.empty_tree(material)
+    node, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
+    name = "Strength" if kind == "ShaderNodeEmission" else "Emission Strength"
+    node.inputs[name].default_value = strength
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material, node.inputs[name]
+
+
+@pytest.mark.parametrize("kind", ["ShaderNodeEmission", "ShaderNodeBsdfPrincipled"])
+def test_emissive_meshes(extension, ball, empty, kind):
+    material, strength = emissive(kind=kind)
+    glow = helpers.add_sphere(empty, material, segments=16)
+    glow.location, glow.scale = (2, 3, 6), (0.2, 0.2, 0.2)
+
+    def ball_at(place, radius):
+        return pytest.approx([*place, 0, 0, 0, 1, 1, 1, 1, radius, 0], rel=1e-4, abs=1e-5)
+
+    assert slots(empty) == [ball_at((2, 3, 6), 0.2)]
+    glow.location.x, glow.scale = 4, (0.3, 0.3, 0.3)
+    assert slots(empty) == [ball_at((4, 3, 6), 0.3)]
+    strength.default_value = 0
+    assert slots(empty) == []
+    strength.default_value = 5
+    assert len(slots(empty)) == 1
+    # A ball away from its object's origin can't be driven, but is followed.
+    glow.data.transform(Matrix.Translation((1, 0, 0)))
+    glow.data.update()
+    glow.rotation_euler = (0, 0, math.pi / 2)
+    assert slots(empty) == [ball_at((4, 3.3, 6), 0.3)]
+    glow.location.z = 7
+    assert slots(empty) == [ball_at((4, 3.3, 7), 0.3)]
+    glow.scale = (3, 3, 3)
+    assert slots(empty) == []
+    glow.scale = (0.3, 0.3, 0.001)
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and "neither round nor small" in lamp.why
+
+
+def test_nothing_is_written_when_nothing_changed(lamps, ball, empty, monkeypatch):
+    """Whatever is written has shaders compiled anew."""
+    written = []
+    write = lamps._write
+    monkeypatch.setattr(lamps, "_write", lambda s, v: (written.append(s), write(s, v)))
+    sky(empty)
+    _, _, node = environment(empty, spotted(np.array([0.6, 0, 0.8]), 0.03, 5000.0))
+    lamp = add_lamp(empty, "POINT", "Key")
+    add_lamp(empty, "AREA", "Area", location=(5, 5, 5))
+    glow = helpers.add_sphere(empty, emissive()[0], segments=8)
+    glow.location, glow.scale = (4, 4, 4), (0.1, 0.1, 0.1)
+    assert len(slots(empty)) == 4 and written
+    written.clear()
+    lamp.location.x = 3
+    lamp.data.energy = 3
+    lamp.data.shadow_soft_size = 0.7
+    ball.location.z = 0.5
+    glow.location.x = 5
+    ball.active_material.diffuse_color = (0, 0, 0, 1)
+    bpy.context.view_layer.update()
+    empty.frame_set(4)
+    lamps._now()
+    for _ in range(3):
+        bpy.context.view_layer.update()
+    assert not written
+    assert_lamp(slots(empty)[[s[9] for s in slots(empty)].index(3)], bpy.data.objects["Area"])
+
+
+def test_handlers_come_and_go(extension, lamps, empty, monkeypatch):
+    def ours():
+        return [
+            name
+            for name in dir(bpy.app.handlers)
+            for function in (getattr(bpy.app.handlers, name),)
+            if isinstance(function, list)
+            and any(getattr(f, "__module__", "") == lamps.__name__ for f in function)
+        ]
+
+    assert set(ours()) == set(lamps._HANDLERS)
+    lamps.unregister()
+    assert ours() == []
+    lamps.register()
+    # In a file without such a group they don't look at anything.
+    looked = []
+    monkeypatch.setattr(lamps, "_look", lambda *_: looked.append(1))
+    add_lamp(empty, "POINT", "Key")
+    bpy.context.view_layer.update()
+    empty.frame_set(2)
+    assert not looked
+
+
+def test_lean_files_name_the_number_of_lamps(extension, ball, empty):
+    lean = import_module(f"{extension.package}.lean")
+    add_lamp(empty, "POINT", "Key")
+    add_lamp(empty, "SUN", "Sun")
+    bpy.context.view_layer.update()
+    assert lean.needs(extension.api.used_materials())["lamps"] == 2
