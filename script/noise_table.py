@@ -507,10 +507,11 @@ for those named.
 **Noise** is the mean over the ball's pixels of the variance over the squared radiance + 0.01:
 relMSE, 64 samples a pixel unless said otherwise. The variance is that between pictures of {seeds}
 seeds (2 where there are 1,024 samples). The radiance is that of the form of the model with least
-noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. What is met once in
-thousands of samples may not be met at all: where noise is thousands, take it as rough. The unit is
-the noise of Blender's own Glossy node (GGX, colour 0.8, roughness 0.4) in the same scene. Grain, as
-the eye sees it, is the square root.
+noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. *unmet*: the form
+shows less than 80 % of the light of that form, because what comes as rare, bright dots came in none
+of the pictures; medians take that for more than any number. Where noise is thousands a few dots
+make it: take it as rough. The unit is the noise of Blender's own Glossy node (GGX, colour 0.8,
+roughness 0.4) in the same scene. Grain, as the eye sees it, is the square root.
 
 **Cost** is CPU time a sample in units of that node, forms and node taking turns in one process;
 compiling is left out. **Noise x cost** is how much longer than with the Glossy node a picture of
@@ -518,9 +519,15 @@ the same noise takes.
 """
 
 
+#: The noise of a form whose pictures lack light that comes as rare dots, of which there was none.
+UNMET = math.inf
+#: A form that shows less than this share of the light has not met the lamps.
+MET = 0.8
+
+
 def number(x):
-    if x is None or not math.isfinite(x):
-        return "-"
+    if x == UNMET:
+        return "unmet"
     if x >= 100:
         return f"{float(f'{x:.2g}'):.0f}" if x < 1e5 else f"{x:.0e}".replace("e+0", "e")
     return f"{x:.2g}" if x >= 0.01 else f"{x:.1g}"
@@ -569,9 +576,19 @@ class Page:
         row = self.noise.get(NODE, {}).get((UNIT, ""), {}).get(place)
         return float(row["noise"]) if row else None
 
+    def met(self, row):
+        """Whether the form shows the light that the steadiest form of the model shows."""
+        place = row["condition"], int(row["samples"])
+        steady = self.noise.get(row["divided_by"], {}).get(case_key(row), {}).get(place, row)
+        mean, of = float(row["mean"]), float(steady["mean"])
+        error = math.hypot(float(row["mean_error"]), float(steady["mean_error"]))
+        return mean >= MET * of or mean + 5 * error >= of
+
     def relative(self, form, case, place):
         row, unit = self.noise[form].get(case, {}).get(place), self.unit(place)
-        return float(row["noise"]) / unit if row and unit else None
+        if not row or not unit:
+            return None
+        return float(row["noise"]) / unit if self.met(row) else UNMET
 
     def cost(self, form, case, place):
         """That of the model's defaults, where lamps are as many."""
@@ -655,7 +672,7 @@ class Page:
         """Relative difference of the means and its standard error."""
         row = self.noise[form].get(case, {}).get(place)
         name, right = self.right(case, place)
-        if row is None or right is None or name == form:
+        if row is None or right is None or name == form or not self.met(right):
             return None
         mean, of = float(row["mean"]), float(right["mean"])
         error = math.hypot(float(row["mean_error"]), float(right["mean_error"]))
@@ -668,7 +685,8 @@ class Page:
             "where there is no exact one: difference and its standard error in percent. Of the",
             "other form the most samples count that were measured. Bold is what exceeds 1 % and 5",
             "standard errors. The error comes from the spread of a few pictures: where light is",
-            "met as rare dots alone, it is larger than it says.",
+            "met as rare dots alone, it is larger than it says; nothing stands where the form to",
+            "compare with has not met the lamp.",
             "",
         ]
         for form in self.forms:
