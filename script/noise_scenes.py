@@ -38,6 +38,7 @@ class Condition:
     samples: tuple = (64,)
     picked: bool = False
     penumbra: bool = False
+    floor: bool = True
 
 
 # ---- parts -------------------------------------------------------------------------------------
@@ -256,7 +257,11 @@ CONDITIONS = {
     "area": Condition("area lamp, 1 m", area, "point"),
     "emissive_ball": Condition("emissive ball, radius 0.2", emissive_ball, "point"),
     "sky_texture": Condition("Sky Texture with sun", sky_texture, "point"),
-    "smooth_sky": Condition("smooth sky", smooth_sky, "smooth_sky", (64, 1024)),
+    "smooth_sky": Condition("smooth sky", smooth_sky, "smooth_sky"),
+    # Light from the floor takes many random numbers, which hides how fast closures converge.
+    "open_sky": Condition(
+        "smooth sky, no floor", smooth_sky, "smooth_sky", (64, 1024), floor=False
+    ),
     "environment": Condition("environment image", environment_image, "smooth_sky"),
     "interior": Condition("interior, indirect light", interior, "point"),
     "penumbra": Condition(
@@ -305,7 +310,8 @@ def build(name, folder, size=SIZE):
     if condition.penumbra:
         return scene, *_penumbra(scene, size)
     world(scene)
-    quads(scene, "Floor", grey("Floor", 0.5), [rectangle(-20, 20, -20, 20, 0)])
+    if condition.floor:
+        quads(scene, "Floor", grey("Floor", 0.5), [rectangle(-20, 20, -20, 20, 0)])
     ball = sphere(scene, "Ball", None, 1.0, CENTRE)
     distance = (CAMERA - CENTRE).length
     half = math.asin(1 / distance)

@@ -136,12 +136,12 @@ def set_up(condition, size, pack):
     """(scene, object, mask) of a condition, lit by OSL. The last one serves again: importance maps
     of skies, which take seconds, are then kept."""
     wanted = condition, size, pack
-    if _blender.get("set_up") != wanted:
+    if _blender.pop("set_up", None) != wanted:
         loader = _blender["loader"]
         loader.pack.use(pack)
         _blender["scene"] = _blender["scenes"].build(condition, _blender["folder"], size)
         loader.api.enable_osl(_blender["scene"][0])
-        _blender["set_up"] = wanted
+    _blender["set_up"] = wanted
     return _blender["scene"]
 
 
@@ -324,6 +324,15 @@ def time_forms(job):
     return rows
 
 
+def tried(work, job):
+    """What `work` returns, or raises as an exception that a process without Blender can read."""
+    try:
+        return work(job)
+    except Exception as error:
+        _blender.pop("set_up", None)
+        raise RuntimeError(f"{type(error).__name__}: {error}") from None
+
+
 def titles():
     """What the page says of conditions, without Blender in the process that asks."""
     scenes = _blender["scenes"]
@@ -451,9 +460,10 @@ class Table:
 
 
 def run(jobs, work, table, options, cache, processes):
-    """Does what the table lacks, several processes side by side."""
+    """Does what the table lacks, several processes side by side. Returns how many jobs failed:
+    one condition that a form can't bear must not cost the others."""
     if not jobs:
-        return
+        return 0
     pool = concurrent.futures.ProcessPoolExecutor(
         processes,
         multiprocessing.get_context("spawn"),
@@ -461,12 +471,20 @@ def run(jobs, work, table, options, cache, processes):
         initargs=(options.extension, cache),
     )
     with pool:
-        pending = {pool.submit(work, job): job for job in jobs}
+        pending = {pool.submit(tried, work, job): job for job in jobs}
+        failed = 0
         for done, future in enumerate(concurrent.futures.as_completed(pending), 1):
             job = pending[future]
-            table.add(future.result())
-            case = Case(*job["case"])
-            print(f"[{done}/{len(jobs)}] {job['condition']}: {case}", file=sys.stderr, flush=True)
+            what = f"[{done}/{len(jobs)}] {job['condition']}: {Case(*job['case'])}"
+            try:
+                table.add(future.result())
+            except concurrent.futures.process.BrokenProcessPool:
+                raise  # Blender crashed: what it left to do is lost
+            except RuntimeError as error:
+                failed += 1
+                what += f": FAILED: {error}"
+            print(what, file=sys.stderr, flush=True)
+    return failed
 
 
 def is_missing(job, table):
@@ -820,6 +838,7 @@ def main():
 
     measured = Table(cache / "noise.csv", FIELDS, KEY)
     costs = Table(cache / "noise-cost.csv", COST_FIELDS, COST_FIELDS[:4])
+    failed = 0
     if not options.page:
         cases = cases_of(entries, options)
         fitted = packs(options, cases, entries, cache)
@@ -829,10 +848,11 @@ def main():
             if form not in known:
                 parser.error(f"--form: expected one of {', '.join(sorted(known))}; got {form!r}")
         missing = [job for job in jobs if is_missing(job, measured)]
-        run(missing, measure, measured, options, cache, options.processes)
+        failed += run(missing, measure, measured, options, cache, options.processes)
         if not options.no_costs:
             # One process: what runs beside it would be measured too.
-            run(list(cost_jobs(jobs, costs, options)), time_forms, costs, options, cache, 1)
+            timed = list(cost_jobs(jobs, costs, options))
+            failed += run(timed, time_forms, costs, options, cache, 1)
 
     docs = cache if options.quick else options.docs
     for made in (measured, costs):
@@ -842,6 +862,8 @@ def main():
     page = Page(measured.all, costs.all, conditions).text(options.seeds)
     (docs / "noise.md").write_text(page + "\n", encoding="utf-8")
     print(docs / "noise.md")
+    if failed:
+        sys.exit(f"noise_table: {failed} measurements failed; the others are in the table")
 
 
 if __name__ == "__main__":
