@@ -38,6 +38,7 @@ class Condition:
     samples: tuple = (64,)
     picked: bool = False
     penumbra: bool = False
+    floor: bool = True
 
 
 # ---- parts -------------------------------------------------------------------------------------
@@ -86,7 +87,8 @@ def sphere(scene, name, material, radius, location, segments=128):
     build.free()
     for polygon in mesh.polygons:
         polygon.use_smooth = True
-    mesh.materials.append(material)
+    if material is not None:
+        mesh.materials.append(material)
     return link(scene, name, mesh, location)
 
 
@@ -95,7 +97,8 @@ def quads(scene, name, material, corners):
     mesh = bpy.data.meshes.new(name)
     faces = [range(4 * i, 4 * i + 4) for i in range(len(corners))]
     mesh.from_pydata([c for quad in corners for c in quad], [], faces)
-    mesh.materials.append(material)
+    if material is not None:
+        mesh.materials.append(material)
     return link(scene, name, mesh)
 
 
@@ -254,7 +257,11 @@ CONDITIONS = {
     "area": Condition("area lamp, 1 m", area, "point"),
     "emissive_ball": Condition("emissive ball, radius 0.2", emissive_ball, "point"),
     "sky_texture": Condition("Sky Texture with sun", sky_texture, "point"),
-    "smooth_sky": Condition("smooth sky", smooth_sky, "smooth_sky", (64, 1024)),
+    "smooth_sky": Condition("smooth sky", smooth_sky, "smooth_sky"),
+    # Light from the floor takes many random numbers, which hides how fast closures converge.
+    "open_sky": Condition(
+        "smooth sky, no floor", smooth_sky, "smooth_sky", (64, 1024), floor=False
+    ),
     "environment": Condition("environment image", environment_image, "smooth_sky"),
     "interior": Condition("interior, indirect light", interior, "point"),
     "penumbra": Condition(
@@ -303,7 +310,8 @@ def build(name, folder, size=SIZE):
     if condition.penumbra:
         return scene, *_penumbra(scene, size)
     world(scene)
-    quads(scene, "Floor", grey("Floor", 0.5), [rectangle(-20, 20, -20, 20, 0)])
+    if condition.floor:
+        quads(scene, "Floor", grey("Floor", 0.5), [rectangle(-20, 20, -20, 20, 0)])
     ball = sphere(scene, "Ball", None, 1.0, CENTRE)
     distance = (CAMERA - CENTRE).length
     half = math.asin(1 / distance)
@@ -336,7 +344,7 @@ def _penumbra(scene, size):
     bpy.context.view_layer.update()
 
     # Where each pixel's ray meets the floor, and how much of the lamp is seen from there.
-    x, y = _screen()
+    x, y = _screen(size)
     turn = np.array(scene.camera.matrix_world.to_3x3())
     rays = np.stack([x * math.tan(half), y * math.tan(half), -np.ones_like(x)], -1) @ turn.T
     places = np.array(eye) - rays * (eye.z / rays[..., 2:])

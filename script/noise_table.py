@@ -13,6 +13,7 @@ import argparse
 import concurrent.futures
 import csv
 import dataclasses
+import functools
 import hashlib
 import json
 import math
@@ -132,22 +133,31 @@ def material_of(case, form):
 
 
 def set_up(condition, size, pack):
-    """(scene, object, mask) of a condition, lit by OSL."""
-    loader = _blender["loader"]
-    loader.pack.use(pack)
-    scene, ball, mask = _blender["scenes"].build(condition, _blender["folder"], size)
-    loader.api.enable_osl(scene)
-    return scene, ball, mask
+    """(scene, object, mask) of a condition, lit by OSL. The last one serves again: importance maps
+    of skies, which take seconds, are then kept."""
+    wanted = condition, size, pack
+    if _blender.pop("set_up", None) != wanted:
+        loader = _blender["loader"]
+        loader.pack.use(pack)
+        _blender["scene"] = _blender["scenes"].build(condition, _blender["folder"], size)
+        loader.api.enable_osl(_blender["scene"][0])
+    _blender["set_up"] = wanted
+    return _blender["scene"]
 
 
-def dress(scene, ball, material):
+def dress(scene, ball, make):
+    """Gives the object the material that `make` returns in place of its last one."""
+    bpy = _blender["bpy"]
+    last = list(ball.data.materials)
     ball.data.materials.clear()
-    ball.data.materials.append(material)
-    _blender["bpy"].context.view_layer.update()
+    for material in last:
+        bpy.data.materials.remove(material)
+    ball.data.materials.append(make())
+    bpy.context.view_layer.update()
     # Forms that know where lamps are ask for it once these stand.
     if see_lamps := getattr(_blender["loader"].api, "see_lamps", None):
         see_lamps(scene)
-        _blender["bpy"].context.view_layer.update()
+        bpy.context.view_layer.update()
 
 
 def render(scene, samples, seed, read=True):
@@ -194,10 +204,9 @@ def pictures(case, form, job):
                 return dict(kept)
     scene, ball, mask = set_up(condition, size, pack_of(case, form, job))
     try:
-        material = material_of(case, form)
+        dress(scene, ball, lambda: material_of(case, form))
     except ValueError:
         return None
-    dress(scene, ball, material)
     made = np.stack([render(scene, samples, seed)[1] for seed in range(1, seeds + 1)])
     if not np.isfinite(made).all():
         raise RuntimeError(f"{case} {form}, {condition}: a pixel is not finite")
@@ -298,10 +307,9 @@ def time_forms(job):
         for turn in turns:
             scene, ball, _ = set_up(condition, job["size"], pack_of(*turn, job))
             try:
-                material = material_of(*turn)
+                dress(scene, ball, functools.partial(material_of, *turn))
             except ValueError:
                 continue
-            dress(scene, ball, material)
             render(scene, 1, 1, read=False)  # compiles
             one, _ = render(scene, 1, 2, read=False)
             many, _ = render(scene, job["samples"], 3, read=False)
@@ -314,6 +322,15 @@ def time_forms(job):
             row |= {"condition": condition, "cost": f"{statistics.median(costs):.3f}"}
             rows.append(row | {"cost_min": f"{min(costs):.3f}", "cost_max": f"{max(costs):.3f}"})
     return rows
+
+
+def tried(work, job):
+    """What `work` returns, or raises as an exception that a process without Blender can read."""
+    try:
+        return work(job)
+    except Exception as error:
+        _blender.pop("set_up", None)
+        raise RuntimeError(f"{type(error).__name__}: {error}") from None
 
 
 def titles():
@@ -443,9 +460,10 @@ class Table:
 
 
 def run(jobs, work, table, options, cache, processes):
-    """Does what the table lacks, several processes side by side."""
+    """Does what the table lacks, several processes side by side. Returns how many jobs failed:
+    one condition that a form can't bear must not cost the others."""
     if not jobs:
-        return
+        return 0
     pool = concurrent.futures.ProcessPoolExecutor(
         processes,
         multiprocessing.get_context("spawn"),
@@ -453,12 +471,20 @@ def run(jobs, work, table, options, cache, processes):
         initargs=(options.extension, cache),
     )
     with pool:
-        pending = {pool.submit(work, job): job for job in jobs}
+        pending = {pool.submit(tried, work, job): job for job in jobs}
+        failed = 0
         for done, future in enumerate(concurrent.futures.as_completed(pending), 1):
             job = pending[future]
-            table.add(future.result())
-            case = Case(*job["case"])
-            print(f"[{done}/{len(jobs)}] {job['condition']}: {case}", file=sys.stderr, flush=True)
+            what = f"[{done}/{len(jobs)}] {job['condition']}: {Case(*job['case'])}"
+            try:
+                table.add(future.result())
+            except concurrent.futures.process.BrokenProcessPool:
+                raise  # Blender crashed: what it left to do is lost
+            except RuntimeError as error:
+                failed += 1
+                what += f": FAILED: {error}"
+            print(what, file=sys.stderr, flush=True)
+    return failed
 
 
 def is_missing(job, table):
@@ -499,10 +525,11 @@ for those named.
 **Noise** is the mean over the ball's pixels of the variance over the squared radiance + 0.01:
 relMSE, 64 samples a pixel unless said otherwise. The variance is that between pictures of {seeds}
 seeds (2 where there are 1,024 samples). The radiance is that of the form of the model with least
-noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. What is met once in
-thousands of samples may not be met at all: where noise is thousands, take it as rough. The unit is
-the noise of Blender's own Glossy node (GGX, colour 0.8, roughness 0.4) in the same scene. Grain, as
-the eye sees it, is the square root.
+noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. *unmet*: the form
+shows less than 80 % of the light of that form, because what comes as rare, bright dots came in none
+of the pictures; medians take that for more than any number. Where noise is thousands a few dots
+make it: take it as rough. The unit is the noise of Blender's own Glossy node (GGX, colour 0.8,
+roughness 0.4) in the same scene. Grain, as the eye sees it, is the square root.
 
 **Cost** is CPU time a sample in units of that node, forms and node taking turns in one process;
 compiling is left out. **Noise x cost** is how much longer than with the Glossy node a picture of
@@ -510,9 +537,15 @@ the same noise takes.
 """
 
 
+#: The noise of a form whose pictures lack light that comes as rare dots, of which there was none.
+UNMET = math.inf
+#: A form that shows less than this share of the light has not met the lamps.
+MET = 0.8
+
+
 def number(x):
-    if x is None or not math.isfinite(x):
-        return "-"
+    if x == UNMET:
+        return "unmet"
     if x >= 100:
         return f"{float(f'{x:.2g}'):.0f}" if x < 1e5 else f"{x:.0e}".replace("e+0", "e")
     return f"{x:.2g}" if x >= 0.01 else f"{x:.1g}"
@@ -561,9 +594,19 @@ class Page:
         row = self.noise.get(NODE, {}).get((UNIT, ""), {}).get(place)
         return float(row["noise"]) if row else None
 
+    def met(self, row):
+        """Whether the form shows the light that the steadiest form of the model shows."""
+        place = row["condition"], int(row["samples"])
+        steady = self.noise.get(row["divided_by"], {}).get(case_key(row), {}).get(place, row)
+        mean, of = float(row["mean"]), float(steady["mean"])
+        error = math.hypot(float(row["mean_error"]), float(steady["mean_error"]))
+        return mean >= MET * of or mean + 5 * error >= of
+
     def relative(self, form, case, place):
         row, unit = self.noise[form].get(case, {}).get(place), self.unit(place)
-        return float(row["noise"]) / unit if row and unit else None
+        if not row or not unit:
+            return None
+        return float(row["noise"]) / unit if self.met(row) else UNMET
 
     def cost(self, form, case, place):
         """That of the model's defaults, where lamps are as many."""
@@ -647,7 +690,7 @@ class Page:
         """Relative difference of the means and its standard error."""
         row = self.noise[form].get(case, {}).get(place)
         name, right = self.right(case, place)
-        if row is None or right is None or name == form:
+        if row is None or right is None or name == form or not self.met(right):
             return None
         mean, of = float(row["mean"]), float(right["mean"])
         error = math.hypot(float(row["mean_error"]), float(right["mean_error"]))
@@ -656,11 +699,12 @@ class Page:
     def means(self):
         lines = ["## Means", ""]
         lines += [
-            "Mean radiance of the ball against that of the exact form, or of the sampled form where",
-            "there is no exact one: difference and its standard error in percent. Of the other form",
-            "the most samples count that were measured. Bold is what exceeds 1 % and 5 standard",
-            "errors. The error comes from the spread of a few pictures: where light is met as rare",
-            "dots alone, it is larger than it says.",
+            "Mean radiance of the ball against that of the exact form, or of the sampled form",
+            "where there is no exact one: difference and its standard error in percent. Of the",
+            "other form the most samples count that were measured. Bold is what exceeds 1 % and 5",
+            "standard errors. The error comes from the spread of a few pictures: where light is",
+            "met as rare dots alone, it is larger than it says; nothing stands where the form to",
+            "compare with has not met the lamp.",
             "",
         ]
         for form in self.forms:
@@ -692,9 +736,10 @@ class Page:
             "## In a penumbra",
             "",
             "A floor that has the model where the edge of a ball's shadow crosses it, under a 1 m",
-            "area lamp, seen from the mirror direction; only pixels that see part of the lamp count.",
-            "Difference of the mean from that of the exact or sampled form, and relative L1 of squares",
-            f"of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in percent.",
+            "area lamp, seen from the mirror direction; only pixels that see part of the lamp",
+            "count. Difference of the mean from that of the exact or sampled form, and relative L1",
+            f"of squares of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in",
+            "percent.",
             "",
             *heading("Model", "form", "samples", "mean", "squares", "by noise"),
             *rows,
@@ -793,6 +838,7 @@ def main():
 
     measured = Table(cache / "noise.csv", FIELDS, KEY)
     costs = Table(cache / "noise-cost.csv", COST_FIELDS, COST_FIELDS[:4])
+    failed = 0
     if not options.page:
         cases = cases_of(entries, options)
         fitted = packs(options, cases, entries, cache)
@@ -802,10 +848,11 @@ def main():
             if form not in known:
                 parser.error(f"--form: expected one of {', '.join(sorted(known))}; got {form!r}")
         missing = [job for job in jobs if is_missing(job, measured)]
-        run(missing, measure, measured, options, cache, options.processes)
+        failed += run(missing, measure, measured, options, cache, options.processes)
         if not options.no_costs:
             # One process: what runs beside it would be measured too.
-            run(list(cost_jobs(jobs, costs, options)), time_forms, costs, options, cache, 1)
+            timed = list(cost_jobs(jobs, costs, options))
+            failed += run(timed, time_forms, costs, options, cache, 1)
 
     docs = cache if options.quick else options.docs
     for made in (measured, costs):
@@ -815,6 +862,8 @@ def main():
     page = Page(measured.all, costs.all, conditions).text(options.seeds)
     (docs / "noise.md").write_text(page + "\n", encoding="utf-8")
     print(docs / "noise.md")
+    if failed:
+        sys.exit(f"noise_table: {failed} measurements failed; the others are in the table")
 
 
 if __name__ == "__main__":
