@@ -7,7 +7,7 @@
 //   rest   a direction that the shader draws, as a lobe as narrow as those of a sampled form, which carries what the
 //          other two leave of f cos, over the density of drawing it
 //
-// Where a drawn direction meets a lamp, lamp and rest share f cos - base by the balance heuristic (E. Veach, L. Guibas:
+// Where a drawn direction meets a lamp, lamp and rest share f cos - base by the power heuristic (E. Veach, L. Guibas:
 // Optimally Combining Sampling Techniques for Monte Carlo Rendering, 1995): a lobe wins for lamps that are small beside
 // the model's lobe, the drawn direction for those that are large. Elsewhere the rest takes off what lobes give beside
 // their lamps. The one approximation: over a lamp f and the lamp's visibility are averaged apart.
@@ -174,7 +174,7 @@ template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, c
   // Cycles drops closures of small weight.
   constexpr double kLeastWeight = 1e-3;
   Sent<T> out;
-  out.value = value * (lamp.emphasis / (T(1) + lamp.solid_angle * density));
+  out.value = value * (lamp.emphasis / (T(1) + sqr(lamp.solid_angle * density)));
   out.covered = out.value * (lamp.covers - lamp.met);
   const T size = maximum(max_component(out.value), max_component(out.value * T(-1)));
   out.weight = select(size > T(0), minimum(maximum(size * lamp.extent, T(kLeastWeight)), T(1)), T(0));
@@ -195,7 +195,7 @@ Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const
   const auto drawn = density > T(0);
   const T p = select(drawn, density, T(1));
   const Rgb<T> left = value - before;
-  const Rgb<T> kept = select(met > T(0), left * (met / (T(1) + met * p)), left / p);
+  const Rgb<T> kept = select(met > T(0), left * (met * (met * p) / (T(1) + sqr(met * p))), left / p);
   const Rgb<T> all = select(drawn, kept - (covered - before) / p, Rgb<T>(T(0)));
   Rest<T> out;
   out.weight = maximum(max_component(all), max_component(all * T(-1)));
