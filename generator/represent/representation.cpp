@@ -126,8 +126,9 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
 }
 
 Recording finish(const Model& model, const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {
-  return {program.print_osl(indent, parameter_names(model)), std::move(closures), program.operations(),
-          program.inputs()};
+  Recording r{"", std::move(closures), program.operations(), program.inputs(), {}};
+  r.statements = program.print_osl(indent, parameter_names(model), &r.arrays);
+  return r;
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
