@@ -29,6 +29,7 @@ __all__ = [
     "PlanError",
     "Finding",
     "Lamp",
+    "add_albedo",
     "add_twin",
     "albedo",
     "bake",
@@ -192,6 +193,15 @@ def switch_representation(material, representation):
     """Changes the form of a material with one model; values and links stay."""
     nodes.switch(_the_node(material), representation)
     prepare_material(material)
+
+
+def add_albedo(material):
+    """Gives the node of a material with one model its Albedo output: what the surface reflects of a
+    white world. Where that takes large tables nodes are made without, so that files stay small.
+
+    Raises ValueError for a lean node, and for one of another version of the extension.
+    """
+    nodes.add_albedo(_the_node(material))
 
 
 #: The form that is made of Blender's own nodes.

@@ -136,7 +136,9 @@ class Plan:
                     k: None if isinstance(v, dict) else v for k, v in entry["parameters"].items()
                 }
                 form = pack.resolve(model, entry["representation"], given)
-                swaps.append((node, nodes.ensure_group(model, form, baked=before["hash"])))
+                albedo = nodes.uses_albedo(node)
+                group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
+                swaps.append((node, group))
         except BaseException:
             for group in set(bpy.data.node_groups) - known:
                 nodes.remove_group(group)

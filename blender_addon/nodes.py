@@ -18,6 +18,7 @@ from . import lamps, pack, twin
 
 TAG = pack.TAG
 OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
+ALBEDO = "Albedo"
 _SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
 
 
@@ -83,6 +84,11 @@ def is_native(group):
     return "script_inputs" not in group[TAG]
 
 
+def has_albedo_script(model_name, representation):
+    """Whether the Albedo output of a form is a script of its own, which a group has if asked."""
+    return pack.representation(model_name, representation).get("albedo_shader") is not None
+
+
 def expected_inputs(model_name, representation):
     """Identifiers of the script node's inputs and the types of their sockets."""
     inputs = {
@@ -106,28 +112,47 @@ def _lamp_inputs(model_name, representation):
     return lamps.part_names(slots)
 
 
-def script_problem(group):
-    """What is wrong with a group's script node, or None.
+def _scripts(group):
+    """The script node that gives the closure, and the one of the Albedo output, if it has one."""
+    found = [n for n in group.nodes if n.bl_idname == "ShaderNodeScript"]
+    albedo = next((n for n in found if n.name == ALBEDO), None)
+    return next((n for n in found if n != albedo), None), albedo
 
-    A shader that fails to compile raises nothing in Cycles: it leaves a node without sockets.
-    """
-    if is_native(group):
-        return None
-    script = next((n for n in group.nodes if n.bl_idname == "ShaderNodeScript"), None)
+
+def _script_problem(script, inputs, outputs):
     if script is None:
         return "has no script node"
     if not script.bytecode:
         return "is not compiled"
-    tag = group[TAG]
-    inputs = {s.identifier: s.type for s in script.inputs}
-    outputs = {s.identifier: s.type for s in script.outputs}
-    for found, expected in ((inputs, dict(tag["script_inputs"])), (outputs, OUTPUTS)):
+    for sockets, expected in ((script.inputs, inputs), (script.outputs, outputs)):
+        found = {s.identifier: s.type for s in sockets}
         if missing := sorted(set(expected) - set(found)):
             return f"lacks the sockets {', '.join(missing)}"
         for name, kind in expected.items():
             if found[name] != kind:
                 return f"has a socket {name} of type {found[name]}, expected {kind}"
     return None
+
+
+def script_problem(group):
+    """What is wrong with a group's script nodes, or None.
+
+    A shader that fails to compile raises nothing in Cycles: it leaves a node without sockets.
+    """
+    if is_native(group):
+        return None
+    tag = group[TAG]
+    script, albedo = _scripts(group)
+    inputs, albedo_inputs = dict(tag["script_inputs"]), tag.get("albedo_inputs")
+    # Files of older versions have both outputs in one script, as have forms of small tables.
+    alone = tag.get("albedo_apart", False)
+    outputs = {n: k for n, k in OUTPUTS.items() if not alone or n != ALBEDO}
+    if problem := _script_problem(script, inputs, outputs):
+        return problem
+    if albedo_inputs is None:
+        return None
+    problem = _script_problem(albedo, dict(albedo_inputs), {ALBEDO: OUTPUTS[ALBEDO]})
+    return problem and f"of the Albedo output {problem}"
 
 
 def _compile(script_node, text, what):
@@ -249,9 +274,10 @@ def _vector_socket(group, name, text):
     return _socket(group, name, "NodeSocketVector", text, hide_value=True)
 
 
-def _start_group(group):
+def _start_group(group, outputs=OUTPUTS):
     """Output sockets, and the nodes that stand for the group's inputs and outputs."""
-    for output, kind in (("BSDF", "NodeSocketShader"), ("Albedo", "NodeSocketColor")):
+    kinds = {"SHADER": "NodeSocketShader", "RGBA": "NodeSocketColor"}
+    for output, kind in ((name, kinds[OUTPUTS[name]]) for name in outputs):
         group.interface.new_socket(output, in_out="OUTPUT", socket_type=kind)
     return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
 
@@ -276,18 +302,38 @@ def _fill_native_group(group, model_name, representation, source):
     group[TAG]["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
 
 
-def _fill_group(group, model_name, representation, text):
-    entry = pack.representation(model_name, representation)
-    group_input, group_output = _start_group(group)
+def _add_script(group, text, what):
     script = group.nodes.new("ShaderNodeScript")
     script.mode = "INTERNAL"
-    group_input.location, group_output.location = (-500, 0), (300, 0)
-    _compile(script, text, f"{model_name} ({representation})")
+    _compile(script, text, what)
+    return script
 
+
+def _fill_group(group, model_name, representation, texts):
+    """`texts`: of the script and, where the Albedo output has one of its own that was asked for, of
+    that."""
+    entry = pack.representation(model_name, representation)
+    what = f"{model_name} ({representation})"
+    apart = has_albedo_script(model_name, representation)
+    outputs = [n for n in OUTPUTS if not apart or n != ALBEDO or len(texts) > 1]
+    group_input, group_output = _start_group(group, outputs)
+    group_input.location, group_output.location = (-500, 0), (300, 0)
+    script = _add_script(group, texts[0], what)
+    from_scripts = {s.identifier: s for s in script.outputs}
     tag = group[TAG]
     tag["script_inputs"] = expected_inputs(model_name, representation)
+    tag["albedo_apart"] = apart
+    if len(texts) > 1:
+        albedo = _add_script(group, texts[1], f"{what}, the Albedo output")
+        albedo.name = albedo.label = ALBEDO
+        albedo.location = (0, -400)
+        only_light = (pack.TANGENT, pack.LOBES)
+        tag["albedo_inputs"] = {
+            name: kind for name, kind in tag["script_inputs"].items() if name not in only_light
+        }
+        from_scripts |= {s.identifier: s for s in albedo.outputs}
     if problem := script_problem(group):
-        raise CompileError(f"{model_name} ({representation}): the compiled shader {problem}")
+        raise CompileError(f"{what}: the compiled shader {problem}")
 
     inputs = {s.identifier: s for s in script.inputs}
     sockets = {}
@@ -313,8 +359,11 @@ def _fill_group(group, model_name, representation, text):
         shared.location = (-500, -400)
         for name in lamp_inputs:
             group.links.new(shared.outputs[name], inputs[name])
-    for output in OUTPUTS:
-        group.links.new(script.outputs[output], group_output.inputs[output])
+    for output in outputs:
+        group.links.new(from_scripts[output], group_output.inputs[output])
+    if len(texts) > 1:
+        for socket in albedo.inputs:
+            group.links.new(inputs[socket.identifier].links[0].from_socket, socket)
     tag["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
 
 
@@ -324,32 +373,39 @@ def is_ours(node):
     return node.bl_idname == "ShaderNodeGroup" and tree is not None and TAG in tree
 
 
-def find_group(model_name, representation):
-    """The group of the current version of a shader, if the file has a sound one."""
+def find_group(model_name, representation, albedo=False):
+    """The group of the current version of a shader, if the file has a sound one; `albedo` as in
+    ensure_group."""
+    albedo = albedo and has_albedo_script(model_name, representation)
     digest = pack.digest(model_name, representation)
     for group in bpy.data.node_groups:
         tag = group.get(TAG)
         if group.library is None and tag is not None and tag.get("digest") == digest:
             same = (tag["model"], tag["representation"]) == (model_name, representation)
-            if same and script_problem(group) is None:
+            if same and ("albedo_inputs" in tag) == albedo and script_problem(group) is None:
                 return group
     return None
 
 
-def ensure_group(model_name, representation="auto", baked=None):
+def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     """Node group of a model, made if the file has none. Raises ValueError, CompileError.
 
     Nothing is left in the file when it fails. `baked`: hash of the extension that a pack of the
-    open file alone, which pack.use() has taken, stands in for.
+    open file alone, which pack.use() has taken, stands in for. `albedo`: with the Albedo output,
+    also where that takes a script of large tables.
     """
     representation = pack.resolve(model_name, representation)
-    if group := find_group(model_name, representation):
+    if group := find_group(model_name, representation, albedo):
         return group
     stem, source = pack.source(model_name, representation)
+    sources = {stem: source}
     native = pack.is_native(model_name, representation)
-    text = None if native else bpy.data.texts.new(f"{stem}.osl")
+    if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
+        sources |= dict([of_albedo])
+    texts = [] if native else [bpy.data.texts.new(f"{stem}.osl") for stem in sources]
+    form = ", ".join([representation, *([ALBEDO] if len(texts) > 1 else [])])
     group = bpy.data.node_groups.new(
-        f"{pack.model(model_name)['label']} ({representation})", "ShaderNodeTree"
+        f"{pack.model(model_name)['label']} ({form})", "ShaderNodeTree"
     )
     try:
         group.color_tag = "SHADER"
@@ -374,12 +430,13 @@ def ensure_group(model_name, representation="auto", baked=None):
         if native:
             _fill_native_group(group, model_name, representation, source)
         else:
-            text.write(source)
-            text.cursor_set(0)
-            _fill_group(group, model_name, representation, text)
+            for text, source in zip(texts, sources.values(), strict=True):
+                text.write(source)
+                text.cursor_set(0)
+            _fill_group(group, model_name, representation, texts)
     except BaseException:
         bpy.data.node_groups.remove(group)
-        if text is not None:
+        for text in texts:
             bpy.data.texts.remove(text)
         lamps.remove_unused_group()
         raise
@@ -523,8 +580,32 @@ def switch(node, representation):
     Raises ValueError, CompileError; the node is then as it was.
     """
     model_name, _ = identity(node)
-    values = _all_values(node)
-    replace_group(node, ensure_group(model_name, pack.resolve(model_name, representation, values)))
+    form = pack.resolve(model_name, representation, _all_values(node))
+    replace_group(node, ensure_group(model_name, form, albedo=uses_albedo(node)))
+
+
+def uses_albedo(node):
+    """Whether something is linked to a group node's Albedo output."""
+    return ALBEDO in node.outputs and node.outputs[ALBEDO].is_linked
+
+
+def add_albedo(node):
+    """Gives a group node the Albedo output, if it lacks that; values and links stay.
+
+    Raises ValueError for one that lacks it and is not of the installed extension, CompileError.
+    """
+    if ALBEDO in node.outputs:
+        return
+    if is_baked(node) or manifest_entry(node) is None:
+        state = "made lean" if is_baked(node) else "of another version of the extension"
+        raise ValueError(
+            f"node {node.name!r} is {state}: expected a form of the installed one, which Switch "
+            "Form or Update brings, to add an Albedo output to"
+        )
+    without = node.node_tree
+    replace_group(node, ensure_group(*identity(node), albedo=True))
+    if without.users == 0:
+        remove_group(without)
 
 
 def replace_group(node, group):

@@ -203,6 +203,32 @@ class BRDFC_OT_find_lamps(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_add_albedo(Operator):
+    """Give the model's node an output for its albedo, whose tables make the file larger"""
+
+    bl_idname = "brdfc.add_albedo"
+    bl_label = "Add Albedo Output"
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(name="Node", description="Name of the group node")
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def execute(self, context):
+        material = context.object.active_material
+        try:
+            for node in nodes.group_nodes(material):
+                if node.name == self.node:
+                    nodes.add_albedo(node)
+                    return {"FINISHED"}
+            raise ValueError(f"material {material.name} has no model node {self.node!r}")
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+
 class BRDFC_OT_add_twin(Operator):
     """Give the active material an output for EEVEE, made of Blender's own nodes"""
 
@@ -360,6 +386,7 @@ class BrdfcPreferences(AddonPreferences):
 _CLASSES = (
     BrdfcPreferences,
     BRDFC_OT_bake,
+    BRDFC_OT_add_albedo,
     BRDFC_OT_add_twin,
     BRDFC_OT_find_lamps,
     BRDFC_OT_write_materials,

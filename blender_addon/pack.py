@@ -4,7 +4,7 @@
 import hashlib
 import json
 import math
-from functools import lru_cache
+from functools import cache, lru_cache
 from numbers import Real
 from pathlib import Path
 
@@ -176,13 +176,24 @@ def source(model_name, name):
     return path.stem, path.read_text(encoding="utf-8")
 
 
-@lru_cache(maxsize=None)
+def albedo_source(model_name, name):
+    """The same of the script that computes the Albedo output, where that is one of its own: its
+    tables are large, and most materials do without. None elsewhere."""
+    file = representation(model_name, name).get("albedo_shader")
+    if file is None:
+        return None
+    path = _file(file)
+    return path.stem, path.read_text(encoding="utf-8")
+
+
+@cache
 def digest(model_name, name):
     """Changes whenever the shader or the sockets of its group would. Panels ask for it at each
     redraw: of the source, of up to a megabyte, the manifest has the hash."""
     form = representation(model_name, name)
     schema = [model(model_name)["parameters"], form.get("lobes"), form["only"]]
-    text = form["sha256"] + json.dumps(schema, sort_keys=True)
+    hashes = [form["sha256"], form.get("albedo_sha256")]
+    text = json.dumps([*hashes, *schema], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -156,6 +156,8 @@ def draw_node(layout, node, material, editable=True):
         button.node = node.name
         button.representation = "auto" if nodes.is_baked(node) else representation
     _draw_values(layout, node)
+    if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
+        layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
     if api.TWIN in entry["representations"] and representation != api.TWIN:
         row = layout.row()
         row.enabled = not api.has_twin(material)

@@ -106,6 +106,7 @@ std::set<std::string> declared_by(const Model& model, RepresentationKind kind, c
   std::set<std::string> names;
   const auto add = [&](const Recording& r) {
     for (const std::string& name : declared_in(r.statements)) names.insert(name);
+    for (const std::string& array : r.arrays) names.insert(declared_in(array).at(0));
   };
   for (const Choices& c : choice_combinations(model.info())) {
     if (!admits(model.info(), c, fixed)) continue;

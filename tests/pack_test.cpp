@@ -149,6 +149,44 @@ TEST(Shader, AFixedParameterLeavesTheText) {
   EXPECT_LT(specular.source.size(), all.source.size());
 }
 
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+TEST(Shader, TablesThatChoicesShareStandThereOnce) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const Shader s = write_shader(m, RepresentationKind::Sampled, empty_table(m));
+  for (const char* table : {"specular_loss", "specular_softness", "mean_loss", "mean_matte"})
+    EXPECT_EQ(count(s.source, fmt::format("float {}[", table)), 1u) << table;
+  EXPECT_GT(count(s.source, "specular_loss, "), 1u) << "more than one look-up reads it";
+}
+
+/// A file holds the text and what it is compiled to, whether or not something is linked to the output.
+TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
+  const Model& m = find_model("ward");
+  const AlbedoTable table = albedo_table_of(m);
+  const Shader apart = write_shader(m, RepresentationKind::Sampled, table);
+  EXPECT_THAT(apart.source, Not(HasSubstr("Albedo")));
+  EXPECT_THAT(apart.source, Not(HasSubstr("knots_")));
+  EXPECT_LT(apart.source.size(), 10000u);
+  EXPECT_THAT(apart.albedo, HasSubstr("shader brdfc_ward_sampled_albedo("));
+  EXPECT_THAT(apart.albedo, HasSubstr("output color Albedo = 0)"));
+  EXPECT_THAT(apart.albedo, HasSubstr("float ax = "));
+  EXPECT_THAT(apart.albedo, Not(HasSubstr("BSDF")));
+  const ParamValues known = {{"ax", 0.2}, {"ay", 0.2}, {"normalisation", std::string("bounded")}};
+  const Shader small = write_shader(m, RepresentationKind::Sampled, fold(table, m, known), known);
+  EXPECT_EQ(small.albedo, "");
+  EXPECT_THAT(small.source, HasSubstr("output color Albedo = 0)"));
+  for (const auto& [name, model] : models())
+    for (const RepresentationKind kind : representations(*model)) {
+      if (is_fit(kind)) continue;  // holds tables of its own
+      const std::string text = write_shader(*model, kind, albedo_table_of(*model)).source;
+      EXPECT_LE(text.size(), 100000u) << name << " " << name_of(kind);
+    }
+}
+
 TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
   const Model& m = find_model("ashikhmin_shirley");
   const ParamValues both = {{"part", std::string("both")}};

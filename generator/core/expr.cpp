@@ -590,20 +590,23 @@ class OslPrinter {
   }
 
   /// The arrays that look-ups read, before all statements.
-  void arrays(int indent, std::string& out) {
+  std::vector<std::string> arrays(int indent) {
+    std::vector<std::string> all;
     for (std::size_t i = 0; i < reachable_.size(); ++i) {
       const ExprNode& n = r_.node(int(i));
       if (!reachable_[i] || n.op != Op::Lookup || array_names_.count(n.name)) continue;
       const std::string name = fresh(n.name);
       array_names_[n.name] = name;
-      out += fmt::format("{:{}}float {}[{}] = {{", "", indent, name, n.table->values.size());
-      for (std::size_t k = 0; k < n.table->values.size(); ++k)
-        out += (k == 0        ? ""
-                : k % 12 == 0 ? ",\n" + std::string(std::size_t(indent + 4), ' ')
-                              : ", ") +
-               number(n.table->values[k]);
-      out += "};\n";
+      // Tables are most of a long shader's text: without what is not needed to read it.
+      std::string out = fmt::format("{:{}}float {}[{}] = {{", "", indent, name, n.table->values.size());
+      for (std::size_t k = 0; k < n.table->values.size(); ++k) {
+        std::string value = number(n.table->values[k]);
+        if (value.starts_with("0.") && value != "0.0") value.erase(0, 1);
+        out += (k == 0 ? "" : k % 16 == 0 ? ",\n" : ",") + value;
+      }
+      all.push_back(out + "};\n");
     }
+    return all;
   }
 
   void count_output(int id) { ++uses_[std::size_t(id)]; }
@@ -802,7 +805,8 @@ class OslPrinter {
 
 }  // namespace
 
-std::string Program::print_osl(int indent, const std::vector<std::string>& taken) const {
+std::string Program::print_osl(int indent, const std::vector<std::string>& taken,
+                               std::vector<std::string>* arrays) const {
   const std::vector<bool>& seen = reachable();
   std::vector<std::string> reserved = taken;
   for (const std::string& name : inputs()) reserved.push_back(name);
@@ -810,7 +814,12 @@ std::string Program::print_osl(int indent, const std::vector<std::string>& taken
   OslPrinter printer(seen, reserved);
   for (const auto& [name, id] : outputs_) printer.count_output(id);
   std::string out;
-  printer.arrays(indent, out);
+  for (const std::string& array : printer.arrays(arrays ? 4 : indent)) {
+    if (arrays)
+      arrays->push_back(array);
+    else
+      out += array;
+  }
   printer.statements(-1, Recorder::current().size(), indent, out);
   for (const auto& [name, id] : outputs_) out += fmt::format("{:{}}{} = {};\n", "", indent, name, printer.use(id, 0));
   return out;

@@ -230,8 +230,9 @@ class Program {
 
   /// OSL statements that assign every output (to variables declared by the caller), indented. The current
   /// recorder must be the one the outputs were recorded with. The text declares no name of `taken`, as it declares no
-  /// osl_words(), inputs and outputs.
-  std::string print_osl(int indent, const std::vector<std::string>& taken) const;
+  /// osl_words(), inputs and outputs. The arrays that look-ups read come first or, one text each, in `arrays`.
+  std::string print_osl(int indent, const std::vector<std::string>& taken,
+                        std::vector<std::string>* arrays = nullptr) const;
   /// Operations the outputs reach: what the shader executes, selections with both arms.
   int operations() const;
   /// Names of the inputs the outputs depend on.

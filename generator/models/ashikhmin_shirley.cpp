@@ -260,8 +260,16 @@ namespace {
 
 constexpr double kNarrowest = 1e-4;  // the width of a lobe with the largest exponents
 
+/// To so many digits, as a shader's text has them: what they leave off is less than a tenth of what interpolation does.
+double rounded(double v, int digits) {
+  if (v == 0) return 0;
+  const double unit = std::pow(10, std::floor(std::log10(std::abs(v))) + 1 - digits);
+  return std::round(v / unit) * unit;
+}
+
 /// A table of at(coordinates in [0, 1]).
-template <class F> std::shared_ptr<const Table> tabulate(const char* name, const std::vector<int>& sizes, const F& at) {
+template <class F>
+std::shared_ptr<const Table> tabulate(const char* name, const std::vector<int>& sizes, int precision, const F& at) {
   std::size_t count = 1;
   for (const int n : sizes) count *= std::size_t(n);
   std::vector<double> values;
@@ -270,7 +278,7 @@ template <class F> std::shared_ptr<const Table> tabulate(const char* name, const
     std::size_t digits = i;
     for (std::size_t d = sizes.size(); d-- > 0; digits /= std::size_t(sizes[d]))
       x[d] = double(digits % std::size_t(sizes[d])) / (sizes[d] - 1);
-    values.push_back(at(x));
+    values.push_back(rounded(at(x), precision));
   }
   return make_table(name, sizes, values);
 }
@@ -321,7 +329,7 @@ template <class F> double mean_over_views(double width, double roundness, const 
 
 const LobeTables& lobe_tables() {
   static const LobeTables tables = {
-      .loss = tabulate("specular_loss", {12, 13, 10, 4},
+      .loss = tabulate("specular_loss", {12, 13, 10, 4}, 4,
                        [](const std::array<double, 4>& x) {
                          const double along = std::sqrt(x[1]), across = std::sqrt(x[2]);
                          // sunk = reach / (cosTheta + reach) with reach = 2 along sinTheta
@@ -329,7 +337,7 @@ const LobeTables& lobe_tables() {
                              x[0] > 0 ? 2 * std::max(along, kNarrowest) * (1 - x[0]) / x[0] : HUGE_VAL;
                          return 1 - specular_albedos(along, across, x[3], 1 / std::hypot(1, 1 / cotTheta)).r;
                        }),
-      .softness = tabulate("specular_softness", {18, 13, 7, 4}, [](const std::array<double, 4>& x) {
+      .softness = tabulate("specular_softness", {18, 13, 7, 4}, 3, [](const std::array<double, 4>& x) {
         const Rgb<double> a = specular_albedos(sqr(x[1]), sqr(x[2]), x[3], sqr(x[0]));
         return 1 - a.g / a.r;
       })};
@@ -338,11 +346,11 @@ const LobeTables& lobe_tables() {
 
 const MeanTables& mean_tables() {
   static const MeanTables tables = {
-      .loss = tabulate("mean_loss", {17, 17},
+      .loss = tabulate("mean_loss", {17, 17}, 4,
                        [](const std::array<double, 4>& x) {
                          return mean_over_views(x[0], x[1], [](const LobeAtView<double>& lobe) { return lobe.loss(); });
                        }),
-      .matte = tabulate("mean_matte", {17, 17}, [](const std::array<double, 4>& x) {
+      .matte = tabulate("mean_matte", {17, 17}, 4, [](const std::array<double, 4>& x) {
         return mean_over_views(x[0], x[1], [](const LobeAtView<double>& lobe) { return lobe.matte(); });
       })};
   return tables;

@@ -348,6 +348,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const std::optional<double> cost = costs.of(model, kind);
     const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
+    const std::string albedo_file = "shaders/" + shader.name + "_albedo.osl";
+    if (!shader.albedo.empty()) built.files[albedo_file] = shader.albedo;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations,
                            shader.statements, error, of_form.size() + of_fit, table.error, shader.source.size(),
                            whole.closures, whole.operations, whole.statements, whole_table.size() + of_whole_fit,
@@ -365,7 +367,9 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"warnings", warnings(kind, model.has_mirror(), shader)},
         {"axis", axis_json(fit)},
         {"highlight", has_highlight(kind, model.has_mirror(), shader) ? highlight_json(model, fixed) : Json()},
-        {"sha256", sha256(shader.source)}};
+        {"sha256", sha256(shader.source)},
+        {"albedo_shader", shader.albedo.empty() ? Json() : Json(albedo_file)},
+        {"albedo_sha256", shader.albedo.empty() ? Json() : Json(sha256(shader.albedo))}};
   }
   if (has_albedo_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
   return built;

@@ -2,7 +2,9 @@
 #include "pack/shader.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "core/osl_words.h"
 #include "pack/osl_library.h"
@@ -141,6 +143,28 @@ class ChoiceSwitch {
   const ModelInfo& info_;
   const ParamValues& fixed_;
   std::vector<std::pair<std::string, std::vector<Choices>>> cases_;
+};
+
+/// The arrays of all statements of a shader, each once: combinations of choices share their tables.
+class SharedArrays {
+ public:
+  /// The statements, before which stand the arrays whose names other ones have taken.
+  std::string without_shared(const Recording& r) {
+    std::string own;
+    for (const std::string& array : r.arrays) {
+      const std::string name = array.substr(0, array.find('['));
+      if (known_.emplace(name, array).first->second != array) own += array;
+    }
+    return own + r.statements;
+  }
+  std::string print() const {
+    std::string out;
+    for (const auto& [name, array] : known_) out += array;
+    return out;
+  }
+
+ private:
+  std::map<std::string, std::string> known_;
 };
 
 std::string array(const char* name, std::size_t index, const auto& values) {
@@ -299,9 +323,9 @@ class AimedText {
       : draw_(info, fixed), value_(info, fixed), lamps_(lamps) {}
 
   /// The base's recording.
-  Recording add(const Choices& choices, const AimedRecording& r) {
-    draw_.add(choices, r.draw.statements);
-    value_.add(choices, r.value.statements);
+  Recording add(const Choices& choices, const AimedRecording& r, SharedArrays& arrays) {
+    draw_.add(choices, arrays.without_shared(r.draw));
+    value_.add(choices, arrays.without_shared(r.value));
     operations_ = std::max(operations_, r.draw.operations + r.value.operations);
     return r.base;
   }
@@ -434,30 +458,32 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   std::vector<RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
   AimedText aimed_text(info, fixed, max_lamps);
+  SharedArrays arrays;
   int operations = 0, mirror_operations = 0;
   const int indent = sampled ? 8 : 4;
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
     const Recording r =
-        aimed ? aimed_text.add(choices, record_aimed(model, values, 0)) : record(model, kind, values, indent, views);
+        aimed ? aimed_text.add(choices, record_aimed(model, values, 0), arrays)
+              : record(model, kind, values, indent, views);
     operations = std::max(operations, r.operations);
-    statements.add(choices, r.statements);
+    statements.add(choices, arrays.without_shared(r));
     if (!kinds.empty() && kinds != r.closures)
       throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
     kinds = r.closures;
     if ((sampled || aimed) && model.has_mirror()) {
       const Recording m = record_mirror(model, values, 0);
       mirror_operations = std::max(mirror_operations, m.operations);
-      mirror.add(choices, m.statements);
+      mirror.add(choices, arrays.without_shared(m));
     }
   }
   shader.operations = operations + mirror_operations;
 
-  std::string body;
-  body += "    vector frame_n = normalize(Normal);\n";
+  std::string normal = "    vector frame_n = normalize(Normal);\n";
   if (kind == RepresentationKind::Fitted || controlled)
-    body += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", kLowestView);
+    normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", kLowestView);
+  std::string body = normal;
   body +=
       "    vector frame_t, frame_b;\n"
       "    brdfc_frame(frame_n, Tangent, frame_t, frame_b);\n"
@@ -468,6 +494,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
         "    // frame_n is on the viewer's side; the model's z leaves the object.\n"
         "    float side = backfacing() ? -1.0 : 1.0;\n";
   if (model.has_medium()) body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
+  body += arrays.print();
   std::vector<std::string> terms;
   if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + block(mirror.print(0), 1);
   if (sampled) {
@@ -573,8 +600,10 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,
                 kMaxClosures);
   body += "    BSDF = " + balanced_sum(terms) + ";\n\n";
+  std::string of_albedo;
   if (model.has_scatter()) {
-    body += AlbedoText(info, table, fixed).print();
+    of_albedo = AlbedoText(info, table, fixed).print();
+    if (of_albedo.size() <= kMaxAlbedoText) body += std::exchange(of_albedo, "");
   } else {
     body += "    Albedo = weight_0";
     for (std::size_t c = 1; c < kinds.size(); ++c) body += fmt::format(" + weight_{}", c);
@@ -584,32 +613,41 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   // Each ends a line; the semicolons of a loop's head do not.
   for (std::size_t at = body.find(";\n"); at != std::string::npos; at = body.find(";\n", at + 1)) ++shader.statements;
 
-  std::string& out = shader.source;
-  out += comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION));
-  out += comment(fmt::format("Form: {}. {}", name_of(kind), info.equations));
-  out += "// SPDX-License-Identifier: GPL-3.0-or-later\n\n";
-  out += library_for(body);
-  out += fmt::format("\nshader {}(\n", shader.name);
+  std::string parameters;
   for (const ParamInfo& p : info.params) {
     if (fixed.count(p.name)) continue;
     if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
     if (is_osl_word(p.name))
       input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
                   p.name);
-    out += parameter(p);
+    parameters += parameter(p);
   }
+  const auto text = [&](const std::string& name, const std::string& what, const std::string& sockets,
+                        const std::string& statements) {
+    return comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
+           comment(fmt::format("{}. {}", what, info.equations)) + "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
+           library_for(statements) + fmt::format("\nshader {}(\n", name) + parameters + sockets + ")\n{\n" +
+           statements + "}\n";
+  };
+  const char* albedo_output = "    output color Albedo = 0";
+  std::string sockets;
   if (shader.lobes)
-    out += fmt::format(
+    sockets += fmt::format(
         "    int Lobes = {} [[ string label = \"Lobes\", string help = \"Directions traced per shading "
         "point, 1 to {}\" ]],\n",
         kDefaultLobes, max_lobes);
   for (int i = 1; i <= shader.lamps; ++i)
     for (const char* what : {"Place", "Turn", "Scale", "Shape"})
-      out += fmt::format("    vector Lamp{}{} = vector(0.0),\n", what, i);
-  out +=
+      sockets += fmt::format("    vector Lamp{}{} = vector(0.0),\n", what, i);
+  sockets +=
       "    normal Normal = N,\n    vector Tangent = vector(0, 0, 0),\n"
-      "    output closure color BSDF = 0,\n    output color Albedo = 0)\n{\n";
-  out += body + "}\n";
+      "    output closure color BSDF = 0";
+  if (of_albedo.empty()) sockets += fmt::format(",\n{}", albedo_output);
+  shader.source = text(shader.name, fmt::format("Form: {}", name_of(kind)), sockets, body);
+  if (!of_albedo.empty())
+    shader.albedo = text(shader.name + "_albedo", fmt::format("Albedo of the form: {}", name_of(kind)),
+                         fmt::format("    normal Normal = N,\n{}", albedo_output),
+                         normal + "    float wo_z = dot(I, frame_n);\n" + of_albedo);
   return shader;
 }
 

@@ -14,6 +14,7 @@ namespace brdfc {
 struct Shader {
   std::string name;     ///< of the shader and, with .osl, of its file
   std::string source;   ///< stands alone
+  std::string albedo;   ///< a shader of its own for the Albedo output; "" where `source` has it
   int closures = 0;     ///< most that one shading point adds
   int slots = 0;        ///< what they take of Cycles' kMaxClosures
   int operations = 0;   ///< most that one combination of choices executes, a loop's body counted once
@@ -24,9 +25,9 @@ struct Shader {
 };
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
-/// output. A sampled form draws at most `max_lobes` directions, and has no parameter for that if it is one. An aimed form
-/// has parameters for `max_lamps` lamps. The form is
-/// right for these `views`. Throws
+/// output, in a shader of its own where its text is longer than kMaxAlbedoText. A sampled form draws at most
+/// `max_lobes` directions, and has no parameter for that if it is one. An aimed form has parameters for `max_lamps`
+/// lamps. The form is right for these `views`. Throws
 /// InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
 /// kMaxOperations.
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
@@ -37,6 +38,9 @@ std::string balanced_sum(const std::vector<std::string>& terms);
 
 /// Operations of a controlled form: fewer than 500 statements, as one holds about one and a half.
 inline constexpr int kMaxOperations = 700;
+
+/// Characters of tables that a shader holds for an output that most materials leave unlinked.
+inline constexpr std::size_t kMaxAlbedoText = 4096;
 
 /// Numbers in one OSL array; more compile slowly.
 inline constexpr std::size_t kMaxArray = 32768;

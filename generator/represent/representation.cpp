@@ -134,7 +134,9 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
 
 Recording finish(const Program& program, int indent, const std::vector<std::string>& taken,
                  std::vector<RecordedClosure> closures = {}) {
-  return {program.print_osl(indent, taken), std::move(closures), program.operations(), program.inputs()};
+  Recording r{"", std::move(closures), program.operations(), program.inputs(), {}};
+  r.statements = program.print_osl(indent, taken, &r.arrays);
+  return r;
 }
 
 Recording finish(const Model& model, const Program& program, int indent, std::vector<RecordedClosure> closures = {}) {

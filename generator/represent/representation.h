@@ -60,6 +60,7 @@ struct Recording {
   std::vector<RecordedClosure> closures;  ///< all but Sampled
   int operations = 0;
   std::vector<std::string> inputs;
+  std::vector<std::string> arrays;  ///< declarations of what the statements look up: they may stand further out
 };
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,

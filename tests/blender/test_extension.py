@@ -93,7 +93,9 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
             found = {s.identifier: s.type for s in script.inputs}
             expected = extension.nodes.expected_inputs(model, representation)
             assert expected.items() <= found.items()
-            assert [s.identifier for s in script.outputs] == ["BSDF", "Albedo"]
+            apart = extension.nodes.has_albedo_script(model, representation)
+            outputs = ["BSDF"] if apart else ["BSDF", "Albedo"]
+            assert [s.identifier for s in script.outputs] == outputs
             assert script.mode == "INTERNAL" and script.bytecode
             for name in expected:
                 assert next(s for s in script.inputs if s.identifier == name).is_linked
@@ -183,6 +185,8 @@ def test_shaders_are_short(extension_zip, subtests):
         manifest = json.loads(archive.read("manifest.json"))
         forms = [f for m in manifest["models"].values() for f in m["representations"].values()]
         shaders = {f["shader"]: f["operations"] for f in forms}
+        # A table's look-ups are no operations of the model.
+        shaders |= {f["albedo_shader"]: 0 for f in forms if f["albedo_shader"]}
         assert set(shaders) == {name for name in archive.namelist() if name.endswith(".osl")}
         for name, operations in shaders.items():
             with subtests.test(name):
@@ -287,6 +291,9 @@ def test_sockets_equal_the_manifest(extension, empty, subtests):
             item = interface[sockets["Lobes"].identifier]
             assert (item.min_value, item.max_value) == (1, lobes["max"])
             assert sockets["Lobes"].default_value == lobes["default"]
+        apart = extension.nodes.has_albedo_script(model, representation)
+        assert [s.name for s in node.outputs] == (["BSDF"] if apart else ["BSDF", "Albedo"])
+        extension.nodes.add_albedo(node)
         assert [s.name for s in node.outputs] == ["BSDF", "Albedo"]
 
 
@@ -399,6 +406,126 @@ def test_broken_shader_under_another_engine(extension, empty, monkeypatch):
         extension.api.new_material("lambert")
     monkeypatch.undo()
     assert extension.api.new_material("lambert").node_tree is not None
+
+
+def scripts_of(node):
+    return [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript"]
+
+
+def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, empty, subtests):
+    """A file holds source and bytecode of each. Fits hold tables of their own."""
+    for model, form in forms(extension):
+        with subtests.test(model=model, form=form):
+            source = extension.pack.source(model, form)[1]
+            if form != "fitted":
+                assert len(source) <= 100_000
+            apart = extension.pack.albedo_source(model, form)
+            assert extension.nodes.has_albedo_script(model, form) == (apart is not None)
+            material = extension.api.new_material(model, form)
+            node = extension.nodes.group_nodes(material)[0]
+            assert [s.script.as_string() for s in scripts_of(node)] == [source]
+
+
+def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
+    """Where it takes a script of its own: with the node's values and links, once a form, and a
+    file does not keep what is not in use."""
+    api, nodes = extension.api, extension.nodes
+    material, other, third = (api.new_material("ward", ax=0.3, ks=(0.1, 0.2, 0.3)) for _ in "123")
+    tree, node = material.node_tree, nodes.group_nodes(material)[0]
+    assert [s.name for s in node.outputs] == ["BSDF"]
+    assert not nodes.uses_albedo(node)
+    value = tree.nodes.new("ShaderNodeValue")
+    tree.links.new(value.outputs[0], nodes.sockets(node)["ay"])
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    whole, before = node.node_tree, helpers.counts()
+
+    api.add_albedo(material)
+    assert [s.name for s in node.outputs] == ["BSDF", "Albedo"]
+    assert nodes.get_value(node, "ax") == pytest.approx(0.3)
+    assert nodes.get_value(node, "ks") == pytest.approx((0.1, 0.2, 0.3))
+    assert nodes.sockets(node)["ay"].links[0].from_node == value
+    assert output.inputs["Surface"].links[0].from_node == node
+    model, albedo = scripts_of(node)
+    assert [s.identifier for s in albedo.outputs] == ["Albedo"]
+    assert albedo.script.as_string() == extension.pack.albedo_source("ward", "sampled")[1]
+    assert all(s.is_linked for s in albedo.inputs)
+    assert nodes.script_problem(node.node_tree) is None
+    assert api.warnings(material, empty) == api.warnings(other, empty)
+    assert nodes.group_nodes(other)[0].node_tree == whole, "another material got it too"
+
+    full, added = node.node_tree, helpers.counts()
+    assert (
+        added["texts"] == before["texts"] + 2 and added["node_groups"] == before["node_groups"] + 1
+    )
+    api.add_albedo(material)
+    assert node.node_tree == full
+    api.add_albedo(other)
+    assert nodes.group_nodes(other)[0].node_tree == full and helpers.counts() == added
+    api.add_albedo(third)
+    left = helpers.counts()
+    assert left["texts"] == before["texts"] + 1 and left["node_groups"] == before["node_groups"]
+
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
+    api.switch_representation(material, "sampled")
+    assert node.node_tree == full
+    assert emission.inputs["Color"].links[0].from_socket == node.outputs["Albedo"]
+    tree.nodes.remove(emission)
+    api.switch_representation(material, "sampled")
+    assert [s.name for s in node.outputs] == ["BSDF"] and len(scripts_of(node)) == 1
+
+    albedo.bytecode = ""
+    assert "Albedo output is not compiled" in nodes.script_problem(full)
+
+
+def test_albedo_output_goes_from_form_to_form(extension, empty):
+    """Also to a form whose one script has it, and back."""
+    material = extension.api.new_material("coupled", "sampled")
+    tree, node = material.node_tree, extension.nodes.group_nodes(material)[0]
+    extension.api.add_albedo(material)
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
+    for form, scripts in (("exact", 1), ("sampled", 2)):
+        extension.api.switch_representation(material, form)
+        assert extension.nodes.identity(node) == ("coupled", form)
+        assert len(scripts_of(node)) == scripts
+        assert emission.inputs["Color"].links[0].from_socket == node.outputs["Albedo"]
+
+
+def test_albedo_output_that_can_not_be_added_changes_nothing(extension, empty, monkeypatch):
+    material = extension.api.new_material("ward")
+    node = extension.nodes.group_nodes(material)[0]
+    group, before = node.node_tree, helpers.counts()
+    broken = ("broken", BROKEN["does not parse"][0])
+    with monkeypatch.context() as patch:
+        patch.setattr(extension.pack, "albedo_source", lambda *_: broken)
+        with pytest.raises(extension.api.CompileError, match="the Albedo output: .* failed to"):
+            extension.api.add_albedo(material)
+    assert node.node_tree == group and helpers.counts() == before
+    group[extension.nodes.TAG]["digest"] = "of an older version"
+    with pytest.raises(ValueError, match="of another version of the extension"):
+        extension.api.add_albedo(material)
+
+
+def test_operator_adds_the_albedo_output_where_it_lacks(extension, empty):
+    mesh = bpy.data.meshes.new("mesh")
+    target = bpy.data.objects.new("target", mesh)
+    empty.collection.objects.link(target)
+    bpy.context.view_layer.objects.active = target
+    material = extension.api.new_material("ward")
+    mesh.materials.append(material)
+    node = extension.nodes.group_nodes(material)[0]
+
+    def is_offered():
+        layout = helpers.Layout()
+        extension.ui.draw_material(layout, material, empty)
+        return any(line.startswith("operator brdfc.add_albedo") for line in layout.log)
+
+    assert is_offered()
+    assert bpy.ops.brdfc.add_albedo(node=node.name) == {"FINISHED"}
+    assert "Albedo" in node.outputs and not is_offered()
+    with pytest.raises(RuntimeError, match="has no model node 'nothing'"):
+        bpy.ops.brdfc.add_albedo(node="nothing")
 
 
 def test_switch_keeps_values_and_links(extension, empty):

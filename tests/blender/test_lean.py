@@ -22,6 +22,12 @@ def used(extension, empty, kept_program, monkeypatch):
     value = made["ward"].node_tree.nodes.new("ShaderNodeValue")
     value.outputs[0].default_value = 0.5
     made["ward"].node_tree.links.new(value.outputs[0], extension.nodes.sockets(node)["ay"])
+    for material in made.values():
+        # What is not linked is left out anyhow.
+        extension.api.add_albedo(material)
+        emission = material.node_tree.nodes.new("ShaderNodeEmission")
+        albedo = the_node(extension, material).outputs["Albedo"]
+        material.node_tree.links.new(albedo, emission.inputs["Color"])
     return made
 
 
@@ -31,9 +37,9 @@ def the_node(extension, material):
 
 
 def source(extension, material):
-    tree = the_node(extension, material).node_tree
-    script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
-    return script.script.as_string()
+    """Of all scripts that a material has."""
+    scripts = the_node(extension, material).node_tree.nodes
+    return "".join(n.script.as_string() for n in scripts if n.bl_idname == "ShaderNodeScript")
 
 
 def picture(extension, material):
@@ -71,6 +77,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
         # In coupled's short text a table of three colours takes the place of a colour.
         part = 1.1 if model == "coupled" else 0.5
         assert len(source(extension, material)) < part * sizes[model]
+        assert nodes.uses_albedo(node)
         found = api.get_parameters(material)
         assert found.keys() == values[model].keys()
         for name, value in found.items():

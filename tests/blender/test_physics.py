@@ -455,6 +455,7 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         scene, material = start(extension, model, form, values, max_bounces=0)
         tree = material.node_tree
+        extension.api.add_albedo(material)
         node = extension.nodes.group_nodes(material)[0]
         output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
         emission = tree.nodes.new("ShaderNodeEmission")
