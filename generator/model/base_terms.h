@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The closures that bases are made of, about the surface's normal.
+// The closures that bases are made of, about the surface's normal. Their weights and roughnesses have constants that
+// make little of what a base lacks: of its magnitude, because Cycles follows what is drawn as often as that is large,
+// and of its square, over the view and the sliders' ranges. base_worth() measures both.
 #pragma once
 
 #include "represent/closure.h"
@@ -37,7 +39,8 @@ template <class T> Closure<T> power_closure(const Rgb<T>& weight, const T& expon
   return c;
 }
 
-/// The height above the surface that a lobe of this exponent has on average, whose axis is at height z.
-template <class T> T lobe_height(const T& z, const T& e) { return sqrt(z * z + T(0.5) / (e + T(2))); }
+/// How high a lobe is on average, whose axis is at height z: of one near the surface the lower half is cut off. A
+/// weight that is divided by a height, or a Fresnel term of one, takes this.
+template <class T> T lobe_height(const T& z, const T& variance) { return sqrt(z * z + variance); }
 
 }  // namespace brdfc

@@ -21,8 +21,8 @@
 // 1 / (n + 1) along the axes; what counts are its variances along and across the plane of incidence and the correlation
 // of the two. A cosine alone would not do: where the lobe begins to sink below the surface moves with the lobe's width.
 // Interpolation errs by at most 0.02 of the incident light, 0.003 on average; that is what R_d = 1 gains or loses.
-#include "model/base_terms.h"
 #include "core/table.h"
+#include "model/base_terms.h"
 #include "model/half_vector.h"
 
 namespace brdfc {
@@ -242,17 +242,27 @@ template <class T> struct AshikhminShirley {
     return sample_if(p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
-  /// Facets whose slopes have the lobe's widths, and eq. 14 of which eq. 12 is a variation.
+  /// Facets nearly as wide as the lobe, and eq. 14 exactly but for the steps of a ramp, or something like eq. 12.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    const Rgb<T> F = named("F_view", rs + (Rgb<T>(T(1)) - rs) * schlick_weight(wo.z));
-    const T along = sqrt(T(2) / (nu + T(2))), across = sqrt(T(2) / (nv + T(2)));
     const Rgb<T> none(T(0));
+    // Seen from above f cos falls as cos^(n + 3), facets fall 4 powers slower than their slopes' density; 5 serves
+    // wide lobes better than 7. Then both have the same peak by the ratio of the normalisations.
+    const T au2 = named("au2", T(2) / (nu + T(5))), av2 = named("av2", T(2) / (nv + T(5)));
+    const T size = sqrt((nu + T(1)) * (nv + T(1)) * au2 * av2) / T(2);
+    // What the lobe reaches towards the horizon.
+    const Vec3<T> k = rotate_z(wo, cos(rotation), sin(rotation));
+    const T reach2 = named("reach2", au2 * sqr(k.x) + av2 * sqr(k.y));
+    const Rgb<T> F = rs + (Rgb<T>(T(1)) - rs) * schlick_weight(lobe_height(wo.z, T(0.7) * reach2));
+    // Eq. 16 loses more there than facets do.
+    const Rgb<T> glossy = F * (size * wo.z / (wo.z + T(0.3) * sqrt(reach2)));
     Closure<T> matte(ClosureKind::DiffuseRamp, part == Specular ? none : substrate_albedo(wo));
     for (int i = 0; i < kRampSize; ++i) {
       const T c = T(i) / T(kRampSize - 1);
-      matte.ramp[std::size_t(i)] = Rgb<T>(T(28. / 23) * fade(c) * c);
+      // Eq. 12's fade is Fresnel's and that of light lost to the lobe; both have the mean 1 over the cosine.
+      const T faded = diffuse == Paper ? T(28. / 23) * fade(c) : T(21. / 20) * one_minus_schlick_weight(c);
+      matte.ramp[std::size_t(i)] = Rgb<T>(faded * c);
     }
-    return {facets(ClosureKind::Beckmann, part == Diffuse ? none : F, along, across, rotation), matte};
+    return {facets(ClosureKind::Beckmann, part == Diffuse ? none : glossy, sqrt(au2), sqrt(av2), rotation), matte};
   }
 };
 

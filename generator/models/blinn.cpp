@@ -58,9 +58,10 @@ template <class T> struct Blinn {
     return sample_if(above(wi, wo), wi, ks * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
   }
 
-  /// Gaussian slopes as wide as the power of the cosine.
+  /// Gaussian slopes as wide as the power of the cosine, but for wide lobes, that much of which is lost, and as high.
   ClosureSum<T> base(const Vec3<T>&) const {
-    return {facets(ClosureKind::Beckmann, ks, sqrt(T(2) / (e + T(2))))};
+    const T scale = T(1) / (e + T(3));
+    return {facets(ClosureKind::Beckmann, ks * ((e + T(2)) * scale), sqrt(T(2) * scale))};
   }
 };
 

@@ -63,8 +63,10 @@ template <class T> struct CookTorrance {
     return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
   }
 
+  /// The same facets with another geometry term, and the Fresnel term of the lobe's middle.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {facets(ClosureKind::Beckmann, F(clamp01(T(1) - wo.z)), m)};
+    const T height = lobe_height(wo.z, T(0.7) * m * m * sin2_theta(wo));
+    return {facets(ClosureKind::Beckmann, F(clamp01(T(1) - height)), m)};
   }
 };
 

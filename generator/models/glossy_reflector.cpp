@@ -68,8 +68,11 @@ template <class T> struct GlossyReflector {
     return sample_if(above(wi, wo), wi, cr * kr, pdf(wi, wo));
   }
 
+  /// The lobe times a cosine of the light that it lacks: its mean is taken off. What is turned back from below makes up
+  /// for a part of what is cut off.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, e))), e)};
+    return {power_closure(
+        cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(below == Mirror ? 0.25 : 1) / (e + T(2))))), e)};
   }
 };
 

@@ -74,9 +74,7 @@ template <class T> struct GlossySpecular {
   }
 
   /// Eq. 25.2 itself, in the cosine that Cycles has rounded.
-  ClosureSum<T> base(const Vec3<T>&) const {
-    return {power_closure(cs * (c() * ks * T(2) * pi<T>() / (e + T(2))), e)};
-  }
+  ClosureSum<T> base(const Vec3<T>&) const { return {power_closure(cs * (c() * ks * T(2) * pi<T>() / (e + T(2))), e)}; }
 };
 
 BRDFC_MODEL(GlossySpecular)

@@ -81,10 +81,14 @@ template <class T> struct Lafortune {
     return sample_if(above(wi, wo), wi, ks * ((e + T(2)) / (e + T(1)) * l.scale * wi.z), pdf(wi, wo));
   }
 
+  /// The lobe, mirrored about the middle between it and the viewer, times a cosine to there instead of that to the
+  /// normal.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const Lobe l = lobe(wo);
     const Vec3<T> n = normalize(wo + l.axis);
-    Closure<T> c = power_closure(ks * (l.scale * lobe_height(l.axis.z, e) / dot(n, l.axis)), e);
+    const T variance = T(1) / (e + T(2));
+    const T cosines = lobe_height(l.axis.z, variance) / lobe_height(dot(n, l.axis), variance);
+    Closure<T> c = power_closure(ks * (l.scale * cosines), e);
     c.normal = n;
     c.turned = true;
     return {c};

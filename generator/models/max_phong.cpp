@@ -53,8 +53,9 @@ template <class T> struct MaxPhong {
     return sample_if(above(wi, wo), wi, ks * ratio, pdf(wi, wo));
   }
 
+  /// The lobe times the light's cosine instead of that over the larger one.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {power_closure(ks * ((e + T(1)) / ((e + T(2)) * lobe_height(wo.z, e))), e)};
+    return {power_closure(ks * ((e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(1) / (e + T(2))))), e)};
   }
 };
 

@@ -100,8 +100,10 @@ template <class T> struct OrenNayar {
     return sample_if(above(wi, wo), wi, eval(wi, wo) * pi<T>(), cosine_pdf(wi));
   }
 
-  ClosureSum<T> base(const Vec3<T>&) const {
-    return {Closure<T>(ClosureKind::Diffuse, rho * C1())};
+  /// What f is for most of the light: less than the mean, which the side towards the viewer raises.
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const Rgb<T> direct = rho * (C1() + T(0.15) * T(0.45) * share(0.09) * sin2_theta(wo));
+    return {Closure<T>(ClosureKind::Diffuse, form == Full ? direct + rho * rho * (T(0.17) * share(0.13)) : direct)};
   }
 };
 

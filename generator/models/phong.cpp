@@ -51,8 +51,9 @@ template <class T> struct Phong {
     return sample_if(above(wi, wo), wi, ks * (T(2) * pi<T>() / (e + T(1))), pdf(wi, wo));
   }
 
+  /// The lobe times a cosine of the light that it lacks: its mean is taken off.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {power_closure(ks * (T(2) * pi<T>() / ((e + T(2)) * lobe_height(wo.z, e))), e)};
+    return {power_closure(ks * (T(2) * pi<T>() / ((e + T(2)) * lobe_height(wo.z, T(1) / (e + T(2))))), e)};
   }
 };
 

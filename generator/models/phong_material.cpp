@@ -91,9 +91,10 @@ template <class T> struct PhongMaterial {
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
   }
 
+  /// Two terms exactly, and the lobe of the last as in glossy_reflector.cpp.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     return {Closure<T>(ClosureKind::Diffuse, cd * kd), power_closure(cs * (ks * T(2) * pi<T>() / (es + T(2))), es),
-            power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, e))), e)};
+            power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(0.25) / (e + T(2))))), e)};
   }
 };
 

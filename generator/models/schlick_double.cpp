@@ -54,9 +54,8 @@ template <class T> struct SchlickDouble {
     return sample_if(above(wi, wo), wi, matte(wi, wo), cosine_pdf(wi));
   }
 
-  ClosureSum<T> base(const Vec3<T>&) const {
-    return {Closure<T>(ClosureKind::Diffuse, rd * (T(1) - r0))};
-  }
+  /// R_f(alpha) is R_0 but where both directions graze, apart.
+  ClosureSum<T> base(const Vec3<T>&) const { return {Closure<T>(ClosureKind::Diffuse, rd * (T(1) - r0))}; }
 };
 
 BRDFC_MODEL(SchlickDouble)

@@ -88,8 +88,15 @@ template <class T> struct Ward {
     return sample_if(above(wi, wo), wi, ks * weight, pdf(wi, wo));
   }
 
+  /// Facets with the curvature that f cos has at its peak seen from above, 1/a^2 + 1, 2 or 3 by the normalisation, or
+  /// less, which serves wide lobes better; as high as it.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {facets(ClosureKind::Beckmann, normalisation == Original ? ks * wo.z : ks, ax, ay, T(0))};
+    const double narrower = normalisation == Bounded ? 1 : normalisation == Duer ? 1.5 : 2;
+    const T sx = T(1) / sqrt(T(1) + T(narrower) * sqr(ax)), sy = T(1) / sqrt(T(1) + T(narrower) * sqr(ay));
+    T weight = sx * sy;
+    // sqrt((n.o) / (n.i)) more than the others.
+    if (normalisation == Original) weight = weight * lobe_height(wo.z, sqr(ax * sx * wo.x) + sqr(ay * sy * wo.y));
+    return {facets(ClosureKind::Beckmann, ks * weight, ax * sx, ay * sy, T(0))};
   }
 };
 

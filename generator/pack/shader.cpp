@@ -567,7 +567,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       if (kinds[c].stretched == Tangent::Surface)
         body += fmt::format(
-            "    vector tangent_{0} = frame_t * tangent_{0}_x + frame_b * tangent_{0}_y + frame_n * tangent_{0}_z;\n", c);
+            "    vector tangent_{0} = frame_t * tangent_{0}_x + frame_b * tangent_{0}_y + frame_n * tangent_{0}_z;\n",
+            c);
       if (kinds[c].turned)
         body += fmt::format(
             "    normal normal_{0} = normalize(frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * "

@@ -7,8 +7,8 @@
 
 namespace brdfc {
 
-/// Of the directions in which the rest is looked for, how many the model draws. The others are those of a matte surface:
-/// closures give light where the model draws nothing.
+/// Of the directions in which the rest is looked for, how many the model draws. The others are those of a matte
+/// surface: closures give light where the model draws nothing.
 inline constexpr double kModelShareOfRest = 0.75;
 
 /// One view. Variances are those of one drawn direction, in squares of the albedo; channels are averaged.

@@ -48,7 +48,7 @@ ParamValues form_values(const Model&, RepresentationKind, const ParamValues& fix
 enum class Division { Done, ByLargest, ByChannel };
 struct RecordedClosure {
   ClosureKind kind;
-  bool turned;     ///< has a normal of its own
+  bool turned;        ///< has a normal of its own
   Tangent stretched;  ///< facets of two roughnesses, and along what
   Division division;
   bool operator==(const RecordedClosure&) const = default;
@@ -64,11 +64,11 @@ struct Recording {
 };
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
-/// alpha_i, alpha_across_i, ior_i, and of its normal and tangent, if they are its own, normal_i_x and so on; Controlled: these, wi_x, wi_y, wi_z,
-/// residual_weight and residual_colour. A form of a fit needs all parameters in `fixed` but one number and what it has
-/// terms by, which it reads, and factors(), which its weights still have to be multiplied by, the mirror's excepted; it
-/// is right for these `views`.
-/// Throws InputError if more closures than Cycles keeps would be needed.
+/// alpha_i, alpha_across_i, ior_i, and of its normal and tangent, if they are its own, normal_i_x and so on;
+/// Controlled: these, wi_x, wi_y, wi_z, residual_weight and residual_colour. A form of a fit needs all parameters in
+/// `fixed` but one number and what it has terms by, which it reads, and factors(), which its weights still have to be
+/// multiplied by, the mirror's excepted; it is right for these `views`. Throws InputError if more closures than Cycles
+/// keeps would be needed.
 Recording record(const Model&, RepresentationKind, const ParamValues& fixed, int indent, const Cosines& views = {});
 /// The statements of an aimed form, for one combination of choices. All read the parameters and wo_x, wo_y, wo_z.
 struct AimedRecording {
