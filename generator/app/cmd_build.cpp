@@ -27,13 +27,13 @@ struct Options {
 };
 
 void print_table(const PackResult& result) {
-  fmt::print("{:<20} {:<8} {:>8} {:>6} {:>10} {:>11} {:>11} {:>12} {:>11} {:>8}\n", "model", "form", "closures",
-             "slots", "operations", "relative_l1", "albedo", "table_floats", "table_error", "bytes");
+  fmt::print("{:<20} {:<8} {:>8} {:>6} {:>10} {:>11} {:>11} {:>12} {:>11} {:>8} {:>12}\n", "model", "form", "closures",
+             "slots", "operations", "relative_l1", "albedo", "table_floats", "table_error", "bytes", "albedo_bytes");
   for (const PackLine& l : result.lines)
-    fmt::print("{:<20} {:<8} {:>8} {:>6} {:>10} {:>11} {:>11.2e} {:>12} {:>11.2e} {:>8}\n", l.model, l.representation,
-               l.closures, l.slots, l.operations,
+    fmt::print("{:<20} {:<8} {:>8} {:>6} {:>10} {:>11} {:>11.2e} {:>12} {:>11.2e} {:>8} {:>12}\n", l.model,
+               l.representation, l.closures, l.slots, l.operations,
                l.error.relative_l1 ? fmt::format("{:.2e}", *l.error.relative_l1) : "expectation", l.error.albedo,
-               l.table_floats, l.table_error, l.bytes);
+               l.table_floats, l.table_error, l.bytes, l.albedo_bytes);
 }
 
 /// How materials are used.
@@ -91,7 +91,7 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
                          {"closures", l.whole_closures},
                          {"table_floats", l.whole_table_floats}}},
                        {"after",
-                        {{"bytes", l.bytes},
+                        {{"bytes", l.bytes + l.albedo_bytes},
                          {"operations", l.operations},
                          {"statements", l.statements},
                          {"closures", l.closures},
@@ -145,8 +145,8 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
         fmt::print(
             "  {}: {} -> {} bytes, {} -> {} operations, {} -> {} statements, {} -> {} closures, {} -> {} floats of "
             "tables\n",
-            l.representation, l.whole_bytes, l.bytes, l.whole_operations, l.operations, l.whole_statements,
-            l.statements, l.whole_closures, l.closures, l.whole_table_floats, l.table_floats);
+            l.representation, l.whole_bytes, l.bytes + l.albedo_bytes, l.whole_operations, l.operations,
+            l.whole_statements, l.statements, l.whole_closures, l.closures, l.whole_table_floats, l.table_floats);
   }
   fmt::print("costs: CPU time with default parameters, in units of Blender's Glossy node at equal samples\n");
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));

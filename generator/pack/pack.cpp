@@ -352,8 +352,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     if (!shader.albedo.empty()) built.files[albedo_file] = shader.albedo;
     built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations,
                            shader.statements, error, of_form.size() + of_fit, table.error, shader.source.size(),
-                           whole.closures, whole.operations, whole.statements, whole_table.size() + of_whole_fit,
-                           whole.source.size()});
+                           shader.albedo.size(), whole.closures, whole.operations, whole.statements,
+                           whole_table.size() + of_whole_fit, whole.source.size() + whole.albedo.size()});
     j["representations"][name_of(kind)] = {
         {twin ? "nodes" : "shader", file},
         {"only", values_json(form_values(model, kind, plan.fixed))},

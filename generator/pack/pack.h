@@ -26,8 +26,9 @@ struct PackLine {
   RepresentationError error;
   std::size_t table_floats = 0;
   double table_error = 0;
-  std::size_t bytes = 0;  ///< of the shader's text
-  /// The same with nothing left out; equal where nothing is.
+  std::size_t bytes = 0;         ///< of the shader's text
+  std::size_t albedo_bytes = 0;  ///< of that of its Albedo output, where that is a shader of its own
+  /// The same with nothing left out, bytes of both texts together; equal where nothing is.
   int whole_closures = 0, whole_operations = 0, whole_statements = 0;
   std::size_t whole_table_floats = 0, whole_bytes = 0;
 };
