@@ -426,6 +426,18 @@ def test_stability_page_refuses_a_folder_that_cannot_be(tmp_path):
 # ---- fit ----------------------------------------------------------------------------------------
 
 
+def test_base_prints_what_it_carries_and_leaves():
+    table = rows(run("base", "ward", "normalisation=duer", "--angles", "20,70", "--points", "4096"))
+    assert [row["theta_o"] for row in table] == [20, 70]
+    assert table[0]["relative_l1"] < 0.02 < table[1]["relative_l1"] + 0.02 < 0.1
+    for row in table:
+        assert row["share"] == pytest.approx(1, abs=0.05) == row["best_scale"]
+        assert row["sky_rest"] < 0.05 * row["sky_drawn"]
+        assert row["white_rest"] < row["white_drawn"]
+    assert run("base", "lambert").returncode == 2
+    assert "lambert: has no base" in run("base", "lambert").stderr
+
+
 def test_fit_prints_its_error_by_view_and_its_closures():
     result = run("fit", "phong", "e=20")
     table = rows(result)

@@ -121,8 +121,9 @@ template <class T> class Brdf {
   virtual bool scatters_through() const = 0;
   /// The closures that equal the model, or nothing if no such sum is known. Delta terms alone are always known.
   virtual std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const = 0;
-  /// Closures that carry most of f cos(theta_i) for any parameters, none for a model that declares no such sum. No error
-  /// is claimed: who uses them adds what they lack. Weights are not negative, nor is there a delta term among them.
+  /// Closures that carry most of f cos(theta_i) for any parameters, none for a model that declares no such sum. No
+  /// error is claimed: who uses them adds what they lack. Weights are not negative, nor is there a delta term among
+  /// them.
   virtual ClosureSum<T> base(const Vec3<T>& wo) const = 0;
 };
 

@@ -135,11 +135,8 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     case ClosureKind::Ggx:
     case ClosureKind::Beckmann: {
       const auto of_facets = [&] {
-        if (c.stretched != Tangent::None && c.turned)
+        if (c.stretched != Tangent::None)
           return microfacet(c.kind, c.alpha, c.alpha_across, c.normal, c.tangent, wi, wo);
-        if (c.stretched != Tangent::None)  // about the normal: half the operations
-          return microfacet(c.kind, c.alpha, c.alpha_across, rotate_z(wi, c.tangent.x, c.tangent.y),
-                            rotate_z(wo, c.tangent.x, c.tangent.y));
         if (c.turned) return microfacet(c.kind, c.alpha, c.normal, wi, wo);
         return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
       };
