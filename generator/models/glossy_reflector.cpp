@@ -11,7 +11,6 @@
 // partner, 2 (r.wi) r - wi, is below, and jumps there. Every ray counts, so the albedo is k_r c_r at every angle.
 //
 // Stable forms: see power_lobe.h.
-#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -66,13 +65,6 @@ template <class T> struct GlossyReflector {
       wi = select(flip, turned, wi);
     }
     return sample_if(above(wi, wo), wi, cr * kr, pdf(wi, wo));
-  }
-
-  /// The lobe times a cosine of the light that it lacks: its mean is taken off. What is turned back from below makes up
-  /// for a part of what is cut off.
-  ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {power_closure(
-        cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(below == Mirror ? 0.25 : 1) / (e + T(2))))), e)};
   }
 };
 

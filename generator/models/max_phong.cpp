@@ -7,7 +7,6 @@
 //
 // c = (e + 1) / (2 pi): f cos theta_i is then at most a density over directions, so that the albedo stays below k_s and
 // reaches it for e -> infinity at every angle. The paper's Fresnel term is k_s here, constant.
-#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -51,11 +50,6 @@ template <class T> struct MaxPhong {
     const Vec3<T> wi = about_axis(reflect(wo), sample_power_lobe(e, u.y, u.z));
     const T ratio = wi.z / maximum(maximum(wi.z, wo.z), tiny<T>());
     return sample_if(above(wi, wo), wi, ks * ratio, pdf(wi, wo));
-  }
-
-  /// The lobe times the light's cosine instead of that over the larger one.
-  ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {power_closure(ks * ((e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(1) / (e + T(2))))), e)};
   }
 };
 

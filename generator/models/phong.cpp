@@ -8,7 +8,6 @@
 //
 // So f is not reciprocal. Nothing ties k_s to e: at normal incidence the albedo is 2 pi k_s / (e + 1), a gain below
 // e = 5.28 and next to nothing for large e. What the horizon cuts off the lobe is lost.
-#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -49,11 +48,6 @@ template <class T> struct Phong {
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const Vec3<T> wi = about_axis(reflect(wo), sample_power_lobe(e, u.y, u.z));
     return sample_if(above(wi, wo), wi, ks * (T(2) * pi<T>() / (e + T(1))), pdf(wi, wo));
-  }
-
-  /// The lobe times a cosine of the light that it lacks: its mean is taken off.
-  ClosureSum<T> base(const Vec3<T>& wo) const {
-    return {power_closure(ks * (T(2) * pi<T>() / ((e + T(2)) * lobe_height(wo.z, T(1) / (e + T(2))))), e)};
   }
 };
 
