@@ -57,7 +57,8 @@ template <class G> double over_sky(const Vec3<double>& axis, double cosEnd, cons
   double sum = 0;
   for (int i = 0; i < kHeights; ++i)
     for (int j = 0; j < kTurns; ++j) {
-      const double c = 1 - (1 - cosEnd) * (i + 0.5) / kHeights, s = std::sqrt(1 - c * c), a = 2 * kPi * (j + 0.5) / kTurns;
+      const double c = 1 - (1 - cosEnd) * (i + 0.5) / kHeights, s = std::sqrt(1 - c * c),
+                   a = 2 * kPi * (j + 0.5) / kTurns;
       const Vec3<double> w = axis * c + t * (s * std::cos(a)) + b * (s * std::sin(a));
       if (w.z > 0) sum += g(w) * sky(w);
     }
@@ -100,8 +101,8 @@ struct Case {
   std::vector<std::string> values;
 };
 
-/// Sum of base, lamps and rest against the model, each lit by a sky and five lamps. The mean of so many draws is compared
-/// at 4.5 of its standard errors, or to 0.2 %, which quadrature may be off by.
+/// Sum of base, lamps and rest against the model, each lit by a sky and five lamps. The mean of so many draws is
+/// compared at 4.5 of its standard errors, or to 0.2 %, which quadrature may be off by.
 void expect_model(const Model& m, const ParamValues& values) {
   constexpr int kDraws = 20000;
   const auto brdf = m.make_double(values);
@@ -147,7 +148,8 @@ void expect_model(const Model& m, const ParamValues& values) {
     }
     const double error = std::sqrt(std::max(squares - sum * sum, 0.0) / kDraws);
     EXPECT_NEAR(sum, truth, std::max(4.5 * error, 2e-3 * truth))
-        << m.info().name << " " << format_values(m.info(), values) << " at " << cosTheta_o << ", standard error " << error;
+        << m.info().name << " " << format_values(m.info(), values) << " at " << cosTheta_o << ", standard error "
+        << error;
     EXPECT_LT(error, 0.05 * truth) << m.info().name << ": too noisy to compare";
   }
 }
@@ -158,9 +160,12 @@ TEST(Aimed, AddsUpToTheModel) {
 }
 
 TEST(Aimed, AddsUpToTheModelWhereItIsStiff) {
-  const Case cases[] = {{"ashikhmin_shirley", {"nu=100", "nv=10000", "rd=0", "rs=0.9"}}, {"phong", {"e=5000"}},
-                        {"ward", {"ax=0.02", "ay=0.3"}},                               {"cook_torrance", {"m=0.05"}},
-                        {"schlick", {"rough=0.01", "p=0.5"}},                          {"blinn", {"e=2000"}}};
+  const Case cases[] = {{"ashikhmin_shirley", {"nu=100", "nv=10000", "rd=0", "rs=0.9"}},
+                        {"phong", {"e=5000"}},
+                        {"ward", {"ax=0.02", "ay=0.3"}},
+                        {"cook_torrance", {"m=0.05"}},
+                        {"schlick", {"rough=0.01", "p=0.5"}},
+                        {"blinn", {"e=2000"}}};
   for (const Case& c : cases) {
     const Model& m = find_model(c.model);
     expect_model(m, values_of(m, c.values));

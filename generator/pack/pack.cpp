@@ -335,9 +335,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
                       of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
     const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
-    const Shader shader =
-        twin ? write_nodes(model, fixed)
-             : write_shader(model, kind, of_form, fixed, plan.max_lobes, plan.views, plan.max_lamps);
+    const Shader shader = twin ? write_nodes(model, fixed)
+                               : write_shader(model, kind, of_form, fixed, plan.max_lobes, plan.views, plan.max_lamps);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
     const ParamValues whole_fixed = is_fit(kind) ? fixed : ParamValues{};

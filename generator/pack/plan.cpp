@@ -156,10 +156,10 @@ std::vector<RepresentationKind> aimed_or_fitted(const Needs& needs, const Budget
 
 /// What lamps without a size make of a form, as script/conditions measured it; empty where they do nothing to it.
 std::string under_lamps(RepresentationKind kind, const Budget& budget) {
-  const char* shine = kind == RepresentationKind::Aimed    ? "as on Blender's own nodes"
-                      : kind == RepresentationKind::Sampled  ? "as rare bright dots"
-                      : kind == RepresentationKind::Fitted ? "as on Blender's own nodes, on drawn directions as rare "
-                                                             "bright dots"
+  const char* shine = kind == RepresentationKind::Aimed     ? "as on Blender's own nodes"
+                      : kind == RepresentationKind::Sampled ? "as rare bright dots"
+                      : kind == RepresentationKind::Fitted  ? "as on Blender's own nodes, on drawn directions as rare "
+                                                              "bright dots"
                       : kind == RepresentationKind::Controlled ? "on its closures alone"
                                                                : nullptr;
   if (!shine || budget.sizeless.empty()) return {};

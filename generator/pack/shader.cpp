@@ -332,7 +332,9 @@ class AimedText {
 
   int operations() const {
     const AimedSteps& steps = aimed_steps(0);
-    return operations_ + steps.rest.operations + (lamps_ > 0 ? steps.room.operations + steps.aim.operations + steps.less.operations + steps.send.operations : 0);
+    return operations_ + steps.rest.operations +
+           (lamps_ > 0 ? steps.room.operations + steps.aim.operations + steps.less.operations + steps.send.operations
+                       : 0);
   }
 
   std::string print() const {
@@ -342,7 +344,8 @@ class AimedText {
                       "    color rest_colour, covered = 0.0;\n    float rest_weight, lamp_met = 0.0;\n";
     if (lamps_ == 0)
       return out +
-             "    color excess, covered_before = 0.0;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
+             "    color excess, covered_before = 0.0;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = "
+             "drawn_z;\n" +
              block(value_.print(0), 1) + block(steps.rest.statements, 1);
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
     out += fmt::format(
@@ -362,7 +365,8 @@ class AimedText {
         "        if (lamp < lamps) {\n"
         "            vector lamp_centre, lamp_across, lamp_along;\n            float lamp_disk, lobe_room = 1.0;\n"
         "            lobe_weight[lamp] = 0.0;\n"
-        "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], lamp_centre, lamp_across,\n"
+        "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], "
+        "lamp_centre, lamp_across,\n"
         "                           lamp_along, lamp_disk) == 0)\n"
         "                continue;\n"
         "            lamp_centre = brdfc_local(lamp_centre, frame_t, frame_b, frame_n);\n"
@@ -375,7 +379,8 @@ class AimedText {
         "            if (lamp_emphasis == 0.0)\n                continue;\n"
         "            lobe_towards[lamp] = vector(to_lamp_x, to_lamp_y, to_lamp_z);\n"
         "            lobe_half[lamp] = vector(to_half_x, to_half_y, to_half_z);\n"
-        "            if (lamp_met_here > 0.0) {\n                lamp_met = lamp_solid_angle;\n                covered_before = covered;\n"
+        "            if (lamp_met_here > 0.0) {\n                lamp_met = lamp_solid_angle;\n                "
+        "covered_before = covered;\n"
         "            }\n"
         "        }\n"
         "        color excess;\n        float drawn_density;\n";
@@ -394,7 +399,8 @@ class AimedText {
         "        if (lobe_weight[lamp] > 0.0) {{\n"
         "            float lobe_level[{0}] = {{{1}}};\n"
         "            color lobe_colours[{0}];\n"
-        "            for (int entry = 0; entry < {0}; entry++)\n                lobe_colours[entry] = lobe_level[entry] * lobe_colour[lamp];\n"
+        "            for (int entry = 0; entry < {0}; entry++)\n                lobe_colours[entry] = "
+        "lobe_level[entry] * lobe_colour[lamp];\n"
         "            vector half_way = lobe_half[lamp];\n"
         "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
         "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], lobe_colours) + aimed;\n"
@@ -464,9 +470,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    const Recording r =
-        aimed ? aimed_text.add(choices, record_aimed(model, values, 0), arrays)
-              : record(model, kind, values, indent, views);
+    const Recording r = aimed ? aimed_text.add(choices, record_aimed(model, values, 0), arrays)
+                              : record(model, kind, values, indent, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, arrays.without_shared(r));
     if (!kinds.empty() && kinds != r.closures)
@@ -537,8 +542,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
           "    float wi_x, wi_y, wi_z, residual_weight;\n    color residual_colour;\n";
     body += aimed ? block(statements.print(0), 1) : statements.print(4);
     if (aimed) {
-      // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then the
-      // rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
+      // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then
+      // the rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
       for (std::size_t c = 0; c < kinds.size(); ++c)
         if (has_facets(kinds[c].kind))
           body += fmt::format("    if (raytype(\"camera\") == 0)\n        weight_{} = 0.0;\n", c);

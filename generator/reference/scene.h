@@ -117,7 +117,8 @@ struct UsedMaterials {
   std::optional<int> lamps;                 ///< how many there are to aim at, if the file says so
 };
 /// A file that has nothing but the schema's "materials", with {"varies": true} in place of the value of a parameter
-/// that is not constant, "sizeless_lamps", a list of names, if there are any, and "lamps", how many there are. Throws as load_scene().
+/// that is not constant, "sizeless_lamps", a list of names, if there are any, and "lamps", how many there are. Throws
+/// as load_scene().
 UsedMaterials load_materials(const std::filesystem::path& path);
 
 /// Writes scene.json, the meshes as .npy and the images as .exr into the folder, scene.json last.

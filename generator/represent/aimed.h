@@ -23,12 +23,12 @@
 
 namespace brdfc {
 
-/// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample; empty
-/// ones cost nothing.
+/// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample;
+/// empty ones cost nothing.
 inline constexpr int kMaxLamps = 8;
 
-/// A lamp as a flat patch, in units of any length: a disk or ellipse with these half axes, or a rectangle. A sun has its
-/// centre at distance 1.
+/// A lamp as a flat patch, in units of any length: a disk or ellipse with these half axes, or a rectangle. A sun has
+/// its centre at distance 1.
 template <class T> struct LampPatch {
   Vec3<T> centre;         ///< from the shading point
   Vec3<T> across, along;  ///< half axes, perpendicular to each other and longer than 0
@@ -87,8 +87,8 @@ template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
   return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
 }
 
-/// How far a lobe towards `centre` may reach, as a sine, without covering the lamp of an earlier one: what it gave there
-/// the drawn directions would have to take off again, bright as the lamp is.
+/// How far a lobe towards `centre` may reach, as a sine, without covering the lamp of an earlier one: what it gave
+/// there the drawn directions would have to take off again, bright as the lamp is.
 template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earlier) {
   return length(normalize(centre) - earlier.towards) - earlier.sinRadius;
 }
@@ -111,8 +111,8 @@ template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, 
   return lobe;
 }
 
-/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that the
-/// rest carries.
+/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that
+/// the rest carries.
 template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2,
                                        const Vec3<T>& drawn, const Vec3<T>& wo) {
   /// Sine of the radius beyond which a lamp is so near that drawn directions meet it well.
@@ -140,8 +140,8 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
     const T d2 = dot(p, p);
     return abs(dot(normal, p)) / (d2 * sqrt(d2));
   };
-  // Its mean over the lamp by four points, which is right to third degree (A. Stroud: Approximate Calculation of Multiple
-  // Integrals, 1971, C2: 3-1 and S2: 3-1).
+  // Its mean over the lamp by four points, which is right to third degree (A. Stroud: Approximate Calculation of
+  // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1).
   const T node = select(disk, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(disk, T(0), node);
   const T mean = (density(patch.at(node, other)) + density(patch.at(-node, other * T(-1))) +
                   density(patch.at(other * T(-1), node)) + density(patch.at(other, -node))) /
@@ -239,8 +239,8 @@ struct AimedSum {
   Rgb<double> rest;                 ///< its weight
 };
 
-/// As the shader goes about it (pack/shader.cpp). u: three numbers that draw the direction, v1, v2: that choose points of
-/// the lamps.
+/// As the shader goes about it (pack/shader.cpp). u: three numbers that draw the direction, v1, v2: that choose points
+/// of the lamps.
 AimedSum aimed_sum(const Brdf<double>&, const std::vector<LampPatch<double>>&, const Vec3<double>& wo,
                    const Vec3<double>& u, double v1, double v2);
 

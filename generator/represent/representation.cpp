@@ -324,9 +324,8 @@ const char* name_of(RepresentationKind kind) {
 }
 
 RepresentationKind representation_named(const std::string& name) {
-  for (RepresentationKind kind :
-       {RepresentationKind::Exact, RepresentationKind::Aimed, RepresentationKind::Sampled, RepresentationKind::Fitted,
-        RepresentationKind::Controlled, RepresentationKind::Twin})
+  for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Aimed, RepresentationKind::Sampled,
+                                  RepresentationKind::Fitted, RepresentationKind::Controlled, RepresentationKind::Twin})
     if (name == name_of(kind)) return kind;
   input_error("unknown representation '{}': expected one of exact, aimed, sampled, fitted, controlled, twin", name);
 }
@@ -449,11 +448,13 @@ const AimedSteps& aimed_steps(int indent) {
   earlier.sinRadius = Expr::input("lobe_radius[earlier]");
   earlier.cosEnd = Expr::input("lobe_end[earlier]");
   const Vec3<Expr> centre = input_vector("lamp_centre");
-  steps.room = record_step([&](Program& p) { p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(centre, earlier))); });
+  steps.room = record_step(
+      [&](Program& p) { p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(centre, earlier))); });
   steps.aim = record_step([&](Program& p) {
-    const LampPatch<Expr> patch{centre, input_vector("lamp_across"), input_vector("lamp_along"), Expr::input("lamp_disk")};
-    const AimedLamp<Expr> lamp = aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"),
-                                        input3("drawn"), input3("wo"));
+    const LampPatch<Expr> patch{centre, input_vector("lamp_across"), input_vector("lamp_along"),
+                                Expr::input("lamp_disk")};
+    const AimedLamp<Expr> lamp =
+        aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("drawn"), input3("wo"));
     output3(p, "wi", lamp.wi);
     output3(p, "to_lamp", lamp.lobe.towards);
     output3(p, "to_half", lamp.lobe.half);
