@@ -55,9 +55,9 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
     assert run("build", "--model", "lafortune", "--out", tmp_path).returncode == 0
     manifest = json.loads((tmp_path / "brdfc_shaders" / "manifest.json").read_text())
     entry = manifest["models"]["lafortune"]
-    assert entry["auto"] == "sampled"
+    assert entry["auto"] == "aimed"
     forms = entry["representations"]
-    assert list(forms) == ["sampled", "fitted"]
+    assert list(forms) == ["aimed", "sampled", "fitted"]
     assert forms["sampled"]["only"] == {}
     assert forms["fitted"]["only"] == {"cxy": -1, "cz": 0.8}
     assert forms["fitted"]["axis"] == {"name": "e", "min": 1, "max": 100}
@@ -68,8 +68,9 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
 def test_list_json_is_the_schema():
     models = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
     assert set(MODELS) <= set(models)
-    assert models["coupled"]["representations"] == ["exact", "sampled"]
-    assert models["ashikhmin_shirley"]["representations"] == ["sampled"]
+    assert models["lambert"]["representations"] == ["exact", "sampled"]
+    assert models["coupled"]["representations"] == ["exact", "aimed", "sampled"]
+    assert models["ashikhmin_shirley"]["representations"] == ["aimed", "sampled"]
     assert models["coupled"]["mirror"] is True
     parameters = {p["name"]: p for p in models["ashikhmin_shirley"]["parameters"]}
     assert parameters["rs"]["kind"] == "color" and parameters["rs"]["default"] == [0.05] * 3
@@ -557,7 +558,8 @@ def phong(tmp_path):
     own here."""
     addon = tmp_path / "addon"
     shutil.copytree(ROOT / "blender_addon", addon)
-    table = "model,form,cost\nphong,sampled,1.1\nphong,fitted,0.9\nphong,twin,0.7\n"
+    rows = ("phong,aimed,1.1", "phong,sampled,1.2", "phong,fitted,0.9", "phong,twin,0.7")
+    table = "\n".join(["model,form,cost", *rows, ""])
     (addon / "costs.csv").write_text(table)
     file = tmp_path / "m.json"
     file.write_text(json.dumps({"materials": {"a": {"model": "phong", "parameters": {"e": 20}}}}))
@@ -573,10 +575,10 @@ def phong(tmp_path):
 @pytest.mark.parametrize(
     ("options", "form"),
     [
-        (["--time", "1.15x"], "sampled"),
+        (["--time", "1.15x"], "aimed"),
         (["--time", "1"], "fitted"),
         (["--time", "0.5x"], "fitted"),
-        (["--time", "1x", "--error", "0.1"], "sampled"),
+        (["--time", "1x", "--error", "0.1"], "aimed"),
         (["--time", "1.15", "--error", "5%"], "fitted"),
     ],
 )
@@ -585,11 +587,12 @@ def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
     assert result.returncode == 0, result.stderr
     (model,) = json.loads(result.stdout)["models"]
     choices = {c["form"]: c for c in model["choices"]}
-    assert list(choices) == ["sampled", "fitted", "controlled", "twin"]
+    assert list(choices) == ["aimed", "sampled", "fitted", "controlled", "twin"]
     assert [f for f, c in choices.items() if c["taken"]] == [form]
     assert all(c["why"] for c in choices.values())
     assert {f: c["cost"] for f, c in choices.items()} == {
-        "sampled": 1.1,
+        "aimed": 1.1,
+        "sampled": 1.2,
         "fitted": 0.9,
         "controlled": None,
         "twin": 0.7,
@@ -599,7 +602,7 @@ def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
     assert model["material_forms"] == [
         {
             "material": "a",
-            "before": {"form": "sampled", "cost": 1.1},
+            "before": {"form": "aimed", "cost": 1.1},
             "after": {"form": form, "cost": choices[form]["cost"]},
         }
     ]
@@ -617,7 +620,7 @@ def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
 
 def test_build_prints_every_form_with_cost_and_error(phong):
     lines = phong("--time", "1x").stdout.splitlines()
-    assert "  sampled     1.10x expectation  not taken: costs 1.1x, and 1x is allowed" in lines
+    assert "  aimed       1.10x expectation  not taken: costs 1.1x, and 1x is allowed" in lines
     (fitted,) = [line.split() for line in lines if line.startswith("  fitted ")]
     assert fitted[:2] == ["fitted", "0.90x"] and 0.005 < float(fitted[2]) < 0.03
     assert " ".join(fitted[3:]) == "taken: a: the form is left open"
@@ -625,17 +628,17 @@ def test_build_prints_every_form_with_cost_and_error(phong):
     assert "not taken: nothing is fitted unasked" in without
 
 
-@pytest.mark.parametrize("time", ["1.15x", "1x"])
-def test_lamps_of_a_blend_take_the_fit(phong, time):
-    """It comes before the sampled form even where both keep the time."""
+def test_lamps_of_a_blend(phong):
+    """Which have no size is said of the form that is taken; how many there are, is had in slots."""
     content = json.loads(phong.file.read_text())
-    phong.file.write_text(json.dumps(content | {"sizeless_lamps": ["Sun.001"]}))
-    (model,) = json.loads(phong("--explain", "--time", time).stdout)["models"]
-    (taken,) = [c for c in model["choices"] if c["taken"]]
-    assert taken["form"] == "fitted" and "Sun.001 without a size" in taken["why"]
+    lamps = {"sizeless_lamps": ["Sun.001"], "lamps": 2}
+    phong.file.write_text(json.dumps(content | lamps))
     (model,) = json.loads(phong("--explain").stdout)["models"]
     (taken,) = [c for c in model["choices"] if c["taken"]]
-    assert taken["form"] == "sampled" and "Sun.001 without a size" in taken["why"]
+    assert taken["form"] == "aimed" and "Sun.001 without a size" in taken["why"]
+    assert "slots for lamps beyond 2: the scene has no more" in model["left_out"]
+    manifest = json.loads((phong.out / "brdfc_shaders" / "manifest.json").read_text())
+    assert manifest["models"]["phong"]["representations"]["aimed"]["lamps"] == 2
 
 
 @pytest.mark.parametrize("time", ["x", "fast", "0x", "-1", "1.2xx", "1,2", "inf", "nan", "1.2 x"])

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A pack cut to a scene holds what its materials need, and computes the same.
+#include "represent/aimed.h"
 #include "pack/plan.h"
 
 #include <gmock/gmock.h>
@@ -46,53 +47,47 @@ TEST(Plan, EverythingIsEveryModelInEveryForm) {
   EXPECT_THROW(plan_models({"nonesuch"}), InputError);
 }
 
-TEST(Plan, SaysWhichLampsADrawnDirectionDoesNotMeet) {
+TEST(Plan, SaysWhatLampsWithoutASizeMakeOfAForm) {
   Budget budget;
-  const std::vector<MaterialNeed> drawn = {need("a", "phong", {"e=20"})}, exact = {need("a", "lambert", {})};
-  EXPECT_EQ(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled), "a: the form is left open");
+  const std::vector<MaterialNeed> open = {need("a", "phong", {"e=20"})}, drawn = {need("a", "phong", {}, "sampled")},
+                                  exact = {need("a", "lambert", {})};
+  EXPECT_EQ(why(plan_scene(open, budget)[0], RepresentationKind::Aimed), "a: the form is left open");
   budget.sizeless = {"lights[1]", "lights[4]"};
+  EXPECT_EQ(why(plan_scene(open, budget)[0], RepresentationKind::Aimed),
+            "a: the form is left open; lights[1], lights[4] without a size shines as on Blender's own nodes");
   EXPECT_THAT(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled),
-              HasSubstr("lights[1], lights[4] without a size"));
+              HasSubstr("lights[1], lights[4] without a size shines as rare bright dots"));
+  EXPECT_THAT(why(plan_scene({need("a", "phong", {"e=20"}, "controlled")}, budget)[0], RepresentationKind::Controlled),
+              HasSubstr("without a size shines on its closures alone"));
   const PlannedModel matte = plan_scene(exact, budget)[0];
   for (const FormChoice& c : matte.choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
 }
 
-TEST(Plan, TakesAFitBeforeDrawingUnderLampsWithoutASize) {
-  const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})};
-  Budget budget;
-  budget.costs = costs("phong,sampled,1.1\nphong,fitted,1.3\ncoupled,exact,1\ncoupled,fitted,0.9\n");
-  budget.sizeless = {"lights[0]"};
-  const auto plan = [&](const std::vector<MaterialNeed>& needs, std::optional<double> error,
-                        std::optional<double> time) {
-    budget.error = error;
-    budget.time = time;
-    return plan_scene(needs, budget)[0];
+TEST(Plan, HasASlotForEveryLampAndNoMore) {
+  const std::vector<MaterialNeed> needs = {need("a", "phong", {"e=20"})};
+  const auto reasons = [&](std::optional<int> lamps) {
+    Budget budget;
+    budget.lamps = lamps;
+    const PlannedModel plan = plan_scene(needs, budget)[0];
+    EXPECT_EQ(plan.max_lamps, std::min(lamps.value_or(kMaxLamps), kMaxLamps));
+    return plan.reasons;
   };
-  EXPECT_THAT(plan(phong, {}, {}).forms, ElementsAre(RepresentationKind::Sampled)) << "nothing unasked";
-  EXPECT_THAT(plan(phong, {}, 1.5).forms, ElementsAre(RepresentationKind::Fitted));
-  EXPECT_EQ(why(plan(phong, {}, 1.5), RepresentationKind::Fitted),
-            "a: the form is left open; lights[0] without a size shines as on Blender's own nodes, on drawn directions "
-            "as rare bright dots");
-  EXPECT_EQ(why(plan(phong, {}, 1.5), RepresentationKind::Sampled), "fitted comes first");
-  EXPECT_THAT(plan(phong, 0.03, {}).forms, ElementsAre(RepresentationKind::Fitted));
-  EXPECT_THAT(why(plan(phong, 0.03, {}), RepresentationKind::Fitted), HasSubstr("lights[0] without a size"));
-  for (const std::optional<double> time : {std::optional<double>(), std::optional<double>(1.5)}) {
-    const PlannedModel off = plan(phong, 0.001, time);
-    EXPECT_THAT(off.forms, ElementsAre(RepresentationKind::Sampled));
-    EXPECT_THAT(why(off, RepresentationKind::Fitted), HasSubstr("0.001 is allowed"));
-    EXPECT_THAT(why(off, RepresentationKind::Sampled), HasSubstr("lights[0] without a size shines as rare bright"));
-  }
-  const PlannedModel late = plan(phong, {}, 1.2);
-  EXPECT_THAT(late.forms, ElementsAre(RepresentationKind::Sampled));
-  EXPECT_EQ(why(late, RepresentationKind::Fitted), "costs 1.3x, and 1.2x is allowed");
-  EXPECT_THAT(plan({need("a", "coupled", {})}, {}, 1.5).forms, ElementsAre(RepresentationKind::Exact));
-  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, {}, 1.5).forms, ElementsAre(RepresentationKind::Sampled));
+  EXPECT_THAT(reasons(0), testing::Contains("slots for lamps: the scene has none"));
+  EXPECT_THAT(reasons(3), testing::Contains("slots for lamps beyond 3: the scene has no more"));
+  for (const std::optional<int> all : {std::optional<int>(), std::optional<int>(8), std::optional<int>(20)})
+    EXPECT_THAT(reasons(all), Not(testing::Contains(HasSubstr("slots for lamps"))));
 
-  budget.offer = true;
-  EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, {}, 1.5).forms,
-              ElementsAre(RepresentationKind::Sampled, RepresentationKind::Fitted));
-  EXPECT_THAT(why(plan({need("a", "phong", {"e=20"}, "controlled")}, {}, {}), RepresentationKind::Controlled),
-              HasSubstr("lights[0] without a size shines on its closures alone"));
+  const Model& m = find_model("phong");
+  const AlbedoTable table = albedo_table_of(m);
+  const auto shader = [&](int lamps) {
+    return write_shader(m, RepresentationKind::Aimed, table, {}, kMaxLobes, {}, lamps);
+  };
+  for (const char* part : {"Lamp", "lamp_", "lobe_", "covered"})
+    EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
+  EXPECT_EQ(shader(0).slots, slots(ClosureKind::PhongRamp));
+  EXPECT_THAT(shader(3).source, HasSubstr("LampShape3"));
+  EXPECT_THAT(shader(3).source, Not(HasSubstr("LampShape4")));
+  EXPECT_EQ(shader(3).slots, 4 * slots(ClosureKind::PhongRamp));
 }
 
 TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {
@@ -126,16 +121,17 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   const auto forms = [](const std::vector<MaterialNeed>& needs, double error) {
     return plan_scene(needs, {error, false})[0].forms;
   };
-  const auto fitted = ElementsAre(RepresentationKind::Fitted), sampled = ElementsAre(RepresentationKind::Sampled);
+  const auto fitted = ElementsAre(RepresentationKind::Fitted), sampled = ElementsAre(RepresentationKind::Sampled),
+             aimed = ElementsAre(RepresentationKind::Aimed);
   EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.03), fitted);
-  EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.001), sampled);
-  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})})[0].forms, sampled) << "not unasked";
+  EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.001), aimed);
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})})[0].forms, aimed) << "not unasked";
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "fitted")})[0].forms, fitted);
   EXPECT_THAT(forms({need("a", "coupled", {})}, 0.5), ElementsAre(RepresentationKind::Exact));
 
   const std::vector<MaterialNeed> two = {need("a", "lafortune", {"cz=0.5", "e=20"}),
                                          need("b", "lafortune", {"cz=0.6", "e=30"})};
-  EXPECT_THAT(forms(two, 0.5), sampled);
+  EXPECT_THAT(forms(two, 0.5), aimed);
   EXPECT_EQ(why(plan_scene(two, {0.5, false})[0], RepresentationKind::Fitted),
             "a and b have other values of cz; a and b have other values of e");
   try {
@@ -184,7 +180,7 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
   EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
   EXPECT_TRUE(plan.fixed.empty());
   EXPECT_EQ(why(plan, RepresentationKind::Twin), "f0 varies over b");
-  EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(RepresentationKind::Sampled));
+  EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(RepresentationKind::Aimed));
 
   // Its shares add up, whatever they are; its exponents are two numbers.
   const auto phong = [](const char* id, const char* value) { return need(id, "phong_material", {value}, "fitted"); };
@@ -193,25 +189,26 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
   EXPECT_THROW(plan_scene({phong("a", "es=10"), phong("b", "e=20")}), InputError);
 }
 
-constexpr RepresentationKind kExact = RepresentationKind::Exact, kSampled = RepresentationKind::Sampled,
+constexpr RepresentationKind kExact = RepresentationKind::Exact, kAimed = RepresentationKind::Aimed,
+                             kSampled = RepresentationKind::Sampled,
                              kFitted = RepresentationKind::Fitted, kControlled = RepresentationKind::Controlled;
 
 TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})}, coupled = {need("a", "coupled", {})};
   Budget budget;
   budget.costs = costs(
-      "phong,sampled,1.1\nphong,fitted,0.9\ncoupled,exact,1.2\ncoupled,sampled,1.3\n"
+      "phong,aimed,1.1\nphong,sampled,1.1\nphong,fitted,0.9\ncoupled,exact,1.2\ncoupled,aimed,1.3\ncoupled,sampled,1.3\n"
       "coupled,fitted,0.8\nphong,controlled,0.1\nphong,twin,0.1\n");
   const auto plan = [&](const std::vector<MaterialNeed>& needs, double time, std::optional<double> error = {}) {
     budget.time = time;
     budget.error = error;
     return plan_scene(needs, budget)[0];
   };
-  EXPECT_THAT(plan(phong, 1.15).forms, ElementsAre(kSampled)) << "noise falls with time, what a fit is off by does not";
-  EXPECT_EQ(why(plan(phong, 1.15), kFitted), "sampled comes first");
-  EXPECT_THAT(plan(phong, 1.1).forms, ElementsAre(kSampled));
+  EXPECT_THAT(plan(phong, 1.15).forms, ElementsAre(kAimed)) << "noise falls with time, what a fit is off by does not";
+  EXPECT_EQ(why(plan(phong, 1.15), kFitted), "aimed comes first");
+  EXPECT_THAT(plan(phong, 1.1).forms, ElementsAre(kAimed));
   EXPECT_THAT(plan(phong, 1).forms, ElementsAre(kFitted));
-  EXPECT_EQ(why(plan(phong, 1), kSampled), "costs 1.1x, and 1x is allowed");
+  EXPECT_EQ(why(plan(phong, 1), kAimed), "costs 1.1x, and 1x is allowed");
   EXPECT_EQ(why(plan(phong, 1), kControlled), "only where it is asked for");
   EXPECT_THAT(plan(coupled, 1.25).forms, ElementsAre(kExact));
   EXPECT_THAT(plan(coupled, 1.1).forms, ElementsAre(kFitted));
@@ -219,33 +216,33 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   // With an error, too, both hold.
   EXPECT_THAT(plan(phong, 1.15, 0.03).forms, ElementsAre(kFitted));
   EXPECT_THAT(plan(phong, 1, 0.03).forms, ElementsAre(kFitted));
-  EXPECT_THAT(plan(phong, 1.15, 0.001).forms, ElementsAre(kSampled));
-  EXPECT_THAT(plan(phong, 1, 0.001).forms, ElementsAre(kSampled));
-  EXPECT_THAT(why(plan(phong, 1, 0.001), kSampled), HasSubstr("no form is known to keep 1x, this is the cheapest"));
+  EXPECT_THAT(plan(phong, 1.15, 0.001).forms, ElementsAre(kAimed));
+  EXPECT_THAT(plan(phong, 1, 0.001).forms, ElementsAre(kAimed));
+  EXPECT_THAT(why(plan(phong, 1, 0.001), kAimed), HasSubstr("no form is known to keep 1x, this is the cheapest"));
   EXPECT_THAT(why(plan(phong, 1, 0.001), kFitted), HasSubstr("0.001 is allowed"));
 
   EXPECT_THAT(plan(phong, 0.5).forms, ElementsAre(kFitted));
   EXPECT_EQ(why(plan(phong, 0.5), kFitted), "a: no form is known to keep 0.5x, this is the cheapest");
   EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 0.5).forms, ElementsAre(kSampled)) << "asked for";
   const PlannedModel both = plan({need("a", "phong", {"e=20"}), need("b", "phong", {"e=20"}, "sampled")}, 1);
-  EXPECT_THAT(both.forms, ElementsAre(kFitted, kSampled)) << "the first is what a form left open becomes in Blender";
+  EXPECT_THAT(both.forms, ElementsAre(kFitted, kAimed)) << "the first is what a form left open becomes in Blender";
 
-  budget.costs = costs("coupled,exact,1.3\ncoupled,sampled,1\ncoupled,fitted,1.2\n");
-  EXPECT_THAT(plan(coupled, 1.1, 0.1).forms, ElementsAre(kSampled));
+  budget.costs = costs("coupled,exact,1.3\ncoupled,aimed,1\ncoupled,sampled,1\ncoupled,fitted,1.2\n");
+  EXPECT_THAT(plan(coupled, 1.1, 0.1).forms, ElementsAre(kAimed));
   EXPECT_EQ(why(plan(coupled, 1.1, 0.1), kExact), "costs 1.3x, and 1.1x is allowed");
   EXPECT_EQ(why(plan(coupled, 1.1, 0.1), kFitted), "costs 1.2x, and 1.1x is allowed");
-  EXPECT_EQ(why(plan(coupled, 1.1), kFitted), "sampled comes first");
+  EXPECT_EQ(why(plan(coupled, 1.1), kFitted), "aimed comes first");
   EXPECT_THAT(plan(coupled, 1.25, 0.1).forms, ElementsAre(kFitted));
-  EXPECT_EQ(why(plan(coupled, 1.25, 0.1), kSampled), "fitted comes first");
+  EXPECT_EQ(why(plan(coupled, 1.25, 0.1), kAimed), "fitted comes first");
   EXPECT_EQ(why(plan(coupled, 1.25, 0.001), kFitted), "off by 0.0043 of the light, and 0.001 is allowed");
 
-  budget.costs = costs("phong,sampled,1.1\nphong,fitted,0.9\n");
+  budget.costs = costs("phong,aimed,1.1\nphong,sampled,1.1\nphong,fitted,0.9\n");
   budget.offer = true;
   EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 1).forms, ElementsAre(kSampled, kFitted));
   EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15).forms, ElementsAre(kSampled));
   EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15), kFitted), "the materials ask for another");
   EXPECT_THAT(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.15, 0.001), kFitted), HasSubstr("off by"));
-  budget.costs = costs("phong,sampled,1.1\nphong,fitted,1.3\n");
+  budget.costs = costs("phong,aimed,1.1\nphong,sampled,1.1\nphong,fitted,1.3\n");
   EXPECT_EQ(why(plan({need("a", "phong", {"e=20"}, "sampled")}, 1.2, 0.1), kFitted), "costs 1.3x, and 1.2x is allowed");
 }
 
@@ -268,20 +265,26 @@ TEST(Plan, SaysWhichCostIsNotKnown) {
   Budget budget;
   budget.time = 1;
   PlannedModel plan = plan_scene(needs, budget)[0];
-  EXPECT_THAT(plan.forms, ElementsAre(kSampled));
-  EXPECT_THAT(why(plan, kSampled), HasSubstr("no cost is known"));
+  EXPECT_THAT(plan.forms, ElementsAre(kAimed));
+  EXPECT_THAT(why(plan, kAimed), HasSubstr("no cost is known"));
   EXPECT_EQ(why(plan, kFitted), "its cost was not measured");
 
   budget.costs = costs("phong,fitted,3\n");
   plan = plan_scene(needs, budget)[0];
   EXPECT_THAT(plan.forms, ElementsAre(kFitted)) << "the cheapest that is known";
-  EXPECT_EQ(why(plan, kSampled), "its cost was not measured");
+  EXPECT_EQ(why(plan, kAimed), "its cost was not measured");
 
-  budget.costs = costs("phong,sampled,0.9\n");
+  budget.costs = costs("phong,aimed,0.9\n");
+  EXPECT_THAT(plan_scene(needs, budget)[0].forms, ElementsAre(kAimed));
+  // One row alone, of a form whose cost hangs on how many directions it draws.
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "brdfc-plan-costs.csv";
+  std::ofstream(file) << "model,form,cost\nphong,sampled,0.9\n";
+  budget.costs = Costs(file);
   EXPECT_THAT(plan_scene(needs, budget)[0].forms, ElementsAre(kSampled));
   needs[0].lobes = 4;
-  EXPECT_EQ(why(plan_scene(needs, budget)[0], kSampled), "a: the form is left open, and no cost is known");
-  budget.costs = costs("phong,sampled,0.9\nphong,fitted,1\n");
+  EXPECT_EQ(why(plan_scene(needs, budget)[0], kAimed), "a: the form is left open, and no cost is known");
+  std::ofstream(file) << "model,form,cost\nphong,sampled,0.9\nphong,fitted,1.5\n";
+  budget.costs = Costs(file);
   plan = plan_scene(needs, budget)[0];
   EXPECT_THAT(plan.forms, ElementsAre(kFitted));
   EXPECT_EQ(why(plan, kSampled), "its cost was measured with one direction alone");
@@ -291,13 +294,13 @@ TEST(Plan, SaysWhatABudgetChangesForEachMaterial) {
   std::vector<MaterialNeed> needs = {need("open", "phong", {"e=20"}), need("many", "phong", {"e=20"}, "sampled")};
   needs[1].lobes = 4;
   Budget budget;
-  budget.costs = costs("phong,sampled,0.9\nphong,fitted,1.5\n");
+  budget.costs = costs("phong,aimed,0.9\nphong,sampled,0.9\nphong,fitted,1.5\n");
   budget.error = 1;
   const PlannedModel plan = plan_scene(needs, budget)[0];
   ASSERT_EQ(plan.material_forms.size(), 2u);
   const FormChange &open = plan.material_forms[0], &many = plan.material_forms[1];
   EXPECT_EQ(open.id, "open");
-  EXPECT_EQ(open.before, kSampled);
+  EXPECT_EQ(open.before, kAimed);
   EXPECT_EQ(open.cost_before, 0.9);
   EXPECT_EQ(open.after, kFitted);
   EXPECT_EQ(open.cost_after, 1.5);
@@ -310,12 +313,12 @@ TEST(Plan, SaysWhatABudgetChangesForEachMaterial) {
 TEST(Plan, AddsControlledFormsWhereThereCanBeOne) {
   Budget budget;
   budget.controlled = true;
-  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})}, budget)[0].forms, ElementsAre(kSampled, kControlled));
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})}, budget)[0].forms, ElementsAre(kAimed, kControlled));
   const PlannedModel turned = plan_scene({need("a", "ward", {"ax=0.5"})}, budget)[0];
-  EXPECT_THAT(turned.forms, ElementsAre(kSampled));
+  EXPECT_THAT(turned.forms, ElementsAre(kAimed));
   EXPECT_EQ(why(turned, kControlled), "it is anisotropic");
   const PlannedModel lengthy = plan_scene({need("a", "phong_material", {})}, budget)[0];
-  EXPECT_THAT(lengthy.forms, ElementsAre(kSampled));
+  EXPECT_THAT(lengthy.forms, ElementsAre(kAimed));
   EXPECT_THAT(why(lengthy, kControlled), HasSubstr("operations"));
 }
 

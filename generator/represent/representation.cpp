@@ -487,12 +487,15 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lobe_weight[lamp]", sent.weight);
     p.output("lobe_colour[lamp]", sent.colour);
   });
-  steps.rest = record_step([&](Program& p) {
-    const Rest<Expr> left =
-        rest(value, density, Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"));
-    p.output("rest_weight", left.weight);
-    p.output("rest_colour", left.colour);
-  });
+  const auto record_rest = [&](const Rgb<Expr>& covered, const Expr& met, const Rgb<Expr>& before) {
+    return record_step([&](Program& p) {
+      const Rest<Expr> left = rest(value, density, covered, met, before);
+      p.output("rest_weight", left.weight);
+      p.output("rest_colour", left.colour);
+    });
+  };
+  steps.rest = record_rest(Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"));
+  steps.alone = record_rest(Rgb<Expr>(Expr(0)), Expr(0), Rgb<Expr>(Expr(0)));
   return made.emplace(indent, std::move(steps)).first->second;
 }
 

@@ -85,6 +85,7 @@ struct AimedSteps {
   Recording less;  ///< reads the lobe `earlier` and wi_*; assigns covers_here
   Recording send;  ///< reads value, density and what aim assigned; assigns sent, covered_here, weight and colour
   Recording rest;  ///< reads value, density, covered, met, before; assigns rest_weight and rest_colour
+  Recording alone;  ///< the same without lamps: reads excess and drawn_density
 };
 const AimedSteps& aimed_steps(int indent);
 

@@ -153,7 +153,7 @@ def lamp(name, kind, **settings):
     return data
 
 
-def test_lamps_without_a_size_choose_the_fit(extension, empty, program, monkeypatch, tmp_path):
+def test_lamps_without_a_size_are_told_of(extension, empty, program, monkeypatch, tmp_path):
     monkeypatch.setenv("BRDFC_TOOL", str(program))
     api = extension.api
     api.new_material("phong", e=40.0)
@@ -172,15 +172,15 @@ def test_lamps_without_a_size_choose_the_fit(extension, empty, program, monkeypa
         (model,) = api.plan(time=time).explanation["models"]
         return [(c["form"], c["why"]) for c in model["choices"] if c["taken"]]
 
-    ((form, _),) = taken(9)
-    assert form == "sampled"
+    ((form, why),) = taken(9)
+    assert form == "aimed" and "without a size" not in why
     lamp("Spot", "SPOT", shadow_soft_size=0.0)
     lamp("Point", "POINT", shadow_soft_size=0.0)
     lamp("Sun", "SUN", angle=0.0)
     ((form, why),) = taken(9)
-    assert form == "fitted" and "Point, Spot, Sun without a size" in why
+    assert form == "aimed" and "Point, Spot, Sun without a size" in why
     ((form, why),) = taken(None)
-    assert form == "sampled" and "Point, Spot, Sun without a size" in why
+    assert form == "aimed" and "Point, Spot, Sun without a size" in why
     api.write_materials(file)
     assert '"Point",\n  "Spot",\n  "Sun"' in file.read_text()
 
