@@ -1161,6 +1161,7 @@ template <class T> ClosureSum<T> Fit::closures(const Vec3<T>& wo, const std::typ
       ClosureSum<T> sum = weighted(frame.into(wo), varied.number, weights(varied), share, divided);
       for (Closure<T>& c : sum) {
         c.normal = frame.out_of(c.normal);
+        c.tangent = frame.out_of(c.tangent);
         c.turned = true;
       }
       return sum;
