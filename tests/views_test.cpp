@@ -227,7 +227,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   // What is off at views that nobody has does not count.
   Budget budget;
   budget.error = 0.006;
-  EXPECT_EQ(plan_scene({need("a", {})}, budget)[0].forms[0], RepresentationKind::Sampled);
+  EXPECT_EQ(plan_scene({need("a", {})}, budget)[0].forms[0], RepresentationKind::Aimed);
   EXPECT_EQ(plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], RepresentationKind::Fitted);
 
   const AlbedoTable table = fold(albedo_table_of(m), m, values, kSome);
