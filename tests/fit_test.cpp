@@ -338,7 +338,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
     fixed.erase(open);
     const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, fixed), fixed);
     EXPECT_THAT(s.source, HasSubstr(fmt::format("color {} = color(", open)));
-    EXPECT_THAT(s.source, HasSubstr("ramp_0[k] /= weight_0;"));
+    EXPECT_THAT(s.source, HasSubstr("ramp_0[entry] /= weight_0;"));
     EXPECT_LE(s.operations, 600) << model;
   }
 }

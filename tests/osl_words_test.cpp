@@ -111,7 +111,14 @@ std::set<std::string> declared_by(const Model& model, RepresentationKind kind, c
   for (const Choices& c : choice_combinations(model.info())) {
     if (!admits(model.info(), c, fixed)) continue;
     const ParamValues values = with_choices(model.info(), c, fixed);
-    add(record(model, kind, values, 4));
+    if (kind == RepresentationKind::Aimed) {
+      const AimedRecording r = record_aimed(model, values, 4);
+      for (const Recording* part : {&r.base, &r.draw, &r.value}) add(*part);
+      const AimedSteps& s = aimed_steps(4);
+      for (const Recording* part : {&s.room, &s.aim, &s.less, &s.send, &s.rest}) add(*part);
+    } else {
+      add(record(model, kind, values, 4));
+    }
     if (model.has_mirror()) add(record_mirror(model, values, 4));
   }
   return names;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A pack cut to a scene holds what its materials need, and computes the same.
-#include "represent/aimed.h"
 #include "pack/plan.h"
 
 #include <gmock/gmock.h>
@@ -10,6 +9,7 @@
 #include <fstream>
 
 #include "pack/shader.h"
+#include "represent/aimed.h"
 
 namespace brdfc {
 namespace {
@@ -82,7 +82,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
   const auto shader = [&](int lamps) {
     return write_shader(m, RepresentationKind::Aimed, table, {}, kMaxLobes, {}, lamps);
   };
-  for (const char* part : {"Lamp", "lamp_", "lobe_", "covered"})
+  for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
   EXPECT_EQ(shader(0).slots, slots(ClosureKind::PhongRamp));
   EXPECT_THAT(shader(3).source, HasSubstr("LampShape3"));
@@ -190,14 +190,15 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
 }
 
 constexpr RepresentationKind kExact = RepresentationKind::Exact, kAimed = RepresentationKind::Aimed,
-                             kSampled = RepresentationKind::Sampled,
-                             kFitted = RepresentationKind::Fitted, kControlled = RepresentationKind::Controlled;
+                             kSampled = RepresentationKind::Sampled, kFitted = RepresentationKind::Fitted,
+                             kControlled = RepresentationKind::Controlled;
 
 TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})}, coupled = {need("a", "coupled", {})};
   Budget budget;
   budget.costs = costs(
-      "phong,aimed,1.1\nphong,sampled,1.1\nphong,fitted,0.9\ncoupled,exact,1.2\ncoupled,aimed,1.3\ncoupled,sampled,1.3\n"
+      "phong,aimed,1.1\nphong,sampled,1.1\nphong,fitted,0.9\ncoupled,exact,1.2\ncoupled,aimed,1.3\ncoupled,sampled,1."
+      "3\n"
       "coupled,fitted,0.8\nphong,controlled,0.1\nphong,twin,0.1\n");
   const auto plan = [&](const std::vector<MaterialNeed>& needs, double time, std::optional<double> error = {}) {
     budget.time = time;
@@ -225,7 +226,7 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   EXPECT_EQ(why(plan(phong, 0.5), kFitted), "a: no form is known to keep 0.5x, this is the cheapest");
   EXPECT_THAT(plan({need("a", "phong", {"e=20"}, "sampled")}, 0.5).forms, ElementsAre(kSampled)) << "asked for";
   const PlannedModel both = plan({need("a", "phong", {"e=20"}), need("b", "phong", {"e=20"}, "sampled")}, 1);
-  EXPECT_THAT(both.forms, ElementsAre(kFitted, kAimed)) << "the first is what a form left open becomes in Blender";
+  EXPECT_THAT(both.forms, ElementsAre(kFitted, kSampled)) << "the first is what a form left open becomes in Blender";
 
   budget.costs = costs("coupled,exact,1.3\ncoupled,aimed,1\ncoupled,sampled,1\ncoupled,fitted,1.2\n");
   EXPECT_THAT(plan(coupled, 1.1, 0.1).forms, ElementsAre(kAimed));

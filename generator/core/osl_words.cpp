@@ -28,7 +28,7 @@ constexpr const char* kWords = R"(
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
   aimed covered covered_before drawn_density drawn_x drawn_y drawn_z earlier excess half_way lamp lamp_across lamp_along
-  lamp_centre lamp_covers lamp_disk lamp_emphasis lamp_met lamp_met_here lamp_place lamp_scale lamp_shape
+  lamp_centre lamp_covers lamp_disk lamp_emphasis lamp_grazed lamp_met lamp_met_here lamp_place lamp_scale lamp_shape
   lamp_solid_angle lamp_turn lamps lobe_colour lobe_colours lobe_end lobe_exponent lobe_extent lobe_half lobe_height
   lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight rest_colour rest_weight to_half_x to_half_y
   to_half_z to_lamp_x to_lamp_y to_lamp_z v_all
@@ -51,8 +51,12 @@ bool is_numbered(const std::string& name) {
   return false;
 }
 
-/// Functions of the library, and constants that OSL defines.
-bool is_prefixed(const std::string& name) { return name.starts_with("brdfc_") || name.starts_with("M_"); }
+/// Functions of the library, constants that OSL defines, and slots of lamps.
+bool is_prefixed(const std::string& name) {
+  for (const char* prefix : {"brdfc_", "M_", "LampPlace", "LampTurn", "LampScale", "LampShape"})
+    if (name.starts_with(prefix)) return true;
+  return false;
+}
 
 }  // namespace
 

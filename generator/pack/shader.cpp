@@ -340,18 +340,17 @@ class AimedText {
   std::string print() const {
     const AimedSteps& steps = aimed_steps(0);
     std::string out = random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float drawn_x, drawn_y, drawn_z;\n" +
-                      block(draw_.print(0), 1) +
-                      "    color rest_colour;\n    float rest_weight;\n";
+                      block(draw_.print(0), 1) + "    color rest_colour;\n    float rest_weight;\n";
     if (lamps_ == 0)
-      return out +
-             "    color excess;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
+      return out + "    color excess;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
              block(value_.print(0), 1) + block(steps.alone.statements, 1);
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
     out += fmt::format(
         "    color lobe_value[{0}], lobe_colour[{0}];\n"
         "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}];\n"
         "    vector lobe_towards[{0}], lobe_half[{0}];\n"
-        "    color covered = 0.0, covered_before = 0.0;\n    float lamp_met = 0.0;\n    int lamps = 0;\n"
+        "    color covered = 0.0, covered_before = 0.0;\n    float lamp_met = 0.0, lamp_grazed = 0.0;\n    int lamps = "
+        "0;\n"
         "    for (int lamp = 0; lamp < {0}; lamp++)\n"
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);

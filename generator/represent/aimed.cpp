@@ -12,12 +12,13 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const std::vector<LampPatch<double>
   AimedSum out;
   out.wi = draw(brdf, !base.empty(), wo, u);
   Rgb<double> covered(0.0), before(0.0);
-  double met = 0;
+  double met = 0, grazed = 0;
   for (const LampPatch<double>& patch : patches) {
     double room = 1;
     for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patch.centre, earlier));
     const AimedLamp<double> lamp = aim_at(patch, room, v1, v2, out.wi, wo);
     if (lamp.emphasis == 0) continue;
+    grazed = std::max(grazed, lamp.grazed);
     if (lamp.met > 0) {
       met = lamp.solid_angle;
       before = covered;
@@ -31,7 +32,7 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const std::vector<LampPatch<double>
     covered += sent.covered;
   }
   const Excess<double> drawn = excess_at(out.wi);
-  const Rest<double> left = rest(drawn.value, drawn.density, covered, met, before);
+  const Rest<double> left = rest(drawn.value, drawn.density, covered, met, before, grazed);
   out.rest = left.colour * left.weight;
   return out;
 }

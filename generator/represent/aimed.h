@@ -67,6 +67,7 @@ template <class T> struct AimedLamp {
   T extent;       ///< solid angle under the lobe, roughly
   T covers;       ///< the lobe's f cos in the drawn direction
   T met;          ///< 1 where the drawn direction meets the lamp, else 0
+  T grazed;       ///< 1 where the lobe that carries the drawn direction touches a lamp of next to no size, else 0
 };
 
 /// cos^e -> f cos of an aimed lobe over its height and (half.wi): ramp times cos^e.
@@ -96,7 +97,7 @@ template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earl
 /// A closure aimed at a lamp whose bounding sphere has the radius of this sine. wo: towards the viewer, unit.
 template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, const T& room, const Vec3<T>& wo) {
   // Room for the drawn directions' own lobes, 5e-3 wide; and cos^e of a narrower lobe loses digits in single precision.
-  constexpr double kRoom = 1.1, kLeast = 0.02, kTight = 0.005, kMost = 0.95;
+  constexpr double kRoom = 1.1, kLeast = 0.03, kTight = 0.005, kMost = 0.95;
   // The flank ends where cos^e = (kLevel - 1) / 7; sines of small angles are as the roots of the logarithms.
   const double level = std::log(double(kLevel) / (kRampSize - 1)), end = std::log(double(kLevel - 1) / (kRampSize - 1));
   const T wide = minimum(T(kRoom) * sinRadius + T(kLeast), T(std::sqrt(level / end)) * room);
@@ -117,8 +118,8 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
                                        const Vec3<T>& drawn, const Vec3<T>& wo) {
   /// Sine of the radius beyond which a lamp is so near that drawn directions meet it well.
   constexpr double kNearest = 0.85;
-  /// Cosine of half the angle between lamp and viewer below which the closure would shine through the surface.
-  constexpr double kLeastHalf = 0.07;
+  /// Cosine of half the angle between lamp and viewer below which the closure's normal is but rounding.
+  constexpr double kLeastHalf = 0.005;
   const auto disk = patch.disk > T(0.5);
   const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
   const T distance2 = dot(patch.centre, patch.centre);
@@ -157,6 +158,10 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
   const T x2 = sqr(dot(offset, patch.across) / a2), y2 = sqr(dot(offset, patch.along) / b2);
   const auto inside = reach > T(0) && select(disk, x2 + y2, maximum(x2, y2)) < T(1);
   lamp.met = select(usable && inside, T(1), T(0));
+  // The lobes of drawn directions are 1e-3 wide.
+  constexpr double kReach = 5e-3;
+  const auto touched = lamp.lobe.sinRadius < T(kReach) && length(drawn - towards) < lamp.lobe.sinRadius + T(kReach);
+  lamp.grazed = select(usable && touched, T(1), T(0));
   return lamp;
 }
 
@@ -189,16 +194,23 @@ template <class T> struct Rest {
 };
 
 /// `value`: f cos - base in the drawn direction, `density` that of drawing it, `covered` the sum over the lamps. `met`:
-/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one.
-template <class T>
-Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met, const Rgb<T>& before) {
+/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one. `grazed`:
+/// see AimedLamp; there light sampling finds the drawn direction's own lobe, once in 1e5 samples and 1e5 times as
+/// bright, and of what is left, which is next to nothing, would make a dot. Nothing is left there then: of the light,
+/// 1e-4 sr of what is no lamp, by no more than that part.
+template <class T> Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met,
+                                const Rgb<T>& before, const T& grazed) {
+  constexpr double kNothing = 0.02;
+  const auto size = [](const Rgb<T>& c) { return maximum(max_component(c), max_component(c * T(-1))); };
   const auto drawn = density > T(0);
   const T p = select(drawn, density, T(1));
   const Rgb<T> left = value - before;
-  const Rgb<T> kept = select(met > T(0), left * (met * (met * p) / (T(1) + sqr(met * p))), left / p);
-  const Rgb<T> all = select(drawn, kept - (covered - before) / p, Rgb<T>(T(0)));
+  const Rgb<T> shared = select(met > T(0), left * (met * (met * p) / (T(1) + sqr(met * p))), Rgb<T>(T(0)));
+  const Rgb<T> lacking = select(met > T(0), Rgb<T>(T(0)), left) - (covered - before);
+  const auto nothing = grazed > T(0) && size(lacking) < T(kNothing) * size(value);
+  const Rgb<T> all = select(drawn, shared + select(nothing, Rgb<T>(T(0)), lacking / p), Rgb<T>(T(0)));
   Rest<T> out;
-  out.weight = maximum(max_component(all), max_component(all * T(-1)));
+  out.weight = size(all);
   out.colour = all / maximum(out.weight, tiny<T>());
   return out;
 }

@@ -467,6 +467,7 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lamp_solid_angle", lamp.solid_angle);
     p.output("lamp_covers", lamp.covers);
     p.output("lamp_met_here", lamp.met);
+    p.output("lamp_grazed", maximum(Expr::input("lamp_grazed"), lamp.grazed));
   });
   const Rgb<Expr> value = Rgb<Expr>::input("excess");
   const Expr density = Expr::input("drawn_density");
@@ -487,15 +488,16 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lobe_weight[lamp]", sent.weight);
     p.output("lobe_colour[lamp]", sent.colour);
   });
-  const auto record_rest = [&](const Rgb<Expr>& covered, const Expr& met, const Rgb<Expr>& before) {
+  const auto record_rest = [&](const Rgb<Expr>& covered, const Expr& met, const Rgb<Expr>& before, const Expr& grazed) {
     return record_step([&](Program& p) {
-      const Rest<Expr> left = rest(value, density, covered, met, before);
+      const Rest<Expr> left = rest(value, density, covered, met, before, grazed);
       p.output("rest_weight", left.weight);
       p.output("rest_colour", left.colour);
     });
   };
-  steps.rest = record_rest(Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"));
-  steps.alone = record_rest(Rgb<Expr>(Expr(0)), Expr(0), Rgb<Expr>(Expr(0)));
+  steps.rest = record_rest(Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"),
+                           Expr::input("lamp_grazed"));
+  steps.alone = record_rest(Rgb<Expr>(Expr(0)), Expr(0), Rgb<Expr>(Expr(0)), Expr(0));
   return made.emplace(indent, std::move(steps)).first->second;
 }
 

@@ -329,7 +329,7 @@ def test_values_round_trip(extension, empty, subtests):
     ("arguments", "message"),
     [
         ((["gloss"], {}), r"unknown model 'gloss'; expected one of .*lambert"),
-        ((["coupled", "fitted"], {}), r"'coupled' has no representation 'fitted'.*auto, exact"),
+        ((["coupled", "fitted"], {}), r"'coupled' has no representation 'fitted'.*auto, aimed"),
         ((["coupled"], {"r1": 0.1}), r"'coupled' has no parameter 'r1'; expected one of r0, rm"),
         ((["coupled"], {"r0": 1.5}), r"coupled\.r0: expected a number from 0 to 1, got 1\.5"),
         ((["coupled"], {"r0": -0.1}), r"coupled\.r0: expected a number from 0 to 1"),
@@ -907,7 +907,7 @@ def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
 
 def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):
     """They are measured at the model's default parameters, which a pack cut to a scene lacks."""
-    names = ("sampled", "fitted", "controlled", "twin")
+    names = ("aimed", "sampled", "fitted", "controlled", "twin")
     listed = {
         name: {"model": "phong", "representation": name, "parameters": {"e": 40}} for name in names
     }
@@ -935,7 +935,7 @@ def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension,
     with pytest.raises(ValueError, match=only):
         api.new_material("coupled", "exact", fresnel="dielectric")
     material = api.new_material("coupled", fresnel="dielectric", r0=0.1)
-    assert nodes.identity(nodes.group_nodes(material)[0]) == ("coupled", "sampled")
+    assert nodes.identity(nodes.group_nodes(material)[0]) == ("coupled", "aimed")
     with pytest.raises(ValueError, match=only):
         api.switch_representation(material, "exact")
     assert api.get_parameters(material)["fresnel"] == "dielectric"
@@ -950,7 +950,7 @@ def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension,
     assert api.get_parameters(material)["fresnel"] == "schlick"
     with pytest.raises(ValueError, match=only):
         api.set_parameters(material, fresnel="dielectric")
-    assert pack.resolve("coupled", "auto", {"fresnel": "dielectric"}) == "sampled"
+    assert pack.resolve("coupled", "auto", {"fresnel": "dielectric"}) == "aimed"
 
 
 def test_panel_says_why_there_is_no_albedo(extension, empty):

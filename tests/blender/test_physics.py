@@ -257,13 +257,17 @@ WORLDS = [
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), SAMPLED)
 def test_sampled_form_in_a_world(extension, empty, tool, batch, request, model, values, world):
+    check_in_a_world(extension, "sampled", tool, batch, request, model, values, world)
+
+
+def check_in_a_world(extension, form, tool, batch, request, model, values, world):
     """Per kind of facet a z-test: the mean over replicas against quadrature, in standard errors."""
 
     def measure(cases):
         lights = []
         found, _ = measure_each(
             extension,
-            "sampled",
+            form,
             cases,
             np.repeat(KINDS, REPLICAS, 0),
             SAMPLES,
@@ -288,6 +292,26 @@ def test_sampled_form_in_a_world(extension, empty, tool, batch, request, model, 
     print(f"{model} {world.__name__}: {np.round(mean[:, 0], 4)} {np.round(expected[:, 0], 4)}")
     # Some thousands of comparisons, and each model that is added draws all anew.
     assert np.abs(z).max() < 5.5, f"z = {np.round(z, 1)}"
+
+
+# Aimed forms: base and rest in worlds without a lamp; test_aimed.py has those with lamps.
+
+AIMED = with_every_model(
+    "aimed",
+    ("ashikhmin_shirley", {"nu": 20.0, "nv": 20.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.5, 0.2)}),
+    ("ashikhmin_shirley", {"nu": 5.0, "nv": 100.0, "rotation": 0.5, "part": "specular"}),
+    ("ashikhmin_shirley", {"diffuse": "tabulated", "rd": 1.0}),
+    ("ward", {"ax": 0.3, "ay": 0.6, "rotation": 0.7, "ks": (1.0, 0.5, 0.2)}),
+    ("schlick", {"rough": 0.7, "p": 0.4, "r": (0.9, 0.5, 0.1)}),
+    ("oren_nayar", {"form": "qualitative"}),
+    ("lafortune", {"cxy": 1.0, "e": 4.0}),
+)
+
+
+@pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
+@pytest.mark.parametrize(("model", "values"), AIMED)
+def test_aimed_form_in_a_world(extension, empty, tool, batch, request, model, values, world):
+    check_in_a_world(extension, "aimed", tool, batch, request, model, values, world)
 
 
 @pytest.mark.full

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Aimed forms under lamps: what they give there is the model, and the slots are all they know of."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from goniometer import Goniometer, tilted, unit
+from helpers import evaluate
+
+#: Towards the sun; the camera is above.
+SUNS = [(0.5, 0.2, 0.8), (-0.7, 0.6, 0.15), (0.0, 0.1, 1.0)]
+FACETS = 150
+#: Defaults, and ends that are stiff.
+CASES = {
+    "ashikhmin_shirley": [{"nu": 100.0, "nv": 1e4, "rs": 0.9, "rd": 0.0}],
+    "blinn": [{"e": 2000.0}],
+    "cook_torrance": [{"m": 0.03}],
+    "phong": [{"e": 5000.0}],
+    "radziszewski_alda": [{"n": 50.0}],
+    "schlick": [{"rough": 0.01, "p": 0.5}],
+    "ward": [{"ax": 0.02, "ay": 0.3}],
+}
+
+
+def random_values(schema, rng):
+    """Numbers and colours anywhere on their sliders, choices as they are by default."""
+    values = {}
+    for p in schema:
+        low, high = p.get("soft_min", 0), p.get("soft_max", 1)
+        if p["kind"] == "number":
+            wide = high - low > 50
+            values[p["name"]] = (
+                low + math.expm1(rng.uniform() * math.log1p(high - low))
+                if wide
+                else rng.uniform(low, high)
+            )
+        elif p["kind"] == "color":
+            values[p["name"]] = tuple(rng.uniform(0, 1, 3))
+    return values
+
+
+def cases_of(extension, rng):
+    found = []
+    for name, model in extension.api.models().items():
+        if "aimed" not in model["representations"]:
+            continue
+        drawn = {k: v for k, v in random_values(model["parameters"], rng).items()}
+        if name == "lossless":  # its heights are a kernel, of which not every one is admitted
+            drawn = {}
+        found += [(name, values) for values in ({}, *CASES.get(name, []), drawn)]
+    return found
+
+
+@pytest.mark.parametrize("towards", SUNS, ids=str)
+def test_a_sun_without_an_angle(extension, empty, tool, towards):
+    """No drawn direction meets it: what is seen is base and lobes, f cos to 1e-3 (relative L1)."""
+    rng = np.random.default_rng(17)
+    cases = cases_of(extension, rng)
+    which = np.repeat(np.arange(len(cases)), FACETS)
+    normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
+    # Every other facet faces halfway between sun and camera, more or less: the highlight.
+    half = unit(unit(towards) + (0, 0, 1))
+    near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
+    normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+    extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
+    extension.api.enable_osl(empty)
+    made = [extension.api.new_material(name, "aimed", **values) for name, values in cases]
+    meter = Goniometer(empty, made, normals, samples=16, which=which)
+    wi = meter.local(meter.add_sun(unit(towards)))
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot == 1
+    wo, picture = meter.wo(), meter.measure()
+    for i, (name, values) in enumerate(cases):
+        lit = (which == i) & (wi[:, 2] > 1e-3)
+        expected = evaluate(tool, name, values, wi[lit], wo[lit]) * wi[lit, 2:]
+        measured = picture[lit]
+        off = np.abs(measured - expected).sum() / expected.sum()
+        print(f"{name} {values}: {off:.2g}")
+        assert expected.max() > 1e-4, name
+        # A cosine in single precision and OSL's pow() err by some 5e-7 of the power times the
+        # exponent: 0.7 % at e = 12,000.
+        exponent = max([0, *(v for k, v in values.items() if k in ("e", "es"))])
+        assert off < max(1e-3, 8e-7 * exponent), f"{name} {values}: relative L1 {off:.3g}"
+
+
+def test_a_lamp_that_is_not_in_the_list(extension, empty, tool):
+    """Costs noise and no light: with and without slots the picture has the same mean."""
+    means = []
+    for seen in (True, False):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+        extension.api.enable_osl(scene)
+        made = extension.api.new_material("ashikhmin_shirley", "aimed", nu=20.0, nv=20.0)
+        normals = tilted(np.full(900, 0.8), np.random.default_rng(1).uniform(0, 6.28, 900))
+        meter = Goniometer(scene, made, normals, samples=256 if seen else 2048, perspective=True)
+        data = bpy.data.lights.new("Disk", "AREA")
+        data.shape, data.size, data.energy = "DISK", 60.0, 1e6
+        disk = bpy.data.objects.new("Disk", data)
+        disk.location = (0, 0, 80)
+        scene.collection.objects.link(disk)
+        bpy.context.view_layer.update()
+        if seen:
+            extension.api.see_lamps(scene)
+        picture = meter.measure()[:, 1]
+        means.append((picture.mean(), picture.std(ddof=1) / math.sqrt(len(picture))))
+    (aimed, error), (drawn, other) = means
+    print(means)
+    assert abs(aimed - drawn) < 4.5 * math.hypot(error, other) + 1e-3 * drawn
+    assert error < 0.01 * aimed
