@@ -20,7 +20,7 @@ constexpr const char* kWords = R"(
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
   abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute isfinite log max
-  microfacet min normalize phong_ramp pow reflection refraction sin sqrt
+  microfacet min normalize phong_ramp pow raytype reflection refraction sin sqrt
 
   Albedo BSDF Lobes Normal Shown Tangent
 

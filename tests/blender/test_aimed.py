@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Aimed forms under lamps: what they give there is the model, and the slots are all they know of."""
+"""Aimed forms under lamps: what they give there is the model; the slots are all they know of."""
 
 import math
 
