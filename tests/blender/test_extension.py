@@ -907,7 +907,7 @@ def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
 
 def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):
     """They are measured at the model's default parameters, which a pack cut to a scene lacks."""
-    names = ("aimed", "sampled", "fitted", "controlled", "twin")
+    names = ("sampled", "fitted", "controlled", "twin")
     listed = {
         name: {"model": "phong", "representation": name, "parameters": {"e": 40}} for name in names
     }
