@@ -117,7 +117,10 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
     for (RepresentationKind kind : representations(*model)) {
       const Shader s = write_shader(*model, kind, empty_table(*model));
       EXPECT_LE(s.slots, kMaxClosures) << s.name;
-      EXPECT_LT(s.operations, 600) << s.name;
+      // Aimed forms hold what is done with lamps, a base and the model's value beside its sampling; lossless' value is
+      // a long sum.
+      const bool aimed = kind == RepresentationKind::Aimed;
+      EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2000 : 1100) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
 }

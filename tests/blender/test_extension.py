@@ -175,7 +175,7 @@ def statements(source):
 def test_shaders_are_short(extension_zip, subtests):
     """Every shader of the extension has fewer than 600 statements, counted by the generator as
     operations and here in its text. Aimed forms hold what is done with lamps beside a model's value
-    and its sampling, and a base: up to 1,000, which compile in some 0.3 s; `lossless`, whose value
+    and its sampling, and a base: up to 1,100, which compile in some 0.4 s; `lossless`, whose value
     is a long sum, 2,000."""
     import zipfile
 
@@ -194,7 +194,7 @@ def test_shaders_are_short(extension_zip, subtests):
             with subtests.test(name):
                 found = statements(archive.read(name).decode())
                 print(f"{name}: {operations} operations, {found} statements")
-                most = 2000 if "lossless_aimed" in name else 1000 if "_aimed" in name else 600
+                most = 2000 if "lossless_aimed" in name else 1100 if "_aimed" in name else 600
                 assert operations < most
                 assert 0 < found < most
 
