@@ -315,7 +315,8 @@ def materials(**parameters):
         (materials(e=-1), ["materials.m.parameters.e"]),
         (materials() | {"sizeless_lamps": "Sun"}, ["sizeless_lamps", "Sun"]),
         (materials() | {"sizeless_lamps": ["Sun", 3]}, ["sizeless_lamps[1]", "3"]),
-        (materials() | {"lamps": ["Sun"]}, ["lamps", "sizeless_lamps"]),
+        (materials() | {"lamps": ["Sun"]}, ["lamps: expected a whole number", "Sun"]),
+        (materials() | {"lights": ["Sun"]}, ["lights", "sizeless_lamps"]),
         (scene(), ["camera"]),
     ],
 )

@@ -500,14 +500,14 @@ def test_what_can_not_be_fitted(args, words, tmp_path):
 
 
 @pytest.mark.parametrize(("radius", "said"), [(0, True), (0.3, False)])
-def test_a_lamp_without_a_size_is_named_beside_drawn_forms(tmp_path, radius, said):
+def test_a_lamp_without_a_size_is_named_beside_the_form(tmp_path, radius, said):
     lamp = {"type": "point", "position": [0, -3, 3], "power": 10, "radius": radius}
     material = {"model": "phong", "parameters": {"e": 20}}
     file = tmp_path / "s.json"
     file.write_text(json.dumps(scene(materials={"m": material}, lights=[lamp])))
     done = run("build", "--scene", file, "--explain", "--out", tmp_path / "out")
     models = json.loads(done.stdout)["models"]
-    reasons = [c["why"] for m in models for c in m["choices"] if c["form"] == "sampled"]
+    reasons = [c["why"] for m in models for c in m["choices"] if c["form"] == "aimed"]
     drawn = [r for r in reasons if "the form is left open" in r]
     assert drawn
     for reason in drawn:
