@@ -327,7 +327,7 @@ def _fill_group(group, model_name, representation, texts):
         albedo = _add_script(group, texts[1], f"{what}, the Albedo output")
         albedo.name = albedo.label = ALBEDO
         albedo.location = (0, -400)
-        only_light = (pack.TANGENT, pack.LOBES)
+        only_light = {pack.TANGENT, pack.LOBES, *_lamp_inputs(model_name, representation)}
         tag["albedo_inputs"] = {
             name: kind for name, kind in tag["script_inputs"].items() if name not in only_light
         }

@@ -66,7 +66,9 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
         assert words in lines
     assert counts() == before, "a plan changes nothing"
     assert api.bake(plan) == 3
-    assert counts() == before, "groups and texts that nothing uses are left"
+    # The file has no lamp, so no lean shader has a slot: the group that lamps are read from goes.
+    lean = before | {"node_groups": before["node_groups"] - 1}
+    assert counts() == lean, "groups and texts that nothing uses are left"
     assert extension.pack.root == extension.pack._INSTALLED
 
     free = {"radziszewski_alda": set(), "ward": {"ay"}, "coupled": set()}
@@ -168,18 +170,16 @@ def test_lamps_without_a_size_are_told_of(extension, empty, program, monkeypatch
     api.write_materials(file)
     assert file.read_text().count("sizeless_lamps") == 0
 
-    def taken(time):
-        (model,) = api.plan(time=time).explanation["models"]
+    def taken():
+        (model,) = api.plan().explanation["models"]
         return [(c["form"], c["why"]) for c in model["choices"] if c["taken"]]
 
-    ((form, why),) = taken(9)
+    ((form, why),) = taken()
     assert form == "aimed" and "without a size" not in why
     lamp("Spot", "SPOT", shadow_soft_size=0.0)
     lamp("Point", "POINT", shadow_soft_size=0.0)
     lamp("Sun", "SUN", angle=0.0)
-    ((form, why),) = taken(9)
-    assert form == "aimed" and "Point, Spot, Sun without a size" in why
-    ((form, why),) = taken(None)
+    ((form, why),) = taken()
     assert form == "aimed" and "Point, Spot, Sun without a size" in why
     api.write_materials(file)
     assert '"Point",\n  "Spot",\n  "Sun"' in file.read_text()
