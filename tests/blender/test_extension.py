@@ -435,7 +435,8 @@ def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
     """Where it takes a script of its own: with the node's values and links, once a form, and a
     file does not keep what is not in use."""
     api, nodes = extension.api, extension.nodes
-    material, other, third = (api.new_material("ward", ax=0.3, ks=(0.1, 0.2, 0.3)) for _ in "123")
+    values = {"ax": 0.3, "ks": (0.1, 0.2, 0.3)}
+    material, other, third = (api.new_material("ward", "sampled", **values) for _ in "123")
     tree, node = material.node_tree, nodes.group_nodes(material)[0]
     assert [s.name for s in node.outputs] == ["BSDF"]
     assert not nodes.uses_albedo(node)

@@ -301,7 +301,7 @@ AIMED = with_every_model(
     ("ashikhmin_shirley", {"nu": 20.0, "nv": 20.0, "rs": (0.3, 0.6, 0.9), "rd": (0.5, 0.5, 0.2)}),
     ("ashikhmin_shirley", {"nu": 5.0, "nv": 100.0, "rotation": 0.5, "part": "specular"}),
     ("ashikhmin_shirley", {"diffuse": "tabulated", "rd": 1.0}),
-    ("ward", {"ax": 0.3, "ay": 0.6, "rotation": 0.7, "ks": (1.0, 0.5, 0.2)}),
+    ("ward", {"ax": 0.3, "ay": 0.6, "ks": (1.0, 0.5, 0.2)}),
     ("schlick", {"rough": 0.7, "p": 0.4, "r": (0.9, 0.5, 0.1)}),
     ("oren_nayar", {"form": "qualitative"}),
     ("lafortune", {"cxy": 1.0, "e": 4.0}),
