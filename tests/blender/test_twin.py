@@ -78,7 +78,7 @@ def test_a_sun_on_a_twin(lean, tool):
 def test_a_twin_stands_beside_its_model(lean, empty):
     """The shader is for Cycles, the twin for EEVEE; that OSL is off concerns the shader alone."""
     api = lean.api
-    material = api.new_material("phong", "sampled")
+    material = api.new_material("phong", "aimed")
     tree = material.node_tree
     bump = tree.nodes.new("ShaderNodeBump")
     node = lean.nodes.group_nodes(material)[0]
@@ -89,7 +89,7 @@ def test_a_twin_stands_beside_its_model(lean, empty):
     outputs = {n.target: n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial"}
     assert set(outputs) == {"CYCLES", "EEVEE"}
     shown = {t: o.inputs["Surface"].links[0].from_node for t, o in outputs.items()}
-    assert [lean.nodes.identity(shown[t])[1] for t in ("CYCLES", "EEVEE")] == ["sampled", "twin"]
+    assert [lean.nodes.identity(shown[t])[1] for t in ("CYCLES", "EEVEE")] == ["aimed", "twin"]
     twin = shown["EEVEE"]
     assert lean.nodes.sockets(twin)["Normal"].links[0].from_node == bump
     assert not any(n.bl_idname == "ShaderNodeScript" for n in twin.node_tree.nodes)
@@ -98,8 +98,8 @@ def test_a_twin_stands_beside_its_model(lean, empty):
 
     api.switch_representation(material, "twin")
     assert "osl_off" not in {f.code for f in api.warnings(material, empty)}
-    api.switch_representation(material, "sampled")
-    assert lean.nodes.identity(shown["CYCLES"])[1] == "sampled"
+    api.switch_representation(material, "aimed")
+    assert lean.nodes.identity(shown["CYCLES"])[1] == "aimed"
 
 
 @pytest.mark.full
@@ -114,7 +114,7 @@ def test_a_twin_in_eevee(extension, use_pack, tmp_path):
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, samples=64, max_bounces=0)
-    materials = [extension.api.new_material(name, "sampled", **v) for name, v in balls.items()]
+    materials = [extension.api.new_material(name, "aimed", **v) for name, v in balls.items()]
     for x, material in zip((-1.1, 1.1), materials, strict=True):
         extension.api.add_twin(material)
         add_sphere(scene, material).location.x = x
