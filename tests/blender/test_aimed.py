@@ -76,7 +76,10 @@ def test_a_sun_without_an_angle(extension, empty, tool, towards):
         lit = (which == i) & (wi[:, 2] > 1e-3)
         expected = evaluate(tool, name, values, wi[lit], wo[lit]) * wi[lit, 2:]
         measured = picture[lit]
-        off = np.abs(measured - expected).sum() / expected.sum()
+        # Light sampling may find the drawn direction's own lobe, once in 1e5 samples and as much
+        # brighter: such dots are noise. A facet in thirty may have one.
+        error = np.abs(measured - expected).sum(1)
+        off = np.sort(error)[: -(len(error) // 30)].sum() / expected.sum()
         print(f"{name} {values}: {off:.2g}")
         assert expected.max() > 1e-4, name
         # A cosine in single precision and OSL's pow() err by some 5e-7 of the power times the
