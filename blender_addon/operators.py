@@ -150,6 +150,14 @@ class BRDFC_OT_no_guiding(Operator):
         return {"FINISHED"}
 
 
+def _model_node(material, name):
+    """The model node of that name. Raises ValueError."""
+    for node in nodes.group_nodes(material):
+        if node.name == name:
+            return node
+    raise ValueError(f"material {material.name} has no model node {name!r}")
+
+
 class BRDFC_OT_switch(Operator):
     """Use another form of the same model; values and links stay"""
 
@@ -171,13 +179,10 @@ class BRDFC_OT_switch(Operator):
 
     def execute(self, context):
         material = context.object.active_material
-        node = next((n for n in nodes.group_nodes(material) if n.name == self.node), None)
-        if node is None:
-            self.report({"ERROR"}, f"material {material.name} has no model node {self.node!r}")
-            return {"CANCELLED"}
-        identity = nodes.identity(node)
         materials = bpy.data.materials if self.all_users else [material]
         try:
+            node = _model_node(material, self.node)
+            identity = nodes.identity(node)
             for user in materials:
                 for other in nodes.group_nodes(user):
                     if other == node or (self.all_users and nodes.identity(other) == identity):
@@ -219,14 +224,11 @@ class BRDFC_OT_add_albedo(Operator):
     def execute(self, context):
         material = context.object.active_material
         try:
-            for node in nodes.group_nodes(material):
-                if node.name == self.node:
-                    nodes.add_albedo(node)
-                    return {"FINISHED"}
-            raise ValueError(f"material {material.name} has no model node {self.node!r}")
+            nodes.add_albedo(_model_node(material, self.node))
         except _ERRORS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        return {"FINISHED"}
 
 
 class BRDFC_OT_add_twin(Operator):
