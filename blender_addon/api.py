@@ -6,7 +6,7 @@
     api.enable_osl(bpy.context.scene)
 
 Names and values are those of the models' schema: numbers, colours as (r, g, b) or one grey
-number, choices by identifier. `lobes` sets how many directions a sampled form draws.
+number, choices by identifier.
 """
 
 import json
@@ -60,13 +60,10 @@ def models():
 def _checked(model_name, representation, given):
     """The form to use, and the values in canonical form."""
     given = dict(given)
-    lobes = given.pop("lobes", None) if "lobes" not in pack.parameters(model_name) else None
     fixed = pack.fixed(model_name)
     checked = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
     values = {name: v for name, v in checked.items() if name not in fixed}
     representation = pack.resolve(model_name, representation, values)
-    if lobes is not None:
-        values[pack.LOBES] = pack.check_lobes(model_name, representation, lobes)
     return representation, values
 
 
@@ -271,10 +268,6 @@ def _used():
                 value = nodes.get_value(node, name)
                 parameters[name] = {"varies": True} if value is None else _as_typed(value)
             entry = {"model": model_name, "representation": representation}
-            form = nodes.manifest_entry(node)
-            if lobes := form and form[0].get("lobes"):
-                value = nodes.get_value(node, pack.LOBES)
-                entry["lobes"] = lobes["max"] if value is None else value
             entry["parameters"] = parameters
             name = material.name if len(ours) == 1 else f"{material.name}/{node.name}"
             found.append((name, material, node, entry))

@@ -348,7 +348,7 @@ def node_warnings(node, material, scene):
                 )
             )
     # Measured: a sampled form comes out right, no less noisy, and half as slow again.
-    if form.get("lobes") and "path_guiding" not in declared and scene.cycles.use_guiding:
+    if nodes.identity(node)[1] == "sampled" and scene.cycles.use_guiding:
         found.append(
             Finding(
                 "path_guiding",

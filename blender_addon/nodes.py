@@ -96,8 +96,6 @@ def expected_inputs(model_name, representation):
         for p in pack.socket_parameters(model_name, representation).values()
     }
     inputs |= {pack.NORMAL: "VECTOR", pack.TANGENT: "VECTOR"}
-    if pack.representation(model_name, representation).get("lobes"):
-        inputs[pack.LOBES] = "INT"
     inputs |= dict.fromkeys(_lamp_inputs(model_name, representation), "VECTOR")
     return inputs
 
@@ -312,7 +310,6 @@ def _add_script(group, text, what):
 def _fill_group(group, model_name, representation, texts):
     """`texts`: of the script and, where the Albedo output has one of its own that was asked for, of
     that."""
-    entry = pack.representation(model_name, representation)
     what = f"{model_name} ({representation})"
     apart = has_albedo_script(model_name, representation)
     outputs = [n for n in OUTPUTS if not apart or n != ALBEDO or len(texts) > 1]
@@ -327,7 +324,7 @@ def _fill_group(group, model_name, representation, texts):
         albedo = _add_script(group, texts[1], f"{what}, the Albedo output")
         albedo.name = albedo.label = ALBEDO
         albedo.location = (0, -400)
-        only_light = {pack.TANGENT, pack.LOBES, *_lamp_inputs(model_name, representation)}
+        only_light = {pack.TANGENT, *_lamp_inputs(model_name, representation)}
         tag["albedo_inputs"] = {
             name: kind for name, kind in tag["script_inputs"].items() if name not in only_light
         }
@@ -339,17 +336,6 @@ def _fill_group(group, model_name, representation, texts):
     sockets = {}
     for name, parameter in pack.socket_parameters(model_name, representation).items():
         sockets[name] = _add_parameter(group, group_input, inputs[name], parameter)
-    if lobes := entry.get("lobes"):
-        sockets[pack.LOBES] = _socket(
-            group,
-            pack.LOBES,
-            "NodeSocketInt",
-            f"Directions drawn per shading: less noise, more time. 1 to {lobes['max']}",
-            min_value=1,
-            max_value=lobes["max"],
-            default_value=lobes["default"],
-        )
-        group.links.new(group_input.outputs[-2], inputs[pack.LOBES])
     for name, text_ in _VECTORS.items():
         sockets[name] = _vector_socket(group, name, text_)
         group.links.new(group_input.outputs[-2], inputs[name])
@@ -482,7 +468,7 @@ def manifest_entry(node):
 
 
 def sockets(node):
-    """Input sockets of a group node by parameter name, and Normal, Tangent, Lobes."""
+    """Input sockets of a group node by parameter name, and Normal, Tangent."""
     by_identifier = {s.identifier: s for s in node.inputs}
     return {
         name: by_identifier[identifier]
@@ -527,7 +513,7 @@ def get_value(node, name):
     if socket.type == "MENU":
         labels = {choice_label(c): c for c in _choices(node, name)}
         return labels.get(socket.default_value)
-    if socket.type == "INT" and name != pack.LOBES:
+    if socket.type == "INT":
         choices = _choices(node, name)
         return choices[min(max(socket.default_value, 0), len(choices) - 1)]
     return socket.default_value

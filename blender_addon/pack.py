@@ -19,7 +19,6 @@ TAG = "brdfc"
 #: Sockets that every group has beside the model's parameters.
 NORMAL = "Normal"
 TANGENT = "Tangent"
-LOBES = "Lobes"
 
 
 class PackError(RuntimeError):
@@ -191,7 +190,7 @@ def digest(model_name, name):
     """Changes whenever the shader or the sockets of its group would. Panels ask for it at each
     redraw: of the source, of up to a megabyte, the manifest has the hash."""
     form = representation(model_name, name)
-    schema = [model(model_name)["parameters"], form.get("lobes"), form["only"]]
+    schema = [model(model_name)["parameters"], form["only"]]
     hashes = [form["sha256"], form.get("albedo_sha256")]
     text = json.dumps([*hashes, *schema], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -256,15 +255,3 @@ def check_value(model_name, name, value):
         _checked_number(f"{what} ({channel})", c, low, high)
         for channel, c in zip("rgb", channels[:3], strict=True)
     )
-
-
-def check_lobes(model_name, name, value):
-    """Returns the number of directions a sampled form draws. Raises ValueError."""
-    lobes = representation(model_name, name).get("lobes")
-    if not lobes:
-        raise ValueError(f"representation {name!r} of {model_name!r} has no lobes to set")
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= lobes["max"]:
-        raise ValueError(
-            f"{model_name}.lobes: expected a whole number from 1 to {lobes['max']}, got {value!r}"
-        )
-    return value

@@ -369,8 +369,6 @@ def _material(name, view, representation, native):
     else:
         try:
             form = pack.resolve(model, representation, values)
-            if view.has("lobes") and pack.representation(model, form).get("lobes"):
-                values["lobes"] = view.get("lobes").value
             material = api.new_material(model, representation, **values)
         except ValueError as error:
             raise ValueError(f"{view.file}: {view.path}: {error}") from error

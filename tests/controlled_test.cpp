@@ -126,7 +126,6 @@ TEST(Controlled, ShadersDrawOneDirection) {
     const Shader s = shader_of(m, values);
     EXPECT_LE(s.operations, kMaxOperations) << row.model;
     EXPECT_LE(s.slots, kMaxClosures);
-    EXPECT_FALSE(s.lobes);
     EXPECT_THAT(s.source, HasSubstr("residual_weight * brdfc_ray_coloured("));
     const RepresentationError e = measure_error(m, RepresentationKind::Controlled, values);
     EXPECT_FALSE(e.relative_l1) << "equal in expectation";

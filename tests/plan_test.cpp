@@ -21,7 +21,7 @@ using testing::Not;
 MaterialNeed need(const std::string& id, const std::string& model, const std::vector<std::string>& values,
                   const std::string& representation = "auto") {
   const Model& m = find_model(model);
-  return {id, &m, parse_values(m.info(), values), {}, representation, kDefaultLobes};
+  return {id, &m, parse_values(m.info(), values), {}, representation};
 }
 
 Costs costs(const std::string& rows) {
@@ -42,7 +42,6 @@ TEST(Plan, EverythingIsEveryModelInEveryForm) {
   for (const PlannedModel& p : plan) {
     EXPECT_EQ(p.forms, representations(*p.model));
     EXPECT_TRUE(p.fixed.empty() && p.reasons.empty());
-    EXPECT_EQ(p.max_lobes, kMaxLobes);
   }
   EXPECT_THROW(plan_models({"nonesuch"}), InputError);
 }
@@ -80,7 +79,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
   const Model& m = find_model("phong");
   const AlbedoTable table = albedo_table_of(m);
   const auto shader = [&](int lamps) {
-    return write_shader(m, RepresentationKind::Aimed, table, {}, kMaxLobes, {}, lamps);
+    return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps);
   };
   for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
@@ -105,7 +104,6 @@ TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {
   const auto two = plan_scene({need("a", "lambert", {"rho=1"}), need("b", "lambert", {"rho=0.5"}, "sampled")});
   EXPECT_TRUE(two[0].fixed.empty()) << "two values";
   EXPECT_THAT(two[0].forms, ElementsAre(RepresentationKind::Exact, RepresentationKind::Sampled));
-  EXPECT_EQ(two[0].max_lobes, 1);
 }
 
 TEST(Plan, NamesTheMaterialWhoseFormDoesNotExist) {
@@ -277,38 +275,26 @@ TEST(Plan, SaysWhichCostIsNotKnown) {
 
   budget.costs = costs("phong,aimed,0.9\n");
   EXPECT_THAT(plan_scene(needs, budget)[0].forms, ElementsAre(kAimed));
-  // One row alone, of a form whose cost hangs on how many directions it draws.
-  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "brdfc-plan-costs.csv";
-  std::ofstream(file) << "model,form,cost\nphong,sampled,0.9\n";
-  budget.costs = Costs(file);
-  EXPECT_THAT(plan_scene(needs, budget)[0].forms, ElementsAre(kSampled));
-  needs[0].lobes = 4;
-  EXPECT_EQ(why(plan_scene(needs, budget)[0], kAimed), "a: the form is left open, and no cost is known");
-  std::ofstream(file) << "model,form,cost\nphong,sampled,0.9\nphong,fitted,1.5\n";
-  budget.costs = Costs(file);
-  plan = plan_scene(needs, budget)[0];
-  EXPECT_THAT(plan.forms, ElementsAre(kFitted));
-  EXPECT_EQ(why(plan, kSampled), "its cost was measured with one direction alone");
 }
 
 TEST(Plan, SaysWhatABudgetChangesForEachMaterial) {
-  std::vector<MaterialNeed> needs = {need("open", "phong", {"e=20"}), need("many", "phong", {"e=20"}, "sampled")};
-  needs[1].lobes = 4;
+  const std::vector<MaterialNeed> needs = {need("open", "phong", {"e=20"}),
+                                           need("asked", "phong", {"e=20"}, "sampled")};
   Budget budget;
-  budget.costs = costs("phong,aimed,0.9\nphong,sampled,0.9\nphong,fitted,1.5\n");
+  budget.costs = costs("phong,aimed,0.9\nphong,fitted,1.5\n");
   budget.error = 1;
   const PlannedModel plan = plan_scene(needs, budget)[0];
   ASSERT_EQ(plan.material_forms.size(), 2u);
-  const FormChange &open = plan.material_forms[0], &many = plan.material_forms[1];
+  const FormChange &open = plan.material_forms[0], &asked = plan.material_forms[1];
   EXPECT_EQ(open.id, "open");
   EXPECT_EQ(open.before, kAimed);
   EXPECT_EQ(open.cost_before, 0.9);
   EXPECT_EQ(open.after, kFitted);
   EXPECT_EQ(open.cost_after, 1.5);
-  EXPECT_EQ(many.id, "many");
-  EXPECT_EQ(many.before, kSampled);
-  EXPECT_EQ(many.after, kSampled);
-  EXPECT_FALSE(many.cost_before || many.cost_after) << "measured with one direction";
+  EXPECT_EQ(asked.id, "asked");
+  EXPECT_EQ(asked.before, kSampled);
+  EXPECT_EQ(asked.after, kSampled);
+  EXPECT_FALSE(asked.cost_before || asked.cost_after) << "not measured";
 }
 
 TEST(Plan, AddsControlledFormsWhereThereCanBeOne) {
@@ -342,17 +328,6 @@ TEST(Plan, FoldedTablesInterpolateToTheSame) {
       EXPECT_NEAR(got.b, want.b, 1e-6);
     }
   }
-}
-
-TEST(Plan, AShaderOfOneDirectionHasNoLobes) {
-  const Model& m = find_model("radziszewski_alda");
-  const AlbedoTable table = albedo_table_of(m);
-  const Shader one = write_shader(m, RepresentationKind::Sampled, table, {}, 1),
-               all = write_shader(m, RepresentationKind::Sampled, table);
-  EXPECT_EQ(one.closures, 1);
-  EXPECT_FALSE(one.lobes);
-  EXPECT_THAT(one.source, Not(HasSubstr("Lobes")));
-  EXPECT_LT(one.source.size(), all.source.size());
 }
 
 }  // namespace

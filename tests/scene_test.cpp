@@ -221,7 +221,7 @@ TEST_F(SceneTest, ResolvedSceneIsTheSame) {
                               {"material", "tiles"},
                               {"camera_only", true}});
   scene["materials"]["tiles"] = json::parse(
-      R"({"model": "lambert", "lobes": 2, "parameters": {"rho": {"texture":
+      R"({"model": "lambert", "parameters": {"rho": {"texture":
           {"procedural": "checker", "a": [0.1, 0.2, 0.3], "b": [0.4, 0.5, 0.6], "cells": 3}}}})");
   scene["environment"] = {{"procedural", "interior"}, {"width", 16}, {"strength", 2}};
   const Scene a = load_scene(write(scene.dump()));

@@ -40,7 +40,7 @@ void print_table(const PackResult& result) {
 std::vector<MaterialNeed> needs_of(const std::vector<Material>& materials) {
   std::vector<MaterialNeed> needs;
   for (const Material& m : materials) {
-    MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation, m.lobes};
+    MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation};
     for (const auto& [name, image] : m.textures) need.textured.insert(name);
     needs.push_back(std::move(need));
   }
@@ -238,7 +238,7 @@ void add_build_command(CLI::App& app) {
   CLI::App* c = app.add_subcommand("build", "Write the Blender extension");
   c->add_flag("--all", options->all, "Every model");
   c->add_option("--scene", options->scene,
-                "Only what the materials of a scene file need: models, forms, lobes, parameters that are not constant, "
+                "Only what the materials of a scene file need: models, forms, parameters that are not constant, "
                 "view angles");
   c->add_option("--materials", options->materials,
                 "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses");

@@ -22,7 +22,7 @@ constexpr const char* kWords = R"(
   abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute isfinite log max
   microfacet min normalize phong_ramp pow raytype reflection refraction sin sqrt
 
-  Albedo BSDF Lobes Normal Shown Tangent
+  Albedo BSDF Normal Shown Tangent
 
   count entry first frame_b frame_n frame_t last lobe mirror_weight path_length residual_colour residual_weight show side
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z

@@ -31,8 +31,7 @@ template <class T> struct GlossySpecular {
                            .positive = false,
                            .smooth = false,  // at e = 1 the lobe ends in an edge
                            .exact_sampling = false,
-                           .specular_limit = "e=1e7",
-                           .fit_axis = "e"},
+                           .specular_limit = "e=1e7"},
             .params = {}};
   }
 
@@ -73,8 +72,10 @@ template <class T> struct GlossySpecular {
     return sample_if(above(wi, wo), wi, cs * (ks * share * wi.z), pdf(wi, wo));
   }
 
-  /// Eq. 25.2 itself, in the cosine that Cycles has rounded.
-  ClosureSum<T> base(const Vec3<T>&) const { return {power_closure(cs * (c() * ks * T(2) * pi<T>() / (e + T(2))), e)}; }
+  /// Cycles' ramp closure is this lobe times a ramp, here constant; see modified_phong.
+  ClosureSum<T> exact(const Vec3<T>&) const {
+    return {power_closure(cs * (c() * ks * T(2) * pi<T>() / (e + T(2))), e)};
+  }
 };
 
 BRDFC_MODEL(GlossySpecular)

@@ -336,11 +336,11 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
                       of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
     const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
     const Shader shader = twin ? write_nodes(model, fixed)
-                               : write_shader(model, kind, of_form, fixed, plan.max_lobes, plan.views, plan.max_lamps);
+                               : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
     const ParamValues whole_fixed = is_fit(kind) ? fixed : ParamValues{};
-    const bool cut = !plan.views.all() || (!is_fit(kind) && (!plan.fixed.empty() || plan.max_lobes < kMaxLobes));
+    const bool cut = !plan.views.all() || (!is_fit(kind) && !plan.fixed.empty());
     const Shader whole =
         cut && !twin ? write_shader(model, kind, fold(whole_table, model, whole_fixed), whole_fixed) : shader;
     const RepresentationError error = measure_error(model, kind, fixed, plan.views);
@@ -362,7 +362,6 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
         {"lamps", shader.lamps},
-        {"lobes", shader.lobes ? Json{{"default", kDefaultLobes}, {"max", plan.max_lobes}} : Json()},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
         {"axis", axis_json(fit)},
         {"highlight", has_highlight(kind, model.has_mirror(), shader) ? highlight_json(model, fixed) : Json()},

@@ -113,9 +113,6 @@ std::string lacking(const MaterialNeed& need, RepresentationKind kind) {
 
 /// One cost for all materials of a model: the extension has one preferred form of it.
 std::optional<double> cost_of(const Needs& needs, RepresentationKind kind, const Budget& budget) {
-  const auto draws_more = [](const MaterialNeed* need) { return need->lobes > 1; };
-  // Measured with one direction; more cost more.
-  if (kind == RepresentationKind::Sampled && std::any_of(needs.begin(), needs.end(), draws_more)) return std::nullopt;
   return budget.costs.of(*needs.front()->model, kind);
 }
 
@@ -124,8 +121,7 @@ std::string over_time(const Needs& needs, RepresentationKind kind, const Budget&
   if (!budget.time) return {};
   const auto cost = cost_of(needs, kind, budget);
   if (cost) return *cost <= *budget.time ? "" : fmt::format("costs {:.3g}x, and {:g}x is allowed", *cost, *budget.time);
-  return budget.costs.of(*needs.front()->model, kind) ? "its cost was measured with one direction alone"
-                                                      : "its cost was not measured";
+  return "its cost was not measured";
 }
 
 struct Chosen {
@@ -282,7 +278,6 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   const ModelInfo& info = model.info();
   PlannedModel plan;
   plan.model = &model;
-  plan.max_lobes = 1;
   std::vector<Chosen> chosen;
   for (const MaterialNeed* need : needs) {
     plan.materials.push_back(need->id);
@@ -290,22 +285,16 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
     const RepresentationKind before = chosen_form(*need, needs, {}).form, after = chosen.back().form;
     plan.material_forms.push_back(
         {need->id, before, after, cost_of({need}, before, budget), cost_of({need}, after, budget)});
-    plan.max_lobes = std::max(plan.max_lobes, std::min(need->lobes, kMaxLobes));
   }
   plan.choices = choose_forms(needs, chosen, budget);
-  bool drawn = false;
-  for (const FormChoice& choice : plan.choices) {
+  for (const FormChoice& choice : plan.choices)
     if (choice.taken) plan.forms.push_back(choice.form);
-    drawn = drawn || (choice.taken && choice.form == RepresentationKind::Sampled);
-  }
   // What "auto" is in Blender, too.
   std::stable_partition(plan.forms.begin(), plan.forms.end(), [&](RepresentationKind kind) {
     for (std::size_t i = 0; i < needs.size(); ++i)
       if (needs[i]->representation == "auto" && chosen[i].form == kind) return true;
     return false;
   });
-  if (drawn && plan.max_lobes < kMaxLobes)
-    plan.reasons.push_back(fmt::format("lobes {} to {}: no material draws so many", plan.max_lobes + 1, kMaxLobes));
   plan.max_lamps = std::min(budget.lamps.value_or(kMaxLamps), kMaxLamps);
   if (std::find(plan.forms.begin(), plan.forms.end(), RepresentationKind::Aimed) != plan.forms.end() &&
       plan.max_lamps < kMaxLamps)

@@ -21,7 +21,6 @@ struct MaterialNeed {
   ParamValues values;              ///< complete
   std::set<std::string> textured;  ///< parameters that vary over the surface
   std::string representation = "auto";
-  int lobes = kDefaultLobes;  ///< directions a sampled form draws
   Cosines views = {};         ///< that it can be seen from
 };
 
@@ -40,7 +39,7 @@ struct FormChoice {
 struct FormChange {
   std::string id;
   RepresentationKind before, after;               ///< without a budget, as in a pack of everything; and with it
-  std::optional<double> cost_before, cost_after;  ///< none where more directions are drawn than were measured
+  std::optional<double> cost_before, cost_after;  ///< none where they were not measured
 };
 
 /// What a pack holds of one model.
@@ -49,7 +48,6 @@ struct PlannedModel {
   std::vector<std::string> materials;      ///< that need it; none in a pack of everything
   ParamValues fixed;                       ///< folded into shaders and tables: no sockets
   std::vector<RepresentationKind> forms;   ///< preferred first
-  int max_lobes = kMaxLobes;               ///< of sampled forms
   int max_lamps = kMaxLamps;               ///< that aimed forms can be told of
   Cosines views;                           ///< that one of the materials can be seen from; tables have no others
   std::vector<FormChoice> choices;         ///< every form, where materials were planned for

@@ -316,6 +316,13 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   throw std::logic_error("no OSL for this closure");
 }
 
+/// Statements that draw numbers in [0, 1) and name them.
+std::string random(const char* all, int index, const std::vector<const char*>& parts) {
+  std::string out = fmt::format("    vector {} = brdfc_random({});\n", all, index);
+  for (std::size_t i = 0; i < parts.size(); ++i) out += fmt::format("    float {} = {}[{}];\n", parts[i], all, i);
+  return out;
+}
+
 /// Lamps and rest of an aimed form: one evaluation of the model, in a loop over the lamps and the drawn direction.
 class AimedText {
  public:
@@ -408,12 +415,6 @@ class AimedText {
   }
 
  private:
-  static std::string random(const char* all, int index, const std::vector<const char*>& parts) {
-    std::string out = fmt::format("    vector {} = brdfc_random({});\n", all, index);
-    for (std::size_t i = 0; i < parts.size(); ++i) out += fmt::format("    float {} = {}[{}];\n", parts[i], all, i);
-    return out;
-  }
-
   std::string slots_array(const std::string& what) const {
     std::string list;
     for (int i = 1; i <= lamps_; ++i) list += fmt::format("{}Lamp{}{}", i > 1 ? ", " : "", what, i);
@@ -447,7 +448,7 @@ std::string balanced_sum(const std::vector<std::string>& terms) {
 }
 
 Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
-                    int max_lobes, const Cosines& views, int max_lamps) {
+                    const Cosines& views, int max_lamps) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
   for (const auto& [name, value] : form_values(model, kind, given))
@@ -457,19 +458,17 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
              aimed = kind == RepresentationKind::Aimed;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
-  shader.lobes = sampled && max_lobes > 1;
 
   std::vector<RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
   AimedText aimed_text(info, fixed, max_lamps);
   SharedArrays arrays;
   int operations = 0, mirror_operations = 0;
-  const int indent = sampled ? 8 : 4;
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
     const Recording r = aimed ? aimed_text.add(choices, record_aimed(model, values, 0), arrays)
-                              : record(model, kind, values, indent, views);
+                              : record(model, kind, values, 4, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, arrays.without_shared(r));
     if (!kinds.empty() && kinds != r.closures)
@@ -501,22 +500,10 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   std::vector<std::string> terms;
   if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + block(mirror.print(0), 1);
   if (sampled) {
-    body += fmt::format(
-        "    color weight_0[{}] = {{ 0.0 }};\n    vector wi[{}] = {{ vector(0.0) }};\n"
-        "    int count = {};\n"
-        "    for (int lobe = 0; lobe < count; lobe++) {{\n"
-        "        vector u_all = brdfc_random(lobe);\n"
-        "        float u_0 = u_all[0];\n        float u_1 = u_all[1];\n        float u_2 = u_all[2];\n"
-        "        float wi_x, wi_y, wi_z;\n        color weight;\n",
-        max_lobes, max_lobes, shader.lobes ? fmt::format("clamp(Lobes, 1, {})", max_lobes) : std::string("1"));
-    body += statements.print(8);
-    body +=
-        "        weight_0[lobe] = weight / float(count);\n"
-        "        wi[lobe] = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n    }\n";
-    for (int i = 0; i < max_lobes; ++i)
-      terms.push_back(model.has_through() ? fmt::format("brdfc_ray_anywhere(weight_0[{}], wi[{}], I, frame_n)", i, i)
-                                          : fmt::format("weight_0[{}] * brdfc_ray(wi[{}], I)", i, i));
-    shader.slots = max_lobes * slots(ClosureKind::PhongRamp);
+    body += random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float wi_x, wi_y, wi_z;\n    color weight;\n" +
+            statements.print(4) + "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n";
+    terms.push_back(model.has_through() ? "brdfc_ray_anywhere(weight, wi, I, frame_n)" : "weight * brdfc_ray(wi, I)");
+    shader.slots = slots(ClosureKind::PhongRamp);
   } else {
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       const ClosureKind closure = kinds[c].kind;
@@ -635,11 +622,6 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   };
   const char* albedo_output = "    output color Albedo = 0";
   std::string sockets;
-  if (shader.lobes)
-    sockets += fmt::format(
-        "    int Lobes = {} [[ string label = \"Lobes\", string help = \"Directions traced per shading "
-        "point, 1 to {}\" ]],\n",
-        kDefaultLobes, max_lobes);
   for (int i = 1; i <= shader.lamps; ++i)
     for (const char* what : {"Place", "Turn", "Scale", "Shape"})
       sockets += fmt::format("    vector Lamp{}{} = vector(0.0),\n", what, i);

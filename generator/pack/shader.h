@@ -19,19 +19,16 @@ struct Shader {
   int slots = 0;        ///< what they take of Cycles' kMaxClosures
   int operations = 0;   ///< most that one combination of choices executes, a loop's body counted once
   int statements = 0;   ///< of the shader for all combinations of choices, without the library it calls
-  bool lobes = false;   ///< has the Lobes parameter
   bool facets = false;  ///< has closures of facets
   int lamps = 0;        ///< slots of lamps that it aims at
 };
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
-/// output, in a shader of its own where its text is longer than kMaxAlbedoText. A sampled form draws at most
-/// `max_lobes` directions, and has no parameter for that if it is one. An aimed form has parameters for `max_lamps`
-/// lamps. The form is right for these `views`. Throws
-/// InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
+/// output, in a shader of its own where its text is longer than kMaxAlbedoText. An aimed form has parameters for
+/// `max_lamps` lamps. The form is right for these `views`. Throws InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
 /// kMaxOperations.
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
-                    int max_lobes = kMaxLobes, const Cosines& views = {}, int max_lamps = kMaxLamps);
+                    const Cosines& views = {}, int max_lamps = kMaxLamps);
 
 /// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
 std::string balanced_sum(const std::vector<std::string>& terms);

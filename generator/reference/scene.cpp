@@ -198,7 +198,7 @@ class Loader {
   void read_materials(const JsonView& j) {
     json& out = scene_.resolved["materials"] = json::object();
     for (const auto& [id, m] : j.members()) {
-      m.only({"model", "parameters", "representation", "lobes"});
+      m.only({"model", "parameters", "representation"});
       Material material;
       material.id = id;
       std::vector<std::string> names;
@@ -231,7 +231,6 @@ class Loader {
         }
       if (const auto v = m.find("representation")) material.representation = v->text();
       resolved["representation"] = material.representation;
-      if (const auto v = m.find("lobes")) resolved["lobes"] = material.lobes = v->integer(1, 8);
       try {
         material.values = complete(info, material.values);
       } catch (const InputError& e) {

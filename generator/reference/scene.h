@@ -47,7 +47,6 @@ struct Material {
   std::map<std::string, std::shared_ptr<const Image>> textures;
   std::set<std::string> varying;  ///< parameters that something not known here sets; only from load_materials()
   std::string representation = "auto";
-  int lobes = 1;  ///< directions that a sampled form draws
 };
 
 /// world = matrix * object + translation

@@ -34,10 +34,6 @@ RepresentationKind representation_named(const std::string&);
 /// declares what it runs over (ModelProperties::fit_axis).
 std::vector<RepresentationKind> representations(const Model&);
 
-/// How many lobes a sampled shader may trace per shading point.
-inline constexpr int kMaxLobes = 8;
-inline constexpr int kDefaultLobes = 1;
-
 /// The values that a form is confined to, beside those that are `fixed`: choices, where the closures of an exact one
 /// are known for some alone; of a fit the defaults of all but factors(), what there are terms by and the number that it
 /// runs over.

@@ -29,7 +29,7 @@ def forms(extension):
 
 def sampled_forms(extension):
     pairs = forms(extension)
-    return [p for p in pairs if extension.pack.representation(*p)["lobes"]]
+    return [p for p in pairs if p[1] == "sampled"]
 
 
 def test_official_validator_accepts_the_zip(extension_zip):
@@ -288,12 +288,6 @@ def test_sockets_equal_the_manifest(extension, empty, subtests):
                     assert all(choice in item.description for choice in parameter["choices"])
         for name in ("Normal", "Tangent"):
             assert sockets[name].hide_value and not sockets[name].is_linked
-        lobes = manifest["models"][model]["representations"][representation]["lobes"]
-        assert ("Lobes" in sockets) == bool(lobes)
-        if lobes:
-            item = interface[sockets["Lobes"].identifier]
-            assert (item.min_value, item.max_value) == (1, lobes["max"])
-            assert sockets["Lobes"].default_value == lobes["default"]
         apart = extension.nodes.has_albedo_script(model, representation)
         assert [s.name for s in node.outputs] == (["BSDF"] if apart else ["BSDF", "Albedo"])
         extension.nodes.add_albedo(node)
@@ -345,11 +339,6 @@ def test_values_round_trip(extension, empty, subtests):
         (
             (["coupled"], {"fresnel": "snell"}),
             r"coupled\.fresnel: expected one of schlick.*'snell'",
-        ),
-        ((["lambert", "exact"], {"lobes": 2}), r"'exact' of 'lambert' has no lobes"),
-        (
-            (["lambert", "sampled"], {"lobes": 99}),
-            r"lambert\.lobes: expected a whole number from 1",
         ),
     ],
 )
