@@ -25,9 +25,9 @@ without a budget to the one taken, in its second from the whole shader of the fo
 all parameters and draws up to eight directions, to the one that the scene gets. Where there is no
 arrow both are the same.
 
-- Costs are those of the table of forms in the [README](../README.md#what-each-form-takes), measured
-  by model and form with default parameters: they change where the form does, and do not tell what
-  folding saves. Errors are measured with the scene's parameters.
+- Costs are those of [what each form takes](tables/forms.md), measured by model and form with
+  default parameters: they change where the form does, and do not tell what folding saves. Errors
+  are measured with the scene's parameters.
 - Bytes and statements are those of a shader's text, for all combinations of choices that it has,
   statements without the library; operations are the most that one combination executes. Floats are
   those of the tables of albedo and fit, of which a shader has the ones it reads.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables in Markdown about the forms of models: closures, error and cost of every form of every
-model with its default parameters; and by the view what fits and twins are off by."""
+"""Pages in Markdown with tables about the forms of models: closures, error and cost of every form
+of every model with its default parameters; and by the view what fits and twins are off by."""
 
 import argparse
 import csv
@@ -152,21 +152,65 @@ def fits_over(tool):
     return "\n".join(errors(("Model", "number"), found))
 
 
-TABLES = {
-    "forms": forms,
-    "fits": fits,
-    "fits-any": fits_any,
-    "fits-over": fits_over,
-    "twins": twins,
+VIEWS = """\
+A row says by the view how much of the light goes elsewhere, the integral of the difference of f cos
+over that of f cos: half of all views are below the first figure, 95 % below the second, none is
+above the third. Most models have their worst view within two degrees of the surface, where lobes
+are flat and wide and little of the light is."""
+
+#: What makes each table, its page's title, and what the page says of it.
+PAGES = {
+    "forms": (
+        forms,
+        "What each form takes",
+        """\
+Closures, error and cost with default parameters. Error: the part of the light that goes elsewhere,
+mean over all views; 0 where a form is right, or right on average. Cost: CPU time at equal samples
+in units of Blender's Glossy node, by `script/bench --forms`. `-`: there is none.""",
+    ),
+    "fits": (
+        fits,
+        "Errors of fitted forms at default parameters",
+        f"Each row is one `build/brdfc fit MODEL [name=value ...]`.\n\n{VIEWS}",
+    ),
+    "fits-any": (
+        fits_any,
+        "Errors of fitted forms, any shares and colours",
+        f"""\
+Each row is one `build/brdfc fit MODEL --any NAME...`: for any value of these parameters, of which f
+is a polynomial, the worst of their mixtures.
+
+{VIEWS}""",
+    ),
+    "fits-over": (
+        fits_over,
+        "Errors of fitted forms along a number",
+        f"""\
+Each row is one `build/brdfc fit MODEL --over NAME`: over all of the number's slider, half way
+between the knots of the tables, for any value of what multiplies or mixes. These fits are in the
+extension.
+
+{VIEWS}""",
+    ),
+    "twins": (
+        twins,
+        "Errors of twins at default parameters",
+        f"Each row is one `build/brdfc fit MODEL --twin [name=value ...]`.\n\n{VIEWS}",
+    ),
 }
+
+
+def page(tool, name):
+    table, title, text = PAGES[name]
+    return f"# {title}\n\nMade by `script/forms {name}`.\n\n{text}\n\n{table(tool)}"
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
-    parser.add_argument("table", choices=TABLES)
+    parser.add_argument("table", choices=PAGES)
     options = parser.parse_args()
-    print(TABLES[options.table](options.tool.resolve()))
+    print(page(options.tool.resolve(), options.table))
 
 
 if __name__ == "__main__":

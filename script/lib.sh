@@ -27,18 +27,6 @@ usage_error() {
 # print_help: the comment at the top of the calling script, between its second line and the first line of code.
 print_help() { sed -n '3,/^[^#]/{/^#/!d;s/^# \{0,1\}//;p}' "$0"; }
 
-# readme_with NAME TEXT: README.md with TEXT between the marks <!-- NAME --> and <!-- end of NAME -->.
-readme_with() {
-  local mark
-  for mark in "<!-- $1 -->" "<!-- end of $1 -->"; do
-    [ "$(grep -cxF -- "$mark" "$ROOT/README.md")" = 1 ] || die "README.md: expected one line $mark"
-  done
-  NAME=$1 TEXT=$2 awk '
-    $0 == "<!-- end of " ENVIRON["NAME"] " -->" { inside = 0 }
-    !inside { print }
-    $0 == "<!-- " ENVIRON["NAME"] " -->" { print ENVIRON["TEXT"]; inside = 1 }' "$ROOT/README.md"
-}
-
 version() { sed -n 's/^project(brdfc VERSION \([0-9.]*\).*/\1/p' "$ROOT/CMakeLists.txt"; }
 extension_zip() { printf '%s/brdfc_shaders-%s.zip' "$BUILD" "$(version)"; }
 

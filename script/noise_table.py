@@ -75,7 +75,7 @@ STEADY = ("exact", "aimed", "controlled", "fitted", "twin")
 RIGHT = ("exact", "sampled")
 #: Side of the squares of pixels whose means are compared.
 BLOCK = 6
-#: Mean of (f - f0)^2 / (f0^2 + this), as in README.md.
+#: Mean of (f - f0)^2 / (f0^2 + this), as in docs/conventions.md.
 FLOOR = 0.01
 
 

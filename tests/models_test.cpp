@@ -95,18 +95,18 @@ std::string test_name(const testing::TestParamInfo<Case>& info) {
   return fmt::format("{}_{}", info.param.model, info.index);
 }
 
-TEST(Registry, EveryModelHasACaseAndAReadmeRowAndNoneIsLeftOver) {
-  std::set<std::string> registered, in_cases, in_readme;
+TEST(Registry, EveryModelHasACaseAndARowOfTheDocsAndNoneIsLeftOver) {
+  std::set<std::string> registered, in_cases, in_docs;
   for (const auto& [name, model] : models()) registered.insert(name);
   for (auto& row : read_table("cases.csv")) EXPECT_TRUE(in_cases.insert(row["model"]).second) << row["model"];
-  std::ifstream readme(std::string(BRDFC_SOURCE_DIR) + "/README.md");
-  ASSERT_TRUE(readme);
-  for (std::string line; std::getline(readme, line);)
-    if (line.starts_with("| `")) in_readme.insert(line.substr(3, line.find('`', 3) - 3));
+  std::ifstream docs(std::string(BRDFC_SOURCE_DIR) + "/docs/models.md");
+  ASSERT_TRUE(docs);
+  for (std::string line; std::getline(docs, line);)
+    if (line.starts_with("| `")) in_docs.insert(line.substr(3, line.find('`', 3) - 3));
   EXPECT_FALSE(registered.empty());
   EXPECT_EQ(in_cases, registered) << "tests/cases.csv needs one row a model";
   for (const std::string& name : registered)
-    EXPECT_TRUE(in_readme.count(name)) << "README.md needs a table row starting with | `" << name << "`";
+    EXPECT_TRUE(in_docs.count(name)) << "docs/models.md needs a table row starting with | `" << name << "`";
 }
 
 TEST(Registry, NamesAreTakenOnce) {

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Following README.md adds a model: its example, dropped into a copy of the sources, builds, equals
-its formula, and renders in Blender as it does in the reference renderer."""
+"""Following docs/add-a-model.md adds a model: its example, dropped into a copy of the sources,
+builds, equals its formula, and renders in Blender as it does in the reference renderer."""
 
 import csv
 import json
@@ -30,14 +30,14 @@ def run(*command, text=None):
 
 @pytest.fixture(scope="module")
 def tool(tmp_path_factory):
-    """The tool, built from a copy of the sources with the example of README.md as a new model."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    """The tool, built from a copy of the sources with the example of the docs as a new model."""
+    page = (ROOT / "docs" / "add-a-model.md").read_text(encoding="utf-8")
     found = re.findall(
-        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", readme, re.S
+        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", page, re.S
     )
     assert len(found) == 1
     path, text = found[0]
-    source = tmp_path_factory.mktemp("readme") / "source"
+    source = tmp_path_factory.mktemp("example") / "source"
     skip = shutil.ignore_patterns("build", ".env", ".git", "__pycache__", ".*_cache")
     shutil.copytree(ROOT, source, ignore=skip)
     assert not (source / path).exists()
@@ -59,8 +59,8 @@ def extension(tool, tmp_path_factory):
 
 def scene(environment, camera, shape):
     return {
-        "name": "readme",
-        "description": "The model of README.md",
+        "name": "example",
+        "description": "The model of docs/add-a-model.md",
         "settings": {"width": 48, "height": 48, "spp": 256, "seed": 1, "max_bounces": 1},
         "camera": camera,
         "materials": {"m": {"model": "minnaert", "parameters": {"k": K, "rho": list(RHO)}}},
@@ -75,7 +75,7 @@ def renderers(tool, extension, tmp_path):
     """(reference, blender, compare) for the scene that reference() was given."""
 
     def reference(content, spp):
-        source = tmp_path / "readme.json"
+        source = tmp_path / "example.json"
         source.write_text(json.dumps(content), encoding="utf-8")
         run(tool, "scene", source, "--out", tmp_path)
         out = tmp_path / "reference.exr"

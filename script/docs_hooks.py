@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pages of the site that are files of the repository's root, and what keeps links right in both.
+
+A file of the root links to docs/NAME.md, which is NAME.md in the site. Pages of docs/ link only to
+one another: what they link to outside would be missing in the site, and the pages made here are
+missing where docs/ is read in the repository. A path in `code` names such files instead.
+"""
+
+import logging
+import posixpath
+import re
+from pathlib import Path
+
+from mkdocs.structure.files import File
+
+ROOT = Path(__file__).resolve().parent.parent
+#: Name in the site by name in the repository.
+PAGES = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+}
+#: [text](target) and ![text](target), with what follows a #.
+LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
+
+log = logging.getLogger("mkdocs.hooks.brdfc")  # a warning fails a strict build
+
+
+def _in_the_site(target):
+    return PAGES.get(target, target.removeprefix("docs/"))
+
+
+def on_files(files, config):
+    for source, name in PAGES.items():
+        text = (ROOT / source).read_text(encoding="utf-8")
+        text = LINK.sub(lambda m: m[1] + _in_the_site(m[2]) + m[3], text)
+        files.append(File.generated(config, name, content=text))
+    return files
+
+
+def on_page_markdown(markdown, page, config, files):
+    if page.file.generated_by is None:
+        for link in LINK.finditer(markdown):
+            if posixpath.basename(link[2]) in PAGES.values():
+                log.warning("%s: %s is a page of the site alone", page.file.src_uri, link[2])
+    return markdown
