@@ -232,7 +232,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
 
   const AlbedoTable table = fold(albedo_table_of(m), m, values, kSome);
   for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
-    const Shader whole = write_shader(m, kind, table, values), cut = write_shader(m, kind, table, values, 1, kSome);
+    const Shader whole = write_shader(m, kind, table, values), cut = write_shader(m, kind, table, values, kSome);
     EXPECT_LT(cut.source.size(), whole.source.size());
     EXPECT_EQ(cut.operations, whole.operations);
   }
