@@ -303,11 +303,13 @@ def write_materials(path):
     return len(materials)
 
 
-def plan(error=None, time=None):
+def plan(error=None, time=None, fit=False):
     """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
     lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
 
-    `error` in percent and `time` in units of Blender's Glossy node let it choose the forms.
+    `error` in percent and `time` in units of Blender's Glossy node let it choose the forms. With
+    `fit` aimed forms get closures fitted to these materials for a base, which takes seconds to
+    minutes a material and leaves less noise under skies and images.
     Nothing is changed. Raises ValueError where no material has a model, PlanError without the
     program or where it refuses.
     """
@@ -318,7 +320,7 @@ def plan(error=None, time=None):
     ]
     if not used:
         raise ValueError(_NO_MATERIAL)
-    return lean.Plan(used, error, time)
+    return lean.Plan(used, error, time, fit)
 
 
 def bake(made):

@@ -153,14 +153,6 @@ def _zero_size_lights(material, scene):
     )
 
 
-def _zero_size_lights_fit(material, scene):
-    return _too_small(
-        scene,
-        "controlled",
-        "they light its closures alone, which are off by what Error says; enlarge the lamp",
-    )
-
-
 def _far_camera(material, scene):
     if _far_orthographic(scene):
         return (
@@ -238,7 +230,6 @@ DECLARED = {
     "clamp_indirect": _clamp_indirect,
     "clamp_direct": _clamp_direct,
     "zero_size_lights": _zero_size_lights,
-    "zero_size_lights_fit": _zero_size_lights_fit,
     "orthographic_far": _far_camera,
     "caustics": _caustics,
     "filter_glossy": _filter_glossy,

@@ -16,7 +16,7 @@ import bpy
 from . import checks, lamps, nodes, pack
 
 #: Forms that a budget does not choose: they are for who asks for them.
-ASKED_FOR = ("controlled", "twin")
+ASKED_FOR = ("twin",)
 
 
 class PlanError(RuntimeError):
@@ -60,13 +60,15 @@ def needs(materials):
 class Plan:
     """What a pack of the open file alone holds, and the pack."""
 
-    def __init__(self, used, error=None, time=None):
+    def __init__(self, used, error=None, time=None, fit=False):
         """`used`: [(id, group node, entry)], entries as `materials` of a scene file has them.
-        Budgets leave the form open; without one each keeps its own. Raises PlanError."""
+        Budgets leave the form open; without one each keeps its own. `fit`: aimed forms get closures
+        fitted to the materials for a base. Raises PlanError."""
         self._budget = error is not None or time is not None
         self.used = [(node, self._open(entry)) for _, node, entry in used]
         options = [] if error is None else ["--error", f"{error:.17g}"]
         options += [] if time is None else ["--time", f"{time:.17g}x"]
+        options += ["--fit"] if fit else []
         materials = {name: entry for (name, _, _), (_, entry) in zip(used, self.used, strict=True)}
         self._folder = tempfile.TemporaryDirectory(prefix="brdfc-lean-")
         folder = Path(self._folder.name)

@@ -368,7 +368,6 @@ def _material(name, view, representation, native):
         targets = {colors[0]: node.inputs[NATIVE[representation][1]]} if colors else {}
     else:
         try:
-            form = pack.resolve(model, representation, values)
             material = api.new_material(model, representation, **values)
         except ValueError as error:
             raise ValueError(f"{view.file}: {view.path}: {error}") from error

@@ -53,8 +53,8 @@ def fits(options, model, forms, folder):
     file = folder / "materials.json"
     file.write_text(json.dumps({"materials": {"m": material}}), encoding="utf-8")
     # Any error will do: the fit comes beside the sampled form.
-    command = [options.tool, "build", "--materials", file, "--error", "100", "--controlled"]
-    command += ["--twin", "--out", folder]
+    command = [options.tool, "build", "--materials", file, "--error", "100", "--twin"]
+    command += ["--out", folder]
     subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
     pack = folder / "brdfc_shaders"
     manifest = json.loads((pack / "manifest.json").read_text(encoding="utf-8"))

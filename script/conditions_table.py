@@ -16,7 +16,7 @@ form, with its standard error. Bold is what exceeds 2 % and 5 standard errors; t
 if that is said. Forms stand for all of their kind: closures with a mirror, alone, with a ramp;
 drawn directions with a mirror, of an anisotropic model, alone; fits with facets, of lobes alone.
 `coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and Glossy nodes are there
-to compare with. `tests/blender/test_every_fit.py` holds fitted and controlled forms and twins of
+to compare with. `tests/blender/test_every_fit.py` holds fitted forms and twins of
 every model to the same.
 
 Of the tilted normals (by the mesh's own, by the Normal input, by that with Bump Map Correction on)

@@ -114,7 +114,7 @@ def forms_of(scene, models, native):
 def build_plan(tool, folder, percent):
     """A pack cut to the scene, in folder/plan; returns the command."""
     command = [tool, "build", "--scene", folder / "scene.json", "--error", percent]
-    command += ["--controlled", "--twin", "--out", folder / "plan"]
+    command += ["--twin", "--out", folder / "plan"]
     run(command, stdout=subprocess.DEVNULL)
     return {"command": shown(map(str, command))}
 
@@ -128,7 +128,8 @@ def planned_forms(folder, scene):
     forms = []
     if any("fitted" in u for u in used):
         forms.append(Form("planned", "auto", pack))
-    forms += [Form(f, f, pack) for f in ("controlled", "twin") if all(f in u for u in used)]
+    if all("twin" in u for u in used):
+        forms.append(Form("twin", "twin", pack))
     return forms
 
 

@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-FORMS = ("exact", "sampled", "fitted", "controlled", "twin")
+FORMS = ("exact", "aimed", "sampled", "fitted", "twin")
 
 #: What f is a polynomial of, for models that have such parameters.
 ANY = {
@@ -43,11 +43,12 @@ def built(tool, folder):
         f"{model['name']} {form}": {"model": model["name"], "representation": form}
         for model in listed(tool)
         for form in model["representations"]
-        if form in ("exact", "sampled")
+        if form in ("exact", "aimed", "sampled")
     }
     file.write_text(json.dumps({"materials": materials}), encoding="utf-8")
-    # Any error will do: the fit comes beside the sampled form.
-    command = [tool, "build", "--materials", file, "--error", "100", "--controlled", "--twin"]
+    # Any error will do: the fit comes beside the sampled form. Any time does, too; with one, aimed
+    # forms keep the bases that models declare.
+    command = [tool, "build", "--materials", file, "--error", "100", "--time", "100", "--twin"]
     run([*command, "--out", folder])
     text = (folder / "brdfc_shaders" / "manifest.json").read_text(encoding="utf-8")
     return json.loads(text)["models"]

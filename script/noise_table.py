@@ -70,7 +70,7 @@ PICKED = (
 )
 
 #: Which form's picture noise is divided by, where a model has several: the one with least noise.
-STEADY = ("exact", "aimed", "controlled", "fitted", "twin")
+STEADY = ("exact", "aimed", "fitted", "twin")
 #: Which form is right on average without an assumption about lamps.
 RIGHT = ("exact", "sampled")
 #: Side of the squares of pixels whose means are compared.
@@ -382,7 +382,7 @@ def packs(options, cases, entries, cache):
             file.write_text(json.dumps({"materials": {"m": material}}), encoding="utf-8")
             # Any error will do: the fit comes beside the sampled form.
             command = [options.tool, "build", "--materials", file, "--error", "100"]
-            command += ["--controlled", "--twin", "--out", folder]
+            command += ["--twin", "--out", folder]
             subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
         forms = json.loads(manifest.read_text("utf-8"))["models"][case.model]["representations"]
         made[case] = (str(folder / "brdfc_shaders"), [f for f in forms if f in MADE_OF_A_FIT])
@@ -390,7 +390,7 @@ def packs(options, cases, entries, cache):
 
 
 #: Forms that packs of a scene or a .blend have and the extension may lack.
-MADE_OF_A_FIT = ("fitted", "controlled", "twin")
+MADE_OF_A_FIT = ("fitted", "twin")
 
 
 def jobs_of(cases, entries, conditions, fitted, options):

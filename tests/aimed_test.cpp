@@ -6,6 +6,8 @@
 
 #include "analysis/probes.h"
 #include "core/parallel.h"
+#include "represent/fit.h"
+#include "represent/representation.h"
 #include "support.h"
 
 namespace brdfc {
@@ -102,8 +104,9 @@ struct Case {
 };
 
 /// Sum of base, lamps and rest against the model, each lit by a sky and five lamps. The mean of so many draws is
-/// compared at 4.5 of its standard errors, or to 0.2 %, which quadrature may be off by.
-void expect_model(const Model& m, const ParamValues& values) {
+/// compared at 4.5 of its standard errors, or to 0.2 %, which quadrature may be off by. The base is that which the
+/// model declares, or a fit.
+void expect_model(const Model& m, const ParamValues& values, AimedBase from = AimedBase::Declared) {
   constexpr int kDraws = 20000;
   const auto brdf = m.make_double(values);
   if (brdf->scatters_through()) return;
@@ -111,7 +114,8 @@ void expect_model(const Model& m, const ParamValues& values) {
     const Vec3<double> wo = direction(cosTheta_o, 0.3);
     const Scene scene = scene_for(wo);
     const auto f_cos = [&](const Vec3<double>& w) { return brdf->eval(w, wo).g * std::max(w.z, 0.0); };
-    const ClosureSum<double> base = brdf->base(wo);
+    const ClosureSum<double> base =
+        from == AimedBase::Fitted ? fit_of(m, values).closures(wo, fit_of(m, values).varied(values)) : brdf->base(wo);
     // The sky's part is drawn both ways: what differs is how lamps are met.
     const double base_lamps = base.empty() ? 0 : scene.of_lamps([&](const auto& w) { return evaluate(base, w, wo).g; });
     const double lamps = scene.of_lamps(f_cos);
@@ -121,7 +125,7 @@ void expect_model(const Model& m, const ParamValues& values) {
     double sum = 0, squares = 0;
     for (int i = 0; i < kDraws; ++i) {
       const Vec3<double> u = uniform_cube(random), v = uniform_cube(random);
-      const AimedSum s = aimed_sum(*brdf, scene.patches, wo, u, v.x, v.y);
+      const AimedSum s = aimed_sum(*brdf, base, scene.patches, wo, u, v.x, v.y);
       if (lobes.empty()) {  // they do not depend on what was drawn
         lobes = s.lobes;
         for (const AimedLobe<double>& lobe : lobes) {
@@ -133,7 +137,7 @@ void expect_model(const Model& m, const ParamValues& values) {
       for (std::size_t k = 0; k < s.lobes.size(); ++k) given += s.values[k].g * of_lobe[k];
       // The base under the sky, by the same density, so that its noise is small: drawn directions see f cos - base.
       if (!base.empty()) {
-        const double p = (1 - kFromEverywhere) * brdf->pdf(s.wi, wo) + kFromEverywhere * cosine_pdf(s.wi);
+        const double p = excess(*brdf, true, Rgb<double>(0.0), s.wi, wo).density;
         if (p > 0 && s.wi.z > 0) given += evaluate(base, s.wi, wo).g / p * sky(s.wi);
       }
       sum += given / kDraws;
@@ -170,6 +174,31 @@ TEST(Aimed, AddsUpToTheModelWhereItIsStiff) {
     const Model& m = find_model(c.model);
     expect_model(m, values_of(m, c.values));
   }
+}
+
+TEST(Aimed, AddsUpToTheModelWhereTheBaseIsAFit) {
+  const Case cases[] = {{"phong", {"e=20"}}, {"oren_nayar", {}}, {"radziszewski_alda", {"n=4"}}, {"ward", {}}};
+  for (const Case& c : cases) {
+    const Model& m = find_model(c.model);
+    expect_model(m, values_of(m, c.values), AimedBase::Fitted);
+  }
+}
+
+TEST(Aimed, DirectionsFromEverywhereHaveTheirDensity) {
+  double all = 0, mean = 0;
+  constexpr int kSteps = 400;
+  for (int i = 0; i < kSteps; ++i) {
+    const double z = (i + 0.5) / kSteps;
+    all += 2 * kPi * everywhere_pdf(Vec3<double>{std::sqrt(1 - z * z), 0, z}) / kSteps;
+    // The share of directions below is what u gives.
+    const Vec3<double> w = sample_everywhere(z, 0.3);
+    EXPECT_NEAR((w.z * w.z + w.z) / 2, z, 1e-12);
+    EXPECT_NEAR(length(w), 1, 1e-12);
+    mean += w.z / kSteps;
+  }
+  EXPECT_NEAR(all, 1, 1e-6);
+  EXPECT_NEAR(mean, 7.0 / 12, 1e-5);
+  EXPECT_EQ(everywhere_pdf(Vec3<double>{0.6, 0, -0.8}), 0);
 }
 
 TEST(Aimed, ProfileIsLevelAndFalls) {

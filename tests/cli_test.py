@@ -454,25 +454,6 @@ def test_fit_prints_its_error_by_view_and_its_closures():
     assert fitted == pytest.approx(truth, rel=0.02)
 
 
-def test_a_model_that_is_refused_beside_one_that_is_not(tmp_path):
-    """While another one is being worked on: nothing is written, and what went on ends well."""
-    materials = {
-        f"{model} {i}": {"model": model, "parameters": {name: value}, "representation": form}
-        for model, name, form in (
-            ("oren_nayar", "rho", "controlled"),
-            ("schlick_double", "r0", "fitted"),
-        )
-        for i, value in enumerate((0.02, 0.1))
-    }
-    file = tmp_path / "materials.json"
-    file.write_text(json.dumps({"materials": materials}))
-    out = tmp_path / "out"
-    result = run("build", "--materials", file, "--out", out)
-    assert result.returncode == 2, (result.returncode, result.stderr)
-    assert "brdfc: oren_nayar: the controlled form has" in result.stderr.splitlines()[-1]
-    assert list(out.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("args", "words"),
     [
@@ -489,7 +470,7 @@ def test_a_model_that_is_refused_beside_one_that_is_not(tmp_path):
         (["build", "--model", "phong", "--error", "2", "--out", "x"], ["--error", "--scene"]),
         (["build", "--model", "phong", "--twin", "--out", "x"], ["--twin", "--scene"]),
         (["build", "--model", "phong", "--time", "1x", "--out", "x"], ["--time", "--scene"]),
-        (["build", "--model", "phong", "--controlled", "--out", "x"], ["--controlled", "--scene"]),
+        (["build", "--model", "phong", "--fit", "--out", "x"], ["--fit", "--scene"]),
     ],
 )
 def test_what_can_not_be_fitted(args, words, tmp_path):
@@ -587,17 +568,16 @@ def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
     assert result.returncode == 0, result.stderr
     (model,) = json.loads(result.stdout)["models"]
     choices = {c["form"]: c for c in model["choices"]}
-    assert list(choices) == ["aimed", "sampled", "fitted", "controlled", "twin"]
+    assert list(choices) == ["aimed", "sampled", "fitted", "twin"]
     assert [f for f, c in choices.items() if c["taken"]] == [form]
     assert all(c["why"] for c in choices.values())
     assert {f: c["cost"] for f, c in choices.items()} == {
         "aimed": 1.1,
         "sampled": 1.2,
         "fitted": 0.9,
-        "controlled": None,
         "twin": 0.7,
     }
-    assert choices["sampled"]["error"] == choices["controlled"]["error"] == "expectation"
+    assert choices["sampled"]["error"] == "expectation"
     assert 0.005 < choices["fitted"]["error"] < 0.03
     assert model["material_forms"] == [
         {

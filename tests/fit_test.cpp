@@ -188,12 +188,12 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   const Model& m = find_model("phong");
   ParamValues fixed = values_of(m, {"e=20"});
   fixed.erase("ks");
-  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
-    const Shader s = write_shader(m, kind, fold(albedo_table_of(m), m, fixed), fixed);
+  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
+    const Shader s = write_shader(m, kind, fold(albedo_table_of(m), m, fixed), fixed, {}, kMaxLamps, AimedBase::Fitted);
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
-    EXPECT_THAT(s.source, HasSubstr("weight_0 *= ks;"));
-    EXPECT_EQ(s.source.find("residual_weight *= brdfc_max_component(color(ks));") != std::string::npos,
-              kind == RepresentationKind::Controlled);
+    const std::size_t factor = s.source.find("weight_0 *= ks;"), rest = s.source.find("excess");
+    ASSERT_NE(factor, std::string::npos);
+    EXPECT_LT(factor, rest) << "the rest takes off what the base gives with the factor";
   }
   EXPECT_THAT(of("glossy_reflector"), ElementsAre("cr", "kr")) << "a number that multiplies all";
 }

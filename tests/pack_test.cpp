@@ -324,7 +324,7 @@ TEST(Costs, ThoseOfTheExtensionAreMeasured) {
   const Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
   for (const auto& [model, kind] :
        {std::pair("coupled", RepresentationKind::Exact), std::pair("ward", RepresentationKind::Sampled),
-        std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Controlled),
+        std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Aimed),
         std::pair("phong", RepresentationKind::Twin)}) {
     const std::optional<double> cost = costs.of(find_model(model), kind);
     ASSERT_TRUE(cost) << model << " " << name_of(kind);

@@ -56,8 +56,6 @@ TEST(Plan, SaysWhatLampsWithoutASizeMakeOfAForm) {
             "a: the form is left open; lights[1], lights[4] without a size shines as on Blender's own nodes");
   EXPECT_THAT(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled),
               HasSubstr("lights[1], lights[4] without a size shines as rare bright dots"));
-  EXPECT_THAT(why(plan_scene({need("a", "phong", {"e=20"}, "controlled")}, budget)[0], RepresentationKind::Controlled),
-              HasSubstr("without a size shines on its closures alone"));
   const PlannedModel matte = plan_scene(exact, budget)[0];
   for (const FormChoice& c : matte.choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
 }
@@ -78,9 +76,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
 
   const Model& m = find_model("phong");
   const AlbedoTable table = albedo_table_of(m);
-  const auto shader = [&](int lamps) {
-    return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps);
-  };
+  const auto shader = [&](int lamps) { return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps); };
   for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
   EXPECT_EQ(shader(0).slots, slots(ClosureKind::PhongRamp));
@@ -188,8 +184,7 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
 }
 
 constexpr RepresentationKind kExact = RepresentationKind::Exact, kAimed = RepresentationKind::Aimed,
-                             kSampled = RepresentationKind::Sampled, kFitted = RepresentationKind::Fitted,
-                             kControlled = RepresentationKind::Controlled;
+                             kSampled = RepresentationKind::Sampled, kFitted = RepresentationKind::Fitted;
 
 TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})}, coupled = {need("a", "coupled", {})};
@@ -197,7 +192,7 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   budget.costs = costs(
       "phong,aimed,1.1\nphong,sampled,1.1\nphong,fitted,0.9\ncoupled,exact,1.2\ncoupled,aimed,1.3\ncoupled,sampled,1."
       "3\n"
-      "coupled,fitted,0.8\nphong,controlled,0.1\nphong,twin,0.1\n");
+      "coupled,fitted,0.8\nphong,twin,0.1\n");
   const auto plan = [&](const std::vector<MaterialNeed>& needs, double time, std::optional<double> error = {}) {
     budget.time = time;
     budget.error = error;
@@ -208,7 +203,7 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   EXPECT_THAT(plan(phong, 1.1).forms, ElementsAre(kAimed));
   EXPECT_THAT(plan(phong, 1).forms, ElementsAre(kFitted));
   EXPECT_EQ(why(plan(phong, 1), kAimed), "costs 1.1x, and 1x is allowed");
-  EXPECT_EQ(why(plan(phong, 1), kControlled), "only where it is asked for");
+  EXPECT_EQ(why(plan(phong, 1), RepresentationKind::Twin), "only where it is asked for");
   EXPECT_THAT(plan(coupled, 1.25).forms, ElementsAre(kExact));
   EXPECT_THAT(plan(coupled, 1.1).forms, ElementsAre(kFitted));
 
@@ -255,7 +250,7 @@ TEST(Plan, SaysThatAFitOfAnotherChoiceIsTooFarOff) {
 TEST(Plan, SaysWhatAModelLacksBeforeWhatItsMaterialsDifferIn) {
   const std::vector<MaterialNeed> two = {need("a", "fresnel_conductor", {"metal=cu"}),
                                          need("b", "fresnel_conductor", {"metal=au"})};
-  for (const RepresentationKind kind : {kFitted, kControlled, RepresentationKind::Twin})
+  for (const RepresentationKind kind : {kFitted, RepresentationKind::Twin})
     EXPECT_EQ(why(plan_scene(two, {})[0], kind), "it only reflects and refracts ideally");
 }
 
@@ -297,16 +292,28 @@ TEST(Plan, SaysWhatABudgetChangesForEachMaterial) {
   EXPECT_FALSE(asked.cost_before || asked.cost_after) << "not measured";
 }
 
-TEST(Plan, AddsControlledFormsWhereThereCanBeOne) {
-  Budget budget;
-  budget.controlled = true;
-  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})}, budget)[0].forms, ElementsAre(kAimed, kControlled));
-  const PlannedModel turned = plan_scene({need("a", "ward", {"ax=0.5"})}, budget)[0];
-  EXPECT_THAT(turned.forms, ElementsAre(kAimed));
-  EXPECT_EQ(why(turned, kControlled), "it is anisotropic");
-  const PlannedModel lengthy = plan_scene({need("a", "phong_material", {})}, budget)[0];
-  EXPECT_THAT(lengthy.forms, ElementsAre(kAimed));
-  EXPECT_THAT(why(lengthy, kControlled), HasSubstr("operations"));
+TEST(Plan, FitsBasesWhereAskedToAndWhereFitsAreMadeAnyway) {
+  Budget asked, error, both;
+  asked.fit_bases = true;
+  error.error = 0.001;
+  both = error;
+  both.time = 3;
+  both.costs = asked.costs = costs("phong,aimed,1.1\n");
+  const auto base = [](const std::vector<MaterialNeed>& needs, const Budget& budget) {
+    return plan_scene(needs, budget)[0].base;
+  };
+  const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})};
+  EXPECT_EQ(base(phong, {}), AimedBase::Declared) << "nothing is fitted unasked";
+  EXPECT_EQ(base(phong, asked), AimedBase::Fitted);
+  EXPECT_EQ(base(phong, error), AimedBase::Fitted);
+  EXPECT_EQ(base(phong, both), AimedBase::Declared) << "its cost is not known";
+  EXPECT_EQ(base({need("a", "ward", {"ax=0.5"})}, asked), AimedBase::Declared) << "it is anisotropic";
+  EXPECT_EQ(base({need("a", "phong", {"e=20"}, "sampled")}, asked), AimedBase::Declared) << "nothing is aimed";
+  EXPECT_EQ(why(plan_scene(phong, asked)[0], kAimed), "a: the form is left open; closures fitted to it are its base");
+  for (const FormChoice& c : plan_scene(phong, asked)[0].choices)
+    if (c.form == kAimed) {
+      EXPECT_FALSE(c.cost);
+    }
 }
 
 TEST(Plan, FoldedTablesInterpolateToTheSame) {

@@ -231,8 +231,9 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   EXPECT_EQ(plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], RepresentationKind::Fitted);
 
   const AlbedoTable table = fold(albedo_table_of(m), m, values, kSome);
-  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Controlled}) {
-    const Shader whole = write_shader(m, kind, table, values), cut = write_shader(m, kind, table, values, kSome);
+  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
+    const Shader whole = write_shader(m, kind, table, values, {}, 0, AimedBase::Fitted),
+                 cut = write_shader(m, kind, table, values, kSome, 0, AimedBase::Fitted);
     EXPECT_LT(cut.source.size(), whole.source.size());
     EXPECT_EQ(cut.operations, whole.operations);
   }

@@ -18,8 +18,8 @@ void add_base_command(CLI::App& app) {
   CLI::App* cmd = app.add_subcommand(
       "base",
       "How much of f cos the closures of a model's base carry by view angle, and the variance of one drawn direction,\n"
-      "in squares of the albedo: of all of f cos drawn from the model, and of the rest after the base, a quarter of\n"
-      "whose directions are those of a matte surface; in a white world and under a smooth sky.\n"
+      "in squares of the albedo: of all of f cos drawn from the model, and of the rest after the base, drawn as the\n"
+      "aimed form draws it; in a white world and under a smooth sky.\n"
       "stdout: CSV with header "
       "theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest:\n"
       "        the integral of |f cos - base| and that of the base over the albedo, the factor of the base that would\n"

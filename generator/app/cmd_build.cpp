@@ -20,7 +20,7 @@ namespace brdfc {
 namespace {
 
 struct Options {
-  bool all = false, json = false, twin = false, controlled = false;
+  bool all = false, json = false, twin = false, fit_bases = false;
   std::optional<std::string> error, time;
   std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
   std::vector<std::string> models;
@@ -185,12 +185,12 @@ void run(const Options& options) {
     for (const auto& [name, given] : {std::pair("--explain", options.json),
                                       {"--error", options.error.has_value()},
                                       {"--time", options.time.has_value()},
-                                      {"--controlled", options.controlled},
+                                      {"--fit", options.fit_bases},
                                       {"--twin", options.twin}})
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
   const std::filesystem::path costs = std::filesystem::path(options.addon) / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
-  Budget budget{{}, !options.materials.empty(), options.twin, options.controlled, {}, Costs(costs)};
+  Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, Costs(costs)};
   if (options.error) budget.error = parse_error(*options.error);
   if (options.time) {
     budget.time = parse_time(*options.time);
@@ -253,8 +253,10 @@ void add_build_command(CLI::App& app) {
   c->add_option("--time", options->time,
                 "With --scene or --materials: what a form may cost, as 1.2x, in CPU time of Blender's Glossy node at\n"
                 "equal samples, where a material leaves its form open; --explain prints what forms cost");
-  c->add_flag("--controlled", options->controlled,
-              "With --scene or --materials: also controlled forms, of every material that can have one");
+  c->add_flag(
+      "--fit", options->fit_bases,
+      "With --scene or --materials: closures are fitted to the materials that can have it, as the base of their\n"
+      "aimed forms, which are then less noisy under skies and images; seconds to minutes a material");
   c->add_flag(
       "--twin", options->twin,
       "With --scene or --materials: also twins, Blender's own nodes for where Open Shading Language does not run,\n"

@@ -50,6 +50,17 @@ template <class T> Vec3<T> sample_cosine(const T& u1, const T& u2) {
   return {sinTheta * cos(phi), sinTheta * sin(phi), sqrt(maximum(T(1) - u1, T(0)))};
 }
 
+/// Direction above the surface with density (1 + 2 cos(theta)) / (4 pi), which does not vanish at the horizon.
+template <class T> Vec3<T> sample_everywhere(const T& u1, const T& u2) {
+  // u1 = (c^2 + c) / 2, without cancellation.
+  const T c = T(4) * u1 / (T(1) + sqrt(T(1) + T(8) * u1)), sinTheta = sqrt(maximum(T(1) - c * c, T(0)));
+  const T phi = T(2) * pi<T>() * u2;
+  return {sinTheta * cos(phi), sinTheta * sin(phi), c};
+}
+template <class T> T everywhere_pdf(const Vec3<T>& wi) {
+  return select(wi.z > T(0), (T(1) + T(2) * wi.z) / (T(4) * pi<T>()), T(0));
+}
+
 /// sinh x without cancellation, for x that e^x does not overflow.
 template <class T> T stable_sinh(const T& x) {
   const T half = expm1(x) / T(2);

@@ -104,9 +104,7 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
     if (mirror) codes.push_back("clamp_mirror");
     return codes;
   }
-  if (kind == RepresentationKind::Controlled)
-    codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "zero_size_lights_fit", "orthographic_far"});
-  else if (kind == RepresentationKind::Aimed)
+  if (kind == RepresentationKind::Aimed)
     codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "orthographic_far", "normal_pass"});
   else if (kind == RepresentationKind::Sampled)
     codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
@@ -240,10 +238,11 @@ struct BuiltModel {
   std::vector<PackLine> lines;
 };
 
-/// What a form looks its closures up in; none but fitted and controlled ones do.
-const Fit* fit_in(RepresentationKind kind, const Model& model, const ParamValues& fixed) {
-  if (kind != RepresentationKind::Fitted && kind != RepresentationKind::Controlled) return nullptr;
-  return &fit_of(model, without_factors(model, fixed));
+/// What a form looks its closures up in; none but a fitted one, and an aimed one whose base is a fit, do.
+const Fit* fit_in(RepresentationKind kind, const PlannedModel& plan, const ParamValues& fixed) {
+  const bool base = kind == RepresentationKind::Aimed && plan.base == AimedBase::Fitted;
+  if (kind != RepresentationKind::Fitted && !base) return nullptr;
+  return &fit_of(*plan.model, without_factors(*plan.model, fixed));
 }
 
 /// The number that a fit runs over, and how far.
@@ -331,12 +330,12 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   for (RepresentationKind kind : plan.forms) {
     const bool twin = kind == RepresentationKind::Twin;
     const ParamValues fixed = fixed_in(plan, kind);
-    const Fit* fit = fit_in(kind, model, fixed);
+    const Fit* fit = fit_in(kind, plan, fixed);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
                       of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
     const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
     const Shader shader = twin ? write_nodes(model, fixed)
-                               : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps);
+                               : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps, plan.base);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
     const ParamValues whole_fixed = is_fit(kind) ? fixed : ParamValues{};
@@ -344,7 +343,9 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const Shader whole =
         cut && !twin ? write_shader(model, kind, fold(whole_table, model, whole_fixed), whole_fixed) : shader;
     const RepresentationError error = measure_error(model, kind, fixed, plan.views);
-    const std::optional<double> cost = costs.of(model, kind);
+    // Costs were measured with the base that a model declares.
+    const bool measured = kind != RepresentationKind::Aimed || plan.base == AimedBase::Declared;
+    const std::optional<double> cost = measured ? costs.of(model, kind) : std::nullopt;
     const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     const std::string albedo_file = "shaders/" + shader.name + "_albedo.osl";
@@ -363,7 +364,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"cost", cost ? Json(*cost) : Json()},
         {"lamps", shader.lamps},
         {"warnings", warnings(kind, model.has_mirror(), shader)},
-        {"axis", axis_json(fit)},
+        {"axis", axis_json(is_fit(kind) ? fit : nullptr)},
         {"highlight", has_highlight(kind, model.has_mirror(), shader) ? highlight_json(model, fixed) : Json()},
         {"sha256", sha256(shader.source)},
         {"albedo_shader", shader.albedo.empty() ? Json() : Json(albedo_file)},
@@ -400,7 +401,8 @@ PackResult build_pack(const PackOptions& options) {
   // line keeps no core waiting.
   for (const PlannedModel& plan : chosen)
     for (const RepresentationKind kind : plan.forms)
-      if (is_fit(kind)) prepare_fit(plan, kind);
+      if (is_fit(kind) || (kind == RepresentationKind::Aimed && plan.base == AimedBase::Fitted))
+        prepare_fit(plan, kind);
   tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   PackResult result;

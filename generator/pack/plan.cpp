@@ -90,20 +90,6 @@ bool fits(const Needs& needs, const Budget& budget) {
   return budget.error && !unfit(needs, RepresentationKind::Fitted) && fitted_error(needs) <= *budget.error;
 }
 
-/// Why the materials of a model have no common controlled form; nothing if they have one.
-std::optional<std::string> not_controlled(const Needs& needs) {
-  if (const auto reason = unfit(needs, RepresentationKind::Controlled)) return reason;
-  const Model& model = *needs.front()->model;
-  AlbedoTable black;  // the albedo is not what a shader may be too long for
-  black.terms.resize(choice_combinations(model.info()).size());
-  try {
-    write_shader(model, RepresentationKind::Controlled, black, constants(needs));
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return std::nullopt;
-}
-
 /// A form may exist for some choices only: the one that a material would need; empty if it has all.
 std::string lacking(const MaterialNeed& need, RepresentationKind kind) {
   for (const auto& [name, value] : form_values(*need.model, kind))
@@ -156,8 +142,7 @@ std::string under_lamps(RepresentationKind kind, const Budget& budget) {
                       : kind == RepresentationKind::Sampled ? "as rare bright dots"
                       : kind == RepresentationKind::Fitted  ? "as on Blender's own nodes, on drawn directions as rare "
                                                               "bright dots"
-                      : kind == RepresentationKind::Controlled ? "on its closures alone"
-                                                               : nullptr;
+                                                            : nullptr;
   if (!shine || budget.sizeless.empty()) return {};
   return fmt::format("; {} without a size shines {}", fmt::join(budget.sizeless, ", "), shine);
 }
@@ -267,9 +252,6 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
   consider(RepresentationKind::Fitted, missing,
            budget.offer && drawn &&
                within_time(needs, aimed_or_fitted(needs, budget), budget).form == RepresentationKind::Fitted);
-  // Telling takes a fit.
-  const bool tell = budget.controlled || budget.error || budget.time;
-  consider(RepresentationKind::Controlled, tell ? not_controlled(needs) : missing, budget.controlled);
   consider(RepresentationKind::Twin, unfit(needs, RepresentationKind::Twin), budget.twin);
   return choices;
 }
@@ -295,9 +277,17 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
       if (needs[i]->representation == "auto" && chosen[i].form == kind) return true;
     return false;
   });
+  // A fit that an error was asked about is there anyway. Its costs were not measured, so that a time leaves it out.
+  const bool aimed = std::find(plan.forms.begin(), plan.forms.end(), RepresentationKind::Aimed) != plan.forms.end();
+  if (aimed && (budget.fit_bases || budget.error) && !budget.time && !unfit(needs, RepresentationKind::Fitted))
+    plan.base = AimedBase::Fitted;
+  for (FormChoice& choice : plan.choices)
+    if (choice.form == RepresentationKind::Aimed && plan.base == AimedBase::Fitted) {
+      choice.why += "; closures fitted to it are its base";
+      choice.cost = std::nullopt;
+    }
   plan.max_lamps = std::min(budget.lamps.value_or(kMaxLamps), kMaxLamps);
-  if (std::find(plan.forms.begin(), plan.forms.end(), RepresentationKind::Aimed) != plan.forms.end() &&
-      plan.max_lamps < kMaxLamps)
+  if (aimed && plan.max_lamps < kMaxLamps)
     plan.reasons.push_back(plan.max_lamps == 0
                                ? std::string("slots for lamps: the scene has none")
                                : fmt::format("slots for lamps beyond {}: the scene has no more", plan.max_lamps));

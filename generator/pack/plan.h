@@ -21,7 +21,7 @@ struct MaterialNeed {
   ParamValues values;              ///< complete
   std::set<std::string> textured;  ///< parameters that vary over the surface
   std::string representation = "auto";
-  Cosines views = {};         ///< that it can be seen from
+  Cosines views = {};  ///< that it can be seen from
 };
 
 /// Why a form of a model is in a pack, or is not.
@@ -49,6 +49,7 @@ struct PlannedModel {
   ParamValues fixed;                       ///< folded into shaders and tables: no sockets
   std::vector<RepresentationKind> forms;   ///< preferred first
   int max_lamps = kMaxLamps;               ///< that aimed forms can be told of
+  AimedBase base = AimedBase::Declared;    ///< of an aimed form
   Cosines views;                           ///< that one of the materials can be seen from; tables have no others
   std::vector<FormChoice> choices;         ///< every form, where materials were planned for
   std::vector<FormChange> material_forms;  ///< of `materials`
@@ -63,7 +64,7 @@ struct Budget {
   std::optional<double> error;  ///< relative L1 of f cos that a form may have where the material leaves the form open
   bool offer = false;           ///< a fitted form that would be taken then comes beside a sampled one that is asked for
   bool twin = false;            ///< a twin comes beside the other forms where there can be one
-  bool controlled = false;      ///< so does a controlled form
+  bool fit_bases = false;       ///< aimed forms have a fit for a base where there can be one
   std::optional<double> time = {};  ///< cost that a form may have where the material leaves the form open
   Costs costs = {};
   /// Lamps that no drawn direction meets, for they have no size: their places in the file, or names.

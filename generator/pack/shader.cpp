@@ -448,14 +448,13 @@ std::string balanced_sum(const std::vector<std::string>& terms) {
 }
 
 Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
-                    const Cosines& views, int max_lamps) {
+                    const Cosines& views, int max_lamps, AimedBase base) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
   for (const auto& [name, value] : form_values(model, kind, given))
     if (fixed.emplace(name, value).first->second != value)
       input_error("{}: the {} form exists only for {}", info.name, name_of(kind), format_values(info, {{name, value}}));
-  const bool sampled = kind == RepresentationKind::Sampled, controlled = kind == RepresentationKind::Controlled,
-             aimed = kind == RepresentationKind::Aimed;
+  const bool sampled = kind == RepresentationKind::Sampled, aimed = kind == RepresentationKind::Aimed;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
 
@@ -467,7 +466,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    const Recording r = aimed ? aimed_text.add(choices, record_aimed(model, values, 0), arrays)
+    const Recording r = aimed ? aimed_text.add(choices, record_aimed(model, values, 0, base, views), arrays)
                               : record(model, kind, values, 4, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, arrays.without_shared(r));
@@ -483,7 +482,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   shader.operations = operations + mirror_operations;
 
   std::string normal = "    vector frame_n = normalize(Normal);\n";
-  if (kind == RepresentationKind::Fitted || controlled)
+  if (kind == RepresentationKind::Fitted)
     normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", kLowestView);
   std::string body = normal;
   body +=
@@ -520,12 +519,22 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       terms.push_back(closure_text(kinds[c], c));
       shader.slots += slots(closure);
     }
-    if (controlled)
-      body +=
-          "    vector u_all = brdfc_random(0);\n"
-          "    float u_0 = u_all[0];\n    float u_1 = u_all[1];\n    float u_2 = u_all[2];\n"
-          "    float wi_x, wi_y, wi_z, residual_weight;\n    color residual_colour;\n";
     body += aimed ? block(statements.print(0), 1) : statements.print(4);
+    for (std::size_t c = 0; c < kinds.size(); ++c)
+      if (kinds[c].division != Division::Done) {
+        const std::string weight = fmt::format("weight_{}", c);
+        body += fmt::format(
+            "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
+            kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
+        ++shader.operations;
+      }
+    if (is_fit(kind) || (aimed && base == AimedBase::Fitted))
+      for (const std::string& name : factors(model, fixed)) {
+        if (fixed.count(name)) continue;
+        for (std::size_t c = 0; c < kinds.size(); ++c)
+          if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
+        ++shader.operations;
+      }
     if (aimed) {
       // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then
       // the rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
@@ -541,19 +550,6 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
                                             : "rest_weight * brdfc_ray_coloured({}, I, rest_colour)";
       terms.push_back(fmt::format(fmt::runtime(ray), "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
     }
-    if (controlled) {
-      terms.push_back(
-          "residual_weight * brdfc_ray_coloured(frame_t * wi_x + frame_b * wi_y + frame_n * wi_z, I, residual_colour)");
-      shader.slots += slots(ClosureKind::PhongRamp);
-    }
-    for (std::size_t c = 0; c < kinds.size(); ++c)
-      if (kinds[c].division != Division::Done) {
-        const std::string weight = fmt::format("weight_{}", c);
-        body += fmt::format(
-            "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
-            kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
-        ++shader.operations;
-      }
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       if (kinds[c].stretched == Tangent::Surface)
         body += fmt::format(
@@ -570,22 +566,6 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     terms.push_back("mirror_weight * reflection(frame_n)");
     shader.slots += slots(ClosureKind::Reflection);
   }
-  if (is_fit(kind))
-    for (const std::string& name : factors(model, fixed)) {
-      if (fixed.count(name)) continue;
-      for (std::size_t c = 0; c < kinds.size(); ++c)
-        if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
-      if (controlled)
-        body += fmt::format(
-            "    residual_weight *= brdfc_max_component(color({0}));\n"
-            "    residual_colour *= {0} / max(brdfc_max_component(color({0})), 1e-20);\n",
-            name);
-      ++shader.operations;
-    }
-  if (controlled && shader.operations > kMaxOperations)
-    input_error(
-        "{}: the controlled form has {} operations with these parameters, and may have {}: take fitted or sampled",
-        info.name, shader.operations, kMaxOperations);
   shader.closures = int(terms.size()) + std::max(shader.lamps - 1, 0);
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,

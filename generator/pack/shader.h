@@ -25,16 +25,13 @@ struct Shader {
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo
 /// output, in a shader of its own where its text is longer than kMaxAlbedoText. An aimed form has parameters for
-/// `max_lamps` lamps. The form is right for these `views`. Throws InputError if the closures would exceed what Cycles keeps, the table what an array holds or a controlled form
-/// kMaxOperations.
+/// `max_lamps` lamps, and the base of this kind. The form is right for these `views`. Throws InputError if the closures
+/// would exceed what Cycles keeps or the table what an array holds.
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
-                    const Cosines& views = {}, int max_lamps = kMaxLamps);
+                    const Cosines& views = {}, int max_lamps = kMaxLamps, AimedBase base = AimedBase::Declared);
 
 /// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
 std::string balanced_sum(const std::vector<std::string>& terms);
-
-/// Operations of a controlled form: fewer than 500 statements, as one holds about one and a half.
-inline constexpr int kMaxOperations = 700;
 
 /// Characters of tables that a shader holds for an output that most materials leave unlinked.
 inline constexpr std::size_t kMaxAlbedoText = 4096;

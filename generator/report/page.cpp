@@ -229,10 +229,9 @@ of the Glossy node: what one gets for the same wait.</dd>
 samples a pixel, in units of the time which that takes.</dd>
 <dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Sampled forms are exact in
 expectation: their error is noise.</dd>
-<dt>planned, controlled, twin</dt><dd>Of a pack cut to the scene by <code>brdfc build --scene</code>: what it chooses where
-forms may be off a little (closures fitted to the model, which lamps can be sampled for); such closures with a drawn
-direction that sets them right on average; and Blender's own nodes steered by the view angle, for where Open Shading
-Language does not run. The latter two where every material can have them.</dd>
+<dt>planned, twin</dt><dd>Of a pack cut to the scene by <code>brdfc build --scene</code>: what it chooses where forms may be
+off a little (closures fitted to the model, which lamps can be sampled for); and Blender's own nodes steered by the view
+angle, for where Open Shading Language does not run, where every material can have them.</dd>
 <dt>Blender's Glossy node</dt><dd>The unit of cost, and what a scene looks like without these models.</dd>
 <dt>Blender's nodes, fitted</dt><dd>What one would take instead: parameters that come nearest to the model, by least squares of
 f cos over directions. Their own error is what is left then.</dd>

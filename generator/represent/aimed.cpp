@@ -3,9 +3,9 @@
 
 namespace brdfc {
 
-AimedSum aimed_sum(const Brdf<double>& brdf, const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo,
-                   const Vec3<double>& u, double v1, double v2) {
-  const ClosureSum<double> base = brdf.base(wo);
+AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
+                   const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
+                   double v1, double v2) {
   const auto excess_at = [&](const Vec3<double>& wi) {
     return excess(brdf, !base.empty(), evaluate(base, wi, wo), wi, wo);
   };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The aimed form: base + lamps + rest. Equal to the model in expectation, whatever the base and wherever the lamps.
 //
-//   base   closures that carry most of the model (Brdf::base), or none
+//   base   closures that carry most of the model: those that it declares (Brdf::base), a fit (fit.h), or none
 //   lamps  one closure a lamp, aimed at it, whose value there is the model's own f cos less the base, so that light
 //          sampling meets the model itself
 //   rest   a direction that the shader draws, as a lobe as narrow as those of a sampled form, which carries what the
@@ -221,8 +221,8 @@ template <class T> struct Excess {
   T density;
 };
 
-/// How often the drawn direction comes from everywhere, where a base may give light that the model has none of.
-inline constexpr double kFromEverywhere = 0.1;
+/// How often the drawn direction comes from everywhere: a base may give light that the model has none of.
+inline constexpr double kFromEverywhere = 0.2;
 
 /// u: three numbers in [0, 1). `with_base`: whether there is a base.
 template <class T> Vec3<T> draw(const Brdf<T>& brdf, bool with_base, const Vec3<T>& wo, const Vec3<T>& u) {
@@ -230,7 +230,7 @@ template <class T> Vec3<T> draw(const Brdf<T>& brdf, bool with_base, const Vec3<
   const T share = T(1 - kFromEverywhere);
   // The number that chooses serves again, stretched.
   const Sample<T> s = brdf.sample(wo, {minimum(u.x / share, T(1 - 1e-7)), u.y, u.z});
-  return select(u.x < share, s.wi, sample_cosine(u.y, u.z));
+  return select(u.x < share, s.wi, sample_everywhere(u.y, u.z));
 }
 
 template <class T>
@@ -239,7 +239,7 @@ Excess<T> excess(const Brdf<T>& brdf, bool with_base, const Rgb<T>& base, const 
   const Rgb<T> f_cos = brdf.eval(wi, wo) * abs(wi.z);
   out.value = with_base ? f_cos - base : f_cos;
   out.density = brdf.pdf(wi, wo);
-  if (with_base) out.density = T(1 - kFromEverywhere) * out.density + T(kFromEverywhere) * cosine_pdf(wi);
+  if (with_base) out.density = T(1 - kFromEverywhere) * out.density + T(kFromEverywhere) * everywhere_pdf(wi);
   return out;
 }
 
@@ -251,9 +251,9 @@ struct AimedSum {
   Rgb<double> rest;                 ///< its weight
 };
 
-/// As the shader goes about it (pack/shader.cpp). u: three numbers that draw the direction, v1, v2: that choose points
-/// of the lamps.
-AimedSum aimed_sum(const Brdf<double>&, const std::vector<LampPatch<double>>&, const Vec3<double>& wo,
-                   const Vec3<double>& u, double v1, double v2);
+/// As the shader goes about it (pack/shader.cpp), with the base for wo. u: three numbers that draw the direction, v1,
+/// v2: that choose points of the lamps.
+AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
+                   const Vec3<double>& wo, const Vec3<double>& u, double v1, double v2);
 
 }  // namespace brdfc

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "model/sampling.h"
-#include "represent/closure.h"
+#include "represent/aimed.h"
 
 namespace brdfc {
 namespace {
@@ -41,21 +40,20 @@ BaseWorth base_worth(const BoundModel& bound, const Vec3<double>& wo, int points
   double largest = 0;
   Sequence3 sequence(7);
   for (int i = 0; i < points; ++i) {
-    Vec3<double> u = sequence.next();
+    const Vec3<double> u = sequence.next();
     const Sample<double> drawn = brdf.sample(wo, u);
     white_drawn.add(drawn.weight);
     sky_drawn.add(drawn.weight * sky(drawn.wi));
 
-    const bool of_model = u.x < kModelShareOfRest;
-    u.x = of_model ? u.x / kModelShareOfRest : u.x;
-    const Vec3<double> wi = of_model ? brdf.sample(wo, u).wi : sample_cosine(u.y, u.z);
+    const Vec3<double> wi = draw(brdf, true, wo, u);
     if (wi.z <= 0) {
       white_rest.add(Rgb<double>(0.0));
       sky_rest.add(Rgb<double>(0.0));
       continue;
     }
-    const double density = kModelShareOfRest * brdf.pdf(wi, wo) + (1 - kModelShareOfRest) * cosine_pdf(wi);
-    const Rgb<double> b = evaluate(base, wi, wo) / density, f = brdf.eval(wi, wo) * (wi.z / density), rest = f - b;
+    const Rgb<double> of_closures = evaluate(base, wi, wo);
+    const Excess<double> e = excess(brdf, true, of_closures, wi, wo);
+    const Rgb<double> b = of_closures / e.density, rest = e.value / e.density, f = rest + b;
     require_value(b, "base", bound.label, wi, wo);
     white_rest.add(rest);
     sky_rest.add(rest * sky(wi));

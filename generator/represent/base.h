@@ -7,10 +7,6 @@
 
 namespace brdfc {
 
-/// Of the directions in which the rest is looked for, how many the model draws. The others are those of a matte
-/// surface: closures give light where the model draws nothing.
-inline constexpr double kModelShareOfRest = 0.75;
-
 /// One view. Variances are those of one drawn direction, in squares of the albedo; channels are averaged.
 struct BaseWorth {
   double relative_l1 = 1;  ///< integral of |f cos(theta_i) - base| over that of f cos

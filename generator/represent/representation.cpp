@@ -12,7 +12,6 @@
 #include "model/horizon.h"
 #include "model/sampling.h"
 #include "represent/aimed.h"
-#include "represent/controlled.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
 
@@ -108,21 +107,6 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
 
 Vec3<Expr> recorded_u() { return {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")}; }
 
-void output_controlled(const Model& model, const Brdf<Expr>& brdf, const ParamValues& fixed, const Cosines& views,
-                       Program& program, std::vector<RecordedClosure>& recorded) {
-  const ParamValues values = without_factors(model, fixed);
-  const std::unique_ptr<Brdf<Expr>> scatter = model.record(values);
-  const Fit fit = fit_of(model, values, views);
-  const Controlled<Expr> c =
-      controlled(*scatter, fit, recorded_wo(model, brdf), recorded_u(), recorded_varied(model, fit, fixed));
-  output_closures(with_mirror(model, brdf, c.closures), program, recorded, division_of(fit));
-  program.output("wi_x", c.wi.x);
-  program.output("wi_y", c.wi.y);
-  program.output("wi_z", c.wi.z);
-  program.output("residual_weight", c.weight);
-  program.output("residual_colour", c.colour);
-}
-
 void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program) {
   const Vec3<Expr> wo = recorded_wo(model, brdf);
   const Sample<Expr> s = brdf.sample(wo, recorded_u());
@@ -172,8 +156,10 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
 }
 
 /// The base of an aimed form; none for what lies on both sides of the surface.
-ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf) {
-  return two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(recorded_wo(model, brdf));
+ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf, const Fit* fit, const ParamValues& fixed) {
+  const Vec3<Expr> wo = recorded_wo(model, brdf);
+  if (fit) return fit->closures(wo, recorded_varied(model, *fit, fixed), Expr(1), false);
+  return two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(wo);
 }
 
 using FloatInputs = std::map<std::string, std::array<float, 3>>;
@@ -224,50 +210,6 @@ RepresentationError fitted_error(const std::vector<ViewError>& errors, const std
   return out;
 }
 
-/// What single precision makes of the drawn residuals. The same numbers drive both, so that what differs is the
-/// arithmetic and not the noise.
-RepresentationError controlled_error(const Model& model, const ParamValues& fixed) {
-  constexpr int kViews = 6, kPoints = 256;
-  const ParamValues values = without_factors(model, fixed);
-  Recorder recorder;
-  const std::unique_ptr<Brdf<Expr>> recorded = model.record(values);
-  Program program;
-  std::vector<RecordedClosure> kinds;
-  output_controlled(model, *recorded, values, {}, program, kinds);
-  const Fit& fit = fit_of(model, values);
-  const RepresentationError of_fit = fitted_error(fit.errors(), "closures", fit.axis());
-  RepresentationError out;
-  Sequence3 points(1);
-  for (int view = 0; view < kViews; ++view) {
-    const Vec3<double> wo = direction((view + 0.5) / kViews, view);
-    // From the upper end of the axis down, so that it does not go with the height of the view.
-    const double number = fit.axis() ? fit.axis()->at(1 - double(view) / (kViews - 1)) : 0;
-    const ParamValues here = complete(model.info(), with_number(model, values, number));
-    const BoundModel truth = bind_model(model, here);
-    const Varied<double> varied = fit.varied(here);
-    FloatInputs inputs = float_inputs(here, wo);
-    Rgb<double> difference(0.0);
-    for (int i = 0; i < kPoints; ++i) {
-      const Vec3<float> v = Vec3<float>::from(points.next());
-      set_input(inputs, "u_0", v.x);
-      set_input(inputs, "u_1", v.y);
-      set_input(inputs, "u_2", v.z);
-      const auto run = program.run<float>(inputs);
-      for (const auto& [name, value] : run)
-        require_finite(model, values, wo, name, value, !name.starts_with("weight_") && name != "residual_weight");
-      const std::array<float, 3> colour = run.at("residual_colour");
-      const double weight = run.at("residual_weight")[0] / double(kPoints);
-      const Residual<double> exact = sample_residual(*truth.brdf, fit, wo, Vec3<double>::from(v), varied);
-      difference += Rgb<double>(colour[0], colour[1], colour[2]) * weight - exact.weight / double(kPoints);
-    }
-    out.albedo = std::max({out.albedo, std::abs(difference.r), std::abs(difference.g), std::abs(difference.b)});
-  }
-  out.note = fmt::format(
-      "equals the model in expectation; a lamp of no size sees {}, which have {:.2g} of the light off on average",
-      of_fit.note, *of_fit.relative_l1);
-  return out;
-}
-
 /// Parameters a slider reaches, drawn uniformly; a wide range logarithmically, as its effect is.
 ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt19937_64& rng) {
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -315,8 +257,6 @@ const char* name_of(RepresentationKind kind) {
       return "sampled";
     case RepresentationKind::Fitted:
       return "fitted";
-    case RepresentationKind::Controlled:
-      return "controlled";
     case RepresentationKind::Twin:
       return "twin";
   }
@@ -325,9 +265,9 @@ const char* name_of(RepresentationKind kind) {
 
 RepresentationKind representation_named(const std::string& name) {
   for (RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Aimed, RepresentationKind::Sampled,
-                                  RepresentationKind::Fitted, RepresentationKind::Controlled, RepresentationKind::Twin})
+                                  RepresentationKind::Fitted, RepresentationKind::Twin})
     if (name == name_of(kind)) return kind;
-  input_error("unknown representation '{}': expected one of exact, aimed, sampled, fitted, controlled, twin", name);
+  input_error("unknown representation '{}': expected one of exact, aimed, sampled, fitted, twin", name);
 }
 
 std::vector<RepresentationKind> representations(const Model& model) {
@@ -380,8 +320,6 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
   } else if (kind == RepresentationKind::Fitted) {
     const Fit fit = fit_of(model, without_factors(model, fixed), views);
     output_closures(recorded_fit(model, *brdf, fit, fixed), program, closures, division_of(fit));
-  } else if (kind == RepresentationKind::Controlled) {
-    output_controlled(model, *brdf, fixed, views, program, closures);
   } else {
     output_sampled(model, *brdf, program);
   }
@@ -393,7 +331,8 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
   return finish(model, program, indent, std::move(closures));
 }
 
-AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int indent) {
+AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int indent, AimedBase from,
+                            const Cosines& views) {
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   const Vec3<Expr> wo = recorded_wo(model, *brdf);
@@ -403,11 +342,13 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     return w;
   };
   AimedRecording out;
-  const ClosureSum<Expr> base = recorded_base(model, *brdf);
+  std::optional<Fit> fit;
+  if (from == AimedBase::Fitted) fit = fit_of(model, without_factors(model, fixed), views);
+  const ClosureSum<Expr> base = recorded_base(model, *brdf, fit ? &*fit : nullptr, fixed);
   {
     Program program;
     std::vector<RecordedClosure> closures;
-    output_closures(base, program, closures);
+    output_closures(base, program, closures, fit ? division_of(*fit) : Division::Done);
     out.base = finish(model, program, indent, closures);
   }
   {
@@ -511,7 +452,6 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
 
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,
                                   const Cosines& views) {
-  if (kind == RepresentationKind::Controlled) return controlled_error(model, fixed);
   if (kind == RepresentationKind::Fitted) {
     const Fit fit = fit_of(model, without_factors(model, fixed), views);
     return fitted_error(fit.errors(), "closures", fit.axis());

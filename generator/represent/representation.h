@@ -12,20 +12,18 @@
 namespace brdfc {
 
 enum class RepresentationKind {
-  Exact,       ///< closures that equal the model
-  Aimed,       ///< closures aimed at lamps that carry the model there, and one drawn direction for the rest (aimed.h)
-  Sampled,     ///< the shader samples the model itself, one narrow lobe per sample
-  Fitted,      ///< closures that come close to the model, for one set of parameters or along a number (fit.h)
-  Controlled,  ///< those and a sample of what they lack (controlled.h)
-  Twin         ///< no shader but Blender's own nodes, close to the model for one set of parameters (twin.h)
+  Exact,    ///< closures that equal the model
+  Aimed,    ///< closures aimed at lamps that carry the model there, and one drawn direction for the rest (aimed.h)
+  Sampled,  ///< the shader samples the model itself, one narrow lobe per sample
+  Fitted,   ///< closures that come close to the model, for one set of parameters or along a number (fit.h)
+  Twin      ///< no shader but Blender's own nodes, close to the model for one set of parameters (twin.h)
 };
 
 const char* name_of(RepresentationKind);
 /// Made of a fit: for parameters that must be known, but for factors(), those that it has terms by (terms.h), and one
 /// number.
 inline bool is_fit(RepresentationKind kind) {
-  return kind == RepresentationKind::Fitted || kind == RepresentationKind::Controlled ||
-         kind == RepresentationKind::Twin;
+  return kind == RepresentationKind::Fitted || kind == RepresentationKind::Twin;
 }
 /// Throws InputError that lists the known names.
 RepresentationKind representation_named(const std::string&);
@@ -50,7 +48,7 @@ struct RecordedClosure {
   bool operator==(const RecordedClosure&) const = default;
 };
 /// Statements of a form for one combination of choices. They read wo_x, wo_y, wo_z, the parameters and, if
-/// sampled or controlled, u_0, u_1, u_2; and assign what `kind` says.
+/// sampled, u_0, u_1, u_2; and assign what `kind` says.
 struct Recording {
   std::string statements;
   std::vector<RecordedClosure> closures;  ///< all but Sampled
@@ -61,7 +59,7 @@ struct Recording {
 
 /// Sampled: assigns wi_x, wi_y, wi_z and weight. Others: what closure i takes of weight_i, ramp_i[8], exponent_i,
 /// alpha_i, alpha_across_i, ior_i, and of its normal and tangent, if they are its own, normal_i_x and so on;
-/// Controlled: these, wi_x, wi_y, wi_z, residual_weight and residual_colour. A form of a fit needs all parameters in
+/// A form of a fit needs all parameters in
 /// `fixed` but one number and what it has terms by, which it reads, and factors(), which its weights still have to be
 /// multiplied by, the mirror's excepted; it is right for these `views`. Throws InputError if more closures than Cycles
 /// keeps would be needed.
@@ -72,7 +70,11 @@ struct AimedRecording {
   Recording draw;   ///< reads u_0, u_1, u_2; assigns drawn_x, drawn_y, drawn_z
   Recording value;  ///< reads wi_x, wi_y, wi_z and the base's closures; assigns value and density
 };
-AimedRecording record_aimed(const Model&, const ParamValues& fixed, int indent);
+/// Where the base comes from: the model declares it, or closures fitted to it, which need in `fixed` what a form of a
+/// fit needs; such a base leaves out the factors(), and is for these `views`.
+enum class AimedBase { Declared, Fitted };
+AimedRecording record_aimed(const Model&, const ParamValues& fixed, int indent, AimedBase = AimedBase::Declared,
+                            const Cosines& views = {});
 /// What is done with each lamp and at the end, which is the same for all models (aimed.h).
 struct AimedSteps {
   Recording room;  ///< of lamp `earlier` and centre: assigns room_here

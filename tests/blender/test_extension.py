@@ -667,17 +667,6 @@ def test_warning_small_lamps(extension, empty):
     assert codes(extension, material, empty) == ["zero_size_lights"]
 
 
-def test_warning_small_lamps_of_a_controlled_form(extension, empty, monkeypatch):
-    material = clean(extension, empty)
-    entry = extension.pack.representation("lambert", "exact")
-    monkeypatch.setitem(entry, "warnings", ["zero_size_lights_fit"])
-    assert codes(extension, material, empty) == []
-    data = bpy.data.lights.new("tiny", "POINT")
-    data.shadow_soft_size = 0
-    empty.collection.objects.link(bpy.data.objects.new("tiny", data))
-    assert codes(extension, material, empty) == ["zero_size_lights_fit"]
-
-
 def test_warning_far_orthographic_camera(extension, empty):
     material = clean(extension, empty, *sampled_forms(extension)[0])
     camera = helpers.add_camera(empty, location=(0, -10, 0), orthographic=4)
@@ -902,7 +891,7 @@ def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
 
 def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):
     """They are measured at the model's default parameters, which a pack cut to a scene lacks."""
-    names = ("sampled", "fitted", "controlled", "twin")
+    names = ("sampled", "fitted", "twin")
     listed = {
         name: {"model": "phong", "representation": name, "parameters": {"e": 40}} for name in names
     }
