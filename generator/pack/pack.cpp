@@ -412,8 +412,8 @@ PackResult build_pack(const PackOptions& options) {
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
   }
-  for (const fs::directory_entry& entry : fs::directory_iterator(options.addon)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(options.addon)) {
+    const std::string name = entry.path().lexically_relative(options.addon).generic_string();
     if (entry.path().extension() == ".py" || name == "blender_manifest.toml") members[name] = read_text(entry.path());
   }
   std::string everything;
