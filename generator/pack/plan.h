@@ -21,7 +21,7 @@ struct MaterialNeed {
   ParamValues values;              ///< complete
   std::set<std::string> textured;  ///< parameters that vary over the surface
   std::string representation = "auto";
-  Cosines views = {};         ///< that it can be seen from
+  Cosines views = {};  ///< that it can be seen from
 };
 
 /// Why a form of a model is in a pack, or is not.
