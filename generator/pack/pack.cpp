@@ -23,6 +23,7 @@
 #include "core/hash.h"
 #include "pack/nodes.h"
 #include "pack/shader.h"
+#include "represent/closure_pool.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
 
@@ -335,8 +336,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
                       of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
     const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
-    const Shader shader = twin ? write_nodes(model, fixed)
-                               : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps);
+    const Shader shader =
+        twin ? write_nodes(model, fixed) : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
     const ParamValues whole_fixed = is_fit(kind) ? fixed : ParamValues{};
@@ -358,6 +359,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"only", values_json(form_values(model, kind, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
+        {"closure_bytes", shader.closure_bytes},
+        {"lamp_bytes", shader.lamp_bytes},
         {"operations", shader.operations},
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
@@ -405,8 +408,12 @@ PackResult build_pack(const PackOptions& options) {
 
   PackResult result;
   std::map<std::string, std::string> members;
-  Json manifest = {
-      {"format", 1}, {"generator", std::string("brdfc ") + BRDFC_VERSION}, {"hash", ""}, {"models", Json::object()}};
+  // Blender's nodes that join closures take of the pool, too: Mix Shader makes two products and their sum.
+  Json manifest = {{"format", 1},
+                   {"generator", std::string("brdfc ") + BRDFC_VERSION},
+                   {"hash", ""},
+                   {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
+                   {"models", Json::object()}};
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     manifest["models"][chosen[i].model->info().name] = built[i].manifest;
     members.merge(built[i].files);
