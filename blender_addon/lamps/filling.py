@@ -24,30 +24,49 @@ def _arranged(chosen, before):
     return arranged[: len(chosen)]
 
 
-def _chosen(survey):
-    return [c for c in survey.candidates if not c.why][: slots.SLOTS]
+def _checks():
+    from .. import checks  # which looks into nodes, and these into this package
+
+    return checks
 
 
-def _listed(survey, chosen=None):
+def limit_of(scene):
+    """How many lamps materials can aim at on a scene's device."""
+    room = _checks().lamps_that_fit(scene)
+    return slots.SLOTS if room is None else min(room, slots.SLOTS)
+
+
+def device_changed(scene):
+    """Whether a scene has come to a device that limits lamps, or away from it, since last time."""
+    return _checks().runs_on_optix(scene) != memory.on_optix
+
+
+def _worth_aiming(survey):
+    return [c for c in survey.candidates if not c.why]
+
+
+def _listed(survey, chosen):
     """[slots.Lamp] of a survey, those that have a slot first."""
-    chosen = _chosen(survey) if chosen is None else chosen
     taken = {id(c) for c in chosen}
     return [slots.Lamp(c.name, slot, c.rank) for slot, c in enumerate(chosen, 1)] + [
-        slots.Lamp(c.name, None, c.rank, c.why or slots.too_many(slots.SLOTS))
+        slots.Lamp(c.name, None, c.rank, c.why or slots.too_many(len(chosen)))
         for c in survey.candidates
         if id(c) not in taken
     ]
 
 
 #: What the last look found, of the scene with that session_uid; whether the group is being filled.
-memory = SimpleNamespace(scene=None, survey=scenes.Survey(), lamps=[], busy=False)
+memory = SimpleNamespace(
+    scene=None, survey=scenes.Survey(), lamps=[], limit=slots.SLOTS, on_optix=False, busy=False
+)
 
 
 def _fill(scene, depsgraph, subject=None, keep=True):
     """Brings the shared group, if there is one, up to date; returns [slots.Lamp]. `keep`: lamps
     stay in their slots; else the brightest come first."""
     survey = scenes.look(scene, depsgraph, subject)
-    chosen = _chosen(survey)
+    limit = limit_of(scene)
+    chosen = _worth_aiming(survey)[:limit]
     if group := shared_group.the_one():
         sockets = shared_group.sockets(group)
         now = shared_group.written(group)
@@ -62,7 +81,8 @@ def _fill(scene, depsgraph, subject=None, keep=True):
             if not shared_group.same(old, new):
                 shared_group.write(socket, new)
     lamps = _listed(survey, chosen)
-    memory.scene, memory.survey, memory.lamps = scene.session_uid, survey, lamps
+    memory.scene, memory.survey = scene.session_uid, survey
+    memory.lamps, memory.limit, memory.on_optix = lamps, limit, _checks().runs_on_optix(scene)
     return lamps
 
 
@@ -118,10 +138,11 @@ def seen(scene):
     """What the last look at a scene found: for panels, which change nothing."""
     if memory.scene == scene.session_uid:
         return memory.lamps
-    return _listed(scenes.look(scene, scene.view_layers[0].depsgraph))
+    survey = scenes.look(scene, scene.view_layers[0].depsgraph)
+    return _listed(survey, _worth_aiming(survey)[: limit_of(scene)])
 
 
 def count():
-    """How many slots the scenes of the open file need."""
+    """How many lamps there are to aim at, in the scene of the open file that has most."""
     surveys = [scenes.look(scene, _depsgraph(scene)) for scene in bpy.data.scenes]
-    return max(len(_chosen(survey)) for survey in surveys)
+    return max(len(_worth_aiming(survey)) for survey in surveys)

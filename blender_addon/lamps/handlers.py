@@ -24,7 +24,7 @@ def _concerns(update, scene):
                 slots.transform_kind(item.matrix_world) != kind
                 or (kind is not None and kind[1])
                 or item.original.name_full in survey.instancers
-                or len(survey.candidates) > slots.SLOTS
+                or len(survey.candidates) > filling.memory.limit
             )
         name = item.original.name_full
         if name in survey.glowing or name in survey.instancers:
@@ -49,6 +49,15 @@ def _concerns(update, scene):
     )
 
 
+def _is_limited_anew(updates, scene):
+    """Whether materials can aim at another number of lamps than before. Counting takes a while:
+    only where the device is another, or a material or setting may be."""
+    kinds = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
+    if not filling.device_changed(scene) and not any(isinstance(u.id, kinds) for u in updates):
+        return False
+    return filling.limit_of(scene) != filling.memory.limit
+
+
 @persistent
 def _after_update(scene, depsgraph):
     # The picture of another scene must not lose its lamps to the window's.
@@ -63,10 +72,12 @@ def _after_update(scene, depsgraph):
         filling.quietly(scene, depsgraph)
         return
     updates = list(depsgraph.updates)
-    if not any(_concerns(update, scene) for update in updates):
+    limited = _is_limited_anew(updates, scene)
+    if not limited and not any(_concerns(update, scene) for update in updates):
         return
     structural = any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
-    if structural and len(updates) == 1:  # what was selected; objects come with what else changes
+    # A scene alone tells what was selected; objects come with what else changes.
+    if structural and len(updates) == 1 and not limited:
         return
     filling.quietly(scene, depsgraph, subject=None if structural else filling.memory.survey.subject)
 

@@ -21,7 +21,7 @@ def part_names(count):
 
 def too_many(slots):
     """Why a lamp is left out that others outshine."""
-    return f"fainter than the {slots} that a material can aim at"
+    return f"fainter than the {slots} that a material can aim at" if slots else "no room for it"
 
 
 @dataclass(frozen=True)
