@@ -85,9 +85,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
 
   const Model& m = find_model("phong");
   const AlbedoTable table = albedo_table_of(m);
-  const auto shader = [&](int lamps) {
-    return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps);
-  };
+  const auto shader = [&](int lamps) { return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps); };
   for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
   EXPECT_EQ(shader(0).slots, slots(ClosureKind::PhongRamp));
