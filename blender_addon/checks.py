@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import nodes
+from . import closure_pool, nodes, pack
 
 BLENDER_MIN = (4, 5, 0)
 #: Devices other than the CPU whose kernels can run OSL.
 OSL_DEVICES = {"OPTIX"}
+#: The run of these shaders on an OptiX device that is on record, in words; None: there is none.
+OPTIX_RUN = None
 #: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
 #: pixel is about 1e-6 of the distance; an orthographic camera has no direction to help out.
 FAR_PIXEL = 1e-5
@@ -52,6 +54,52 @@ def device_without_osl(scene):
     if scene.cycles.device != "GPU" or backend == "NONE" or backend in OSL_DEVICES:
         return None
     return backend
+
+
+def runs_on_optix(scene):
+    """Whether a scene's shaders run on a GPU, where closures have a pool of limited size."""
+    cycles = scene.cycles
+    on_gpu = scene.render.engine == "CYCLES" and cycles.device == "GPU"
+    return on_gpu and cycles.shading_system and gpu_backend() in OSL_DEVICES
+
+
+def lamps_that_fit(scene):
+    """How many lamps the open file's materials can aim at on a scene's device; None where the
+    device sets no limit."""
+    return closure_pool.lamps_that_fit() if runs_on_optix(scene) else None
+
+
+def device_refusal(model_name, form, scene):
+    """Why a form of a model can't run on a scene's device; None where it can."""
+    size, room = pack.representation(model_name, form)["closure_bytes"], closure_pool.capacity()
+    if size > room and runs_on_optix(scene):
+        return (
+            f"{form} takes {size} bytes of closures, and OptiX has room for {room}: it is for the "
+            "CPU"
+        )
+    return None
+
+
+def _pool_findings(material, scene):
+    """Whether a material's closures fit the pool of a scene's device."""
+    if not runs_on_optix(scene):
+        return
+    use, room = closure_pool.of_material(material), closure_pool.capacity()
+    if use.size > room:
+        yield Finding(
+            "closure_pool",
+            "ERROR",
+            f"The models of this material take {use.size} bytes of closures, and OptiX has room "
+            f"for {room}: what it renders is undefined; use smaller forms, fewer models in one "
+            "material, or the CPU",
+        )
+    elif use.shared:
+        yield Finding(
+            "closure_pool_shared",
+            "WARNING",
+            f"OptiX has room for {room} bytes of closures, of which the models of this material "
+            f"take {use.size}, and {use.per_lamp} a lamp; its other shaders share the rest",
+        )
 
 
 def _pixel_size(scene):
@@ -278,6 +326,15 @@ def scene_warnings(scene):
                 f"{backend} devices can't run Open Shading Language; use the CPU or OptiX",
             )
         )
+    if OPTIX_RUN is None and runs_on_optix(scene):
+        found.append(
+            Finding(
+                "optix_untested",
+                "ERROR",
+                "These shaders have not been tested on OptiX devices; the CPU is what they are "
+                "tested on",
+            )
+        )
     return found
 
 
@@ -368,6 +425,7 @@ def warnings(material, scene):
     found = scene_warnings(scene) if scripted else []
     for node in ours:
         found += node_warnings(node, material, scene)
+    found += _pool_findings(material, scene)
     return list(dict.fromkeys(found))
 
 

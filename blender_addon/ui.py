@@ -102,7 +102,7 @@ def energy_text(node):
     return "   ".join(numbers) or "not at a view angle of this scene"
 
 
-def _draw_form(layout, node, form, editable):
+def _draw_form(layout, node, form, scene, editable):
     model_name, representation = nodes.identity(node)
     if lean := nodes.is_baked(node):
         _wrapped(layout, "Lean: only what this file needs. A form brings the whole one back")
@@ -112,7 +112,8 @@ def _draw_form(layout, node, form, editable):
     values = {key: nodes.get_value(node, key) for key in pack.parameters(model_name)}
     refusals = []
     for name in entry["representations"]:
-        if refusal := pack.refusal(model_name, name, values):
+        refusal = pack.refusal(model_name, name, values)
+        if refusal := refusal or checks.device_refusal(model_name, name, scene):
             refusals.append(refusal)
             continue
         button = row.operator(
@@ -142,7 +143,7 @@ def _draw_values(layout, node):
             row.prop(socket, "default_value", text=socket.name)
 
 
-def draw_node(layout, node, material, editable=True):
+def draw_node(layout, node, material, scene, editable=True):
     """Model, form, error, cost, energy and values of one group node."""
     model_name, representation = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL")
@@ -150,7 +151,7 @@ def draw_node(layout, node, material, editable=True):
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
-        _draw_form(layout, node, made[0], editable)
+        _draw_form(layout, node, made[0], scene, editable)
     else:
         button = layout.operator("brdfc.switch", text="Update", icon="FILE_REFRESH")
         button.node = node.name
@@ -177,6 +178,14 @@ def draw_lamps(layout, material, scene):
     taken = [lamp.name for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > slots]
     _wrapped(box, f"Free of noise under {', '.join(taken) or 'no lamp yet'}", "LIGHT")
+    room = checks.lamps_that_fit(scene)
+    if room is not None and room < slots:
+        _wrapped(
+            box,
+            f"OptiX: {room} lamps at most are aimed at, for its memory for closures holds no more "
+            "beside this file's models; all that a Mix Shader mixes shares that memory",
+            "ERROR",
+        )
     for lamp in left_out:
         _wrapped(box, f"{lamp.name} may be noisy: {lamp.why or lamps.too_many(slots)}")
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
@@ -203,7 +212,7 @@ def draw_material(layout, material, scene):
     """Everything the panels show for a material."""
     draw_warnings(layout, material, scene)
     for node in nodes.group_nodes(material):
-        draw_node(layout.box(), node, material)
+        draw_node(layout.box(), node, material, scene)
     draw_lamps(layout, material, scene)
     layout.operator("brdfc.write_materials", icon="EXPORT")
     layout.operator("brdfc.bake", icon="MOD_DECIM")

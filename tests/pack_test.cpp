@@ -12,6 +12,7 @@
 #include "model/sampling.h"
 #include "pack/osl_library.h"
 #include "pack/shader.h"
+#include "represent/closure_pool.h"
 #include "support.h"
 
 namespace brdfc {
@@ -123,6 +124,43 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2000 : 1100) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
+}
+
+/// Sizes by hand from Cycles' structs: see pool_bytes().
+TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
+  const auto bytes = [](const char* name, RepresentationKind kind, int lamps = kMaxLamps) {
+    const Model& m = find_model(name);
+    const Shader s = write_shader(m, kind, empty_table(m), {}, {}, lamps);
+    return std::pair(s.closure_bytes, s.lamp_bytes);
+  };
+  constexpr int kLobe = 16 + 120, kFacets = 16 + 56, kMirror = 16 + 24, kDiffuse = 16 + 24, kNode = 24;
+  // burley_diffuse_bsdf, diffuse_ramp and a mirror
+  EXPECT_EQ(bytes("coupled", RepresentationKind::Exact), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
+  EXPECT_EQ(bytes("lambert", RepresentationKind::Exact), std::pair(kDiffuse, 0));
+  EXPECT_EQ(bytes("glass", RepresentationKind::Exact), std::pair(kMirror + 16 + 24 + kNode, 0));
+  // A lamp's lobe is one of the sum. A direction through the surface is one of three closures, times a weight.
+  EXPECT_EQ(bytes("lambert", RepresentationKind::Sampled), std::pair(kLobe, 0));
+  EXPECT_EQ(bytes("phong", RepresentationKind::Aimed), std::pair(kLobe, kLobe + kNode));
+  EXPECT_EQ(bytes("phong", RepresentationKind::Aimed, 0), std::pair(kLobe, 0));
+  EXPECT_EQ(bytes("ward", RepresentationKind::Aimed), std::pair(kFacets + kLobe + kNode, kLobe + kNode));
+  EXPECT_EQ(bytes("schlick_double", RepresentationKind::Aimed),
+            std::pair(kDiffuse + kMirror + kLobe + 2 * kNode, kLobe + kNode));
+  EXPECT_EQ(bytes("radziszewski_alda", RepresentationKind::Aimed), std::pair(kLobe + kNode, kLobe + kNode));
+}
+
+TEST(Shader, AnAimedFormHasAtLeastALampInAGpusPool) {
+  for (const auto& [name, model] : models())
+    for (const RepresentationKind kind : representations(*model)) {
+      if (is_fit(kind)) continue;  // eight closures, most of them ramps
+      const Shader s = write_shader(*model, kind, empty_table(*model));
+      EXPECT_LE(s.closure_bytes + s.lamp_bytes, kPoolBytes) << s.name;
+    }
+}
+
+TEST(Shader, AnAimedFormWithoutABaseHasNoEmptyBlock) {
+  const Model& m = find_model("phong");
+  const std::string source = write_shader(m, RepresentationKind::Aimed, empty_table(m)).source;
+  EXPECT_THAT(source, Not(testing::ContainsRegex("[{][ \n]*[}]")));
 }
 
 TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
@@ -278,6 +316,9 @@ TEST_F(PackFiles, ManifestAndFilesAgree) {
   EXPECT_EQ(manifest.at("format"), 1);
   const auto& lambert = manifest.at("models").at("lambert");
   EXPECT_EQ(lambert.at("auto"), "exact");
+  EXPECT_EQ(manifest.at("closure_pool"), (nlohmann::json{{"bytes", 1016}, {"mix", 72}, {"add", 24}}));
+  EXPECT_EQ(lambert.at("representations").at("exact").at("closure_bytes"), 40);
+  EXPECT_EQ(lambert.at("representations").at("exact").at("lamp_bytes"), 0);
   for (const auto& [form, r] : lambert.at("representations").items())
     EXPECT_TRUE(fs::exists(pack.folder / r.at("shader").get<std::string>())) << form;
   EXPECT_TRUE(fs::exists(pack.folder / lambert.at("albedo").at("table").get<std::string>()));

@@ -54,6 +54,13 @@ TEST(Plan, SaysWhatLampsWithoutASizeMakeOfAForm) {
   budget.sizeless = {"lights[1]", "lights[4]"};
   EXPECT_EQ(why(plan_scene(open, budget)[0], RepresentationKind::Aimed),
             "a: the form is left open; lights[1], lights[4] without a size shines as on Blender's own nodes");
+  budget.lamps = 12;
+  EXPECT_THAT(
+      why(plan_scene(open, budget)[0], RepresentationKind::Aimed),
+      HasSubstr("shines as on Blender's own nodes while among the 8 of up to 12 lamps that are aimed at, else as "
+                "rare bright dots"));
+  budget.lamps = 0;
+  EXPECT_THAT(why(plan_scene(open, budget)[0], RepresentationKind::Aimed), HasSubstr("shines as rare bright dots"));
   EXPECT_THAT(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled),
               HasSubstr("lights[1], lights[4] without a size shines as rare bright dots"));
   const PlannedModel matte = plan_scene(exact, budget)[0];

@@ -204,7 +204,7 @@ void run(const Options& options) {
       if ((l.kind == Light::Kind::Point || l.kind == Light::Kind::Sun) && l.radius == 0)
         budget.sizeless.push_back(l.key);
     // The extension finds bright spots of an image as well, and aims at them if there is room.
-    budget.lamps = scene.environment.image ? kMaxLamps : int(scene.lights.size());
+    budget.lamps = int(scene.lights.size()) + (scene.environment.image ? kMaxLamps : 0);
     std::vector<MaterialNeed> needs = needs_of(scene.materials);
     const std::vector<Cosines> views = seen_cosines(scene);
     for (std::size_t i = 0; i < needs.size(); ++i) needs[i].views = views[i];

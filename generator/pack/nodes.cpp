@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/nodes.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "represent/closure_pool.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
 
@@ -52,9 +54,14 @@ Shader write_nodes(const Model& model, const ParamValues& fixed) {
       j["spread"] = floats(part.spread);
     }
     closures.push_back(j);
-    out.closures += has_facets(part.kind) ? 2 : 1;
+    const int nodes = has_facets(part.kind) ? 2 : 1;
+    out.closures += nodes;
+    // In Open Shading Language Blender's nodes are these closures; a mirror of theirs is facets without roughness.
+    const bool glossy = part.kind != ClosureKind::Diffuse;
+    out.closure_bytes += nodes * pool_bytes(glossy ? ClosureKind::Ggx : ClosureKind::Diffuse);
   }
   out.slots = out.closures;
+  out.closure_bytes += std::max(out.closures - 1, 0) * kPoolNode;
   const Rgb<double> tint = twin.tint().value_or(Rgb<double>(1.0));
   out.source = Json{{"format", 1},
                     {"tint", {tint.r, tint.g, tint.b}},

@@ -23,6 +23,7 @@
 #include "core/hash.h"
 #include "pack/nodes.h"
 #include "pack/shader.h"
+#include "represent/closure_pool.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
 
@@ -359,6 +360,8 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"only", values_json(form_values(model, kind, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
+        {"closure_bytes", shader.closure_bytes},
+        {"lamp_bytes", shader.lamp_bytes},
         {"operations", shader.operations},
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
@@ -407,15 +410,19 @@ PackResult build_pack(const PackOptions& options) {
 
   PackResult result;
   std::map<std::string, std::string> members;
-  Json manifest = {
-      {"format", 1}, {"generator", std::string("brdfc ") + BRDFC_VERSION}, {"hash", ""}, {"models", Json::object()}};
+  // Blender's nodes that join closures take of the pool, too: Mix Shader makes two products and their sum.
+  Json manifest = {{"format", 1},
+                   {"generator", std::string("brdfc ") + BRDFC_VERSION},
+                   {"hash", ""},
+                   {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
+                   {"models", Json::object()}};
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     manifest["models"][chosen[i].model->info().name] = built[i].manifest;
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
   }
-  for (const fs::directory_entry& entry : fs::directory_iterator(options.addon)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(options.addon)) {
+    const std::string name = entry.path().lexically_relative(options.addon).generic_string();
     if (entry.path().extension() == ".py" || name == "blender_manifest.toml") members[name] = read_text(entry.path());
   }
   std::string everything;

@@ -136,14 +136,27 @@ std::vector<RepresentationKind> aimed_or_fitted(const Needs& needs, const Budget
   return {RepresentationKind::Aimed, RepresentationKind::Fitted};
 }
 
+/// That an aimed form has for the lamps there are.
+int lamp_slots(const Budget& budget) { return std::min(budget.lamps.value_or(kMaxLamps), kMaxLamps); }
+
+/// What lamps without a size make of an aimed form.
+std::string under_aimed(const Budget& budget) {
+  const int lamps = std::max(budget.lamps.value_or(0), int(budget.sizeless.size())), slots = lamp_slots(budget);
+  if (lamps <= slots) return "as on Blender's own nodes";
+  const char* left_out = "as rare bright dots";
+  if (slots == 0) return left_out;
+  return fmt::format("as on Blender's own nodes while among the {} of up to {} lamps that are aimed at, else {}", slots,
+                     lamps, left_out);
+}
+
 /// What lamps without a size make of a form, as script/conditions measured it; empty where they do nothing to it.
 std::string under_lamps(RepresentationKind kind, const Budget& budget) {
-  const char* shine = kind == RepresentationKind::Aimed     ? "as on Blender's own nodes"
-                      : kind == RepresentationKind::Sampled ? "as rare bright dots"
-                      : kind == RepresentationKind::Fitted  ? "as on Blender's own nodes, on drawn directions as rare "
-                                                              "bright dots"
-                                                            : nullptr;
-  if (!shine || budget.sizeless.empty()) return {};
+  const std::string shine = kind == RepresentationKind::Aimed     ? under_aimed(budget)
+                            : kind == RepresentationKind::Sampled ? "as rare bright dots"
+                            : kind == RepresentationKind::Fitted
+                                ? "as on Blender's own nodes, on drawn directions as rare bright dots"
+                                : "";
+  if (shine.empty() || budget.sizeless.empty()) return {};
   return fmt::format("; {} without a size shines {}", fmt::join(budget.sizeless, ", "), shine);
 }
 
@@ -286,7 +299,7 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
       choice.why += "; closures fitted to it are its base";
       choice.cost = std::nullopt;
     }
-  plan.max_lamps = std::min(budget.lamps.value_or(kMaxLamps), kMaxLamps);
+  plan.max_lamps = lamp_slots(budget);
   if (aimed && plan.max_lamps < kMaxLamps)
     plan.reasons.push_back(plan.max_lamps == 0
                                ? std::string("slots for lamps: the scene has none")

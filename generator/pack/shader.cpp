@@ -8,6 +8,7 @@
 
 #include "core/osl_words.h"
 #include "pack/osl_library.h"
+#include "represent/closure_pool.h"
 #include "represent/fit.h"
 
 namespace brdfc {
@@ -74,8 +75,9 @@ std::string indented(const std::string& text, std::size_t levels = 1) {
   return out;
 }
 
-/// In a scope of their own, so that what they declare stands in no other's way.
+/// In a scope of their own, so that what they declare stands in no other's way. None where there is nothing to do.
 std::string block(const std::string& statements, std::size_t levels) {
+  if (statements.empty()) return {};
   const std::string edge(4 * levels, ' ');
   return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
 }
@@ -395,7 +397,7 @@ class AimedText {
                          steps.less.statements) +
            indented(steps.send.statements, 3) + "        } else {\n" + indented(steps.rest.statements, 3) +
            "        }\n    }\n";
-    // Each joins the sum from the left: Cycles walks it without a stack.
+    // Each joins the sum from the left: Cycles walks it without a stack. The weight is a colour: see kPoolNode.
     std::string ramp;
     for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
     out += fmt::format(
@@ -408,7 +410,8 @@ class AimedText {
         "lobe_level[entry] * lobe_colour[lamp];\n"
         "            vector half_way = lobe_half[lamp];\n"
         "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
-        "            aimed = lobe_weight[lamp] * phong_ramp(half_way, lobe_exponent[lamp], lobe_colours) + aimed;\n"
+        "            color lobe_followed = lobe_weight[lamp];\n"
+        "            aimed = lobe_followed * phong_ramp(half_way, lobe_exponent[lamp], lobe_colours) + aimed;\n"
         "        }}\n",
         kRampSize, ramp);
     return out;
@@ -463,6 +466,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   AimedText aimed_text(info, fixed, max_lamps);
   SharedArrays arrays;
   int operations = 0, mirror_operations = 0;
+  // A drawn direction is a lobe. Where it may be another closure, OSL makes a product of that and its weight.
+  const int ray_bytes = pool_bytes(ClosureKind::PhongRamp) + (model.has_through() ? kPoolNode : 0);
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
@@ -503,6 +508,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
             statements.print(4) + "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n";
     terms.push_back(model.has_through() ? "brdfc_ray_anywhere(weight, wi, I, frame_n)" : "weight * brdfc_ray(wi, I)");
     shader.slots = slots(ClosureKind::PhongRamp);
+    shader.closure_bytes = ray_bytes;
   } else {
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       const ClosureKind closure = kinds[c].kind;
@@ -518,6 +524,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       shader.facets = shader.facets || (has_facets(closure) && !aimed);
       terms.push_back(closure_text(kinds[c], c));
       shader.slots += slots(closure);
+      shader.closure_bytes += pool_bytes(closure);
     }
     body += aimed ? block(statements.print(0), 1) : statements.print(4);
     for (std::size_t c = 0; c < kinds.size(); ++c)
@@ -545,9 +552,13 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       shader.lamps = max_lamps;
       shader.operations += aimed_text.operations();
       shader.slots += (max_lamps + 1) * slots(ClosureKind::PhongRamp);
+      shader.closure_bytes += ray_bytes;
+      shader.lamp_bytes = max_lamps > 0 ? pool_bytes(ClosureKind::PhongRamp) + kPoolNode : 0;
       if (max_lamps > 0) terms.push_back("aimed");
+      // As a colour: see kPoolNode.
+      if (!model.has_through()) body += "    color rest_followed = rest_weight;\n";
       const char* ray = model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, {}, I, frame_n)"
-                                            : "rest_weight * brdfc_ray_coloured({}, I, rest_colour)";
+                                            : "rest_followed * brdfc_ray_coloured({}, I, rest_colour)";
       terms.push_back(fmt::format(fmt::runtime(ray), "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
     }
     for (std::size_t c = 0; c < kinds.size(); ++c) {
@@ -565,8 +576,10 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   if ((sampled || aimed) && model.has_mirror()) {
     terms.push_back("mirror_weight * reflection(frame_n)");
     shader.slots += slots(ClosureKind::Reflection);
+    shader.closure_bytes += pool_bytes(ClosureKind::Reflection);
   }
   shader.closures = int(terms.size()) + std::max(shader.lamps - 1, 0);
+  shader.closure_bytes += std::max(int(terms.size()) - (shader.lamps > 0 ? 1 : 0) - 1, 0) * kPoolNode;
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,
                 kMaxClosures);

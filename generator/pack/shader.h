@@ -12,15 +12,17 @@
 namespace brdfc {
 
 struct Shader {
-  std::string name;     ///< of the shader and, with .osl, of its file
-  std::string source;   ///< stands alone
-  std::string albedo;   ///< a shader of its own for the Albedo output; "" where `source` has it
-  int closures = 0;     ///< most that one shading point adds
-  int slots = 0;        ///< what they take of Cycles' kMaxClosures
-  int operations = 0;   ///< most that one combination of choices executes, a loop's body counted once
-  int statements = 0;   ///< of the shader for all combinations of choices, without the library it calls
-  bool facets = false;  ///< has closures of facets
-  int lamps = 0;        ///< slots of lamps that it aims at
+  std::string name;       ///< of the shader and, with .osl, of its file
+  std::string source;     ///< stands alone
+  std::string albedo;     ///< a shader of its own for the Albedo output; "" where `source` has it
+  int closures = 0;       ///< most that one shading point adds
+  int slots = 0;          ///< what they take of Cycles' kMaxClosures
+  int operations = 0;     ///< most that one combination of choices executes, a loop's body counted once
+  int statements = 0;     ///< of the shader for all combinations of choices, without the library it calls
+  bool facets = false;    ///< has closures of facets
+  int lamps = 0;          ///< slots of lamps that it aims at
+  int closure_bytes = 0;  ///< most that they take of a GPU's kPoolBytes where no lamp is aimed at
+  int lamp_bytes = 0;     ///< that each lamp adds
 };
 
 /// Parameters in `given` are folded into the text and are no parameters of the shader. `table` gives the Albedo

@@ -66,7 +66,7 @@ class Loader {
     materials_alone_ = true;
     read_materials(root.at("materials"));
     UsedMaterials used{std::move(scene_.materials), {}, {}};
-    if (const auto lamps = root.find("lamps")) used.lamps = lamps->integer(0, 1000);
+    if (const auto lamps = root.find("lamps")) used.lamps = lamps->integer(0, 1000000);
     if (const auto lamps = root.find("sizeless_lamps"))
       for (const JsonView& lamp : lamps->elements()) used.sizeless_lamps.push_back(lamp.text());
     return used;

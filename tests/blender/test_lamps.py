@@ -19,6 +19,21 @@ def lamps(extension):
 
 
 @pytest.fixture(scope="module")
+def shared_group(lamps):
+    return import_module(f"{lamps.__name__}.shared_group")
+
+
+@pytest.fixture(scope="module")
+def scenes(lamps):
+    return import_module(f"{lamps.__name__}.scenes")
+
+
+@pytest.fixture(scope="module")
+def handlers(lamps):
+    return import_module(f"{lamps.__name__}.handlers")
+
+
+@pytest.fixture(scope="module")
 def aimed(extension):
     """A model and a form of it that aims at lamps."""
     return next(
@@ -243,7 +258,7 @@ def test_undo(ball, empty):
     assert len(slots(scene)) == 2
 
 
-def test_two_scenes(lamps, ball, empty, extension):
+def test_two_scenes(lamps, shared_group, ball, empty, extension):
     here = add_lamp(empty, "POINT", "Here")
     other = bpy.data.scenes.new("Other")
     other.collection.objects.link(ball)
@@ -263,8 +278,7 @@ def test_two_scenes(lamps, ball, empty, extension):
         met.append((scene.name, len([s for s in written() if s[9] != 0])))
 
     def written():
-        group = lamps.find_group()
-        values = lamps._written(group, lamps._sockets(group))
+        values = shared_group.written(lamps.find_group())
         return [values[12 * i : 12 * i + 12] for i in range(8)]
 
     bpy.app.handlers.render_pre.append(note)
@@ -280,7 +294,7 @@ def test_two_scenes(lamps, ball, empty, extension):
     assert_lamps(slots(empty), [here])
 
 
-def test_copies_of_the_group_give_way(extension, lamps, ball, empty, aimed, tmp_path):
+def test_copies_of_the_group_give_way(extension, shared_group, ball, empty, aimed, tmp_path):
     lamp = add_lamp(empty, "POINT", "Key")
     name = ball.active_material.name
     bpy.context.view_layer.update()
@@ -296,7 +310,7 @@ def test_copies_of_the_group_give_way(extension, lamps, ball, empty, aimed, tmp_
     helpers.add_sphere(scene, to.materials[0], segments=8)
     helpers.add_sphere(scene, own, segments=8)
     assert_lamps(slots(scene), [lamp])
-    (group,) = [g for g in bpy.data.node_groups if lamps.TAG in g]
+    (group,) = [g for g in bpy.data.node_groups if shared_group.TAG in g]
     for material in (own, to.materials[0]):
         (node,) = extension.nodes.group_nodes(material)
         inner = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
@@ -305,7 +319,7 @@ def test_copies_of_the_group_give_way(extension, lamps, ball, empty, aimed, tmp_
     next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup").node_tree = copy
     lamp.data.angle = 0.5
     assert_lamps(slots(scene), [lamp])
-    assert len([g for g in bpy.data.node_groups if lamps.TAG in g]) == 1
+    assert len([g for g in bpy.data.node_groups if shared_group.TAG in g]) == 1
 
 
 def test_linked_lamps(extension, empty, aimed, tmp_path):
@@ -373,7 +387,7 @@ def test_a_file_needs_no_extension(ball, empty, tmp_path):
             assert want is None or got == pytest.approx(want, rel=1e-4)
 
 
-def test_more_lamps_than_slots(extension, lamps, ball, empty):
+def test_more_lamps_than_slots(extension, ball, empty):
     for i in range(11):
         place = (4 * math.cos(i), 4 * math.sin(i), 3)
         add_lamp(empty, "POINT", f"Lamp{i}", location=place, energy=10 * (i + 1))
@@ -493,20 +507,21 @@ def spotted(direction, half_angle, radiance, width=512):
 
 
 def test_bright_spots_are_found(lamps, subtests):
+    find = import_module(f"{lamps.__name__}.bright_spots").find
     for direction in ((1, 0, 0), (-1, 0.001, 0.2), (0.3, -0.8, 0.5), (0, 0.1, 1), (0, 0, -1)):
         with subtests.test(direction=direction):
             to = np.array(direction) / np.linalg.norm(direction)
             pixels = spotted(to, 0.05, 5000.0)[..., 0]
-            (spot,) = lamps.bright_spots(pixels)
+            (spot,) = find(pixels)
             assert spot[0] @ to > math.cos(0.01)
             assert 0.1 <= spot[1] < 0.13
             assert spot[2] == pytest.approx(5000 * math.pi * 0.05**2, rel=0.05)
     plain = np.ones((64, 128))
-    assert lamps.bright_spots(plain) == [] == lamps.bright_spots(0 * plain)
+    assert find(plain) == [] == find(0 * plain)
     window = spotted(np.array([1.0, 0, 0]), 0.3, 100.0)[..., 0]
-    assert lamps.bright_spots(window) == []  # drawn directions meet that
+    assert find(window) == []  # drawn directions meet that
     large = spotted(np.array([0.6, 0, 0.8]), 0.01, 1e5, width=2048)[..., 0]
-    (spot,) = lamps.bright_spots(large)
+    (spot,) = find(large)
     assert 0.02 <= spot[1] < 0.026
 
 
@@ -579,11 +594,11 @@ def test_emissive_meshes(extension, ball, empty, kind):
     assert lamp.slot is None and "neither round nor small" in lamp.why
 
 
-def test_nothing_is_written_when_nothing_changed(lamps, ball, empty, monkeypatch):
+def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, empty, monkeypatch):
     """Whatever is written has shaders compiled anew."""
     written = []
-    write = lamps._write
-    monkeypatch.setattr(lamps, "_write", lambda s, v: (written.append(s), write(s, v)))
+    write = shared_group.write
+    monkeypatch.setattr(shared_group, "write", lambda s, v: (written.append(s), write(s, v)))
     sky(empty)
     _, _, node = environment(empty, spotted(np.array([0.6, 0, 0.8]), 0.03, 5000.0))
     lamp = add_lamp(empty, "POINT", "Key")
@@ -600,18 +615,18 @@ def test_nothing_is_written_when_nothing_changed(lamps, ball, empty, monkeypatch
     ball.active_material.diffuse_color = (0, 0, 0, 1)
     bpy.context.view_layer.update()
     empty.frame_set(4)
-    lamps._now()
+    handlers._now()
     for _ in range(3):
         bpy.context.view_layer.update()
     assert not written
     assert_lamp(slots(empty)[[s[9] for s in slots(empty)].index(3)], bpy.data.objects["Area"])
 
 
-def test_selecting_is_no_reason_to_look(lamps, ball, empty, monkeypatch):
+def test_selecting_is_no_reason_to_look(scenes, ball, empty, monkeypatch):
     add_lamp(empty, "POINT", "Key")
     assert len(slots(empty)) == 1
-    looked, look = [], lamps._look
-    monkeypatch.setattr(lamps, "_look", lambda *a: (looked.append(1), look(*a))[1])
+    looked, look = [], scenes.look
+    monkeypatch.setattr(scenes, "look", lambda *a: (looked.append(1), look(*a))[1])
     ball.select_set(not ball.select_get())
     bpy.context.view_layer.update()
     ball.location.x = 0.1
@@ -639,23 +654,23 @@ def test_a_sun_without_a_size_is_seen(extension, ball, empty):
     assert np.median(np.abs(pictures[0] / pictures[1] - 1)) < 0.05
 
 
-def test_handlers_come_and_go(extension, lamps, empty, monkeypatch):
+def test_handlers_come_and_go(lamps, handlers, scenes, empty, monkeypatch):
     def ours():
         return [
             name
             for name in dir(bpy.app.handlers)
             for function in (getattr(bpy.app.handlers, name),)
             if isinstance(function, list)
-            and any(getattr(f, "__module__", "") == lamps.__name__ for f in function)
+            and any(getattr(f, "__module__", "") == handlers.__name__ for f in function)
         ]
 
-    assert set(ours()) == set(lamps._HANDLERS)
+    assert set(ours()) == set(handlers._HANDLERS)
     lamps.unregister()
     assert ours() == []
     lamps.register()
     # In a file without such a group they don't look at anything.
     looked = []
-    monkeypatch.setattr(lamps, "_look", lambda *_: looked.append(1))
+    monkeypatch.setattr(scenes, "look", lambda *_: looked.append(1))
     add_lamp(empty, "POINT", "Key")
     bpy.context.view_layer.update()
     empty.frame_set(2)

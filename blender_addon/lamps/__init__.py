@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tells shaders where the lamps are: forms that aim closures at lamps read one shared node group.
+
+Its outputs, four vectors a slot, are constants to Cycles. What moves is driven without Python
+expressions, so a saved file renders and animates where neither the extension nor scripts may run.
+A list that is out of date costs noise and nothing else: forms are right whatever it says.
+"""
+
+from .filling import count, ensure_group, see, seen
+from .handlers import register, unregister
+from .shared_group import find as find_group
+from .shared_group import remove_unused as remove_unused_group
+from .slots import SLOTS, Lamp, part_names, too_many
+
+__all__ = [
+    "SLOTS",
+    "Lamp",
+    "count",
+    "ensure_group",
+    "find_group",
+    "part_names",
+    "register",
+    "remove_unused_group",
+    "see",
+    "seen",
+    "too_many",
+    "unregister",
+]

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much light lights and materials give, as their nodes and settings have it."""
+
+import numpy as np
+
+from .. import shader_trees
+
+#: Of linear Rec.709 channels.
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def animated(owner):
+    """Whether a data-block has animation of its own."""
+    data = owner.animation_data
+    return data is not None and bool(data.action or data.drivers or data.nla_tracks)
+
+
+def _luminance(color):
+    return float(np.dot(LUMINANCE, list(color)[:3]))
+
+
+def _strength(node, color, strength):
+    """Luminance that a node emits; what a link controls counts as 1."""
+    parts = [node.inputs[name] for name in (color, strength)]
+    shade = 1.0 if parts[0].is_linked else _luminance(parts[0].default_value)
+    return shade * (1.0 if parts[1].is_linked else parts[1].default_value)
+
+
+_EMITTERS = {
+    "ShaderNodeEmission": ("Color", "Strength"),
+    "ShaderNodeBsdfPrincipled": ("Emission Color", "Emission Strength"),
+}
+
+
+def of_material(material):
+    """Radiance of a material that light sampling looks for, 0 of most."""
+    tree = shader_trees.shading(material)
+    if tree is None or material.cycles.emission_sampling == "NONE":
+        return 0.0
+    output = shader_trees.output(tree, "ShaderNodeOutputMaterial")
+    if output is None:
+        return 0.0
+    return sum(
+        _strength(node, *_EMITTERS[node.bl_idname])
+        for node in shader_trees.upstream(output.inputs["Surface"], "SHADER")
+        if node.bl_idname in _EMITTERS
+    )
+
+
+def of_light(light):
+    """Energy of a light times its colour; of a dark one that may light up, next to nothing."""
+    power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
+    if tree := shader_trees.shading(light):
+        output = shader_trees.output(tree, "ShaderNodeOutputLight")
+        nodes = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []
+        power *= sum(
+            _strength(n, "Color", "Strength") for n in nodes if n.bl_idname == "ShaderNodeEmission"
+        )
+    if power <= 0 and (animated(light) or (light.node_tree and animated(light.node_tree))):
+        return 1e-9
+    return power

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fills the slots of the shared group with the brightest lamps of a scene."""
+
+from types import SimpleNamespace
+
+import bpy
+
+from . import scenes, shared_group, slots, world
+
+
+def _arranged(chosen, before):
+    """The chosen lamps in the order of slots: each stays where it is if the list has it already, so
+    that a lamp more or less changes one slot."""
+    arranged, rest = [None] * slots.SLOTS, []
+    for candidate in chosen:
+        places = [i for i in range(len(chosen)) if arranged[i] is None]
+        kept = next((i for i in places if shared_group.all_same(candidate.values, before[i])), None)
+        if kept is None:
+            rest.append(candidate)
+        else:
+            arranged[kept] = candidate
+    for candidate in rest:
+        arranged[arranged.index(None)] = candidate
+    return arranged[: len(chosen)]
+
+
+def _checks():
+    from .. import checks  # which looks into nodes, and these into this package
+
+    return checks
+
+
+def limit_of(scene):
+    """How many lamps materials can aim at on a scene's device."""
+    room = _checks().lamps_that_fit(scene)
+    return slots.SLOTS if room is None else min(room, slots.SLOTS)
+
+
+def device_changed(scene):
+    """Whether a scene has come to a device that limits lamps, or away from it, since last time."""
+    return _checks().runs_on_optix(scene) != memory.on_optix
+
+
+def _worth_aiming(survey):
+    return [c for c in survey.candidates if not c.why]
+
+
+def _listed(survey, chosen):
+    """[slots.Lamp] of a survey, those that have a slot first."""
+    taken = {id(c) for c in chosen}
+    return [slots.Lamp(c.name, slot, c.rank) for slot, c in enumerate(chosen, 1)] + [
+        slots.Lamp(c.name, None, c.rank, c.why or slots.too_many(len(chosen)))
+        for c in survey.candidates
+        if id(c) not in taken
+    ]
+
+
+#: What the last look found, of the scene with that session_uid; whether the group is being filled.
+memory = SimpleNamespace(
+    scene=None, survey=scenes.Survey(), lamps=[], limit=slots.SLOTS, on_optix=False, busy=False
+)
+
+
+def _fill(scene, depsgraph, subject=None, keep=True):
+    """Brings the shared group, if there is one, up to date; returns [slots.Lamp]. `keep`: lamps
+    stay in their slots; else the brightest come first."""
+    survey = scenes.look(scene, depsgraph, subject)
+    limit = limit_of(scene)
+    chosen = _worth_aiming(survey)[:limit]
+    if group := shared_group.the_one():
+        sockets = shared_group.sockets(group)
+        now = shared_group.written(group)
+        size = 3 * len(slots.PARTS)
+        before = [now[size * i : size * (i + 1)] for i in range(slots.SLOTS)]
+        if keep:
+            chosen = _arranged(chosen, before)
+        empty = (0.0,) * size
+        wanted = [v for c in chosen for v in c.values] + [*empty] * (slots.SLOTS - len(chosen))
+        for (socket, _), old, new in zip(sockets, now, wanted, strict=True):
+            # Only what changed: shaders are compiled anew otherwise, and handlers called again.
+            if not shared_group.same(old, new):
+                shared_group.write(socket, new)
+    lamps = _listed(survey, chosen)
+    memory.scene, memory.survey = scene.session_uid, survey
+    memory.lamps, memory.limit, memory.on_optix = lamps, limit, _checks().runs_on_optix(scene)
+    return lamps
+
+
+def current_scene():
+    """The scene that the shared group follows: that of the first window."""
+    windows = bpy.context.window_manager.windows if bpy.context.window_manager else ()
+    return windows[0].scene if len(windows) else bpy.context.scene
+
+
+def _depsgraph(scene):
+    """The evaluated scene, brought up to date."""
+    layer = scene.view_layers[0]
+    for window in bpy.context.window_manager.windows if bpy.context.window_manager else ():
+        if window.scene == scene:
+            layer = window.view_layer
+            break
+    # A window's scene is up to date, and may be in use by the viewport while a picture is made.
+    if bpy.app.background or layer.depsgraph is None:
+        layer.update()
+    return layer.depsgraph
+
+
+def ensure_group():
+    """The shared group, made and filled from the window's scene if the file has none."""
+    group = shared_group.find()
+    if group is None:
+        group = shared_group.make()
+        if scene := current_scene():
+            _fill(scene, depsgraph=_depsgraph(scene))
+    return group
+
+
+def quietly(scene, depsgraph=None, **options):
+    """_fill() where handlers that it sets off find nothing to do."""
+    if memory.busy:
+        return []
+    memory.busy = True
+    try:
+        return _fill(scene, depsgraph or _depsgraph(scene), **options)
+    finally:
+        memory.busy = False
+
+
+def see(scene):
+    """Fills the slots of the shared group from a scene, the brightest lamp first, and looks at
+    environment images anew. Returns every lamp of the scene as a slots.Lamp, those with a
+    slot first."""
+    world.forget_images()
+    return quietly(scene, keep=False)
+
+
+def seen(scene):
+    """What the last look at a scene found: for panels, which change nothing."""
+    if memory.scene == scene.session_uid:
+        return memory.lamps
+    survey = scenes.look(scene, scene.view_layers[0].depsgraph)
+    return _listed(survey, _worth_aiming(survey)[: limit_of(scene)])
+
+
+def count():
+    """How many lamps there are to aim at, in the scene of the open file that has most."""
+    surveys = [scenes.look(scene, _depsgraph(scene)) for scene in bpy.data.scenes]
+    return max(len(_worth_aiming(survey)) for survey in surveys)

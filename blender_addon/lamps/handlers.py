@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps the shared group current: what Blender calls when something changes."""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import emission, filling, meshes, shared_group, slots
+
+#: The scene of which a picture is being made.
+_rendering = None
+
+
+def _concerns(update, scene):
+    """Whether an update of the dependency graph may change what belongs into the slots."""
+    item, survey = update.id, filling.memory.survey
+    if isinstance(item, bpy.types.Object):
+        if item.type == "LIGHT":
+            moved = update.is_updated_transform and not update.is_updated_geometry
+            if not moved:
+                return True
+            # Drivers follow it; what they can't follow or what is ranked needs another look.
+            kind = survey.kinds.get(item.original.name_full)
+            return (
+                slots.transform_kind(item.matrix_world) != kind
+                or (kind is not None and kind[1])
+                or item.original.name_full in survey.instancers
+                or len(survey.candidates) > filling.memory.limit
+            )
+        name = item.original.name_full
+        if name in survey.glowing or name in survey.instancers:
+            return True
+        if item.type == "EMPTY":
+            return update.is_updated_geometry and item.instance_type != "NONE"
+        if update.is_updated_geometry and item.type in meshes.TYPES:
+            return any(
+                s.material and survey.emission.get(s.material.name_full, 0.0) > 0
+                for s in item.material_slots
+            )
+        return False
+    if isinstance(item, bpy.types.Material):
+        return emission.of_material(item.original) != survey.emission.get(
+            item.original.name_full, 0.0
+        )
+    if isinstance(item, bpy.types.NodeTree):
+        # Materials come with an update of their own.
+        return scene.world is not None and item.original == scene.world.node_tree
+    return isinstance(
+        item, bpy.types.Light | bpy.types.World | bpy.types.Scene | bpy.types.Collection
+    )
+
+
+def _is_limited_anew(updates, scene):
+    """Whether materials can aim at another number of lamps than before. Counting takes a while:
+    only where the device is another, or a material or setting may be."""
+    kinds = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
+    if not filling.device_changed(scene) and not any(isinstance(u.id, kinds) for u in updates):
+        return False
+    return filling.limit_of(scene) != filling.memory.limit
+
+
+@persistent
+def _after_update(scene, depsgraph):
+    # The picture of another scene must not lose its lamps to the window's.
+    if (
+        filling.memory.busy
+        or _rendering
+        or shared_group.find() is None
+        or scene != filling.current_scene()
+    ):
+        return
+    if filling.memory.scene != scene.session_uid:
+        filling.quietly(scene, depsgraph)
+        return
+    updates = list(depsgraph.updates)
+    limited = _is_limited_anew(updates, scene)
+    if not limited and not any(_concerns(update, scene) for update in updates):
+        return
+    structural = any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
+    # A scene alone tells what was selected; objects come with what else changes.
+    if structural and len(updates) == 1 and not limited:
+        return
+    filling.quietly(scene, depsgraph, subject=None if structural else filling.memory.survey.subject)
+
+
+@persistent
+def _after_frame(scene, depsgraph):
+    if shared_group.find() is not None and scene.session_uid in {
+        _rendering,
+        filling.current_scene().session_uid,
+    }:
+        filling.quietly(scene, depsgraph)
+
+
+@persistent
+def _before_render(scene, *_):
+    global _rendering
+    _rendering = scene.session_uid
+    if shared_group.find() is not None:
+        filling.quietly(scene)
+
+
+@persistent
+def _now(*_):
+    """A file was loaded or is to be saved, an undo or a picture is over."""
+    global _rendering
+    _rendering = filling.memory.scene = None
+    if shared_group.find() is not None and (scene := filling.current_scene()):
+        filling.quietly(scene)
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _after_update,
+    "frame_change_post": _after_frame,
+    "render_init": _before_render,
+    "render_pre": _before_render,
+    "render_complete": _now,
+    "render_cancel": _now,
+    "save_pre": _now,
+    "load_post": _now,
+    "undo_post": _now,
+    "redo_post": _now,
+}
+
+
+def register():
+    """Has Blender call the handlers."""
+    for name, function in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister():
+    """Takes them away again."""
+    for name, function in _HANDLERS.items():
+        if function in (handlers := getattr(bpy.app.handlers, name)):
+            handlers.remove(function)

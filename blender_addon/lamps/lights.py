@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's lights as lamps: those of a scene, and copies that other objects place."""
+
+import math
+
+import bpy
+import numpy as np
+
+from . import emission, slots
+
+#: Lamps that shine on something else than the subject still come before none.
+_ASIDE = 0.01
+
+
+def hidden(item):
+    """Whether no picture shows a light's object."""
+    return item.hide_render and not emission.animated(item)
+
+
+def is_lamp(light):
+    """Whether a light gives light of its own."""
+    return not (light.type == "AREA" and light.cycles.is_portal) and emission.of_light(light) > 0
+
+
+def _values(light, item, matrix):
+    place, turn, scale = slots.placed(item, matrix)
+    if light.type == "SUN":
+        return slots.numbers(slots.SUN, place, turn, scale, (slots.Driven(light, "angle"), 0.0))
+    if light.type in {"POINT", "SPOT"}:
+        return slots.numbers(
+            slots.BALL, place, turn, scale, (slots.Driven(light, "shadow_soft_size"), 0.0)
+        )
+    round_ = light.shape in {"DISK", "ELLIPSE"}
+    other = "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
+    sizes = slots.Driven(light, "size"), slots.Driven(light, other)
+    return slots.numbers(slots.ELLIPSE if round_ else slots.RECTANGLE, place, turn, scale, sizes)
+
+
+def _irradiance(light, matrix):
+    """Irradiance of a lamp at points that face it; see docs/cycles.md for powers."""
+    power = emission.of_light(light)
+    if light.type == "SUN":
+        return lambda points: np.full(len(points), power)
+    place, axis = np.array(matrix.translation), -np.array(matrix.col[2].to_3d().normalized())
+
+    def irradiance(points):
+        to = points - place
+        squared = np.maximum((to**2).sum(-1), 1e-6)
+        along = to @ axis / np.sqrt(squared)
+        if light.type == "AREA":
+            return power / math.pi / squared * np.maximum(along, _ASIDE)
+        inside = 1.0
+        if light.type == "SPOT":
+            inside = np.where(along > math.cos(light.spot_size / 2), 1.0, _ASIDE)
+        return power / (4 * math.pi) / squared * inside
+
+    return irradiance
+
+
+def candidate_of(item, name, light, matrix):
+    """A light that stands where `matrix` says: followed by drivers where `item` is its object, None
+    where it is a copy."""
+    return slots.Candidate(name, _values(light, item, matrix), _irradiance(light, matrix))
+
+
+def places_lamps(item, depth=0):
+    """Whether an object places copies of lamps."""
+
+    def has_lights(collection):
+        return collection is not None and any(
+            o.type == "LIGHT" or (depth < 4 and places_lamps(o, depth + 1))
+            for o in collection.all_objects
+        )
+
+    if item.instance_type == "COLLECTION":
+        return has_lights(item.instance_collection)
+    if item.instance_type in {"VERTS", "FACES"}:
+        return any(child.type == "LIGHT" for child in item.children)
+    for modifier in item.modifiers:
+        if modifier.type == "NODES" and modifier.node_group is not None:
+            for key in modifier.keys():  # noqa: SIM118 (a modifier is no dict)
+                value = modifier[key]
+                if isinstance(value, bpy.types.Collection) and has_lights(value):
+                    return True
+                if isinstance(value, bpy.types.Object) and value.type == "LIGHT":
+                    return True
+    return False
+
+
+def instances(depsgraph):
+    """A candidate for each light that an object places."""
+    for instance in depsgraph.object_instances:
+        item = instance.object
+        if not instance.is_instance or item.type != "LIGHT" or item.hide_render:
+            continue
+        parent = instance.parent
+        if parent is None or parent.original.hide_render or not is_lamp(item.data):
+            continue
+        light, matrix = item.data.original, instance.matrix_world.copy()
+        yield candidate_of(None, f"{parent.name}/{item.name}", light, matrix)

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looks a scene over for lamps, and ranks them by their light where the camera looks."""
+
+import math
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from . import emission, lights, meshes, slots, world
+
+
+@dataclass
+class Survey:
+    """What a scene holds, and what of it a handler must know to tell a change."""
+
+    candidates: list = field(default_factory=list)
+    emission: dict = field(default_factory=dict)  # of materials, by name
+    glowing: set = field(default_factory=set)  # names of objects that emit
+    instancers: set = field(default_factory=set)  # names of objects that place lamps
+    kinds: dict = field(
+        default_factory=dict
+    )  # slots.transform_kind() of the lamps' transforms, by name
+    subject: object = None
+
+
+def _rendered(scene, found=None):
+    """Objects that the scene's pictures show, of its background sets too."""
+    found = {} if found is None else found
+
+    def walk(layer):
+        if layer.collection.hide_render:
+            return
+        if not layer.exclude:
+            for item in layer.collection.objects:
+                found[item] = None
+        for child in layer.children:
+            walk(child)
+
+    for layer in [v for v in scene.view_layers if v.use] or scene.view_layers:
+        walk(layer.layer_collection)
+    if scene.background_set is not None:
+        _rendered(scene.background_set, found)
+    return found
+
+
+def _subject(scene, shown, matrices):
+    """Points by which lamps are ranked: centres of the four meshes that are nearest to the camera
+    and in its view, else of all meshes."""
+    if not shown:
+        return np.zeros((1, 3))
+    boxes = [o.bound_box for o in shown]
+    middles = [(Vector(box[0]) + Vector(box[6])) / 2 for box in boxes]  # opposite corners
+    centres = np.array([matrices(o) @ m for o, m in zip(shown, middles, strict=True)])
+    camera = scene.camera
+    if camera is not None and camera.type == "CAMERA":
+        matrix, data = matrices(camera), camera.data
+        to = centres - np.array(matrix.translation)
+        depth = to @ -np.array(matrix.col[2].to_3d().normalized())
+        aside = np.sqrt(np.maximum((to**2).sum(-1) - depth**2, 0))
+        # A cone around the frame; what is larger than the frame has its centre elsewhere.
+        if data.type == "ORTHO":
+            seen = aside < 0.75 * data.ortho_scale
+        else:
+            seen = aside < 1.5 * math.tan(min(data.angle, 3.0) / 2) * depth
+        seen &= depth > 0
+        if seen.any():
+            order = np.argsort((to**2).sum(-1) + np.where(seen, 0, np.inf))
+            return centres[order[: min(4, seen.sum())]]
+    return centres.mean(0)[None]
+
+
+def look(scene, depsgraph, subject=None):
+    """A Survey of a scene. `subject`: points of an earlier one, which need no looking for."""
+    survey = Survey(subject=subject)
+
+    def matrices(item):
+        return item.evaluated_get(depsgraph).matrix_world if depsgraph else item.matrix_world
+
+    survey.emission = {m.name_full: emission.of_material(m) for m in bpy.data.materials}
+    emitting = {m: e for m in bpy.data.materials if (e := survey.emission[m.name_full]) > 0}
+    shown = []
+    for item in _rendered(scene):
+        kind = item.type
+        if kind == "LIGHT":
+            if not lights.hidden(item) and lights.is_lamp(item.data):
+                matrix = matrices(item).copy()
+                survey.kinds[item.name_full] = slots.transform_kind(matrix)
+                survey.candidates.append(lights.candidate_of(item, item.name, item.data, matrix))
+        elif kind in meshes.TYPES:
+            if item.hide_render:
+                continue
+            glows = emitting and any(s.material in emitting for s in item.material_slots)
+            if glows and (
+                made := meshes.candidate_of(item, emitting, matrices(item).copy(), depsgraph)
+            ):
+                survey.glowing.add(item.name_full)
+                survey.candidates.append(made)
+            elif subject is None:
+                shown.append(item)
+        if (kind == "EMPTY" or kind == "MESH") and lights.places_lamps(item):
+            survey.instancers.add(item.name_full)
+    if survey.instancers and depsgraph:
+        survey.candidates += lights.instances(depsgraph)
+    survey.candidates += world.candidates(scene.world)
+    if survey.subject is None:
+        survey.subject = _subject(scene, shown, matrices)
+    for candidate in survey.candidates:
+        meshes.judge(candidate, survey.subject)
+        candidate.rank = float(np.mean(candidate.irradiance(survey.subject)))
+    survey.candidates.sort(key=lambda c: (-c.rank, c.name))
+    return survey

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The node group that all shaders share: makes and finds it, reads and writes its numbers."""
+
+import math
+
+import bpy
+
+from . import slots
+
+#: Name of the shared group, and the custom property that tells it from another of that name.
+GROUP = "brdfc Lamps"
+TAG = "brdfc_lamps"
+
+
+def make():
+    """An empty shared group."""
+    group = bpy.data.node_groups.new(GROUP, "ShaderNodeTree")
+    group[TAG] = 1
+    group.description = "Where the lamps are: what forms aim at. Kept current by brdfc"
+    end = group.nodes.new("NodeGroupOutput")
+    end.location = (300, 0)
+    for index, name in enumerate(slots.part_names(slots.SLOTS)):
+        group.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketVector")
+        node = group.nodes.new("ShaderNodeCombineXYZ")
+        node.name = node.label = name
+        node.hide = True
+        node.location = (0, -40 * index)
+        group.links.new(node.outputs[0], end.inputs[name])
+    return group
+
+
+def _own():
+    return [g for g in bpy.data.node_groups if g.library is None and TAG in g]
+
+
+def find():
+    """The shared group of the open file, or None."""
+    group = bpy.data.node_groups.get((GROUP, None))
+    if group is not None and TAG in group:
+        return group
+    return next(iter(_own()), None)
+
+
+def remove_unused():
+    """Takes the shared group out of the file when no shader has it."""
+    for group in _own():
+        if group.users == 0:
+            bpy.data.node_groups.remove(group)
+
+
+def the_one():
+    """The shared group; copies, which come with appended materials, give way to it."""
+    group = find()
+    for other in _own():
+        if other != group:
+            other.user_remap(group)
+            bpy.data.node_groups.remove(other)
+    return group
+
+
+def sockets(group):
+    """[(socket, data path)] of the numbers of all slots, twelve a slot."""
+    found = []
+    for name in slots.part_names(slots.SLOTS):
+        for index, socket in enumerate(group.nodes[name].inputs):
+            found.append((socket, f'nodes["{name}"].inputs[{index}].default_value'))
+    return found
+
+
+def written(group):
+    """What the group's numbers are now: floats and slots.Driven; None for a driver of
+    someone else."""
+    drivers = {}
+    if group.animation_data is not None:
+        drivers = {curve.data_path: curve for curve in group.animation_data.drivers}
+    values = []
+    for socket, path in sockets(group):
+        curve = drivers.get(path)
+        values.append(socket.default_value if curve is None else _read(curve))
+    return values
+
+
+def _read(curve):
+    driver = curve.driver
+    if len(driver.variables) != 1 or not curve.is_valid:
+        return None
+    variable = driver.variables[0]
+    target = variable.targets[0]
+    if target.id is None:
+        return None
+    channel = variable.type == "TRANSFORMS"
+    path = target.transform_type if channel else target.data_path
+    factor = curve.modifiers[0].coefficients[1] if curve.modifiers else 1.0
+    return slots.Driven(target.id, path, factor)
+
+
+def write(socket, value):
+    """Gives a socket a float, or the driver of a slots.Driven."""
+    socket.driver_remove("default_value")
+    if not isinstance(value, slots.Driven):
+        socket.default_value = value
+        return
+    curve = socket.driver_add("default_value")
+    curve.driver.type = "AVERAGE"
+    variable = curve.driver.variables.new()
+    if value.is_channel:
+        variable.type = "TRANSFORMS"
+        target = variable.targets[0]
+        target.id = value.of
+        target.transform_type = value.path
+        target.transform_space = "WORLD_SPACE"
+        target.rotation_mode = "QUATERNION"
+    else:
+        target = variable.targets[0]
+        target.id_type = value.of.id_type
+        target.id = value.of
+        target.data_path = value.path
+    if value.factor != 1.0:
+        # 4.5 gives a driver's curve this modifier, later versions two keys on the diagonal.
+        modifier = curve.modifiers[0] if curve.modifiers else curve.modifiers.new("GENERATOR")
+        modifier.coefficients = (0.0, value.factor)
+
+
+def same(a, b):
+    """Whether two numbers are one to a socket; see written()."""
+    if isinstance(a, slots.Driven) or isinstance(b, slots.Driven):
+        return (
+            isinstance(a, slots.Driven)
+            and isinstance(b, slots.Driven)
+            and (a.of, a.path) == (b.of, b.path)
+            and math.isclose(a.factor, b.factor, rel_tol=1e-5)
+        )
+    # Sockets hold single precision.
+    return a is not None and b is not None and math.isclose(a, b, rel_tol=1e-5, abs_tol=1e-6)
+
+
+def all_same(a, b):
+    """The same of two sequences of equal length."""
+    return all(map(same, a, b))

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a slot of the shared group holds of a lamp: twelve numbers, some of them driven."""
+
+from dataclasses import dataclass
+
+import bpy
+from mathutils import Matrix, Vector
+
+#: How many lamps the shared group holds.
+SLOTS = 8
+#: Vectors of a slot, each followed by the slot's number from 1.
+PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
+#: What a slot may hold, in the numbers of the shaders (osl/brdfc.osl.in, brdfc_lamp).
+EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
+
+
+def part_names(count):
+    """Names of the outputs of the first slots, which are those of the shaders' inputs."""
+    return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
+
+
+def too_many(slots):
+    """Why a lamp is left out that others outshine."""
+    return f"fainter than the {slots} that a material can aim at" if slots else "no room for it"
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A lamp of a scene: its slot from 1, or None and why; its irradiance at the subject, which is
+    an estimate to rank lamps by."""
+
+    name: str
+    slot: int | None
+    irradiance: float
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A number that Blender keeps current: a channel of an object's transform in the world, or
+    a property of a data-block; times a factor."""
+
+    of: bpy.types.ID
+    path: str
+    factor: float = 1.0
+
+    @property
+    def is_channel(self):
+        return self.path.startswith(("LOC_", "ROT_", "SCALE_"))
+
+
+@dataclass
+class Candidate:
+    """A lamp, the twelve numbers of its slot, and irradiance(points), (n, 3) to (n,)."""
+
+    name: str
+    values: tuple
+    irradiance: object
+    why: str = ""
+    rank: float = 0.0
+    #: Of a mesh: the ball around it; see meshes.judge().
+    ball: object = None
+
+
+def numbers(kind, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):
+    """The twelve numbers of a slot, in the order of PARTS."""
+    return (*place, *turn, *scale, float(kind), *sizes)
+
+
+def turned(direction):
+    """Turn and last component of scale of a lamp that lies in a direction."""
+    turn = Vector(direction).to_track_quat("Z", "Y")
+    return (turn.x, turn.y, turn.z), turn.w
+
+
+def is_sheared(matrix):
+    """Whether the axes of a transform are not perpendicular."""
+    axes = [Vector(c).normalized() for c in matrix.to_3x3().transposed()]
+    return max(abs(axes[i].dot(axes[j])) for i, j in ((0, 1), (1, 2), (2, 0))) > 1e-3
+
+
+def transform_kind(matrix):
+    """What of a transform the drivers are chosen by: whether it mirrors, and is oblique."""
+    return matrix.is_negative, is_sheared(matrix)
+
+
+def _upright(matrix):
+    """A rotation with the lamp's own -z, and its x and y but for signs, which lamps have none of.
+    Of an oblique transform the direction is kept."""
+    x, _, z = (Vector(c) for c in matrix.to_3x3().transposed())
+    z = z.normalized()
+    x = (x - z * x.dot(z)).normalized()
+    return Matrix((x, z.cross(x), z)).transposed().to_quaternion()
+
+
+def placed(item, matrix):
+    """Place, turn, and scale of a lamp: driven where `item` is an object, else of the matrix."""
+    if item is None or is_sheared(matrix):
+        turn = _upright(matrix)
+        scale = matrix.to_scale()
+        return (
+            tuple(matrix.translation),
+            (turn.x, turn.y, turn.z),
+            (abs(scale.x), abs(scale.y), turn.w),
+        )
+
+    def channels(*names):
+        return tuple(Driven(item, name) for name in names)
+
+    place = channels("LOC_X", "LOC_Y", "LOC_Z")
+    turn = channels("ROT_X", "ROT_Y", "ROT_Z")
+    scale = channels("SCALE_X", "SCALE_Y", "ROT_W")
+    if matrix.is_negative:
+        # Blender's quaternion q of a mirrored transform is that of all axes turned round, so that
+        # -z would be +z. Half a turn about x, q i, sets that right; signs of x and y don't matter.
+        turn = (Driven(item, "ROT_W"), Driven(item, "ROT_Z"), Driven(item, "ROT_Y", -1.0))
+        scale = (*scale[:2], Driven(item, "ROT_X", -1.0))
+    return place, turn, scale

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the extension does where closures have a pool of limited size: OptiX, which is pretended.
+Sums are by hand, of what tests/pack_test.cpp counts; 1016 bytes is what the pool holds."""
+
+import bpy
+import helpers
+import pytest
+
+
+@pytest.fixture
+def optix(extension, empty, monkeypatch):
+    """The empty scene on an OptiX device with Open Shading Language on."""
+    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "OPTIX")
+    extension.api.enable_osl(empty)
+    empty.cycles.device = "GPU"
+    empty.cycles.sample_clamp_indirect = empty.cycles.blur_glossy = 0
+    return empty
+
+
+def put(scene, material):
+    """A ball of a material."""
+    return helpers.add_sphere(scene, material, segments=8)
+
+
+def add_lamps(scene, count):
+    """Lamps, the brightest first."""
+    for i in range(count):
+        item = bpy.data.objects.new(f"Lamp{i}", bpy.data.lights.new(f"Lamp{i}", "POINT"))
+        item.location, item.data.energy = (i, 0, 5), 100 / (i + 1)
+        scene.collection.objects.link(item)
+
+
+def filled():
+    """How many slots hold a lamp after what Blender calls by itself."""
+    for _ in range(2):
+        bpy.context.view_layer.update()
+    nodes = bpy.data.node_groups["brdfc Lamps"].nodes
+    return sum(nodes[f"LampShape{i}"].inputs[0].default_value > 0 for i in range(1, 9))
+
+
+def panel(extension, material, scene):
+    layout = helpers.Layout()
+    extension.ui.draw_material(layout, material, scene)
+    return " ".join(layout.log)
+
+
+def codes(extension, material, scene):
+    return {w.code: w for w in extension.api.warnings(material, scene)}
+
+
+def test_forms_state_what_they_take(extension):
+    pack = extension.pack
+    assert extension.pack.manifest()["closure_pool"] == {"bytes": 1016, "mix": 72, "add": 24}
+    assert pack.representation("ward", "aimed")["closure_bytes"] == 72 + 136 + 24
+    assert pack.representation("ward", "aimed")["lamp_bytes"] == 136 + 24
+    for model in pack.model_names():
+        for form in pack.model(model)["representations"].values():
+            assert form["closure_bytes"] >= 40
+            assert bool(form["lamp_bytes"]) == bool(form["lamps"])
+
+
+def test_optix_is_an_error_until_a_run_is_on_record(extension, optix, monkeypatch):
+    material = extension.api.new_material("lambert")
+    assert codes(extension, material, optix)["optix_untested"].severity == "ERROR"
+    monkeypatch.setattr(extension.checks, "OPTIX_RUN", "some device")
+    assert codes(extension, material, optix) == {}
+
+
+@pytest.mark.parametrize(("setting", "value"), [("device", "CPU"), ("shading_system", False)])
+def test_elsewhere_nothing_is_limited(extension, optix, setting, value):
+    setattr(optix.cycles, setting, value)
+    material = extension.api.new_material("ward")
+    put(optix, material)
+    add_lamps(optix, 9)
+    assert filled() == 8
+    assert "OptiX" not in panel(extension, material, optix)
+
+
+def test_lamps_are_as_many_as_the_largest_material_has_room_for(extension, optix):
+    phong = put(optix, extension.api.new_material("phong"))  # (1016 - 136) / 160
+    add_lamps(optix, 7)
+    assert filled() == 5
+    found = extension.api.see_lamps(optix)
+    assert [lamp.slot for lamp in found] == [1, 2, 3, 4, 5, None, None]
+    assert found[5].why == "fainter than the 5 that a material can aim at"
+    text = panel(extension, phong.active_material, optix)
+    assert "OptiX: 5 lamps at most" in text and "Mix Shader" in text
+    # By themselves: another material, which needs more; its end; another device.
+    ward = put(optix, extension.api.new_material("ward"))  # (1016 - 232) / 160
+    assert filled() == 4
+    bpy.data.materials.remove(ward.active_material)
+    put(optix, phong.active_material)
+    assert filled() == 5
+    # A script's change of a setting of Cycles tells nobody; the next change of anything does.
+    for device, count in (("CPU", 7), ("GPU", 5)):
+        optix.cycles.device = device
+        phong.location.x += 1
+        assert filled() == count
+    optix.cycles.device = "CPU"
+    assert sum(lamp.slot is not None for lamp in extension.api.see_lamps(optix)) == 7
+
+
+def mixed(extension, scene):
+    """Ward's and Phong's model in one material, by a Mix Shader."""
+    material = extension.api.new_material("ward")
+    tree = material.node_tree
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    ward = extension.nodes.group_nodes(material)[0]
+    phong = extension.nodes.add_group_node(tree, "phong")
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(ward.outputs["BSDF"], mix.inputs[1])
+    tree.links.new(phong.outputs["BSDF"], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    put(scene, material)
+    return material, mix
+
+
+def test_models_that_are_mixed_share_the_pool(extension, optix):
+    material, mix = mixed(extension, optix)
+    add_lamps(optix, 4)
+    assert filled() == 1  # (1016 - 232 - 136 - 72) / (2 * 160)
+    assert not {"closure_pool", "closure_pool_shared"} & codes(extension, material, optix).keys()
+    # What is not linked does not run; what Blender's own nodes take is not known.
+    tree = material.node_tree
+    tree.links.remove(mix.inputs[2].links[0])
+    assert filled() == 4  # (1016 - 232 - 72) / 160
+    glossy = tree.nodes.new("ShaderNodeBsdfGlossy")
+    tree.links.new(glossy.outputs[0], mix.inputs[2])
+    warning = codes(extension, material, optix)["closure_pool_shared"]
+    assert warning.severity == "WARNING" and "take 304, and 160 a lamp" in warning.message
+
+
+def test_a_form_that_does_not_fit_is_refused(extension, optix):
+    api = extension.api
+    material = api.new_material("phong")
+    text = panel(extension, material, optix)
+    assert "Fitted takes 1256 bytes of closures, and OptiX has room for 1016" in text
+    assert "operator brdfc.switch Fitted" not in text and "brdfc.switch Sampled" in text
+    # A material may have it already.
+    api.switch_representation(material, "fitted")
+    finding = codes(extension, material, optix)["closure_pool"]
+    assert finding.severity == "ERROR" and "1256 bytes" in finding.message
+    optix.cycles.device = "CPU"
+    assert "closure_pool" not in codes(extension, material, optix)
+    assert "operator brdfc.switch Fitted" in panel(extension, material, optix)
