@@ -162,7 +162,7 @@ TEST_F(ReportTest, WritesPageJsonAndCsv) {
 }
 
 TEST_F(ReportTest, NamesInTheChartLieBesideEachOther) {
-  for (const char* form : {"sampled", "planned", "exact", "twin"}) {
+  for (const char* form : {"sampled", "planned", "aimed", "twin"}) {
     runs_["runs"].push_back(runs_["runs"][1]);
     runs_["runs"].back()["form"] = form;
   }

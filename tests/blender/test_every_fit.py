@@ -3,8 +3,8 @@
 suns, in a white world and in worlds that vary with the direction.
 
 What is fitted, and a twin, must be the sum of closures that `brdfc fit` judges, an aimed form whose
-base is a fit the model. With BRDFC_EVERY_FIT=all every model is measured, as script/conditions does; else some,
-for their fits take minutes.
+base is a fit the model. With BRDFC_EVERY_FIT=all every model is measured, as script/conditions
+does; else some, for their fits take minutes.
 """
 
 import json
