@@ -85,14 +85,15 @@ struct Scene {
   }
 };
 
-/// Lamps by the mirror direction and off it, large, small, and covering one another's lobes.
+/// Lamps by the mirror direction and off it, large, small, and covering one another's lobes, but not nearer each other
+/// than their seams (beside()).
 Scene scene_for(const Vec3<double>& wo) {
   const Vec3<double> mirror = reflect(wo), beside = normalize(mirror + Vec3<double>{0.05, 0.12, 0.1});
   Scene scene;
   scene.patches = {disk(normalize(Vec3<double>{0.4, -0.6, 0.8}) * 3.0, 0.6),
                    disk(beside * 5.0, 0.1),
                    {Vec3<double>{-0.5, 1.2, 1.4}, {0.5, 0, 0}, {0, 0.3, -0.25}, 0},
-                   disk(normalize(beside + Vec3<double>{0.03, 0, 0}), 0.005),
+                   disk(normalize(beside + Vec3<double>{0.06, 0, 0}), 0.005),
                    disk(normalize(Vec3<double>{-0.6, 0.2, 0.5}) * 2.0, 0.3, 0.4)};
   scene.light = {3, 400, 5, 1e5, 10};
   return scene;
@@ -122,10 +123,15 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
     Random random(7);
     std::vector<AimedLobe<double>> lobes;
     std::vector<double> of_lobe;
+    std::vector<std::array<double, 2>> v(scene.patches.size());
     double sum = 0, squares = 0;
     for (int i = 0; i < kDraws; ++i) {
-      const Vec3<double> u = uniform_cube(random), v = uniform_cube(random);
-      const AimedSum s = aimed_sum(*brdf, base, scene.patches, wo, u, v.x, v.y);
+      const Vec3<double> u = uniform_cube(random);
+      for (auto& pair : v) {
+        const Vec3<double> number = uniform_cube(random);
+        pair = {number.x, number.y};
+      }
+      const AimedSum s = aimed_sum(*brdf, base, scene.patches, wo, u, v);
       if (lobes.empty()) {  // they do not depend on what was drawn
         lobes = s.lobes;
         for (const AimedLobe<double>& lobe : lobes) {
@@ -137,8 +143,8 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
       for (std::size_t k = 0; k < s.lobes.size(); ++k) given += s.values[k].g * of_lobe[k];
       // The base under the sky, by the same density, so that its noise is small: drawn directions see f cos - base.
       if (!base.empty()) {
-        const double p = excess(*brdf, true, Rgb<double>(0.0), s.wi, wo).density;
-        if (p > 0 && s.wi.z > 0) given += evaluate(base, s.wi, wo).g / p * sky(s.wi);
+        const double p = excess(*brdf, true, Rgb<double>(0.0), s.drawn, wo).density;
+        if (p > 0 && s.drawn.z > 0) given += evaluate(base, s.drawn, wo).g / p * sky(s.drawn);
       }
       sum += given / kDraws;
       squares += given * given / kDraws;

@@ -121,7 +121,7 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       // Aimed forms hold what is done with lamps, a base and the model's value beside its sampling; lossless' value is
       // a long sum.
       const bool aimed = kind == RepresentationKind::Aimed;
-      EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2000 : 1100) << s.name;
+      EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2200 : 1200) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
 }
@@ -227,7 +227,7 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
       // What two aimed forms hold for each of their many choices is more than it should be.
       const bool longer =
           kind == RepresentationKind::Aimed && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
-      EXPECT_LE(text.size(), longer ? 180000u : 100000u) << name << " " << name_of(kind);
+      EXPECT_LE(text.size(), longer ? 190000u : 100000u) << name << " " << name_of(kind);
     }
 }
 

@@ -318,12 +318,9 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   throw std::logic_error("no OSL for this closure");
 }
 
-/// Statements that draw numbers in [0, 1) and name them.
-std::string random(const char* all, int index, const std::vector<const char*>& parts) {
-  std::string out = fmt::format("    vector {} = brdfc_random({});\n", all, index);
-  for (std::size_t i = 0; i < parts.size(); ++i) out += fmt::format("    float {} = {}[{}];\n", parts[i], all, i);
-  return out;
-}
+/// Three numbers in [0, 1) that draw a direction.
+constexpr const char* kDraws =
+    "    vector u_all = brdfc_random(0);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";
 
 /// Lamps and rest of an aimed form: one evaluation of the model, in a loop over the lamps and the drawn direction.
 class AimedText {
@@ -348,8 +345,8 @@ class AimedText {
 
   std::string print() const {
     const AimedSteps& steps = aimed_steps(0);
-    std::string out = random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float drawn_x, drawn_y, drawn_z;\n" +
-                      block(draw_.print(0), 1) + "    color rest_colour;\n    float rest_weight;\n";
+    std::string out = std::string(kDraws) + "    float drawn_x, drawn_y, drawn_z;\n" + block(draw_.print(0), 1) +
+                      "    color rest_colour;\n    float rest_weight;\n";
     if (lamps_ == 0)
       return out + "    color excess;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
              block(value_.print(0), 1) + block(steps.alone.statements, 1);
@@ -358,12 +355,11 @@ class AimedText {
         "    color lobe_value[{0}], lobe_colour[{0}];\n"
         "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}];\n"
         "    vector lobe_towards[{0}], lobe_half[{0}];\n"
-        "    color covered = 0.0, covered_before = 0.0;\n    float lamp_met = 0.0, lamp_grazed = 0.0;\n    int lamps = "
-        "0;\n"
+        "    color covered = 0.0, covered_before = 0.0;\n"
+        "    float lamp_met = 0.0, ray_x = drawn_x, ray_y = drawn_y, ray_z = drawn_z;\n    int lamps = 0;\n"
         "    for (int lamp = 0; lamp < {0}; lamp++)\n"
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);
-    out += random("v_all", 1, {"v_1", "v_2"});
     out +=
         "    // The lamps, and at last the direction that was drawn.\n"
         "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
@@ -376,6 +372,9 @@ class AimedText {
         "lamp_centre, lamp_across,\n"
         "                           lamp_along, lamp_disk) == 0)\n"
         "                continue;\n"
+        "            // Numbers of its own: what a lobe gives at another's lamp must not go with where that is met.\n"
+        "            vector v_all = brdfc_random(1 + lamp);\n"
+        "            float v_1 = v_all[0], v_2 = v_all[1];\n"
         "            lamp_centre = brdfc_local(lamp_centre, frame_t, frame_b, frame_n);\n"
         "            lamp_across = brdfc_local(lamp_across, frame_t, frame_b, frame_n);\n"
         "            lamp_along = brdfc_local(lamp_along, frame_t, frame_b, frame_n);\n";
@@ -397,6 +396,9 @@ class AimedText {
                          steps.less.statements) +
            indented(steps.send.statements, 3) + "        } else {\n" + indented(steps.rest.statements, 3) +
            "        }\n    }\n";
+    out +=
+        "    if (lamp_met > 0.0) {\n"
+        "        ray_x = drawn_x;\n        ray_y = drawn_y;\n        ray_z = drawn_z;\n    }\n";
     // Each joins the sum from the left: Cycles walks it without a stack. The weight is a colour: see kPoolNode.
     std::string ramp;
     for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
@@ -504,8 +506,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   std::vector<std::string> terms;
   if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + block(mirror.print(0), 1);
   if (sampled) {
-    body += random("u_all", 0, {"u_0", "u_1", "u_2"}) + "    float wi_x, wi_y, wi_z;\n    color weight;\n" +
-            statements.print(4) + "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n";
+    body += std::string(kDraws) + "    float wi_x, wi_y, wi_z;\n    color weight;\n" + statements.print(4) +
+            "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n";
     terms.push_back(model.has_through() ? "brdfc_ray_anywhere(weight, wi, I, frame_n)" : "weight * brdfc_ray(wi, I)");
     shader.slots = slots(ClosureKind::PhongRamp);
     shader.closure_bytes = ray_bytes;
@@ -559,7 +561,9 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
       if (!model.has_through()) body += "    color rest_followed = rest_weight;\n";
       const char* ray = model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, {}, I, frame_n)"
                                             : "rest_followed * brdfc_ray_coloured({}, I, rest_colour)";
-      terms.push_back(fmt::format(fmt::runtime(ray), "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
+      terms.push_back(
+          fmt::format(fmt::runtime(ray), max_lamps > 0 ? "frame_t * ray_x + frame_b * ray_y + frame_n * ray_z"
+                                                       : "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
     }
     for (std::size_t c = 0; c < kinds.size(); ++c) {
       if (kinds[c].stretched == Tangent::Surface)

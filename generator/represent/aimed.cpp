@@ -5,20 +5,21 @@ namespace brdfc {
 
 AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
                    const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
-                   double v1, double v2) {
+                   const std::vector<std::array<double, 2>>& v) {
   const auto excess_at = [&](const Vec3<double>& wi) {
     return excess(brdf, !base.empty(), evaluate(base, wi, wo), wi, wo);
   };
   AimedSum out;
-  out.wi = draw(brdf, !base.empty(), wo, u);
+  out.drawn = out.wi = draw(brdf, !base.empty(), wo, u);
   Rgb<double> covered(0.0), before(0.0);
-  double met = 0, grazed = 0;
-  for (const LampPatch<double>& patch : patches) {
+  double met = 0;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    const LampPatch<double>& patch = patches[i];
     double room = 1;
     for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patch.centre, earlier));
-    const AimedLamp<double> lamp = aim_at(patch, room, v1, v2, out.wi, wo);
+    const AimedLamp<double> lamp = aim_at(patch, room, v[i][0], v[i][1], out.drawn, wo);
     if (lamp.emphasis == 0) continue;
-    grazed = std::max(grazed, lamp.grazed);
+    out.wi = beside(patch, out.wi);
     if (lamp.met > 0) {
       met = lamp.solid_angle;
       before = covered;
@@ -31,8 +32,9 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
     out.values.push_back(sent.value);
     covered += sent.covered;
   }
-  const Excess<double> drawn = excess_at(out.wi);
-  const Rest<double> left = rest(drawn.value, drawn.density, covered, met, before, grazed);
+  const Excess<double> drawn = excess_at(out.drawn);
+  if (met > 0) out.wi = out.drawn;
+  const Rest<double> left = rest(drawn.value, drawn.density, covered, met, before);
   out.rest = left.colour * left.weight;
   return out;
 }

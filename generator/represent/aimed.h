@@ -7,7 +7,7 @@
 //   rest   a direction that the shader draws, as a lobe as narrow as those of a sampled form, which carries what the
 //          other two leave of f cos, over the density of drawing it
 //
-// Where a drawn direction meets a lamp, lamp and rest share f cos - base by the power heuristic (E. Veach, L. Guibas:
+// Where a drawn direction meets a lamp, lamp and rest share f cos - base by a power heuristic (E. Veach, L. Guibas:
 // Optimally Combining Sampling Techniques for Monte Carlo Rendering, 1995): a lobe wins for lamps that are small beside
 // the model's lobe, the drawn direction for those that are large. Elsewhere the rest takes off what lobes give beside
 // their lamps. The one approximation: over a lamp f and the lamp's visibility are averaged apart.
@@ -61,13 +61,13 @@ template <class T> struct AimedLobe {
 template <class T> struct AimedLamp {
   AimedLobe<T> lobe;
   Vec3<T> wi;     ///< to a point of the lamp, unit
-  T emphasis;     ///< what the point stands for, over the mean of all points; 0 where the lamp is left to the rest
+  T emphasis;     ///< what the point stands for over the mean of all points, and over the lobe's height there, which is
+                  ///< 1 to some percent; 0 where the lamp is left to the rest
   T solid_angle;  ///< of the lamp
   T height;       ///< of the closure's colours over aimed_ramp() where f cos is 1
   T extent;       ///< solid angle under the lobe, roughly
   T covers;       ///< the lobe's f cos in the drawn direction
   T met;          ///< 1 where the drawn direction meets the lamp, else 0
-  T grazed;       ///< 1 where the lobe that carries the drawn direction touches a lamp of next to no size, else 0
 };
 
 /// cos^e -> f cos of an aimed lobe over its height and (half.wi): ramp times cos^e.
@@ -112,6 +112,32 @@ template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, 
   return lobe;
 }
 
+/// The direction `ray`, moved out of the seam about a lamp if it lies there. The rest is drawn as a lobe 1e-3 wide,
+/// which in the seam still touches the lamp: light sampling finds that rarely, and where it does, what little is left
+/// beside the lamp would be as bright as the lamp, or as dark. Beside the seam it meets next to the same light without.
+template <class T> Vec3<T> beside(const LampPatch<T>& patch, const Vec3<T>& ray) {
+  constexpr double kReach = 5e-3;
+  const auto disk = patch.disk > T(0.5);
+  const Vec3<T> normal = cross(patch.across, patch.along);
+  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
+  const T facing = dot(normal, ray);
+  const T distance = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const Vec3<T> offset = ray * distance - patch.centre;
+  const T x = dot(offset, patch.across) / a2, y = dot(offset, patch.along) / b2;
+  // The seam's width in the plane of the lamp, in units of its axes.
+  const T width = T(kReach) * distance * length(normal) / maximum(abs(facing), tiny<T>());
+  const T seam_x = T(1) + width / sqrt(a2), seam_y = T(1) + width / sqrt(b2);
+  const T r = sqrt(x * x + y * y), seam = maximum(seam_x, seam_y);
+  const auto past_x = abs(x) > T(1);
+  const auto touches = distance > T(0) && select(disk, r, maximum(abs(x), abs(y))) > T(1) &&
+                       select(disk, r / seam, maximum(abs(x) / seam_x, abs(y) / seam_y)) < T(1);
+  const T round = seam / maximum(r, tiny<T>());
+  const T out_x = select(past_x, select(x > T(0), seam_x, -seam_x), x),
+          out_y = select(past_x, y, select(y > T(0), seam_y, -seam_y));
+  const Vec3<T> moved = normalize(patch.at(select(disk, x * round, out_x), select(disk, y * round, out_y)));
+  return select(touches && moved.z * ray.z > T(0), moved, ray);
+}
+
 /// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that
 /// the rest carries.
 template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2,
@@ -149,7 +175,7 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
                  T(4);
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
   const auto usable = radius2 < T(kNearest * kNearest) * distance2 && rise > T(kLeastHalf);
-  lamp.emphasis = select(usable, density(point) / maximum(mean, tiny<T>()), T(0));
+  lamp.emphasis = select(usable, density(point) / maximum(mean * evaluate(lamp.lobe, lamp.wi), tiny<T>()), T(0));
 
   lamp.covers = evaluate(lamp.lobe, drawn);
   const T facing = dot(normal, drawn);
@@ -158,17 +184,25 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
   const T x2 = sqr(dot(offset, patch.across) / a2), y2 = sqr(dot(offset, patch.along) / b2);
   const auto inside = reach > T(0) && select(disk, x2 + y2, maximum(x2, y2)) < T(1);
   lamp.met = select(usable && inside, T(1), T(0));
-  // The lobes of drawn directions are 1e-3 wide.
-  constexpr double kReach = 5e-3;
-  const auto touched = lamp.lobe.sinRadius < T(kReach) && length(drawn - towards) < lamp.lobe.sinRadius + T(kReach);
-  lamp.grazed = select(usable && touched, T(1), T(0));
   return lamp;
 }
+
+/// What the drawn direction carries of a lamp of this solid angle, which it meets with this density: the power
+/// heuristic, to the fourth so that it has next to nothing where the lamp is the smaller one: light sampling finds
+/// that, too, and rarely.
+template <class T> T share_of_drawn(const T& solid_angle, const T& density) {
+  constexpr double kAll = 1e3;  // beyond it the share is 1 in single precision
+  const T power = sqr(sqr(minimum(solid_angle * density, T(kAll))));
+  return power / (T(1) + power);
+}
+
+/// The largest magnitude of a channel.
+template <class T> T largest(const Rgb<T>& c) { return maximum(max_component(c), max_component(c * T(-1))); }
 
 /// What a lamp's lobe carries and the rest has to take off.
 template <class T> struct Sent {
   Rgb<T> value;    ///< f cos over the lamp
-  Rgb<T> covered;  ///< less than that where the drawn direction meets the lamp, f cos of the lobe elsewhere
+  Rgb<T> covered;  ///< f cos of the lobe in the drawn direction, unless that meets the lamp
   T weight;        ///< of the closure: what Cycles follows it by
   Rgb<T> colour;   ///< aimed_ramp() times this are the closure's colours
 };
@@ -179,9 +213,11 @@ template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, c
   // Cycles drops closures of small weight.
   constexpr double kLeastWeight = 1e-3;
   Sent<T> out;
-  out.value = value * (lamp.emphasis / (T(1) + sqr(lamp.solid_angle * density)));
-  out.covered = out.value * (lamp.covers - lamp.met);
-  const T size = maximum(max_component(out.value), max_component(out.value * T(-1)));
+  out.value = value * (lamp.emphasis * (T(1) - share_of_drawn(lamp.solid_angle, density)));
+  // On the lamp the lobe is not quite level. Its height is in the emphasis: were it in the rest, light sampling would
+  // find it there, as rarely and as bright as in a seam (beside()).
+  out.covered = out.value * (lamp.covers * (T(1) - lamp.met));
+  const T size = largest(out.value);
   out.weight = select(size > T(0), minimum(maximum(size * lamp.extent, T(kLeastWeight)), T(1)), T(0));
   out.colour = out.value * (lamp.height / maximum(out.weight, T(kLeastWeight)));
   return out;
@@ -194,23 +230,17 @@ template <class T> struct Rest {
 };
 
 /// `value`: f cos - base in the drawn direction, `density` that of drawing it, `covered` the sum over the lamps. `met`:
-/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one. `grazed`:
-/// see AimedLamp; there light sampling finds the drawn direction's own lobe, once in 1e5 samples and 1e5 times as
-/// bright, and of what is left, which is next to nothing, would make a dot. Nothing is left there then: of the light,
-/// 1e-4 sr of what is no lamp, by no more than that part.
-template <class T> Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met,
-                                const Rgb<T>& before, const T& grazed) {
-  constexpr double kNothing = 0.02;
-  const auto size = [](const Rgb<T>& c) { return maximum(max_component(c), max_component(c * T(-1))); };
+/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one.
+template <class T>
+Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met, const Rgb<T>& before) {
   const auto drawn = density > T(0);
   const T p = select(drawn, density, T(1));
   const Rgb<T> left = value - before;
-  const Rgb<T> shared = select(met > T(0), left * (met * (met * p) / (T(1) + sqr(met * p))), Rgb<T>(T(0)));
+  const Rgb<T> shared = left * (share_of_drawn(met, p) / p);
   const Rgb<T> lacking = select(met > T(0), Rgb<T>(T(0)), left) - (covered - before);
-  const auto nothing = grazed > T(0) && size(lacking) < T(kNothing) * size(value);
-  const Rgb<T> all = select(drawn, shared + select(nothing, Rgb<T>(T(0)), lacking / p), Rgb<T>(T(0)));
+  const Rgb<T> all = select(drawn, shared + lacking / p, Rgb<T>(T(0)));
   Rest<T> out;
-  out.weight = size(all);
+  out.weight = largest(all);
   out.colour = all / maximum(out.weight, tiny<T>());
   return out;
 }
@@ -247,13 +277,14 @@ Excess<T> excess(const Brdf<T>& brdf, bool with_base, const Rgb<T>& base, const 
 struct AimedSum {
   std::vector<AimedLobe<double>> lobes;
   std::vector<Rgb<double>> values;  ///< of the lobes: f cos is value times evaluate(lobe, wi)
-  Vec3<double> wi;                  ///< the drawn direction
+  Vec3<double> drawn;               ///< the drawn direction
+  Vec3<double> wi;                  ///< the same, beside lamps' seams: where the rest goes
   Rgb<double> rest;                 ///< its weight
 };
 
-/// As the shader goes about it (pack/shader.cpp), with the base for wo. u: three numbers that draw the direction, v1,
-/// v2: that choose points of the lamps.
+/// As the shader goes about it (pack/shader.cpp), with the base for wo. u: three numbers that draw the direction; v:
+/// two a lamp that choose a point of it, independent of one another.
 AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
-                   const Vec3<double>& wo, const Vec3<double>& u, double v1, double v2);
+                   const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 2>>& v);
 
 }  // namespace brdfc

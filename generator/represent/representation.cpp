@@ -408,7 +408,7 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lamp_solid_angle", lamp.solid_angle);
     p.output("lamp_covers", lamp.covers);
     p.output("lamp_met_here", lamp.met);
-    p.output("lamp_grazed", maximum(Expr::input("lamp_grazed"), lamp.grazed));
+    output3(p, "ray", select(lamp.emphasis > Expr(0), beside(patch, input3("ray")), input3("ray")));
   });
   const Rgb<Expr> value = Rgb<Expr>::input("excess");
   const Expr density = Expr::input("drawn_density");
@@ -429,16 +429,15 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lobe_weight[lamp]", sent.weight);
     p.output("lobe_colour[lamp]", sent.colour);
   });
-  const auto record_rest = [&](const Rgb<Expr>& covered, const Expr& met, const Rgb<Expr>& before, const Expr& grazed) {
+  const auto record_rest = [&](const Rgb<Expr>& covered, const Expr& met, const Rgb<Expr>& before) {
     return record_step([&](Program& p) {
-      const Rest<Expr> left = rest(value, density, covered, met, before, grazed);
+      const Rest<Expr> left = rest(value, density, covered, met, before);
       p.output("rest_weight", left.weight);
       p.output("rest_colour", left.colour);
     });
   };
-  steps.rest = record_rest(Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"),
-                           Expr::input("lamp_grazed"));
-  steps.alone = record_rest(Rgb<Expr>(Expr(0)), Expr(0), Rgb<Expr>(Expr(0)), Expr(0));
+  steps.rest = record_rest(Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"));
+  steps.alone = record_rest(Rgb<Expr>(Expr(0)), Expr(0), Rgb<Expr>(Expr(0)));
   return made.emplace(indent, std::move(steps)).first->second;
 }
 
