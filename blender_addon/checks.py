@@ -266,7 +266,7 @@ def _leaning_facets(material, scene):
         return (
             "WARNING",
             "Cycles in Blender 4.5 lets facets that lean reflect too much: seen from the side a "
-            "twin is up to 8 % too bright; 5.0 is right",
+            "twin is up to 7 % too bright; 5.0 is right",
         )
 
 

@@ -10,8 +10,9 @@
 #include <random>
 #include <set>
 
+#include "analysis/albedo.h"
 #include "analysis/albedo_table.h"
-#include "analysis/checks.h"
+#include "check/check.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -183,11 +184,18 @@ TEST(Cubature, FindsAPeakFarNarrowerThanTheNodesAreApart) {
 
 // ---- checks ----------------------------------------------------------------------------------------------
 
+/// Of the checks that apply.
 template <Defect D> std::map<std::string, bool> outcome() {
   const detail::ModelOf<Faulty<D>::template Type> model;
   std::map<std::string, bool> passed;
-  for (const CheckRow& r : check_model(model)) passed[r.check] = r.passed;
+  for (const CheckRow& r : check_model(model))
+    if (r.result != CheckResult::Skipped) passed[r.check] = r.result == CheckResult::Passed;
   return passed;
+}
+CheckRow row_of(const Model& model, const std::string& check) {
+  for (const CheckRow& r : check_model(model, {.effort = 0.1}))
+    if (r.check == check) return r;
+  throw InputError(check + ": no such check");
 }
 
 TEST(Checks, PassARightModel) {
@@ -247,6 +255,27 @@ TEST(Checks, SeeLimitsThatAreNone) {
   EXPECT_FALSE(r.at("no diffuse limit"));
 }
 TEST(Checks, SeeWeightsThatVary) { EXPECT_FALSE(outcome<kPdf>().at("exact sampling")); }
+TEST(Checks, SeeALobeThatItsSamplerDoesNotKnow) {
+  EXPECT_FALSE(outcome<kShadow>().at("sampling variance"));
+  EXPECT_TRUE(outcome<kDark>().at("sampling variance"));
+}
+TEST(Checks, SayWhyOneDoesNotApply) {
+  const CheckRow skipped = row_of(find_model("fresnel_dielectric"), "chi-square");
+  EXPECT_EQ(skipped.result, CheckResult::Skipped);
+  EXPECT_EQ(skipped.cases, 0);
+  EXPECT_EQ(skipped.reason, "the model has delta terms alone");
+  EXPECT_EQ(row_of(find_model("phong"), "exact closures").reason, "no closures equal the model");
+  EXPECT_EQ(row_of(find_model("lambert"), "exact closures").reason, "");
+}
+TEST(Checks, AreTheSameNumberForEveryModelAndHaveALimit) {
+  std::set<std::size_t> numbers;
+  for (const auto& [name, model] : models()) {
+    const std::vector<CheckRow> rows = check_model(*model, {.effort = 0.01});
+    numbers.insert(rows.size());
+    for (const CheckRow& r : rows) EXPECT_LT(std::abs(r.limit), 100) << name << ": " << r.check;
+  }
+  EXPECT_EQ(numbers.size(), 1u);
+}
 
 template <class F> std::string message(const F& f) {
   try {
@@ -260,9 +289,10 @@ template <class F> std::string message(const F& f) {
 TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
   const detail::ModelOf<Faulty<kNegative>::Type> negative;
   const detail::ModelOf<Faulty<kNan>::Type> nan;
-  for (const std::string& text :
-       {message([&] { check_model(negative); }), message([&] { tabulate_albedo(negative); }),
-        message([&] { albedo(*bind_model(negative, {}).brdf, 0.5, 0, bind_model(negative, {}).label); })}) {
+  for (const std::string& text : {row_of(negative, "values").where, row_of(negative, "conserving").where,
+                                  message([&] { tabulate_albedo(negative); }), message([&] {
+                                    albedo(*bind_model(negative, {}).brdf, 0.5, 0, bind_model(negative, {}).label);
+                                  })}) {
     EXPECT_THAT(text, HasSubstr("faulty rho="));
     EXPECT_THAT(text, HasSubstr("level="));
     EXPECT_THAT(text, testing::ContainsRegex("(f|weight)\\(wi=\\("));
@@ -272,6 +302,10 @@ TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
   }
   // Only at some parameters, which the table has to come across.
   EXPECT_THAT(message([&] { tabulate_albedo(nan); }), HasSubstr("nan"));
+  // One bad value fails the checks that meet it, and no other.
+  for (const char* check : {"values", "conserving"})
+    EXPECT_EQ(row_of(negative, check).result, CheckResult::Failed) << check;
+  EXPECT_EQ(row_of(negative, "sample weight").result, CheckResult::Passed);
 }
 
 // ---- albedo ----------------------------------------------------------------------------------------------

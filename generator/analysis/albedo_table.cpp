@@ -13,6 +13,7 @@
 
 #include "analysis/albedo.h"
 #include "analysis/table_file.h"
+#include "core/data_dir.h"
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "model/choices.h"
@@ -801,13 +802,15 @@ bool has_albedo_table(const Model& model) {
 }
 
 std::filesystem::path stored_albedo(const Model& model) {
-  return std::filesystem::path(BRDFC_SOURCE_DIR) / "generator" / "albedos" /
-         fmt::format("{}_{}.exr", model.info().name, hash_of(model).substr(0, 16));
+  return data_dir("albedos") / fmt::format("{}_{}.exr", model.info().name, hash_of(model).substr(0, 16));
 }
 
 AlbedoTable albedo_table_of(const Model& model) {
   const std::filesystem::path path = stored_albedo(model);
-  if (!std::filesystem::exists(path)) return tabulate_albedo(model);
+  if (!std::filesystem::exists(path)) {
+    note_missing("stored albedo of " + model.info().name, path.parent_path(), "up to a minute");
+    return tabulate_albedo(model);
+  }
   AlbedoTable table = read_albedo_exr(path);
   if (table.model != model.info().name)
     input_error("{}: model: expected {}, got {}", path.string(), model.info().name, table.model);

@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   brdfc::add_scene_command(app);
   brdfc::add_compare_command(app);
   brdfc::add_report_command(app);
+  brdfc::add_where_command(app);
   try {
     app.parse(argc, argv);
     return 0;

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "app/commands.h"
+#include "core/data_dir.h"
 #include "pack/pack.h"
 #include "reference/scene.h"
 #include "reference/views.h"
@@ -22,7 +23,7 @@ namespace {
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false;
   std::optional<std::string> error, time;
-  std::string scene, materials, out, addon = BRDFC_SOURCE_DIR "/blender_addon";
+  std::string scene, materials, out, addon;
   std::vector<std::string> models;
 };
 
@@ -188,7 +189,9 @@ void run(const Options& options) {
                                       {"--fit", options.fit_bases},
                                       {"--twin", options.twin}})
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
-  const std::filesystem::path costs = std::filesystem::path(options.addon) / "costs.csv";
+  const std::filesystem::path addon =
+      options.addon.empty() ? data_dir("blender_addon") : std::filesystem::path(options.addon);
+  const std::filesystem::path costs = addon / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
   Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, Costs(costs)};
   if (options.error) budget.error = parse_error(*options.error);
@@ -217,7 +220,7 @@ void run(const Options& options) {
   } else {
     plan = plan_models(options.models);
   }
-  PackOptions pack{options.out, options.addon, plan, budget.costs, {}};
+  PackOptions pack{options.out, addon, plan, budget.costs, {}};
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -263,7 +266,7 @@ void add_build_command(CLI::App& app) {
       "of every material whose parameters are constant");
   c->add_option("--model", options->models, "Only these models (repeat for several)");
   c->add_option("--out", options->out, "Folder for the extension and its zip")->required();
-  c->add_option("--addon", options->addon, "Folder with the add-on's Python");
+  c->add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`");
   c->callback([options] { run(*options); });
 }
 

@@ -3,9 +3,9 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "analysis/checks.h"
 #include "analysis/properties.h"
 #include "app/commands.h"
+#include "check/check.h"
 
 namespace brdfc {
 
@@ -23,10 +23,11 @@ void add_check_command(CLI::App& app) {
       "float\n"
       "and double), over defaults, random and extreme parameters. Of all models it then prints the table of "
       "properties.\n"
-      "Exit status 1 if one fails.");
+      "A check that does not apply to a model is skipped, with the reason. Exit status 1 if one fails.");
   CLI::Option* model = cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
   cmd->add_flag("--all", o->all, "All models, the same as without a model")->excludes(model);
-  CLI::Option* json = cmd->add_flag("--json", o->json, "As JSON: an array of objects, one a row");
+  CLI::Option* json = cmd->add_flag(
+      "--json", o->json, "As JSON: an array of objects, one a row; passed is null where a check was skipped");
   cmd->add_flag("--markdown", o->markdown, "Only the table of properties of all models, for a Markdown page")
       ->excludes(model)
       ->excludes(json);
@@ -52,11 +53,14 @@ void add_check_command(CLI::App& app) {
       const std::vector<CheckRow> rows = check_model(*m, o->check);
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       if (!o->json)
-        fmt::print("{} ({:.1f} s)\n  {:<18} {:>6} {:>7} {:>11} {:>11}  {:<6}  {}\n", m->info().name, seconds, "check",
+        fmt::print("{} ({:.1f} s)\n  {:<18} {:>6} {:>7} {:>11} {:>11}  {:<7}  {}\n", m->info().name, seconds, "check",
                    "cases", "skipped", "worst", "limit", "result", "expected");
       for (const CheckRow& r : rows) {
-        failed += r.passed ? 0 : 1;
+        const bool skipped = r.result == CheckResult::Skipped;
+        failed += r.result == CheckResult::Failed ? 1 : 0;
         if (o->json) {
+          const nlohmann::ordered_json passed =
+              skipped ? nlohmann::ordered_json() : nlohmann::ordered_json(r.result == CheckResult::Passed);
           all.push_back({{"model", r.model},
                          {"check", r.check},
                          {"expected", r.expected},
@@ -64,13 +68,19 @@ void add_check_command(CLI::App& app) {
                          {"skipped", r.skipped},
                          {"worst", r.worst},
                          {"limit", r.limit},
-                         {"passed", r.passed},
-                         {"where", r.where}});
+                         {"passed", passed},
+                         {"where", r.where},
+                         {"reason", r.reason}});
           continue;
         }
-        fmt::print("  {:<18} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<6}  {}\n", r.check, r.cases, r.skipped, r.worst,
-                   r.limit, r.passed ? "ok" : "FAILED", r.expected);
-        if (!r.passed) fmt::print("    at {}\n", r.where);
+        if (skipped) {
+          fmt::print("  {:<18} {:>6} {:>7} {:>11} {:>11}  {:<7}  {}\n", r.check, "-", "-", "-", "-", "skipped",
+                     r.reason);
+          continue;
+        }
+        fmt::print("  {:<18} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<7}  {}\n", r.check, r.cases, r.skipped, r.worst,
+                   r.limit, r.result == CheckResult::Passed ? "ok" : "FAILED", r.expected);
+        if (r.result == CheckResult::Failed) fmt::print("    at {}\n", r.where);
       }
     }
     if (o->json) fmt::print("{}\n", all.dump(2));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "analysis/checks.h"
 #include "analysis/stability.h"
 #include "analysis/stability_page.h"
 #include "app/commands.h"

@@ -14,6 +14,7 @@ struct CheckFailed : std::runtime_error {
 };
 
 void add_list_command(CLI::App&);
+void add_where_command(CLI::App&);
 void add_eval_command(CLI::App&);
 void add_closure_command(CLI::App&);
 void add_probe_command(CLI::App&);

@@ -15,6 +15,7 @@
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
 #include "analysis/table_file.h"
+#include "core/data_dir.h"
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "model/horizon.h"
@@ -617,8 +618,7 @@ std::string hash_of(const Model& model, const ParamValues& values) {
 }
 
 std::filesystem::path path_of(const Model& model, const std::string& hash) {
-  return std::filesystem::path(BRDFC_SOURCE_DIR) / "generator" / "fits" /
-         fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
+  return data_dir("fits") / fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
 }
 
 ViewError worse(const ViewError& a, const ViewError& b) {
@@ -649,10 +649,15 @@ Fit::Fit(const Model& model, const ParamValues& given, From from) {
     axis_ = fit_axis(*p);
     const std::string hash = hash_of(model, values);
     const std::filesystem::path path = path_of(model, hash);
-    if (from == From::Store && std::filesystem::exists(path)) {
-      read(path, hash);
-      apply(factor);
-      return;
+    if (from == From::Store) {
+      if (std::filesystem::exists(path)) {
+        read(path, hash);
+        apply(factor);
+        return;
+      }
+      note_missing(
+          fmt::format("stored fit of {} {} over {}", model.info().name, format_values(model.info(), values), p->name),
+          path.parent_path(), "about a minute");
     }
   }
   // Where the channels differ by a factor alone, one fit serves them all.

@@ -367,7 +367,19 @@ def test_check_json():
     assert result.returncode == 0, result.stderr
     table = json.loads(result.stdout)
     assert {row["model"] for row in table} == {"coupled"}
-    assert all(row["passed"] and row["cases"] > 0 for row in table)
+    assert all(row["passed"] and row["cases"] > 0 and not row["reason"] for row in table)
+
+
+def test_check_says_what_it_skips_and_why():
+    # A mirror has no lobe to judge, and what is not judged has not passed.
+    quick = ("check", "fresnel_dielectric", "--effort", "0.1")
+    table = {row["check"]: row for row in json.loads(run(*quick, "--json").stdout)}
+    row = table["chi-square"]
+    assert (row["passed"], row["cases"]) == (None, 0)
+    assert row["reason"] == "the model has delta terms alone"
+    assert table["exact closures"]["passed"] is True
+    (line,) = (ln for ln in run(*quick).stdout.splitlines() if ln.startswith("  chi-square"))
+    assert line.split()[5] == "skipped" and line.endswith(row["reason"])
 
 
 def page_of_table(name):

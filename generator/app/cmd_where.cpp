@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc where: the folder of the tool's data.
+#include <fmt/format.h>
+
+#include "app/commands.h"
+#include "core/data_dir.h"
+
+namespace brdfc {
+
+void add_where_command(CLI::App& app) {
+  app.add_subcommand("where",
+                     "Prints the folder that stored fits and albedos and the extension's Python are taken from: what\n"
+                     "the environment variable BRDFC_DATA names, or share/brdfc beside the program's folder, or the\n"
+                     "sources that it was built from.")
+      ->callback([] { fmt::print("{}\n", data_dir().string()); });
+}
+
+}  // namespace brdfc

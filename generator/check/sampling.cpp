@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drawn directions: their weights, their density, and that they follow it.
+#include "analysis/properties.h"
+#include "check/chi_square.h"
+#include "check/claim.h"
+
+namespace brdfc::checks {
+namespace {
+
+/// The error of quadrature is added to it.
+constexpr double kNormalisation = 1e-6;
+/// How far two meshes of quadrature may differ. More, and a thin curved ridge is missed by one of them: no judgement is
+/// possible over directions.
+constexpr double kMeshes = 1e-5;
+constexpr double kSignificance = 0.01;
+/// A picture of 64 samples a pixel has then an error of half the light, about what it would be without a picture. The
+/// models here come to 5.3; a lobe that its sampler does not know comes to hundreds.
+constexpr double kVariance = 16;
+
+/// f(weights, where) for three views of each case within the sliders' ranges.
+template <class F> void for_each_view(const Trial& t, const F& f) {
+  t.for_each([&](const Case& c) {
+    if (!c.within || c.bound.brdf->scatters_through()) return;
+    Random random = t.random(c, Purpose::Spread);
+    for (const double cos_o : {1., 0.2 + 0.7 * uniform(random), 0.05}) {
+      const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
+      const Weights w = sampled_weights(c.bound, wo, t.scaled(512), random);
+      if (w.kept >= 2) f(w, fmt::format("{} wo={}", c.bound.label, text(wo)));
+    }
+  });
+}
+
+void even(const Trial& t, Verdict& verdict) {
+  for_each_view(t, [&](const Weights& w, const std::string& where) { verdict.add(w.spread, where); });
+}
+
+void variance(const Trial& t, Verdict& verdict) {
+  for_each_view(t, [&](const Weights& w, const std::string& where) { verdict.add(w.variance, where); });
+}
+
+void normalised(const Trial& t, Verdict& verdict) {
+  t.for_each([&](const Case& c) {
+    if (!c.thorough) return;
+    const Brdf<double>& f = *c.bound.brdf;
+    const std::string& label = c.bound.label;
+    Random random = t.random(c, Purpose::Density);
+    const double cos_o = c.index % 3 == 0 ? 1 : c.index % 3 == 1 ? 0.2 + 0.7 * uniform(random) : 0.05;
+    const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
+    const auto drawn = [&](int samples) { return sampled_albedo(f, cos_o, std::atan2(wo.y, wo.x), label, samples); };
+    SampledAlbedo s = drawn(std::max(1024, t.scaled(1 << 13)));
+    const auto integral = [&](int guides) {
+      return integrate_hemisphere(
+          f, wo, 1,
+          [&](const Vec3<double>& wi, double* out) {
+            out[0] = f.pdf(wi, wo);
+            require_value(out[0], "pdf", label, wi, wo);
+          },
+          {1e-7, 0, 2000}, guides);
+    };
+    const CubatureResult p = integral(512);
+    const CubatureResult q = p.converged ? integral(4096) : p;
+    const double moved = std::abs(p.value[0] - q.value[0]);
+    if (!p.converged || !q.converged || !(moved < kMeshes)) return verdict.skip();
+    const double uncertain = q.error[0] + moved;
+    // A loss rarer than one sample in those drawn shows only among more.
+    if (s.lost_error == 0 && std::abs(q.value[0] + s.lost - 1) > kNormalisation + uncertain) s = drawn(1 << 20);
+    verdict.add(std::abs(q.value[0] + s.lost - 1), fmt::format("{} wo={}", label, text(wo)),
+                uncertain + 7 * s.lost_error);
+  });
+}
+
+void weights(const Trial& t, Verdict& verdict) {
+  t.for_each([&](const Case& c) {
+    Random random = t.random(c, Purpose::Weights);
+    for (int k = 0; k < t.scaled(24); ++k) {
+      Vec3<double> wo = uniform_direction(random);
+      const Vec3<double> u = uniform_cube(random);
+      if (two_sided(t.model(), *c.bound.brdf) && k % 2 == 1) wo.z = -wo.z;
+      const Vec3<Wide> wide_wo = Vec3<Wide>::from(wo);
+      const Sample<Wide> s = c.wide->sample(wide_wo, Vec3<Wide>::from(u));
+      if (!(s.pdf > Wide(0))) continue;
+      const Rgb<Wide> value = c.wide->eval(s.wi, wide_wo) * Wide(abs(s.wi.z)), by_weight = s.weight * s.pdf;
+      verdict.add(std::max(relative(value, by_weight), relative(s.pdf, c.wide->pdf(s.wi, wide_wo))),
+                  fmt::format("{} wo={} u={}", c.bound.label, text(wo), text(u)));
+    }
+  });
+}
+
+void histogram(const Trial& t, Verdict& verdict) {
+  struct Found {
+    ChiSquare of;
+    std::string where;
+  };
+  std::vector<Found> found;
+  std::mutex mutex;
+  t.for_each([&](const Case& c) {
+    if (!c.thorough) return;
+    Random random = t.random(c, Purpose::Histogram);
+    double cos_o = c.index % 4 == 0 ? 1 : 0.15 + 0.8 * uniform(random);
+    if (two_sided(t.model(), *c.bound.brdf) && c.index % 4 > 1) cos_o = -cos_o;
+    const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
+    const ChiSquare of = chi_square(c.bound, wo, std::max(10000, t.scaled(30000)), random());
+    if (!of.converged) return verdict.skip();
+    const std::lock_guard lock(mutex);
+    found.push_back(
+        {of, fmt::format("{} wo={} statistic={:.4g} degrees={}", c.bound.label, text(wo), of.statistic, of.degrees)});
+  });
+  // The smallest of m independent ones is below p with probability 1 - (1 - p)^m.
+  for (const Found& one : found) verdict.add(-std::expm1(double(found.size()) * std::log1p(-one.of.p)), one.where);
+}
+
+}  // namespace
+
+std::vector<Check> sampling_checks(const ModelProperties& claims) {
+  return {claims.exact_sampling
+              ? Check{"exact sampling", "the weight does not depend on wi", at_most(kEven), even, without_upper_lobe}
+              : Check{"not exact sampling", "the weight depends on wi somewhere", somewhere_at_least(kVisible), even,
+                      without_upper_lobe},
+          {"sampling variance", "variance of f cos / pdf over its mean squared", at_most(kVariance), variance,
+           without_upper_lobe},
+          {"pdf integral", "integral of pdf + lost samples = 1", at_most(kNormalisation), normalised, without_lobe},
+          {"sample weight", "weight pdf = f cos, sample's pdf = pdf()", at_most(kIdentity), weights, without_lobe},
+          {"chi-square", "p > 0.01 over all cases (Sidak)", at_least(kSignificance), histogram, without_lobe}};
+}
+
+}  // namespace brdfc::checks

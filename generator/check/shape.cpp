@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The shape of the lobe above the surface, and what it becomes at the ends of its ranges.
+#include <sstream>
+
+#include "analysis/properties.h"
+#include "check/claim.h"
+
+namespace brdfc::checks {
+namespace {
+
+/// A jump of a derivative that is rounding or a curvature, and one that the eye sees as an edge.
+constexpr double kSmooth = 1e-3;
+constexpr double kEdge = 1e-2;
+/// Share of the light near ideal reflection that makes a mirror.
+constexpr double kMirror = 0.99;
+
+/// f(case, random numbers) for the cases whose lobe ends at the surface: the others have no shape above it alone.
+template <class F> void for_each_upper(const Trial& t, Purpose what, const F& f) {
+  t.for_each([&](const Case& c) {
+    if (c.bound.brdf->scatters_through()) return;
+    Random random = t.random(c, what);
+    f(c, random);
+  });
+}
+
+/// With colours neither black nor full, which hide what f does.
+ParamValues with_inner_colors(const Trial& t, const Case& c) {
+  ParamValues inner = c.bound.values;
+  for (const ParamInfo& p : t.info().params)
+    if (p.kind == ParamKind::Color)
+      for (double& x : std::get<std::array<double, 3>>(inner[p.name])) x = 0.1 + 0.8 * x;
+  return inner;
+}
+
+// Claims about the lobe hold where sliders lead; a failure that is declared may also show at the end of a range.
+
+void positive(const Trial& t, Verdict& verdict) {
+  for_each_upper(t, Purpose::Positive, [&](const Case& c, Random& random) {
+    if (!c.within && t.claims().positive) return;
+    const auto place = find_dark_place(t.model(), with_inner_colors(t, c), t.scaled(256), random);
+    verdict.add(place ? 1 : 0, place.value_or(c.bound.label));
+  });
+}
+
+void smooth(const Trial& t, Verdict& verdict) {
+  for_each_upper(t, Purpose::Smooth, [&](const Case& c, Random& random) {
+    if (!c.within && t.claims().smooth) return;
+    const Edge e = sharpest_edge(bind_model(t.model(), with_inner_colors(t, c)), t.scaled(24), random);
+    verdict.add(e.jump, e.where);
+  });
+}
+
+void not_matte(const Trial& t, Verdict& verdict) {
+  for_each_upper(t, Purpose::Matte, [&](const Case& c, Random& random) {
+    if (const auto u = unevenness(*c.bound.brdf, 128, random)) verdict.add(*u, c.bound.label);
+  });
+}
+
+void not_mirror(const Trial& t, Verdict& verdict) {
+  for_each_upper(t, Purpose::Mirror, [&](const Case& c, Random& random) {
+    if (const auto share = least_mirror_share(*c.bound.brdf, t.scaled(512), random)) verdict.add(*share, c.bound.label);
+  });
+}
+
+/// "n=0 m=1" as values.
+BoundModel at_limit(const Trial& t, const std::string& limit) {
+  std::vector<std::string> assignments;
+  std::istringstream in(limit);
+  for (std::string one; in >> one;) assignments.push_back(one);
+  return bind_model(t.model(), parse_values(t.info(), assignments));
+}
+
+void matte(const Trial& t, Verdict& verdict) {
+  const BoundModel b = at_limit(t, t.claims().diffuse_limit);
+  Random random = t.random();
+  const auto u = unevenness(*b.brdf, 1024, random);
+  verdict.add(u.value_or(1), u ? b.label : b.label + ": f is 0");
+}
+
+void mirror(const Trial& t, Verdict& verdict) {
+  const BoundModel b = at_limit(t, t.claims().specular_limit);
+  Random random = t.random();
+  const auto share = least_mirror_share(*b.brdf, 8192, random);
+  verdict.add(1 - share.value_or(0), share ? b.label : b.label + ": no light");
+}
+
+}  // namespace
+
+std::vector<Check> shape_checks(const ModelProperties& claims) {
+  return {claims.specular_limit.empty()
+              ? Check{"no specular limit", "light leaves elsewhere at every end of a range", at_most(kMirror),
+                      not_mirror, without_upper_lobe}
+              : Check{"specular limit", "share away from ideal reflection at " + claims.specular_limit,
+                      at_most(1 - kMirror), mirror},
+          claims.diffuse_limit.empty()
+              ? Check{"no diffuse limit", "f not constant at any end of a range", at_least(kVisible), not_matte,
+                      without_upper_lobe}
+              : Check{"diffuse limit", "f constant at " + claims.diffuse_limit, at_most(kEven), matte, without_lobe},
+          // A place that is dark counts 1.
+          claims.positive
+              ? Check{"positive", "f > 0 above the surface, underflow aside", at_most(0), positive, without_upper_lobe}
+              : Check{"not positive", "f = 0 somewhere, not by underflow", somewhere_at_least(1), positive,
+                      without_upper_lobe},
+          claims.smooth ? Check{"smooth", "no jump of a derivative of f", at_most(kSmooth), smooth, without_upper_lobe}
+                        : Check{"not smooth", "a derivative of f jumps visibly somewhere", somewhere_at_least(kEdge),
+                                smooth, without_upper_lobe}};
+}
+
+}  // namespace brdfc::checks
