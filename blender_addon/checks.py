@@ -201,6 +201,22 @@ def _zero_size_lights(material, scene):
     )
 
 
+def _multiple_importance(material, scene):
+    alone = [
+        o.name
+        for o in scene.objects
+        if o.type == "LIGHT"
+        and not o.hide_render
+        and not getattr(o.data.cycles, "use_multiple_importance_sampling", True)
+    ]
+    if alone:
+        return (
+            "WARNING",
+            f"Multiple Importance is off for lamps ({', '.join(alone[:3])}): the mirror and the "
+            "directions that this form draws do not meet them, and it is too dark",
+        )
+
+
 def _far_camera(material, scene):
     if _far_orthographic(scene):
         return (
@@ -278,6 +294,7 @@ DECLARED = {
     "clamp_indirect": _clamp_indirect,
     "clamp_direct": _clamp_direct,
     "zero_size_lights": _zero_size_lights,
+    "multiple_importance": _multiple_importance,
     "orthographic_far": _far_camera,
     "caustics": _caustics,
     "filter_glossy": _filter_glossy,

@@ -14,17 +14,21 @@ Made by `script/conditions`. Each row changes one thing in a clean scene, a grid
 sun and a bright sky, so that light bounces; a cell is what that does to the mean radiance of a
 form, with its standard error. Bold is what exceeds 2 % and 5 standard errors; there the panel warns
 if that is said. Forms stand for all of their kind: closures with a mirror, alone, with a ramp;
-drawn directions with a mirror, of an anisotropic model, alone; fits with facets, of lobes alone.
-`coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and Glossy nodes are there
-to compare with. `tests/blender/test_every_fit.py` holds fitted forms and twins of
+drawn directions with a mirror, of an anisotropic model, alone; fits with facets, of lobes alone;
+aimed forms with a base of facets, without one, with a mirror, with a base of ramps, told of the
+scene's lamps. `coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and Glossy
+nodes are there to compare with. `tests/blender/test_every_fit.py` holds fitted forms and twins of
 every model to the same.
 
 Of the tilted normals (by the mesh's own, by the Normal input, by that with Bump Map Correction on)
 the worst of three views is shown, against the model's own rays without those that end below the
-surface. Passes: mean difference from the model's albedo, median angle from the true normal,
-largest difference of picture and light group. "sun without size" compares the median cells of
-drawn directions, which meet that lamp as rare, bright dots, and other forms with a sun 0.02 wide;
-it leaves out exact forms with a mirror, which by its nature does not show it.
+surface. Passes: mean difference from the model's albedo, median angle from the true normal, largest
+difference of the picture and the sum of its light groups. "lamp without shadows" is a sun overhead,
+"lamp without multiple importance" one 1 rad wide, each compared with the same sun as it should be;
+"lamp linked elsewhere" adds a sun that shines on something else, "nine lamps for one" puts nine
+suns of a ninth of the light where one was. "sun without size" compares the median cells of drawn
+directions, which meet that lamp as rare, bright dots, and other forms with a sun 0.02 wide; it
+leaves out exact forms with a mirror, which by its nature does not show it.
 """
 
 
@@ -43,9 +47,29 @@ def cell(row):
     return f"**{text}**" + (" (panel warns)" if warned else "")
 
 
-def markdown(versions):
+def sections_of(page):
+    """Text below each heading of an older page, by the heading."""
+    found = {}
+    for part in page.split("\n## ")[1:]:
+        form, text = part.split("\n", 1)
+        found[form] = text.strip("\n")
+    return found
+
+
+def in_order(forms):
+    """Blender's own nodes, which are there to compare with, come last."""
+    return sorted(forms, key=lambda form: form.endswith("(node)"))
+
+
+def markdown(versions, page=""):
+    """The page; of `page` it takes what was not measured."""
+    kept = sections_of(page)
+    measured = forms_of(versions)
     lines = [INTRODUCTION]
-    for form in forms_of(versions):
+    for form in in_order([*kept, *(f for f in measured if f not in kept)]):
+        if form not in measured:
+            lines += [f"## {form}", "", kept[form], ""]
+            continue
         lines += [
             f"## {form}",
             "",
@@ -75,7 +99,9 @@ def conditions_of(versions):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="where <version>.json lie")
-    folder = parser.parse_args().folder
+    parser.add_argument("--page", type=Path, help="an older page, whose other rows are kept")
+    options = parser.parse_args()
+    folder = options.folder
     versions = {}
     for path in sorted(folder.glob("[0-9]*.json")):
         versions[path.stem] = json.loads(path.read_text(encoding="utf-8"))["rows"]
@@ -87,7 +113,8 @@ def main():
         writer = csv.DictWriter(file, list(every[0]))
         writer.writeheader()
         writer.writerows(r | {"warned": " ".join(r["warned"])} for r in every)
-    (folder / "conditions.md").write_text(markdown(versions) + "\n", encoding="utf-8")
+    page = options.page.read_text(encoding="utf-8") if options.page else ""
+    (folder / "conditions.md").write_text(markdown(versions, page) + "\n", encoding="utf-8")
     print(folder / "conditions.md")
 
 

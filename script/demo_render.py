@@ -93,18 +93,17 @@ def write_json(path, value):
 
 
 def forms_of(scene, models, native):
-    """Forms to render: each kind that every material has, a mixture where only some have the exact
-    one, what the scene itself asks for, Blender's own node as the unit of cost, and others of its
-    nodes where they were fitted to every material."""
+    """Forms to render: what `auto` makes of the scene, by the name of the one form that it is or,
+    where materials differ, as auto; drawn directions where every material has them; what the scene
+    itself asks for; Blender's own node as the unit of cost, and others of its nodes where they were
+    fitted to every material."""
     forms = ["glossy"]
     fitted = [native.get(name, {}) for name in scene["materials"]]
     forms += [node for node in ("principled", "metallic") if all(node in f for f in fitted)]
-    available = [models[m["model"]]["representations"] for m in scene["materials"].values()]
-    if all("exact" in a for a in available):
-        forms.append("exact")
-    elif any("exact" in a for a in available):
-        forms.append("auto")
-    if all("sampled" in a for a in available):
+    used = [models[m["model"]] for m in scene["materials"].values()]
+    chosen = {u["auto"] for u in used}
+    forms.append(chosen.pop() if len(chosen) == 1 else "auto")
+    if all("sampled" in u["representations"] for u in used):
         forms.append("sampled")
     if any(m.get("representation", "auto") != "auto" for m in scene["materials"].values()):
         forms.append("scene")

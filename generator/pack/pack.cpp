@@ -94,28 +94,34 @@ Json values_json(const ParamValues& values) {
 
 /// What a user must know of a form; the add-on turns each into words where it applies.
 std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Shader& shader) {
-  // Measured in Cycles (script/conditions): bump-map correction turns closures where a normal is bent; a clamp on
-  // indirect light or a lamp of no size meets a sampled lobe differently from Blender's own closures, and its lobes'
-  // normals are not the surface's; a clamp darkens lights in a mirror and, by how bright they are, highlights; Filter
-  // Glossy blurs mirrors and facets.
+  // Measured in Cycles (script/conditions): bump-map correction turns closures where a normal is bent; a clamp or a
+  // lamp of no size meets a sampled lobe differently from Blender's own closures, and its lobes' normals are not the
+  // surface's; a clamp darkens lights in a mirror and, by how bright they are, highlights; Filter Glossy blurs mirrors
+  // and facets; mirrors and drawn directions do not meet lamps without multiple importance.
   std::vector<std::string> codes = {"bump_correction"};
+  if (mirror || kind == RepresentationKind::Sampled || kind == RepresentationKind::Aimed)
+    codes.push_back("multiple_importance");
   if (kind == RepresentationKind::Twin) {
     // Blender's own nodes: a matte one, glossy ones whose facets lean, and a mirror.
     codes.insert(codes.end(), {"leaning_facets", "caustics", "filter_glossy"});
     if (mirror) codes.push_back("clamp_mirror");
     return codes;
   }
-  if (kind == RepresentationKind::Aimed)
-    codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "orthographic_far", "normal_pass"});
-  else if (kind == RepresentationKind::Sampled)
-    codes.insert(codes.end(), {"clamp_indirect", "zero_size_lights", "orthographic_far", "normal_pass"});
-  else if (mirror)
+  if (kind == RepresentationKind::Aimed) {
+    // Path Guiding and the passes know nothing of closures that take light away: pictures get 2 % too bright, the
+    // albedo too high by what base and rest cancel. Normals are those of the drawn lobes where no base outweighs them.
+    codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "orthographic_far", "albedo_passes"});
+    if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
+  } else if (kind == RepresentationKind::Sampled) {
+    codes.insert(codes.end(),
+                 {"clamp_indirect", "clamp_direct", "zero_size_lights", "orthographic_far", "normal_pass"});
+  } else if (mirror) {
     codes.push_back("clamp_mirror");
+  }
   // Cycles drops glossy closures behind a diffuse surface; ramps it does not.
   if (shader.facets) codes.push_back("caustics");
   if (mirror || shader.facets) codes.push_back("filter_glossy");
-  if (mirror && (kind == RepresentationKind::Sampled || kind == RepresentationKind::Aimed))
-    codes.push_back("albedo_passes_mirror");
+  if (mirror && kind == RepresentationKind::Sampled) codes.push_back("albedo_passes_mirror");
   // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
   // do not see.
   if (kind == RepresentationKind::Exact && shader.slots > shader.closures) codes.push_back("albedo_passes");

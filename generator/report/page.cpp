@@ -227,8 +227,10 @@ which chance is a good part.</dd>
 of the Glossy node: what one gets for the same wait.</dd>
 <dt>CPU time to equal error</dt><dd>Until the form's noise is as small as that of Blender's Glossy node with 16, 256 or 1024
 samples a pixel, in units of the time which that takes.</dd>
-<dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Sampled forms are exact in
-expectation: their error is noise.</dd>
+<dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Aimed and sampled forms are exact
+in expectation: their error is noise.</dd>
+<dt>auto</dt><dd>What materials have by default, where that is not one form for all: the exact form where there is one, else
+the aimed one.</dd>
 <dt>planned, twin</dt><dd>Of a pack cut to the scene by <code>brdfc build --scene</code>: what it chooses where forms may be
 off a little (closures fitted to the model, which lamps can be sampled for); and Blender's own nodes steered by the view
 angle, for where Open Shading Language does not run, where every material can have them.</dd>

@@ -22,13 +22,15 @@ from helpers import (
     render,
     render_passes,
 )
-from mathutils import Vector
+from mathutils import Quaternion, Vector
 from worlds import gradient
 
 #: Cells of a form and of each kind.
 REPLICAS = 40
 #: Distance of cells, and so the size of a pixel; a groove is 1 wide and 1/2 deep.
 PITCH = 2.0
+#: Towards the sun.
+SUN = (0.3, -0.25, 0.9)
 #: A bias counts from this share on, and only beyond so many standard errors.
 BIASED, SIGNIFICANT = 0.02, 5.0
 
@@ -84,6 +86,9 @@ def representatives(extension, listed):
     pick("drawn, anisotropic", "sampled", lambda m, e: not e["isotropic"])
     pick("fitted, with facets", "fitted", lambda m, e: of_facets(e))
     pick("fitted, of lobes", "fitted", lambda m, e: not of_facets(e))
+    # Facets below the drawn directions, none, a mirror beside them, ramps.
+    for model in ("cook_torrance", "radziszewski_alda", "schlick_double", "phong_material"):
+        pick(f"aimed, {model}", "aimed", lambda m, e, model=model: m["name"] == model)
     pick(
         "drawn alone",
         "sampled",
@@ -130,7 +135,7 @@ class Grooves:
         offset=(0.0, 0.0, 0.0),
     ):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-        self.scene, self.forms = bpy.context.scene, forms
+        self.extension, self.scene, self.forms = extension, bpy.context.scene, forms
         extension.scene_loader.apply_clean_settings(self.scene, samples=samples, max_bounces=4)
         self.materials = [[material_of(extension, f) for _ in range(copies)] for f in forms]
         flat = [m for group in self.materials for m in group]
@@ -197,11 +202,23 @@ class Grooves:
         data.energy, data.angle = 3.0, 0.3
         self.sun = bpy.data.objects.new("Sun", data)
         self.sun.rotation_mode = "QUATERNION"
-        self.sun.rotation_quaternion = Vector((0.3, -0.25, 0.9)).to_track_quat("Z", "Y")
+        self.sun.rotation_quaternion = Vector(SUN).to_track_quat("Z", "Y")
         self.scene.collection.objects.link(self.sun)
+
+    def add_sun(self, towards, name="Other"):
+        """Another sun like the first one, which shines from `towards`."""
+        other = self.sun.copy()
+        other.data, other.name = self.sun.data.copy(), name
+        other.rotation_quaternion = Vector(towards).to_track_quat("Z", "Y")
+        self.scene.collection.objects.link(other)
+        return other
 
     def measure(self):
         """Radiance of each form's cells, (forms, 2, replicas)."""
+        # What aims at lamps is measured with lamps aimed at, or nothing of it would be.
+        lamps = self.extension.api.see_lamps(self.scene)
+        if any(f.form == "aimed" for f in self.forms):
+            assert any(lamp.slot for lamp in lamps)
         picture = render(self.scene)[self.rows, self.columns]
         colour = picture[:, :3].mean(-1) / np.maximum(picture[:, 3], 1e-6)
         return colour.reshape(len(self.forms), 2, REPLICAS)
@@ -284,14 +301,92 @@ def _displaced(grooves):
 SMALL_SUN = 0.02
 
 
+def _small_sun(grooves):
+    grooves.sun.data.angle = SMALL_SUN
+
+
 def _no_size(grooves):
     grooves.sun.data.angle = 0.0
 
 
+def _overhead(grooves):
+    """A sun that no wall hides, and the ends of the grooves hardly."""
+    grooves.sun.rotation_quaternion = (1, 0, 0, 0)
+    grooves.sun.data.angle = 0.05
+
+
+def _shadowless(grooves):
+    _overhead(grooves)
+    grooves.sun.data.use_shadow = False
+
+
+def _wide(grooves):
+    """A sun that directions of the material's own meet as often as light sampling does."""
+    grooves.sun.data.angle = 1.0
+
+
+def _without_multiple_importance(grooves):
+    _wide(grooves)
+    grooves.sun.data.cycles.use_multiple_importance_sampling = False
+
+
+def _hidden_lamp(grooves):
+    grooves.sun.visible_camera = False
+
+
+def _turning_lamp(grooves):
+    grooves.scene.render.use_motion_blur = True
+    grooves.scene.frame_set(1)
+    middle = grooves.sun.rotation_quaternion.copy()
+    for time, angle in ((0, -0.4), (2, 0.4)):
+        grooves.sun.rotation_quaternion = middle @ Quaternion((1, 0, 0), angle)
+        grooves.sun.keyframe_insert("rotation_quaternion", frame=time)
+
+
+def _collection_of(item, name):
+    collection = bpy.data.collections.new(name)
+    collection.objects.link(item)
+    return collection
+
+
+def _linked_elsewhere(grooves):
+    """Another sun, which shines on something else alone."""
+    mesh = bpy.data.meshes.new("elsewhere")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    elsewhere = bpy.data.objects.new("elsewhere", mesh)
+    elsewhere.location.z = -100
+    grooves.scene.collection.objects.link(elsewhere)
+    other = grooves.add_sun((-0.2, 0.3, 0.9))
+    other.light_linking.receiver_collection = _collection_of(elsewhere, "receivers")
+
+
+def _linked_here(grooves):
+    here = _collection_of(grooves.object, "here")
+    grooves.sun.light_linking.receiver_collection = here
+    grooves.sun.light_linking.blocker_collection = here
+
+
+def _portal(grooves):
+    data = bpy.data.lights.new("Portal", "AREA")
+    data.size = 4 * PITCH * grooves.side
+    data.cycles.is_portal = True
+    portal = bpy.data.objects.new("Portal", data)
+    portal.location.z = 2
+    grooves.scene.collection.objects.link(portal)
+
+
+def _nine_suns(grooves):
+    """As many that the list of lamps does not hold them, where one was: with its light."""
+    grooves.sun.data.energy /= 9
+    for i in range(8):
+        grooves.add_sun(SUN, f"Sun{i}")
+
+
 @dataclasses.dataclass(frozen=True)
 class Condition:
-    """`change` alters clean grooves, built with `build`. `code`: how the panel's codes begin where
-    a form suffers. `light_from_a_point`: no mirror shows that lamp, the model's neither. What draws
+    """`change` alters clean grooves, built with `build`; `clean`, if there is one, alters those
+    that it is compared with. `code`: how the panel's codes begin where a form suffers.
+    `light_from_a_point`: no mirror shows that lamp, the model's neither. What draws
     its directions shows it as rare, bright dots, judged by the median cell, as a person would;
     closures meet it, and are compared with what a very small lamp shows: a narrow highlight is
     another one under a wide lamp."""
@@ -302,18 +397,34 @@ class Condition:
     code: str | tuple = ""
     quick: bool = False
     light_from_a_point: bool = False
+    clean: object = None
 
 
 CONDITIONS = [
     Condition("default settings", _cycles(**FACTORY), code=("clamp", "filter_glossy"), quick=True),
     Condition("clamp indirect 10", _cycles(sample_clamp_indirect=10.0), code="clamp"),
     Condition("clamp indirect 1", _cycles(sample_clamp_indirect=1.0), code="clamp"),
+    Condition("clamp direct 10", _cycles(sample_clamp_direct=10.0), code="clamp_direct"),
     Condition("filter glossy 1", _cycles(blur_glossy=1.0), code="filter_glossy", quick=True),
     Condition("path guiding", _cycles(use_guiding=True), code="path_guiding"),
     Condition("caustics off", _cycles(caustics_reflective=False), code="caustics", quick=True),
     Condition(
         "sun without size", _no_size, (), "zero_size_lights", quick=True, light_from_a_point=True
     ),
+    Condition("lamp without shadows", _shadowless, clean=_overhead),
+    Condition(
+        "lamp without multiple importance",
+        _without_multiple_importance,
+        code="multiple_importance",
+        clean=_wide,
+    ),
+    Condition("lamp that cameras can't see", _hidden_lamp),
+    Condition("lamp that turns", _turning_lamp),
+    Condition("lamp linked elsewhere", _linked_elsewhere),
+    Condition("lamp linked here", _linked_here),
+    Condition("nine lamps for one", _nine_suns),
+    Condition("no light tree", _cycles(use_light_tree=False)),
+    Condition("portal", _portal),
     Condition("backfaces", build=(("flip", True),), quick=True),
     Condition("instance", _instance),
     Condition("object motion", _moving),
@@ -342,13 +453,16 @@ def measure(extension, forms, names, samples):
     clean radiance, its standard error, what the panel says.
     """
     rows = []
-    clean = Grooves(extension, forms, samples)
-    before = clean.measure()
-    clean.sun.data.angle = SMALL_SUN
-    small = clean.measure()
-    for condition in CONDITIONS:
-        if names is not None and condition.name not in names:
-            continue
+    chosen = [c for c in CONDITIONS if names is None or c.name in names]
+    unchanged = {}
+    for change in {c.clean: None for c in chosen} | {None: None, _small_sun: None}:
+        grooves = Grooves(extension, forms, samples)
+        if change:
+            change(grooves)
+        unchanged[change] = grooves.measure()
+    small = unchanged[_small_sun]
+    for condition in chosen:
+        before = unchanged[condition.clean]
         grooves = Grooves(extension, forms, samples, **dict(condition.build))
         if condition.change:
             condition.change(grooves)
@@ -396,8 +510,8 @@ def change_of_median(before, after):
 
 
 def passes(extension, tool, forms):
-    """What the passes that denoisers and compositors use say of each form, in a white world:
-    differences from the model's albedo, the normal and the picture."""
+    """What the passes that denoisers and compositors use say of each form, under a white sky and a
+    sun: differences from the model's albedo, the normal and the picture."""
     rows = []
     cosines = np.tile((0.2, 0.5, 0.8, 1.0), 64)
     normals = tilted(cosines, np.linspace(0, 6, len(cosines)))
@@ -408,9 +522,15 @@ def passes(extension, tool, forms):
         material = material_of(extension, form)
         meter = Goniometer(scene, material, normals, samples=64, perspective=True)
         meter.add_world()
-        scene.world.lightgroup = "sky"
+        data = bpy.data.lights.new("Sun", "SUN")
+        data.angle = 0.3
+        sun = bpy.data.objects.new("Sun", data)
+        scene.collection.objects.link(sun)
         layer = scene.view_layers[0]
-        layer.lightgroups.add(name="sky")
+        for owner, group in ((scene.world, "sky"), (sun, "sun")):
+            layer.lightgroups.add(name=group)
+            owner.lightgroup = group
+        extension.api.see_lamps(scene)
         layer.cycles.denoising_store_passes = True
         layer.use_pass_diffuse_color = layer.use_pass_glossy_color = True
         layer.use_pass_transmission_color = True
@@ -441,12 +561,12 @@ def passes(extension, tool, forms):
         angle = np.degrees(np.arccos(np.clip((normal * meter.normals).sum(-1), -1, 1)))
         warned = {f.code for f in extension.api.warnings(material, scene)}
         combined = value("Combined")
-        sky = value("Combined_sky")
+        groups = value("Combined_sky") + value("Combined_sun")
         for name, bias, biased in (
             ("denoising albedo", (value("Denoising Albedo") - scattered).mean(), None),
             ("colour passes", (colours - expected).mean(), None),
             ("denoising normal, degrees", np.median(angle), np.median(angle) > 5),
-            ("light group", np.abs(sky - combined).max(), None),
+            ("light group", np.abs(groups - combined).max(), None),
         ):
             rows.append(
                 {

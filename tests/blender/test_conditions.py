@@ -3,7 +3,7 @@
 
 Where a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all every condition is
 measured, and the rows go to conditions/<version>.json beside the tool, of which script/conditions
-makes its table; else a few.
+makes its table; else a few. BRDFC_CONDITIONS_FORM=aimed measures forms of that name alone.
 """
 
 import json
@@ -16,19 +16,23 @@ import pytest
 
 VERSION = ".".join(map(str, bpy.app.version[:2]))
 ALL = os.environ.get("BRDFC_CONDITIONS") == "all"
+ONLY = os.environ.get("BRDFC_CONDITIONS_FORM") or None
 
 pytestmark = pytest.mark.full
 
 
 @pytest.fixture(scope="module")
 def forms(extension, tool):
-    return conditions.representatives(extension, json.loads(tool("list", "--json")))
+    every = conditions.representatives(extension, json.loads(tool("list", "--json")))
+    every = [f for f in every if ONLY in (None, f.form)]
+    assert every, f"BRDFC_CONDITIONS_FORM: there is no form {ONLY}"
+    return every
 
 
 @pytest.fixture(scope="module")
 def rows(extension, tool, forms):
     names = None if ALL else [c.name for c in conditions.CONDITIONS if c.quick]
-    every = [*forms, *conditions.NATIVE]
+    every = [*forms, *([] if ONLY else conditions.NATIVE)]
     found = conditions.measure(extension, every, names, samples=4096 if ALL else 512)
     found += conditions.passes(extension, tool, every)
     found += conditions.normals(extension, tool, forms)
@@ -63,4 +67,6 @@ def test_the_panel_is_silent_under_clean_settings(extension, forms):
 def test_conditions_can_tell(rows):
     """A sun without size, which drawn rays never meet, must show as a bias of sampled forms."""
     found = [r for r in rows if r["condition"] == "sun without size" and "sampled" in r["form"]]
+    if ONLY not in (None, "sampled"):
+        pytest.skip("it is of sampled forms, and others are asked for")
     assert found and all(r["biased"] for r in found)

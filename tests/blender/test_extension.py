@@ -653,6 +653,40 @@ def test_warning_path_guiding(extension, empty):
     assert codes(extension, extension.api.new_material("lambert", "exact"), empty) == []
 
 
+def test_warning_clamp_direct(extension, empty):
+    """What only drawn directions show of a lamp is as bright as the lamp itself."""
+    material = clean(extension, empty, *sampled_forms(extension)[0])
+    empty.cycles.sample_clamp_direct = 10
+    assert codes(extension, material, empty) == ["clamp_direct"]
+    aimed = extension.api.new_material("cook_torrance", "aimed")
+    assert codes(extension, aimed, empty) == []
+
+
+def test_warning_multiple_importance(extension, empty):
+    """Lamps that directions of a material's own do not meet."""
+    made = {
+        (model, form): clean(extension, empty, model, form)
+        for model, form in (
+            ("blinn", "sampled"),
+            ("blinn", "aimed"),
+            ("coupled", "exact"),
+            ("blinn", "fitted"),
+        )
+    }
+    data = bpy.data.lights.new("Key", "SUN")
+    data.angle = 1.0
+    lamp = bpy.data.objects.new("Key", data)
+    empty.collection.objects.link(lamp)
+    assert not any(codes(extension, m, empty) for m in made.values())
+    data.cycles.use_multiple_importance_sampling = False
+    warned = {key for key, m in made.items() if codes(extension, m, empty)}
+    assert warned == made.keys() - {("blinn", "fitted")}
+    (found,) = extension.api.warnings(made["blinn", "aimed"], empty)
+    assert found.code == "multiple_importance" and "Key" in found.message
+    lamp.hide_render = True
+    assert not any(codes(extension, m, empty) for m in made.values())
+
+
 def test_warning_small_lamps(extension, empty):
     material = clean(extension, empty, *sampled_forms(extension)[0])
     data = bpy.data.lights.new("tiny", "POINT")
@@ -753,6 +787,20 @@ def test_warning_albedo_passes(extension, empty):
     assert codes(extension, material, empty) == []
     empty.view_layers[0].use_pass_diffuse_color = True
     assert codes(extension, material, empty) == ["albedo_passes"]
+
+
+def test_warnings_of_an_aimed_form_that_is_denoised(extension, empty):
+    """Base and rest are signed; normals are those of what is drawn where no base outweighs it."""
+    empty.cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+    for model, expected in (
+        ("cook_torrance", ["albedo_passes"]),
+        ("lossless", ["albedo_passes", "normal_pass"]),
+        ("coupled", ["albedo_passes", "normal_pass"]),
+        ("schlick_double", ["albedo_passes"]),
+    ):
+        material = clean(extension, empty, model, "aimed")
+        empty.cycles.use_denoising = True
+        assert codes(extension, material, empty) == expected, model
 
 
 def test_warning_script_failed(extension, empty):
