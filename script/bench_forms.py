@@ -7,7 +7,8 @@ parameters, all forms of a model in turns in one process, so that what else the 
 them alike, and in several processes, because times of one differ from those of the next by more
 than they differ within it; the cost of a form is the median over all repetitions of its sampling
 time divided by that of the Glossy node. Forms made of a fit come from a pack of these very
-materials. Prints CSV, a model's rows as soon as they are measured.
+materials. Aimed forms, and the Glossy node beside them, have a point lamp besides the sky: without
+lamps they have less to do. Prints CSV, a model's rows as soon as they are measured.
 """
 
 import argparse
@@ -22,10 +23,15 @@ from pathlib import Path
 RENDER_SCENE = Path(__file__).resolve().parent / "render_scene.py"
 
 
-def scene(model, options):
+#: Forms whose scene has a lamp.
+LIT = ("aimed",)
+
+
+def scene(model, options, lit):
+    lamp = {"type": "point", "position": [2, -3, 3], "radius": 0.1, "power": 300}
     return {
         "name": model,
-        "description": "A sphere under a sky",
+        "description": "A sphere under a sky" + (", with a lamp" if lit else ""),
         "settings": {
             "width": options.size,
             "height": options.size,
@@ -42,6 +48,7 @@ def scene(model, options):
         },
         "materials": {"m": {"model": model}},
         "objects": [{"name": "ball", "shape": {"type": "sphere"}, "material": "m"}],
+        "lights": [lamp] if lit else [],
         "environment": {"procedural": "sky"},
     }
 
@@ -63,32 +70,42 @@ def fits(options, model, forms, folder):
 
 
 def measure(options, model, forms, folder):
-    """Sampling times of each form, by name, the Glossy node first."""
+    """Sampling times of each form and of the Glossy node in its scene, by the form's name: of the node
+    itself, too, first."""
     pack, fitted = fits(options, model, forms, folder)
-    source = folder / "source.json"
-    source.write_text(json.dumps(scene(model, options)), encoding="utf-8")
-    subprocess.run([options.tool, "scene", source, "--out", folder], check=True)
-    names = ("glossy", *forms, *fitted)
+    names = [n for n in (*forms, *fitted) if not options.form or n in options.form]
+    if not names:
+        return {}
+    scenes = {lit: folder / ("lit" if lit else "sky") / "scene.json" for lit in (False, True)}
+    for lit, file in scenes.items():
+        file.parent.mkdir()
+        source = file.with_name("source.json")
+        source.write_text(json.dumps(scene(model, options, lit)), encoding="utf-8")
+        subprocess.run([options.tool, "scene", source, "--out", file.parent], check=True)
+    rendered = [("glossy", lit) for lit in (False, True) if any((n in LIT) == lit for n in names)]
+    rendered += [(n, n in LIT) for n in names]
     jobs = [
         {
             "name": f"{model} {form}",
-            "scene": str(folder / "scene.json"),
+            "scene": str(scenes[lit]),
             "out": str(folder / f"{form}.exr"),
             "representation": form,
             "repeat": options.repeat,
             "pack": str(pack) if form in fitted else None,
         }
-        for form in names
+        for form, lit in rendered
     ]
     file = folder / "jobs.json"
     file.write_text(json.dumps(jobs), encoding="utf-8")
     command = [sys.executable, RENDER_SCENE, "--extension", options.extension, "--jobs", file]
-    times = {name: [] for name in names}
+    times = {key: [] for key in rendered}
     for _ in range(options.processes):
         done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
-        for name, record in zip(names, json.loads(done.stdout), strict=True):
-            times[name] += [r["sampling_cpu_seconds"] for r in record["repeats"]]
-    return times
+        for key, record in zip(rendered, json.loads(done.stdout), strict=True):
+            times[key] += [r["sampling_cpu_seconds"] for r in record["repeats"]]
+    # A node's own row is that under the sky alone, where that was rendered.
+    shown = [rendered[0], *(key for key in rendered if key[0] != "glossy")]
+    return {form: (times[form, lit], times["glossy", lit]) for form, lit in shown}
 
 
 def main():
@@ -98,6 +115,7 @@ def main():
     parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
     parser.add_argument("--extension", required=True, type=Path, help="brdfc_shaders-<version>.zip")
     parser.add_argument("--model", action="append", help="only this model; may be repeated")
+    parser.add_argument("--form", action="append", help="only this form; may be repeated")
     parser.add_argument("--size", type=int, default=128, help="pixels along each side (128)")
     parser.add_argument("--spp", type=int, default=32, help="samples a pixel (32)")
     parser.add_argument("--repeat", type=int, default=3, help="renders a form and process (3)")
@@ -123,8 +141,8 @@ def main():
         with tempfile.TemporaryDirectory(prefix="brdfc-bench-") as scratch:
             forms = list(entries[model]["representations"])
             times = measure(options, model, forms, Path(scratch))
-        for form, taken in times.items():
-            costs = [t / u for t, u in zip(taken, times["glossy"], strict=True)]
+        for form, (taken, unit) in times.items():
+            costs = [t / u for t, u in zip(taken, unit, strict=True)]
             print(
                 f"{model},{form},{statistics.median(costs):.3f},{min(costs):.3f},{max(costs):.3f},"
                 f"{statistics.median(taken) / samples * 1e9:.1f}",

@@ -65,8 +65,10 @@ def test_the_panel_is_silent_under_clean_settings(extension, forms):
 
 
 def test_conditions_can_tell(rows):
-    """A sun without size, which drawn rays never meet, must show as a bias of sampled forms."""
+    """A sun without size, which drawn rays never meet, must show as a bias of sampled forms: of those
+    whose noise elsewhere does not hide it, and in all as less light."""
     found = [r for r in rows if r["condition"] == "sun without size" and "sampled" in r["form"]]
     if ONLY not in (None, "sampled"):
         pytest.skip("it is of sampled forms, and others are asked for")
-    assert found and all(r["biased"] for r in found)
+    assert any(r["biased"] for r in found)
+    assert all(r["bias"] < -3 * r["error"] for r in found)

@@ -222,7 +222,7 @@ def test_aimed_forms_whose_base_is_a_fit(extension, fits, tool, subtests):
     """They reflect what the model does: in every world within 5.5 standard errors, 60 comparisons a
     model, so one false alarm in some ten thousand runs."""
     models = [m for m in fits("aimed") if m in fits("fitted")]
-    assert len(models) >= 12 if ALL else set(models) == SOME - {"coupled"}
+    assert len(models) >= 12 if ALL else set(models) == SOME
     worlds = in_worlds(extension, "aimed", models)
     for model in models:
         with subtests.test(model):

@@ -97,7 +97,7 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
         assert shaders_and_tables(cut) <= shaders_and_tables(extension_zip) / 10
 
 
-@pytest.mark.parametrize("form", ["sampled", "fitted", "controlled"])
+@pytest.mark.parametrize("form", ["sampled", "fitted", "aimed"])
 def test_tables_of_the_views_that_occur_show_the_same(
     extension, empty, extension_zip, tool, tmp_path, form
 ):

@@ -112,10 +112,10 @@ def test_a_form_of_the_same_mean_that_wastes_samples_is_found(extension, empty, 
     """Seven of eight drawn directions weigh nothing, the others eight times as much."""
     model = "ward"
     source = extension.pack.source(model, "sampled")[1]
-    weight = "weight_0[lobe] = weight / float(count);"
+    weight = "BSDF = weight *"
     wasteful = (
-        "vector more = brdfc_random(lobe + 99); "
-        "weight_0[lobe] = (more[0] < 0.125 ? 8.0 : 0.0) * weight;"
+        "vector more = brdfc_random(99); "
+        "color kept = (more[0] < 0.125 ? 8.0 : 0.0) * weight; BSDF = kept *"
     )
     assert weight in source
     sources = {"as it is": source, "wasteful": source.replace(weight, wasteful)}
