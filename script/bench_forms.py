@@ -72,7 +72,9 @@ def fits(options, model, forms, folder):
 def measure(options, model, forms, folder):
     """Sampling times of each form and of the Glossy node in its scene, by the form's name: of the node
     itself, too, first."""
-    pack, fitted = fits(options, model, forms, folder)
+    pack, fitted = None, []
+    if not options.form or set(options.form) - set(forms):
+        pack, fitted = fits(options, model, forms, folder)
     names = [n for n in (*forms, *fitted) if not options.form or n in options.form]
     if not names:
         return {}

@@ -52,8 +52,8 @@ PACK_FAULTS = {
     "a distribution": (
         1,
         "shaders/brdfc_lambert_sampled.osl",
-        r"float u_1 = u_all\[1\];",
-        "float u_1 = u_all[1] * sqrt(u_all[1]);",
+        r"u_1 = u_all\[1\],",
+        "u_1 = u_all[1] * sqrt(u_all[1]),",
         f"{GRADIENT} and lambert",
     ),
     "a weight of a closure": (
@@ -73,8 +73,8 @@ PACK_FAULTS = {
     "a weight of a drawn direction": (
         2,
         "shaders/brdfc_lambert_sampled.osl",
-        r"weight_0\[lobe\] = weight",
-        "weight_0[lobe] = 0.97 * weight",
+        r"BSDF = weight \*",
+        "BSDF = 0.97 * weight *",
         f"{GRADIENT} and lambert",
     ),
     "a table of the panel": (

@@ -110,7 +110,8 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   if (kind == RepresentationKind::Aimed) {
     // Path Guiding and the passes know nothing of closures that take light away: pictures get 2 % too bright, the
     // albedo too high by what base and rest cancel. Normals are those of the drawn lobes where no base outweighs them.
-    codes.insert(codes.end(), {"path_guiding", "clamp_indirect", "orthographic_far", "albedo_passes"});
+    codes.insert(codes.end(), {"path_guiding", "orthographic_far", "albedo_passes"});
+    if (mirror) codes.push_back("clamp_mirror");
     if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
   } else if (kind == RepresentationKind::Sampled) {
     codes.insert(codes.end(),
@@ -128,11 +129,11 @@ std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Sh
   return codes;
 }
 
-/// Whether a clamp shows in a form by how bright its highlight is: in closures that are glossy, of which no mirror
-/// shows it before.
+/// Whether a clamp shows in a form by how bright its highlight is: in closures that are glossy, and directions drawn
+/// beside a base or lobes; not where a mirror shows it before.
 bool has_highlight(RepresentationKind kind, bool mirror, const Shader& shader) {
   const bool ramps = shader.slots > shader.closures;
-  return !mirror && (kind == RepresentationKind::Twin ||
+  return !mirror && (kind == RepresentationKind::Twin || kind == RepresentationKind::Aimed ||
                      ((kind == RepresentationKind::Exact || kind == RepresentationKind::Fitted) && ramps));
 }
 

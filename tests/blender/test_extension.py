@@ -194,7 +194,7 @@ def test_shaders_are_short(extension_zip, subtests):
             with subtests.test(name):
                 found = statements(archive.read(name).decode())
                 print(f"{name}: {operations} operations, {found} statements")
-                most = 2000 if "lossless_aimed" in name else 1100 if "_aimed" in name else 600
+                most = 2200 if "lossless_aimed" in name else 1200 if "_aimed" in name else 600
                 assert operations < most
                 assert 0 < found < most
 
@@ -407,7 +407,7 @@ def scripts_of(node):
 def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, empty, subtests):
     """A file holds source and bytecode of each. Fits hold tables of their own; what two aimed forms
     hold for each of their many choices is more than it should be."""
-    longer = {("ashikhmin_shirley", "aimed"): 140_000, ("radziszewski_alda", "aimed"): 180_000}
+    longer = {("ashikhmin_shirley", "aimed"): 140_000, ("radziszewski_alda", "aimed"): 190_000}
     for model, form in forms(extension):
         with subtests.test(model=model, form=form):
             source = extension.pack.source(model, form)[1]
@@ -754,8 +754,12 @@ def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
 
 
 def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
-    """The narrower it is the brighter, in a fit along its slider and in an exact form."""
-    for model, form in (("max_phong", "fitted"), ("modified_phong", "exact")):
+    """The narrower it is the brighter, in a fit along its slider, in an exact form and an aimed one."""
+    for model, form in (
+        ("max_phong", "fitted"),
+        ("modified_phong", "exact"),
+        ("max_phong", "aimed"),
+    ):
         material = clean(extension, empty, model, form)
         empty.cycles.sample_clamp_indirect = 10
         extension.api.set_parameters(material, e=10.0)
