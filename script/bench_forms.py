@@ -70,8 +70,8 @@ def fits(options, model, forms, folder):
 
 
 def measure(options, model, forms, folder):
-    """Sampling times of each form and of the Glossy node in its scene, by the form's name: of the node
-    itself, too, first."""
+    """Sampling times of each form and of the Glossy node in its scene, by the form's name; those of
+    the node itself first."""
     pack, fitted = None, []
     if not options.form or set(options.form) - set(forms):
         pack, fitted = fits(options, model, forms, folder)

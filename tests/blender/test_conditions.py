@@ -65,8 +65,8 @@ def test_the_panel_is_silent_under_clean_settings(extension, forms):
 
 
 def test_conditions_can_tell(rows):
-    """A sun without size, which drawn rays never meet, must show as a bias of sampled forms: of those
-    whose noise elsewhere does not hide it, and in all as less light."""
+    """A sun without size, which drawn rays never meet, must show as a bias of sampled forms: of
+    those whose noise elsewhere does not hide it, and in all as less light."""
     found = [r for r in rows if r["condition"] == "sun without size" and "sampled" in r["form"]]
     if ONLY not in (None, "sampled"):
         pytest.skip("it is of sampled forms, and others are asked for")

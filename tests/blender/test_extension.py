@@ -754,7 +754,7 @@ def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
 
 
 def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
-    """The narrower it is the brighter, in a fit along its slider, in an exact form and an aimed one."""
+    """The narrower it is the brighter, in a fit along its slider, in exact forms and aimed ones."""
     for model, form in (
         ("max_phong", "fitted"),
         ("modified_phong", "exact"),
