@@ -317,7 +317,8 @@ TEST(Plan, FitsBasesWhereAskedToAndWhereFitsAreMadeAnyway) {
   EXPECT_EQ(base({need("a", "ward", {"ax=0.5"})}, asked), AimedBase::Declared) << "it is anisotropic";
   EXPECT_EQ(base({need("a", "phong", {"e=20"}, "sampled")}, asked), AimedBase::Declared) << "nothing is aimed";
   EXPECT_EQ(why(plan_scene(phong, asked)[0], kAimed), "a: the form is left open; closures fitted to it are its base");
-  for (const FormChoice& c : plan_scene(phong, asked)[0].choices)
+  const PlannedModel planned = plan_scene(phong, asked)[0];
+  for (const FormChoice& c : planned.choices)
     if (c.form == kAimed) {
       EXPECT_FALSE(c.cost);
     }
