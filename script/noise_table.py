@@ -107,7 +107,7 @@ _blender = {}
 def start(extension, cache):
     """Of each process: Blender with the extension; what it prints goes to a file."""
     # Imported here: this process may be one that never renders.
-    from render_scene import start_blender
+    from render_scene import start_blender, take_even_block
 
     log = os.open(cache / "blender.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(log, 1)
@@ -119,6 +119,7 @@ def start(extension, cache):
         bpy=bpy,
         loader=loader,
         scenes=noise_scenes,
+        take_even_block=take_even_block,
         cache=cache,
         resources=resources,
         folder=Path(resources.name),
@@ -161,16 +162,10 @@ def dress(scene, ball, make):
 
 
 def render(scene, samples, seed, read=True):
-    """Seconds of CPU time, and pixels, (height, width, 3), row 0 at the bottom.
-
-    The first sample of a pixel goes through its centre whatever the seed, where a drawn form would
-    draw the same in every picture. The second half of twice as many is as evenly spread as the
-    first.
-    """
+    """Seconds of CPU time, and pixels, (height, width, 3), row 0 at the bottom."""
     bpy, cycles = _blender["bpy"], scene.cycles
     cycles.seed = seed
-    cycles.samples, cycles.sample_offset = 2 * samples, samples
-    cycles.use_sample_subset, cycles.sample_subset_length = True, samples
+    _blender["take_even_block"](cycles, samples)
     path = _blender["folder"] / "picture.exr"
     scene.render.filepath = str(path)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_utime

@@ -77,15 +77,20 @@ def cpu_seconds():
     return usage.ru_utime + usage.ru_stime
 
 
+def take_even_block(cycles, samples):
+    """Sets how many samples are taken, and which: a block of Cycles' sequence that is as even as its
+    first ones, without the very first. Cycles sends that through the centre of each pixel whatever
+    the seed, where a form that draws from where the path is would draw the same in every picture.
+    """
+    first = 1 << (samples - 1).bit_length()  # blocks of powers of two are even
+    cycles.samples, cycles.sample_offset = first + samples, first
+    cycles.use_sample_subset, cycles.sample_subset_length = True, samples
+
+
 def timed_render(bpy, samples, path=None):
     """CPU and wall seconds of one render of the active scene."""
     scene = bpy.context.scene
-    # Cycles sends the first sample of a pixel through its centre, whatever the seed. There a form
-    # that draws from where the path is would draw the same in every picture, so that one is left
-    # out.
-    cycles = scene.cycles
-    cycles.samples, cycles.sample_offset = samples + 1, 1
-    cycles.use_sample_subset, cycles.sample_subset_length = True, samples
+    take_even_block(scene.cycles, samples)
     if path is not None:
         scene.render.filepath = str(path)
     with quiet():

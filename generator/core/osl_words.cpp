@@ -27,11 +27,12 @@ constexpr const char* kWords = R"(
   entry first frame_b frame_n frame_t last mirror_weight path_length show side
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
-  aimed covered covered_before drawn_density drawn_x drawn_y drawn_z earlier excess half_way lamp lamp_across lamp_along
-  lamp_centre lamp_covers lamp_disk lamp_emphasis lamp_met lamp_met_here lamp_place lamp_scale lamp_shape
-  lamp_solid_angle lamp_turn lamps lobe_colour lobe_colours lobe_end lobe_exponent lobe_extent lobe_followed lobe_half
-  lobe_height lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight ray_x ray_y ray_z rest_colour
-  rest_followed rest_weight to_half_x to_half_y to_half_z to_lamp_x to_lamp_y to_lamp_z v_all
+  across_here aimed along_here centre_here chosen covered covered_before density_under disk_here drawn_density drawn_x
+  drawn_y drawn_z earlier excess half_way lamp lamp_across lamp_along lamp_centre lamp_disk lamp_emphasis lamp_met
+  lamp_place lamp_scale lamp_shape lamp_solid_angle lamp_turn lamps lobe_colour lobe_colours lobe_end lobe_exponent
+  lobe_extent lobe_followed lobe_half lobe_height lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight
+  lobes ray_x ray_y ray_z rest_colour rest_followed rest_weight to_half_x to_half_y to_half_z to_lamp_x to_lamp_y
+  to_lamp_z tossed v_all
 )";
 
 /// What a shader numbers.

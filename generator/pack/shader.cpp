@@ -338,64 +338,73 @@ class AimedText {
 
   int operations() const {
     const AimedSteps& steps = aimed_steps(0);
-    return operations_ + steps.rest.operations +
-           (lamps_ > 0 ? steps.room.operations + steps.aim.operations + steps.less.operations + steps.send.operations
-                       : 0);
+    if (lamps_ == 0) return operations_ + steps.alone.operations;
+    int all = operations_ + steps.rest.operations;
+    for (const Recording* r : {&steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
+      all += r->operations;
+    return all;
   }
 
   std::string print() const {
     const AimedSteps& steps = aimed_steps(0);
-    std::string out = std::string(kDraws) + "    float drawn_x, drawn_y, drawn_z;\n" + block(draw_.print(0), 1) +
-                      "    color rest_colour;\n    float rest_weight;\n";
+    std::string out =
+        std::string(kDraws) + "    float drawn_x, drawn_y, drawn_z;\n    color rest_colour;\n    float rest_weight;\n";
     if (lamps_ == 0)
-      return out + "    color excess;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
+      return out + block(draw_.print(0), 1) +
+             "    color excess;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
              block(value_.print(0), 1) + block(steps.alone.statements, 1);
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
     out += fmt::format(
-        "    color lobe_value[{0}], lobe_colour[{0}];\n"
-        "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}];\n"
-        "    vector lobe_towards[{0}], lobe_half[{0}];\n"
-        "    color covered = 0.0, covered_before = 0.0;\n"
-        "    float lamp_met = 0.0, ray_x = drawn_x, ray_y = drawn_y, ray_z = drawn_z;\n    int lamps = 0;\n"
+        "    vector lamp_centre[{0}], lamp_across[{0}], lamp_along[{0}], lobe_towards[{0}], lobe_half[{0}];\n"
+        "    float lamp_disk[{0}], lamp_solid_angle[{0}];\n"
+        "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}], lobe_extent[{0}];\n"
+        "    color lobe_value[{0}], lobe_colour[{0}], covered = 0.0, covered_before = 0.0;\n"
+        "    float ray_x, ray_y, ray_z, lamp_met = 0.0, density_under = 0.0;\n    int lamps = 0, lobes = 0;\n"
         "    for (int lamp = 0; lamp < {0}; lamp++)\n"
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);
     out +=
         "    // The lamps, and at last the direction that was drawn.\n"
         "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
-        "        float wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n"
-        "        float lobe_height, lobe_extent, lamp_emphasis, lamp_solid_angle, lamp_covers, lamp_met_here;\n"
+        "        float wi_x, wi_y, wi_z, lobe_height, lamp_emphasis;\n"
         "        if (lamp < lamps) {\n"
-        "            vector lamp_centre, lamp_across, lamp_along;\n            float lamp_disk, lobe_room = 1.0;\n"
-        "            lobe_weight[lamp] = 0.0;\n"
+        "            vector centre_here, across_here, along_here;\n            float disk_here, lobe_room = 1.0;\n"
         "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], "
-        "lamp_centre, lamp_across,\n"
-        "                           lamp_along, lamp_disk) == 0)\n"
+        "centre_here, across_here,\n"
+        "                           along_here, disk_here) == 0)\n"
         "                continue;\n"
         "            // Numbers of its own: what a lobe gives at another's lamp must not go with where that is met.\n"
         "            vector v_all = brdfc_random(1 + lamp);\n"
         "            float v_1 = v_all[0], v_2 = v_all[1];\n"
-        "            lamp_centre = brdfc_local(lamp_centre, frame_t, frame_b, frame_n);\n"
-        "            lamp_across = brdfc_local(lamp_across, frame_t, frame_b, frame_n);\n"
-        "            lamp_along = brdfc_local(lamp_along, frame_t, frame_b, frame_n);\n";
+        "            lamp_centre[lobes] = brdfc_local(centre_here, frame_t, frame_b, frame_n);\n"
+        "            lamp_across[lobes] = brdfc_local(across_here, frame_t, frame_b, frame_n);\n"
+        "            lamp_along[lobes] = brdfc_local(along_here, frame_t, frame_b, frame_n);\n"
+        "            lamp_disk[lobes] = disk_here;\n";
     out += earlier_lobes("", steps.room.statements);
     out += "            float to_lamp_x, to_lamp_y, to_lamp_z, to_half_x, to_half_y, to_half_z;\n";
     out += indented(steps.aim.statements, 3);
     out +=
         "            if (lamp_emphasis == 0.0)\n                continue;\n"
-        "            lobe_towards[lamp] = vector(to_lamp_x, to_lamp_y, to_lamp_z);\n"
-        "            lobe_half[lamp] = vector(to_half_x, to_half_y, to_half_z);\n"
-        "            if (lamp_met_here > 0.0) {\n                lamp_met = lamp_solid_angle;\n                "
-        "covered_before = covered;\n"
-        "            }\n"
+        "            lobe_towards[lobes] = vector(to_lamp_x, to_lamp_y, to_lamp_z);\n"
+        "            lobe_half[lobes] = vector(to_half_x, to_half_y, to_half_z);\n"
+        "        } else {\n"
+        "            float tossed;\n";
+    out += indented(steps.toss.statements, 3);
+    out += "            if (tossed < 0.0) {\n" + indented(draw_.print(0), 4) +
+           "            } else {\n                int chosen = int(tossed);\n" + indented(steps.under.statements, 4) +
+           "            }\n"
+           "            ray_x = drawn_x;\n            ray_y = drawn_y;\n            ray_z = drawn_z;\n";
+    out += earlier_lobes("", steps.meet.statements);
+    out +=
+        "            wi_x = drawn_x;\n            wi_y = drawn_y;\n            wi_z = drawn_z;\n"
         "        }\n"
         "        color excess;\n        float drawn_density;\n";
     out += indented(value_.print(0), 2);
     out += "        if (lamp < lamps) {\n" +
-           earlier_lobes(" && dot(lobe_towards[earlier], vector(wi_x, wi_y, wi_z)) > lobe_end[earlier]",
+           earlier_lobes("if (dot(lobe_towards[earlier], vector(wi_x, wi_y, wi_z)) > lobe_end[earlier]) ",
                          steps.less.statements) +
-           indented(steps.send.statements, 3) + "        } else {\n" + indented(steps.rest.statements, 3) +
-           "        }\n    }\n";
+           indented(steps.send.statements, 3) + "            lobes++;\n        } else {\n" +
+           indented(steps.rest.statements, 3) + "        }\n    }\n";
     out +=
         "    if (lamp_met > 0.0) {\n"
         "        ray_x = drawn_x;\n        ray_y = drawn_y;\n        ray_z = drawn_z;\n    }\n";
@@ -404,7 +413,7 @@ class AimedText {
     for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
     out += fmt::format(
         "    closure color aimed = 0;\n"
-        "    for (int lamp = 0; lamp < lamps; lamp++)\n"
+        "    for (int lamp = 0; lamp < lobes; lamp++)\n"
         "        if (lobe_weight[lamp] > 0.0) {{\n"
         "            float lobe_level[{0}] = {{{1}}};\n"
         "            color lobe_colours[{0}];\n"
@@ -428,12 +437,10 @@ class AimedText {
     return fmt::format("    vector lamp_{}[{}] = {{{}}};\n", name, lamps_, list);
   }
 
-  /// Done with every lobe before this one, in the loop's branch for lamps.
+  /// Done with every lobe so far, in the loop over the lamps.
   static std::string earlier_lobes(const char* condition, const std::string& statements) {
-    return fmt::format(
-               "            for (int earlier = 0; earlier < lamp; earlier++)\n"
-               "                if (lobe_weight[earlier] > 0.0{}) {{\n",
-               condition) +
+    return fmt::format("            for (int earlier = 0; earlier < lobes; earlier++)\n                {}{{\n",
+                       condition) +
            indented(statements, 5) + "                }\n";
   }
 

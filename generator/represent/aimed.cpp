@@ -10,32 +10,36 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
     return excess(brdf, !base.empty(), evaluate(base, wi, wo), wi, wo);
   };
   AimedSum out;
-  out.drawn = out.wi = draw(brdf, !base.empty(), wo, u);
-  Rgb<double> covered(0.0), before(0.0);
-  double met = 0;
+  std::vector<const LampPatch<double>*> of;
+  std::vector<double> solid_angles;
   for (std::size_t i = 0; i < patches.size(); ++i) {
-    const LampPatch<double>& patch = patches[i];
     double room = 1;
-    for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patch.centre, earlier));
-    const AimedLamp<double> lamp = aim_at(patch, room, v[i][0], v[i][1], out.drawn, wo);
+    for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patches[i].centre, earlier));
+    const AimedLamp<double> lamp = aim_at(patches[i], room, v[i][0], v[i][1], wo);
     if (lamp.emphasis == 0) continue;
-    out.wi = beside(patch, out.wi);
-    if (lamp.met > 0) {
-      met = lamp.solid_angle;
-      before = covered;
-    }
     Excess<double> there = excess_at(lamp.wi);
     for (std::size_t k = 0; k < out.lobes.size(); ++k)
       there.value = there.value - out.values[k] * evaluate(out.lobes[k], lamp.wi);
-    const Sent<double> sent = send(lamp, there.value, there.density);
+    of.push_back(&patches[i]);
+    solid_angles.push_back(lamp.solid_angle);
     out.lobes.push_back(lamp.lobe);
-    out.values.push_back(sent.value);
-    covered += sent.covered;
+    out.values.push_back(send(lamp, there.value, there.density).value);
   }
+  const auto count = double(out.lobes.size());
+  const Toss<double> tossed = toss(u.x, count);
+  out.drawn = tossed.lobe < 0 ? draw(brdf, !base.empty(), wo, {tossed.u, u.y, u.z})
+                              : sample_under(out.lobes[std::size_t(tossed.lobe)], u.y, u.z);
+  out.wi = out.drawn;
+  Met<double> met;
+  for (std::size_t k = 0; k < out.lobes.size(); ++k) {
+    met = meet(met, *of[k], out.lobes[k], solid_angles[k], out.values[k], out.drawn);
+    out.wi = beside(*of[k], out.wi);
+  }
+  if (met.solid_angle > 0) out.wi = out.drawn;
   const Excess<double> drawn = excess_at(out.drawn);
-  if (met > 0) out.wi = out.drawn;
-  const Rest<double> left = rest(drawn.value, drawn.density, covered, met, before);
+  const Rest<double> left = rest(drawn.value, drawn.density, count, met);
   out.rest = left.colour * left.weight;
+  out.density = density_of_drawn(drawn.density, count, met);
   return out;
 }
 

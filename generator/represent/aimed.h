@@ -10,7 +10,8 @@
 // Where a drawn direction meets a lamp, lamp and rest share f cos - base by a power heuristic (E. Veach, L. Guibas:
 // Optimally Combining Sampling Techniques for Monte Carlo Rendering, 1995): a lobe wins for lamps that are small beside
 // the model's lobe, the drawn direction for those that are large. Elsewhere the rest takes off what lobes give beside
-// their lamps. The one approximation: over a lamp f and the lamp's visibility are averaged apart.
+// their lamps, for which some directions are drawn from there: the model's own hardly come where it falls steeply. The
+// one approximation: over a lamp f and the lamp's visibility are averaged apart.
 //
 // Directions and lamps are in the local frame of the shader: z is the normal on the viewer's side.
 #pragma once
@@ -55,6 +56,7 @@ template <class T> struct AimedLobe {
   T exponent;
   T sinRadius;  ///< of the lamp
   T cosEnd;     ///< from its centre on the lobe is 0
+  T extent;     ///< solid angle of where it is not
 };
 
 /// What a shading point makes of a lamp.
@@ -65,9 +67,6 @@ template <class T> struct AimedLamp {
                   ///< 1 to some percent; 0 where the lamp is left to the rest
   T solid_angle;  ///< of the lamp
   T height;       ///< of the closure's colours over aimed_ramp() where f cos is 1
-  T extent;       ///< solid angle under the lobe, roughly
-  T covers;       ///< the lobe's f cos in the drawn direction
-  T met;          ///< 1 where the drawn direction meets the lamp, else 0
 };
 
 /// cos^e -> f cos of an aimed lobe over its height and (half.wi): ramp times cos^e.
@@ -109,7 +108,22 @@ template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, 
   lobe.exponent = T(2 * level) / log1p(-sqr(sinWidth));
   lobe.sinRadius = sinRadius;
   lobe.cosEnd = exp(T(end) / lobe.exponent);
+  lobe.extent = T(-2) * pi<T>() * expm1(T(end) / lobe.exponent);
   return lobe;
+}
+
+/// A direction under a lobe, each as likely as the others; and how likely that is.
+template <class T> Vec3<T> sample_under(const AimedLobe<T>& lobe, const T& u, const T& v) {
+  // From 1 - cos, which has all its digits.
+  const T drop = u * lobe.extent / (T(2) * pi<T>()), sine = sqrt(drop * (T(2) - drop)), turn = T(2) * pi<T>() * v;
+  const auto upright = abs(lobe.towards.z) > T(0.9);
+  const Vec3<T> t =
+      normalize(cross(lobe.towards, Vec3<T>{select(upright, T(1), T(0)), T(0), select(upright, T(0), T(1))}));
+  const Vec3<T> b = cross(lobe.towards, t);
+  return lobe.towards * (T(1) - drop) + t * (sine * cos(turn)) + b * (sine * sin(turn));
+}
+template <class T> T pdf_under(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
+  return select(dot(lobe.towards, wi) > lobe.cosEnd, T(1) / lobe.extent, T(0));
 }
 
 /// The direction `ray`, moved out of the seam about a lamp if it lies there. The rest is drawn as a lobe 1e-3 wide,
@@ -138,14 +152,14 @@ template <class T> Vec3<T> beside(const LampPatch<T>& patch, const Vec3<T>& ray)
   return select(touches && moved.z * ray.z > T(0), moved, ray);
 }
 
-/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp. `drawn`: the direction that
-/// the rest carries.
-template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2,
-                                       const Vec3<T>& drawn, const Vec3<T>& wo) {
+/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp.
+template <class T>
+AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2, const Vec3<T>& wo) {
   /// Sine of the radius beyond which a lamp is so near that drawn directions meet it well.
   constexpr double kNearest = 0.85;
-  /// Cosine of half the angle between lamp and viewer below which the closure's normal is but rounding.
-  constexpr double kLeastHalf = 0.005;
+  /// Cosine between the closure's normal and any point of the lamp below which the normal is but rounding; and the same
+  /// in units of that to the lamp's centre, where the closure would be as good as black.
+  constexpr double kLeastRise = 0.005, kLeastShare = 0.2;
   const auto disk = patch.disk > T(0.5);
   const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
   const T distance2 = dot(patch.centre, patch.centre);
@@ -155,7 +169,6 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
   lamp.lobe = aim(towards, sqrt(minimum(radius2 / distance2, T(1))), room, wo);
   const T rise = dot(lamp.lobe.half, towards);
   lamp.height = T(2) * pi<T>() / (rise * (lamp.lobe.exponent + T(2)));
-  lamp.extent = T(2) * pi<T>() * (T(1) - lamp.lobe.cosEnd);
 
   const T radius = sqrt(v1), angle = T(2) * pi<T>() * v2;
   const Vec3<T> point = patch.at(select(disk, radius * cos(angle), T(2) * v1 - T(1)),
@@ -174,17 +187,24 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room,
                   density(patch.at(other * T(-1), node)) + density(patch.at(other, -node))) /
                  T(4);
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
-  const auto usable = radius2 < T(kNearest * kNearest) * distance2 && rise > T(kLeastHalf);
+  const T sinRadius = lamp.lobe.sinRadius;
+  const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
+  const auto usable =
+      radius2 < T(kNearest * kNearest) * distance2 && least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
   lamp.emphasis = select(usable, density(point) / maximum(mean * evaluate(lamp.lobe, lamp.wi), tiny<T>()), T(0));
-
-  lamp.covers = evaluate(lamp.lobe, drawn);
-  const T facing = dot(normal, drawn);
-  const T reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
-  const Vec3<T> offset = drawn * reach - patch.centre;
-  const T x2 = sqr(dot(offset, patch.across) / a2), y2 = sqr(dot(offset, patch.along) / b2);
-  const auto inside = reach > T(0) && select(disk, x2 + y2, maximum(x2, y2)) < T(1);
-  lamp.met = select(usable && inside, T(1), T(0));
   return lamp;
+}
+
+/// 1 where a direction meets the lamp, else 0.
+template <class T> T meets(const LampPatch<T>& patch, const Vec3<T>& wi) {
+  const Vec3<T> normal = cross(patch.across, patch.along);
+  const T facing = dot(normal, wi);
+  const T reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const Vec3<T> offset = wi * reach - patch.centre;
+  const T x2 = sqr(dot(offset, patch.across) / dot(patch.across, patch.across)),
+          y2 = sqr(dot(offset, patch.along) / dot(patch.along, patch.along));
+  const auto inside = reach > T(0) && select(patch.disk > T(0.5), x2 + y2, maximum(x2, y2)) < T(1);
+  return select(inside, T(1), T(0));
 }
 
 /// What the drawn direction carries of a lamp of this solid angle, which it meets with this density: the power
@@ -199,12 +219,11 @@ template <class T> T share_of_drawn(const T& solid_angle, const T& density) {
 /// The largest magnitude of a channel.
 template <class T> T largest(const Rgb<T>& c) { return maximum(max_component(c), max_component(c * T(-1))); }
 
-/// What a lamp's lobe carries and the rest has to take off.
+/// What a lamp's lobe carries.
 template <class T> struct Sent {
-  Rgb<T> value;    ///< f cos over the lamp
-  Rgb<T> covered;  ///< f cos of the lobe in the drawn direction, unless that meets the lamp
-  T weight;        ///< of the closure: what Cycles follows it by
-  Rgb<T> colour;   ///< aimed_ramp() times this are the closure's colours
+  Rgb<T> value;   ///< f cos over the lamp
+  T weight;       ///< of the closure: what Cycles follows it by
+  Rgb<T> colour;  ///< aimed_ramp() times this are the closure's colours
 };
 
 /// `value`: f cos - base towards AimedLamp::wi, less what the lobes of earlier lamps give there; `density` that of
@@ -214,13 +233,52 @@ template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, c
   constexpr double kLeastWeight = 1e-3;
   Sent<T> out;
   out.value = value * (lamp.emphasis * (T(1) - share_of_drawn(lamp.solid_angle, density)));
-  // On the lamp the lobe is not quite level. Its height is in the emphasis: were it in the rest, light sampling would
-  // find it there, as rarely and as bright as in a seam (beside()).
-  out.covered = out.value * (lamp.covers * (T(1) - lamp.met));
   const T size = largest(out.value);
-  out.weight = select(size > T(0), minimum(maximum(size * lamp.extent, T(kLeastWeight)), T(1)), T(0));
+  out.weight = select(size > T(0), minimum(maximum(size * lamp.lobe.extent, T(kLeastWeight)), T(1)), T(0));
   out.colour = out.value * (lamp.height / maximum(out.weight, T(kLeastWeight)));
   return out;
+}
+
+/// How often, where there are lobes, the drawn direction comes from under one of them.
+inline constexpr double kFromLobes = 0.1;
+
+/// u.x from 0 to 1 chooses where the drawn direction comes from, and serves again, stretched.
+template <class T> struct Toss {
+  T lobe;  ///< number of the lobe, less than 0: none
+  T u;     ///< the number in [0, 1) for draw()
+};
+/// `lobes`: how many there are.
+template <class T> Toss<T> toss(const T& u, const T& lobes) {
+  const T of_lobes = select(lobes > T(0), T(kFromLobes), T(0));
+  const auto from_lobe = u < of_lobes;
+  return {select(from_lobe, minimum(u * lobes / T(kFromLobes), lobes - T(0.5)), T(-1)),
+          minimum(maximum(u - of_lobes, T(0)) / (T(1) - of_lobes), T(1 - 1e-7))};
+}
+
+/// What lamps make of the drawn direction, added up lobe by lobe.
+template <class T> struct Met {
+  Rgb<T> covered = Rgb<T>(T(0));  ///< f cos of the lobes, but for that of the lamp that it meets
+  Rgb<T> before = Rgb<T>(T(0));   ///< the same of the lobes before that one's; none where it meets no lamp
+  T solid_angle{0};               ///< of the lamp that it meets, else 0
+  T density{0};                   ///< sum of pdf_under()
+};
+template <class T>
+Met<T> meet(Met<T> met, const LampPatch<T>& patch, const AimedLobe<T>& lobe, const T& solid_angle, const Rgb<T>& value,
+            const Vec3<T>& drawn) {
+  const auto here = meets(patch, drawn) > T(0);
+  met.solid_angle = select(here, solid_angle, met.solid_angle);
+  met.before = select(here, met.covered, met.before);
+  // On the lamp the lobe is not quite level. Its height is in the emphasis: were it in the rest, light sampling would
+  // find it there, as rarely and as bright as in a seam (beside()). Below the surface nothing is taken off.
+  met.covered += value * select(here || drawn.z <= T(0), T(0), evaluate(lobe, drawn));
+  met.density = met.density + pdf_under(lobe, drawn);
+  return met;
+}
+
+/// Of the drawn direction, by that of draw(); `lobes`: how many there are.
+template <class T> T density_of_drawn(const T& density, const T& lobes, const Met<T>& met) {
+  const T of_lobes = select(lobes > T(0), T(kFromLobes), T(0));
+  return (T(1) - of_lobes) * density + of_lobes * met.density / maximum(lobes, T(1));
 }
 
 /// The drawn direction's weight without its sign, and sign and colour.
@@ -229,19 +287,17 @@ template <class T> struct Rest {
   Rgb<T> colour;
 };
 
-/// `value`: f cos - base in the drawn direction, `density` that of drawing it, `covered` the sum over the lamps. `met`:
-/// the solid angle of the lamp that it meets, 0 if none; `before`: the sum over the lamps before that one.
-template <class T>
-Rest<T> rest(const Rgb<T>& value, const T& density, const Rgb<T>& covered, const T& met, const Rgb<T>& before) {
-  const auto drawn = density > T(0);
-  const T p = select(drawn, density, T(1));
-  const Rgb<T> left = value - before;
-  const Rgb<T> shared = left * (share_of_drawn(met, p) / p);
-  const Rgb<T> lacking = select(met > T(0), Rgb<T>(T(0)), left) - (covered - before);
-  const Rgb<T> all = select(drawn, shared + lacking / p, Rgb<T>(T(0)));
+/// `value`: f cos - base in the drawn direction; `density`, `lobes`: see density_of_drawn().
+template <class T> Rest<T> rest(const Rgb<T>& value, const T& density, const T& lobes, const Met<T>& met) {
+  const T p = density_of_drawn(density, lobes, met);
+  const auto drawn = p > T(0);
+  const Rgb<T> left = value - met.before;
+  const Rgb<T> lacking = select(met.solid_angle > T(0), Rgb<T>(T(0)), left) - (met.covered - met.before);
+  const Rgb<T> all = left * share_of_drawn(met.solid_angle, density) + lacking;
   Rest<T> out;
-  out.weight = largest(all);
-  out.colour = all / maximum(out.weight, tiny<T>());
+  const T size = largest(all);
+  out.weight = select(drawn, size / select(drawn, p, T(1)), T(0));
+  out.colour = all / maximum(size, tiny<T>());
   return out;
 }
 
@@ -251,7 +307,7 @@ template <class T> struct Excess {
   T density;
 };
 
-/// How often the drawn direction comes from everywhere: a base may give light that the model has none of.
+/// How often the direction of draw() comes from everywhere: a base may give light that the model has none of.
 inline constexpr double kFromEverywhere = 0.2;
 
 /// u: three numbers in [0, 1). `with_base`: whether there is a base.
@@ -280,6 +336,7 @@ struct AimedSum {
   Vec3<double> drawn;               ///< the drawn direction
   Vec3<double> wi;                  ///< the same, beside lamps' seams: where the rest goes
   Rgb<double> rest;                 ///< its weight
+  double density;                   ///< of drawing it
 };
 
 /// As the shader goes about it (pack/shader.cpp), with the base for wo. u: three numbers that draw the direction; v:

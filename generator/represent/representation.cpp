@@ -382,33 +382,40 @@ const AimedSteps& aimed_steps(int indent) {
     outputs(program);
     return finish(program, indent, {});
   };
-  AimedLobe<Expr> earlier;
-  earlier.towards = input_vector("lobe_towards[earlier]");
-  earlier.half = input_vector("lobe_half[earlier]");
-  earlier.exponent = Expr::input("lobe_exponent[earlier]");
-  earlier.sinRadius = Expr::input("lobe_radius[earlier]");
-  earlier.cosEnd = Expr::input("lobe_end[earlier]");
-  const Vec3<Expr> centre = input_vector("lamp_centre");
+  const auto kept_lobe = [](const std::string& index) {
+    const auto of = [&](const char* what) { return fmt::format("lobe_{}[{}]", what, index); };
+    AimedLobe<Expr> lobe;
+    lobe.towards = input_vector(of("towards"));
+    lobe.half = input_vector(of("half"));
+    lobe.exponent = Expr::input(of("exponent"));
+    lobe.sinRadius = Expr::input(of("radius"));
+    lobe.cosEnd = Expr::input(of("end"));
+    lobe.extent = Expr::input(of("extent"));
+    return lobe;
+  };
+  const auto kept_patch = [](const std::string& index) {
+    const auto of = [&](const char* what) { return fmt::format("lamp_{}[{}]", what, index); };
+    return LampPatch<Expr>{input_vector(of("centre")), input_vector(of("across")), input_vector(of("along")),
+                           Expr::input(of("disk"))};
+  };
+  const AimedLobe<Expr> earlier = kept_lobe("earlier");
+  const LampPatch<Expr> patch = kept_patch("lobes");
+  const Expr lobes = Expr::input("lobes");
   steps.room = record_step(
-      [&](Program& p) { p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(centre, earlier))); });
+      [&](Program& p) { p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(patch.centre, earlier))); });
   steps.aim = record_step([&](Program& p) {
-    const LampPatch<Expr> patch{centre, input_vector("lamp_across"), input_vector("lamp_along"),
-                                Expr::input("lamp_disk")};
     const AimedLamp<Expr> lamp =
-        aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("drawn"), input3("wo"));
+        aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
     output3(p, "wi", lamp.wi);
     output3(p, "to_lamp", lamp.lobe.towards);
     output3(p, "to_half", lamp.lobe.half);
-    p.output("lobe_exponent[lamp]", lamp.lobe.exponent);
-    p.output("lobe_radius[lamp]", lamp.lobe.sinRadius);
-    p.output("lobe_end[lamp]", lamp.lobe.cosEnd);
+    p.output("lobe_exponent[lobes]", lamp.lobe.exponent);
+    p.output("lobe_radius[lobes]", lamp.lobe.sinRadius);
+    p.output("lobe_end[lobes]", lamp.lobe.cosEnd);
+    p.output("lobe_extent[lobes]", lamp.lobe.extent);
     p.output("lobe_height", lamp.height);
-    p.output("lobe_extent", lamp.extent);
     p.output("lamp_emphasis", lamp.emphasis);
-    p.output("lamp_solid_angle", lamp.solid_angle);
-    p.output("lamp_covers", lamp.covers);
-    p.output("lamp_met_here", lamp.met);
-    output3(p, "ray", select(lamp.emphasis > Expr(0), beside(patch, input3("ray")), input3("ray")));
+    p.output("lamp_solid_angle[lobes]", lamp.solid_angle);
   });
   const Rgb<Expr> value = Rgb<Expr>::input("excess");
   const Expr density = Expr::input("drawn_density");
@@ -418,26 +425,42 @@ const AimedSteps& aimed_steps(int indent) {
   steps.send = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;
     lamp.height = Expr::input("lobe_height");
-    lamp.extent = Expr::input("lobe_extent");
+    lamp.lobe.extent = Expr::input("lobe_extent[lobes]");
     lamp.emphasis = Expr::input("lamp_emphasis");
-    lamp.solid_angle = Expr::input("lamp_solid_angle");
-    lamp.covers = Expr::input("lamp_covers");
-    lamp.met = Expr::input("lamp_met_here");
+    lamp.solid_angle = Expr::input("lamp_solid_angle[lobes]");
     const Sent<Expr> sent = send(lamp, value, density);
-    p.output("covered", Rgb<Expr>::input("covered") + sent.covered);
-    p.output("lobe_value[lamp]", sent.value);
-    p.output("lobe_weight[lamp]", sent.weight);
-    p.output("lobe_colour[lamp]", sent.colour);
+    p.output("lobe_value[lobes]", sent.value);
+    p.output("lobe_weight[lobes]", sent.weight);
+    p.output("lobe_colour[lobes]", sent.colour);
   });
-  const auto record_rest = [&](const Rgb<Expr>& covered, const Expr& met, const Rgb<Expr>& before) {
+  steps.toss = record_step([&](Program& p) {
+    const Toss<Expr> tossed = toss(Expr::input("u_0"), lobes);
+    p.output("tossed", tossed.lobe);
+    p.output("u_0", tossed.u);
+  });
+  steps.under = record_step(
+      [&](Program& p) { output3(p, "drawn", sample_under(kept_lobe("chosen"), Expr::input("u_1"), Expr::input("u_2"))); });
+  const Met<Expr> before{Rgb<Expr>::input("covered"), Rgb<Expr>::input("covered_before"), Expr::input("lamp_met"),
+                         Expr::input("density_under")};
+  steps.meet = record_step([&](Program& p) {
+    const LampPatch<Expr> of_earlier = kept_patch("earlier");
+    const Met<Expr> met = meet(before, of_earlier, earlier, Expr::input("lamp_solid_angle[earlier]"),
+                               Rgb<Expr>::input("lobe_value[earlier]"), input3("drawn"));
+    p.output("covered_before", met.before);  // from what was covered before this one is added
+    p.output("covered", met.covered);
+    p.output("lamp_met", met.solid_angle);
+    p.output("density_under", met.density);
+    output3(p, "ray", beside(of_earlier, input3("ray")));
+  });
+  const auto record_rest = [&](const Expr& count, const Met<Expr>& met) {
     return record_step([&](Program& p) {
-      const Rest<Expr> left = rest(value, density, covered, met, before);
+      const Rest<Expr> left = rest(value, density, count, met);
       p.output("rest_weight", left.weight);
       p.output("rest_colour", left.colour);
     });
   };
-  steps.rest = record_rest(Rgb<Expr>::input("covered"), Expr::input("lamp_met"), Rgb<Expr>::input("covered_before"));
-  steps.alone = record_rest(Rgb<Expr>(Expr(0)), Expr(0), Rgb<Expr>(Expr(0)));
+  steps.rest = record_rest(lobes, before);
+  steps.alone = record_rest(Expr(0), Met<Expr>());
   return made.emplace(indent, std::move(steps)).first->second;
 }
 

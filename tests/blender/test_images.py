@@ -16,7 +16,8 @@ import bpy
 import numpy as np
 import pytest
 
-DRIVER = Path(__file__).parents[2] / "script" / "render_scene.py"
+ROOT = Path(__file__).parents[2]
+DRIVER, SCENES = ROOT / "script" / "render_scene.py", ROOT / "scenes"
 #: Pictures of a form; pixels along a sphere's diameter, roughly; spheres in a row.
 SEEDS, SIZE, COLUMNS = 8, 24, 8
 
@@ -114,6 +115,19 @@ def judge(tmp_path):
         return found
 
     return run
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["small-lamp", "ra-back", "lamps"])
+def test_small_lamps_against_the_reference(extension_zip, tool, tmp_path, judge, name):
+    """Scenes that drawn directions alone can't be told right in: nearly all they see is dots."""
+    content = json.loads((SCENES / f"{name}.json").read_text())
+    settings = content["settings"]
+    settings |= {"width": 128, "height": round(128 * settings["height"] / settings["width"])}
+    settings |= {"spp": 768}
+    found = judge(render_both(tmp_path, extension_zip, tool, content, spp=32))
+    print(f"{name}: {json.dumps(found['test'])}")
+    assert found["test"]["passed"], f"see {tmp_path}"
 
 
 @pytest.mark.full
