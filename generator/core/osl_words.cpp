@@ -27,7 +27,7 @@ constexpr const char* kWords = R"(
   entry first frame_b frame_n frame_t last mirror_weight path_length show side
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
-  across_here aimed along_here centre_here chosen covered covered_before density_under disk_here drawn_density drawn_x
+  across_here aimed along_here centre_here chosen covered covered_before density_under lamp_above disk_here drawn_density drawn_x
   drawn_y drawn_z earlier excess half_way lamp lamp_across lamp_along lamp_centre lamp_disk lamp_emphasis lamp_met
   lamp_place lamp_scale lamp_shape lamp_solid_angle lamp_turn lamps lobe_colour lobe_colours lobe_end lobe_exponent
   lobe_extent lobe_followed lobe_half lobe_height lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight

@@ -320,13 +320,14 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
 
 /// Three numbers in [0, 1) that draw a direction.
 constexpr const char* kDraws =
-    "    vector u_all = brdfc_random(0);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";
+    "    vector u_all = brdfc_random(0, path_length);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";
 
 /// Lamps and rest of an aimed form: one evaluation of the model, in a loop over the lamps and the drawn direction.
 class AimedText {
  public:
-  AimedText(const ModelInfo& info, const ParamValues& fixed, int lamps)
-      : draw_(info, fixed), value_(info, fixed), lamps_(lamps) {}
+  /// `through`: whether the model may scatter through the surface.
+  AimedText(const ModelInfo& info, const ParamValues& fixed, int lamps, bool through)
+      : draw_(info, fixed), value_(info, fixed), lamps_(lamps), through_(through) {}
 
   /// The base's recording.
   Recording add(const Choices& choices, const AimedRecording& r, SharedArrays& arrays) {
@@ -340,7 +341,7 @@ class AimedText {
     const AimedSteps& steps = aimed_steps(0);
     if (lamps_ == 0) return operations_ + steps.alone.operations;
     int all = operations_ + steps.rest.operations;
-    for (const Recording* r : {&steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
+    for (const Recording* r : {&steps.above, &steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
       all += r->operations;
     return all;
   }
@@ -373,13 +374,17 @@ class AimedText {
         "centre_here, across_here,\n"
         "                           along_here, disk_here) == 0)\n"
         "                continue;\n"
-        "            // Numbers of its own: what a lobe gives at another's lamp must not go with where that is met.\n"
-        "            vector v_all = brdfc_random(1 + lamp);\n"
-        "            float v_1 = v_all[0], v_2 = v_all[1];\n"
         "            lamp_centre[lobes] = brdfc_local(centre_here, frame_t, frame_b, frame_n);\n"
         "            lamp_across[lobes] = brdfc_local(across_here, frame_t, frame_b, frame_n);\n"
         "            lamp_along[lobes] = brdfc_local(along_here, frame_t, frame_b, frame_n);\n"
         "            lamp_disk[lobes] = disk_here;\n";
+    if (!through_)
+      out += "            float lamp_above;\n" + indented(steps.above.statements, 3) +
+             "            if (lamp_above <= 0.0)\n                continue;\n";
+    out +=
+        "            // Numbers of its own: what a lobe gives at another's lamp must not go with where that is met.\n"
+        "            vector v_all = brdfc_random(1 + lamp, path_length);\n"
+        "            float v_1 = v_all[0], v_2 = v_all[1];\n";
     out += earlier_lobes("", steps.room.statements);
     out += "            float to_lamp_x, to_lamp_y, to_lamp_z, to_half_x, to_half_y, to_half_z;\n";
     out += indented(steps.aim.statements, 3);
@@ -446,6 +451,7 @@ class AimedText {
 
   ChoiceSwitch draw_, value_;
   int lamps_, operations_ = 0;
+  bool through_;
 };
 
 }  // namespace
@@ -472,7 +478,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
 
   std::vector<RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
-  AimedText aimed_text(info, fixed, max_lamps);
+  AimedText aimed_text(info, fixed, max_lamps, model.has_through());
   SharedArrays arrays;
   int operations = 0, mirror_operations = 0;
   // A drawn direction is a lobe. Where it may be another closure, OSL makes a product of that and its weight.
@@ -508,7 +514,8 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     body +=
         "    // frame_n is on the viewer's side; the model's z leaves the object.\n"
         "    float side = backfacing() ? -1.0 : 1.0;\n";
-  if (model.has_medium()) body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
+  if (model.has_medium() || sampled || aimed)
+    body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
   body += arrays.print();
   std::vector<std::string> terms;
   if ((sampled || aimed) && model.has_mirror()) body += "    color mirror_weight;\n" + block(mirror.print(0), 1);

@@ -13,6 +13,7 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
   std::vector<const LampPatch<double>*> of;
   std::vector<double> solid_angles;
   for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!brdf.scatters_through() && highest(patches[i]) <= 0) continue;
     double room = 1;
     for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patches[i].centre, earlier));
     const AimedLamp<double> lamp = aim_at(patches[i], room, v[i][0], v[i][1], wo);

@@ -39,6 +39,12 @@ template <class T> struct LampPatch {
   Vec3<T> at(const T& x, const T& y) const { return centre + across * x + along * y; }
 };
 
+/// How high above the surface the lamp reaches, at most. Where that is not above 0, a surface that lets no light through
+/// need not look at it.
+template <class T> T highest(const LampPatch<T>& patch) {
+  return patch.centre.z + abs(patch.across.z) + abs(patch.along.z);
+}
+
 /// How much of a ramp's flank, from 1 down, an aimed lobe is level over: colours of 7/k at its entries k >= kLevel make
 /// colour times cos^e equal 1 (to 2 %) where cos^e >= kLevel / 7.
 inline constexpr int kLevel = 3;

@@ -401,6 +401,7 @@ const AimedSteps& aimed_steps(int indent) {
   const AimedLobe<Expr> earlier = kept_lobe("earlier");
   const LampPatch<Expr> patch = kept_patch("lobes");
   const Expr lobes = Expr::input("lobes");
+  steps.above = record_step([&](Program& p) { p.output("lamp_above", highest(patch)); });
   steps.room = record_step(
       [&](Program& p) { p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(patch.centre, earlier))); });
   steps.aim = record_step([&](Program& p) {

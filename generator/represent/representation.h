@@ -78,6 +78,7 @@ AimedRecording record_aimed(const Model&, const ParamValues& fixed, int indent, 
 /// What is done with each lamp and at the end, which is the same for all models (aimed.h). `lobes` counts the lobes so
 /// far: arrays of lamp_* and lobe_* hold their numbers, at `earlier` one of them and at `lobes` the one to come.
 struct AimedSteps {
+  Recording above;  ///< reads the lamp; assigns lamp_above, how high it reaches
   Recording room;   ///< of `earlier` and the lamp's centre: assigns lobe_room
   Recording aim;    ///< reads the lamp, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_emphasis, lamp_solid_angle,
                     ///< lobe_height and of the lobe to_lamp_*, to_half_*, exponent, radius, end and extent

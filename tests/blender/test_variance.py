@@ -114,7 +114,7 @@ def test_a_form_of_the_same_mean_that_wastes_samples_is_found(extension, empty, 
     source = extension.pack.source(model, "sampled")[1]
     weight = "BSDF = weight *"
     wasteful = (
-        "vector more = brdfc_random(99); "
+        "vector more = brdfc_random(99, path_length); "
         "color kept = (more[0] < 0.125 ? 8.0 : 0.0) * weight; BSDF = kept *"
     )
     assert weight in source
