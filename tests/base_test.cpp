@@ -13,6 +13,7 @@
 #include "model/choices.h"
 #include "represent/lobe.h"
 #include "support.h"
+#include "trace/program.h"
 
 namespace brdfc {
 namespace {

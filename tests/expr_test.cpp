@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The recorded scalar: folding, sharing, pruning, loops, and what it refuses.
-#include "core/expr.h"
+#include "trace/expr.h"
 
 #include <gmock/gmock.h>
 
 #include <random>
 
-#include "core/table.h"
-#include "model/model.h"
+#include "model/choices.h"
+#include "print/osl_program.h"
 #include "represent/representation.h"
+#include "tables/table.h"
 
 namespace brdfc {
 namespace {
@@ -21,7 +22,7 @@ TEST(Expr, FoldsConstantsInDoublePrecision) {
   Program program;
   program.output("y", sqrt(Expr(2.0)) * Expr(2.0) + Expr(1.0));
   EXPECT_EQ(program.operations(), 0);
-  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("y = 3.828427;"));
+  EXPECT_THAT(print::osl_program(program, 0, {}), HasSubstr("y = 3.828427;"));
 }
 
 TEST(Expr, SharesEqualSubexpressions) {
@@ -46,7 +47,7 @@ TEST(Expr, OnlyWhatOutputsReachIsPrinted) {
   const Expr x = Expr::input("x");
   named("unused", exp(x));
   program.output("z", named("used", sin(x)));
-  const std::string text = program.print_osl(0, {});
+  const std::string text = print::osl_program(program, 0, {});
   EXPECT_THAT(text, HasSubstr("float used = sin(x);"));
   EXPECT_THAT(text, Not(HasSubstr("unused")));
 }
@@ -59,7 +60,7 @@ TEST(Expr, GroupingOfFloatingPointOperationsIsPrinted) {
   program.output("q", (a - b) - c);
   program.output("r", a / (b * c));
   program.output("s", -(a + b));
-  const std::string text = program.print_osl(0, {});
+  const std::string text = print::osl_program(program, 0, {});
   EXPECT_THAT(text, HasSubstr("p = a - (b - c);"));
   EXPECT_THAT(text, HasSubstr("q = a - b - c;"));
   EXPECT_THAT(text, HasSubstr("r = a / (b * c);"));
@@ -75,7 +76,7 @@ TEST(Expr, ALoopStaysALoop) {
     return std::array<Expr, 1>{(s[0] + x / s[0]) / Expr(2.0)};
   });
   program.output("root", result[0]);
-  const std::string text = program.print_osl(0, {});
+  const std::string text = print::osl_program(program, 0, {});
   EXPECT_THAT(text, HasSubstr("for (int i = 0; i < 5; i++) {"));
   EXPECT_NEAR(program.run<double>({{"x", {2.0, 2.0, 2.0}}}).at("root")[0], std::sqrt(2.0), 1e-9);
 }
@@ -97,7 +98,7 @@ TEST(Expr, ALookUpIsAnArrayAndACall) {
   Program program;
   const auto table = make_table("grid", {2, 3}, {0, 1, 4, 10, 11, 14});
   program.output("z", lookup(table, std::array<Expr, 2>{Expr::input("x"), Expr::input("y")}));
-  const std::string text = program.print_osl(0, {});
+  const std::string text = print::osl_program(program, 0, {});
   EXPECT_THAT(text, HasSubstr("float grid[6] = {0.0,1.0,4.0,10.0,11.0,14.0};"));
   EXPECT_THAT(text, HasSubstr("brdfc_table2(grid, 2, 3, 1.0 * clamp(x, 0.0, 1.0), 2.0 * clamp(y, 0.0, 1.0))"));
   for (const double x : {0.0, 0.3, 1.0, 2.0})
@@ -121,7 +122,8 @@ TEST(Expr, ALookUpOverFourAxesIsTheSameRecordedAndComputed) {
   std::array<Expr, 4> inputs;
   for (std::size_t k = 0; k < 4; ++k) inputs[k] = Expr::input(names[k]);
   program.output("v", lookup(table, inputs));
-  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("brdfc_table4(grid, 2, 3, 2, 4, 1.0 * clamp(x, 0.0, 1.0), 2.0 * "));
+  EXPECT_THAT(print::osl_program(program, 0, {}),
+              HasSubstr("brdfc_table4(grid, 2, 3, 2, 4, 1.0 * clamp(x, 0.0, 1.0), 2.0 * "));
   // At a knot, and in the middle between two on the last axis.
   EXPECT_EQ(lookup(table, std::array<double, 4>{1, 0.5, 0, 2 / 3.}), values[((1 * 3 + 1) * 2 + 0) * 4 + 2]);
   EXPECT_DOUBLE_EQ(lookup(table, std::array<double, 4>{1, 1, 1, 0.5}), 0.5 * (values[45] + values[46]));
@@ -137,7 +139,7 @@ TEST(Expr, ColoursDivideByChannel) {
   Recorder recorder;
   Program program;
   program.output("z", Rgb<Expr>::input("a") / Rgb<Expr>::input("b"));
-  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("z = a / b;"));
+  EXPECT_THAT(print::osl_program(program, 0, {}), HasSubstr("z = a / b;"));
   const auto z = program.run<double>({{"a", {1, 2, 3}}, {"b", {2, 8, 0.5}}}).at("z");
   EXPECT_EQ(z, (std::array<double, 3>{0.5, 0.25, 6}));
 }
@@ -157,7 +159,7 @@ TEST(Expr, NamesDoNotCollideWithOslOrInputs) {
   Program program;
   const Expr n = Expr::input("n");
   program.output("z", named("n", exp(n)) + named("N", sin(n)) + named("float", cos(n)));
-  const std::string text = program.print_osl(0, {});
+  const std::string text = print::osl_program(program, 0, {});
   EXPECT_THAT(text, HasSubstr("float n_1 = exp(n);"));
   EXPECT_THAT(text, HasSubstr("float N_1 = sin(n);"));
   EXPECT_THAT(text, HasSubstr("float float_1 = cos(n);"));
@@ -168,7 +170,7 @@ TEST(Expr, ColoursAreOneNode) {
   Program program;
   const Rgb<Expr> c = Rgb<Expr>::input("c");
   program.output("z", c + (Rgb<Expr>(Expr(1.0)) - c) * Expr::input("f"));
-  EXPECT_THAT(program.print_osl(0, {}), HasSubstr("z = c + (1.0 - c) * f;"));
+  EXPECT_THAT(print::osl_program(program, 0, {}), HasSubstr("z = c + (1.0 - c) * f;"));
 }
 
 /// Every model's recorded eval, pdf and sample, executed in float, against its float instantiation: the same bits,
@@ -186,20 +188,16 @@ TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
   for (const Choices& choices : choice_combinations(model.info())) {
     Recorder recorder;
     const auto recorded = model.record(with_choices(model.info(), choices));
-    const auto vec = [](const char* stem) {
-      const std::string s = stem;
-      return Vec3<Expr>{Expr::input(s + "_x"), Expr::input(s + "_y"), Expr::input(s + "_z")};
-    };
     const Vec3<Expr> u = {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")};
     Program program;
-    program.output("f", recorded->eval(vec("wi"), vec("wo")));
-    program.output("p", recorded->pdf(vec("wi"), vec("wo")));
-    program.output("w", recorded->sample(vec("wo"), u).weight);
+    program.output("f", recorded->eval(input3("wi"), input3("wo")));
+    program.output("p", recorded->pdf(input3("wi"), input3("wo")));
+    program.output("w", recorded->sample(input3("wo"), u).weight);
 
     double worst = 0;
     for (int i = 0; i < 2000; ++i) {
       ParamValues values = with_choices(model.info(), choices);
-      std::map<std::string, std::array<float, 3>> inputs;
+      Inputs<float> inputs;
       for (const ParamInfo& p : model.info().params) {
         if (p.kind == ParamKind::Choice) continue;
         std::array<float, 3> v;
@@ -213,10 +211,11 @@ TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
           values[p.name] = std::array<double, 3>{v[0], v[1], v[2]};
       }
       const Vec3<float> wi = direction(), wo = direction(), un = {uniform(rng), uniform(rng), uniform(rng)};
-      const auto set = [&](const std::string& name, float x) { inputs[name] = {x, x, x}; };
-      set("wi_x", wi.x), set("wi_y", wi.y), set("wi_z", wi.z);
-      set("wo_x", wo.x), set("wo_y", wo.y), set("wo_z", wo.z);
-      set("u_0", un.x), set("u_1", un.y), set("u_2", un.z);
+      set_input(inputs, "wi", wi);
+      set_input(inputs, "wo", wo);
+      set_input(inputs, "u_0", un.x);
+      set_input(inputs, "u_1", un.y);
+      set_input(inputs, "u_2", un.z);
       const auto brdf = model.make_float(values);
       const auto out = program.run<float>(inputs);
       const Rgb<float> f = brdf->eval(wi, wo);

@@ -14,12 +14,12 @@
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
-#include "analysis/table_file.h"
 #include "core/hash.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
 #include "represent/lobe.h"
 #include "support.h"
+#include "tables/table_file.h"
 
 namespace brdfc {
 namespace {

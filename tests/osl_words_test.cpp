@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The list of names that a shader's text uses itself: complete, and kept from models.
-#include "core/osl_words.h"
+#include "print/osl_words.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <regex>
 
+#include "model/choices.h"
 #include "model/sampling.h"
 #include "pack/plan.h"
 #include "pack/probe.h"
@@ -20,8 +21,8 @@ namespace osl_words_test {
 
 /// All names that a shader has for something else, also those that it numbers.
 std::vector<std::string> all_words() {
-  std::vector<std::string> words(osl_words().begin(), osl_words().end());
-  for (const std::string& stem : numbered_osl_words())
+  std::vector<std::string> words(print::osl_words().begin(), print::osl_words().end());
+  for (const std::string& stem : print::numbered_osl_words())
     for (const char* end : {"", "_0", "_12", "_0_1", "_1_x"}) words.push_back(stem + end);
   words.insert(words.end(), {"brdfc_random", "M_PI"});
   return words;
@@ -136,8 +137,8 @@ TEST(OslWords, AreAllThatShadersUseBesideTheirModelsNames) {
       // A number's exponent, or a vector's component, is no name.
       for (const std::string& word :
            matches(text.substr(text.find("\n{\n", text.find("\nshader "))), R"((\b[A-Za-z_]\w*))"))
-        if (!own.count(word) && !is_osl_word(word)) unknown.insert(word);
-      EXPECT_THAT(unknown, testing::IsEmpty()) << shader.name << ": add to core/osl_words.cpp";
+        if (!own.count(word) && !print::is_osl_word(word)) unknown.insert(word);
+      EXPECT_THAT(unknown, testing::IsEmpty()) << shader.name << ": add to print/osl_words.cpp";
     }
 }
 
@@ -149,7 +150,7 @@ TEST(OslWords, AStatementOfAModelMayHaveAnyForAName) {
     EXPECT_GE(names.size(), all_words().size() + 4) << "each has its own";
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size()) << "twice the same";
     for (const std::string& name : names) {
-      EXPECT_FALSE(is_osl_word(name)) << name;
+      EXPECT_FALSE(print::is_osl_word(name)) << name;
       EXPECT_EQ(model.info().param(name), nullptr) << name << ": a parameter, also where statements do not read it";
     }
     EXPECT_THAT(r.statements, HasSubstr("float count_1 = sin("));
@@ -162,7 +163,7 @@ TEST(OslWords, AParameterMayHaveNoneForAName) {
   for (const std::string& word : all_words()) {
     name_of_parameter = word;
     const detail::ModelOf<OfName> model;
-    if (numbered_osl_words().count(word) && !osl_words().count(word)) {
+    if (print::numbered_osl_words().count(word) && !print::osl_words().count(word)) {
       EXPECT_NO_THROW(write_shader(model, RepresentationKind::Sampled, table_of(model))) << word;
       continue;
     }

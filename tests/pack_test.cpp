@@ -10,8 +10,9 @@
 #include <sstream>
 
 #include "model/sampling.h"
-#include "pack/osl_library.h"
 #include "pack/shader.h"
+#include "print/osl_library.h"
+#include "print/osl_text.h"
 #include "represent/closure_pool.h"
 #include "support.h"
 
@@ -95,11 +96,11 @@ namespace {
 TEST(Shader, SumIsABalancedTree) {
   std::vector<std::string> terms;
   for (int i = 0; i < 64; ++i) terms.push_back(fmt::format("t{}", i));
-  const std::string sum = balanced_sum(terms);
+  const std::string sum = print::balanced_sum(terms);
   EXPECT_EQ(std::count(sum.begin(), sum.end(), '+'), 63);
   EXPECT_LE(nesting(sum), 6);
-  EXPECT_EQ(balanced_sum({"a", "b", "c"}), "(a + b) + c");
-  EXPECT_EQ(balanced_sum({}), "0");
+  EXPECT_EQ(print::balanced_sum({"a", "b", "c"}), "(a + b) + c");
+  EXPECT_EQ(print::balanced_sum({}), "0");
 }
 
 TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
@@ -243,10 +244,10 @@ TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
 }
 
 TEST(Shader, TextOnlyHoldsTheLibraryItCalls) {
-  const std::string library = library_for("x = brdfc_log1p(y);");
+  const std::string library = print::library_for("x = brdfc_log1p(y);");
   EXPECT_THAT(library, HasSubstr("float brdfc_log1p("));
   EXPECT_THAT(library, Not(HasSubstr("brdfc_expm1(")));
-  EXPECT_THROW(library_for("brdfc_missing(1)"), std::logic_error);
+  EXPECT_THROW(print::library_for("brdfc_missing(1)"), std::logic_error);
 }
 
 TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {

@@ -10,10 +10,10 @@
 #include <set>
 
 #include "analysis/albedo_table.h"
-#include "analysis/table_file.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "support.h"
+#include "tables/table_file.h"
 
 namespace brdfc {
 namespace {

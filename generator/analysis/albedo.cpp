@@ -24,8 +24,6 @@ std::string text(const Vec3<double>& w) { return fmt::format("({:.17g}, {:.17g},
 
 bool good(double v) { return v >= 0 && std::isfinite(v); }
 
-double wrap(double u) { return u - std::floor(u); }
-
 /// The intervals of the first random number on which sample() uses one lobe: ends, increasing from 0 to 1. Empty if the
 /// direction changes with it everywhere.
 std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& wo) {
@@ -103,11 +101,6 @@ BoundModel bind_model(const Model& model, const ParamValues& values) {
   return bound;
 }
 
-Vec3<double> direction(double cos_theta, double phi) {
-  const double s = std::sqrt((1 - cos_theta) * (1 + cos_theta));
-  return {s * std::cos(phi), s * std::sin(phi), cos_theta};
-}
-
 void require_value(double value, const char* what, const std::string& label, const Vec3<double>& wi,
                    const Vec3<double>& wo) {
   if (!good(value)) bad_value(fmt::format("{:.17g}", value), what, label, wi, wo);
@@ -117,35 +110,6 @@ void require_value(const Rgb<double>& v, const char* what, const std::string& la
                    const Vec3<double>& wo) {
   if (!good(v.r) || !good(v.g) || !good(v.b))
     bad_value(fmt::format("{:.17g}, {:.17g}, {:.17g}", v.r, v.g, v.b), what, label, wi, wo);
-}
-
-Sequence3::Sequence3(std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> uniform;
-  state_.x = uniform(random);
-  state_.y = uniform(random);
-  state_.z = uniform(random);
-}
-
-Vec3<double> Sequence3::next() {
-  constexpr double g = 1.22074408460575947536;  // g^4 = g + 1
-  const Vec3<double> u = state_;
-  state_ = {wrap(state_.x + 1 / g), wrap(state_.y + 1 / (g * g)), wrap(state_.z + 1 / (g * g * g))};
-  return u;
-}
-
-Sequence2::Sequence2(std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> uniform;
-  state_.x = uniform(random);
-  state_.y = uniform(random);
-}
-
-Point2 Sequence2::next() {
-  constexpr double g = 1.32471795724474602596;  // g^3 = g + 1
-  const Point2 u = state_;
-  state_ = {wrap(state_.x + 1 / g), wrap(state_.y + 1 / (g * g))};
-  return u;
 }
 
 Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brdf_(brdf), wo_(wo) {

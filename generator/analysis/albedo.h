@@ -12,6 +12,7 @@
 #include <string>
 
 #include "analysis/cubature.h"
+#include "core/sequence.h"
 #include "model/model.h"
 
 namespace brdfc {
@@ -26,35 +27,11 @@ struct BoundModel {
 /// Throws InputError for inadmissible values.
 BoundModel bind_model(const Model&, const ParamValues&);
 
-/// Unit vector with z = cos_theta (0 < |cos_theta| <= 1) and azimuth phi from the tangent.
-Vec3<double> direction(double cos_theta, double phi);
-
 /// Throws ValueError unless every component is finite and >= 0. `what` is "f", "pdf", ...
 void require_value(const Rgb<double>& value, const char* what, const std::string& label, const Vec3<double>& wi,
                    const Vec3<double>& wo);
 void require_value(double value, const char* what, const std::string& label, const Vec3<double>& wi,
                    const Vec3<double>& wo);
-
-/// Low-discrepancy points in [0, 1)^3: additive recurrence on the powers of the plastic number's sister in three
-/// dimensions (root of x^4 = x + 1), shifted by numbers drawn from the seed.
-class Sequence3 {
- public:
-  explicit Sequence3(std::uint64_t seed);
-  Vec3<double> next();
-
- private:
-  Vec3<double> state_;
-};
-
-/// The same in [0, 1)^2, on the plastic number.
-class Sequence2 {
- public:
-  explicit Sequence2(std::uint64_t seed);
-  Point2 next();
-
- private:
-  Point2 state_;
-};
 
 /// Where in the hemisphere a model's samples fall: cells for a cubature over (theta, phi - phi_o), coordinates in which
 /// smooth functions of the direction are smooth up to the pole.

@@ -12,11 +12,12 @@
 #include <utility>
 
 #include "analysis/albedo.h"
-#include "analysis/table_file.h"
 #include "core/data_dir.h"
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "model/choices.h"
+#include "print/osl_program.h"
+#include "tables/table_file.h"
 
 namespace brdfc {
 namespace {
@@ -43,12 +44,9 @@ constexpr std::nullopt_t kAllAzimuths = std::nullopt;
 /// The text of all that the model computes with these values fixed: equal texts are equal models.
 std::string formula(const Model& model, const ParamValues& fixed) {
   Recorder recorder;
-  const auto direction = [](const char* x, const char* y, const char* z) {
-    return Vec3<Expr>{Expr::input(x), Expr::input(y), Expr::input(z)};
-  };
-  const Vec3<Expr> wi = direction("wi_x", "wi_y", "wi_z"), wo = direction("wo_x", "wo_y", "wo_z");
+  const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
   const auto brdf = model.record(fixed);
-  const Sample<Expr> sample = brdf->sample(wo, direction("u1", "u2", "u3"));
+  const Sample<Expr> sample = brdf->sample(wo, input3("u"));
   Program program;
   program.output("f", brdf->eval(wi, wo));
   program.output("pdf", brdf->pdf(wi, wo));
@@ -60,7 +58,7 @@ std::string formula(const Model& model, const ParamValues& fixed) {
   program.output("mirror", brdf->mirror(wo));
   program.output("transmit", brdf->transmit(wo));
   program.output("ior", brdf->ior());
-  return program.print_osl(0, {});
+  return print::osl_program(program, 0, {});
 }
 
 /// A coordinate of the albedo: the view cosine or a Number parameter.

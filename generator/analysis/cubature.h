@@ -5,13 +5,12 @@
 #include <functional>
 #include <vector>
 
+#include "core/sequence.h"
+
 namespace brdfc {
 
 struct Rect {
   double x0 = 0, x1 = 1, y0 = 0, y1 = 1;
-};
-struct Point2 {
-  double x = 0, y = 0;
 };
 
 /// Writes the components of the integrand at (x, y).

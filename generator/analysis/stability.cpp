@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/expr.h"
+#include "model/inputs.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -355,22 +355,9 @@ std::map<int, SinglePrecision> single_precision_by_decade(const Model& model, in
     Recorder recorder;
     const auto recorded = model.record(choices);
     Program program;
-    const auto input = [](const char* name) {
-      const std::string n = name;
-      return Vec3<Expr>{Expr::input(n + "_x"), Expr::input(n + "_y"), Expr::input(n + "_z")};
-    };
-    program.output("f", recorded->eval(input("wi"), input("wo")));
-    std::map<std::string, std::array<float, 3>> inputs;
-    for (const ParamInfo& p : info.params) {
-      if (p.kind == ParamKind::Number) {
-        const float v = float(std::get<double>(values[p.name]));
-        inputs[p.name] = {v, v, v};
-      }
-      if (p.kind == ParamKind::Color) {
-        const auto& c = std::get<std::array<double, 3>>(values[p.name]);
-        inputs[p.name] = {float(c[0]), float(c[1]), float(c[2])};
-      }
-    }
+    program.output("f", recorded->eval(input3("wi"), input3("wo")));
+    Inputs<float> inputs;
+    set_inputs(inputs, values);
     double all = 0, native = 0, printed = 0, inherent = 0;
     const Vec3<double> wo = direction(0.1 + 0.9 * uniform(random), 2 * kPi * uniform(random));
     const Vec3<float> fo = Vec3<float>::from(wo);
@@ -381,12 +368,8 @@ std::map<int, SinglePrecision> single_precision_by_decade(const Model& model, in
       if (!(s.pdf > 0) || !(fi.z > 0)) continue;
       const Rgb<double> truth = exact->eval(normalize(Vec3<double>::from(fi)), same_wo);
       const Rgb<float> a = single->eval(fi, fo);
-      for (const auto& [name, w] : {std::pair{"wi", fi}, {"wo", fo}}) {
-        const std::string n = name;
-        inputs[n + "_x"] = {w.x, w.x, w.x};
-        inputs[n + "_y"] = {w.y, w.y, w.y};
-        inputs[n + "_z"] = {w.z, w.z, w.z};
-      }
+      set_input(inputs, "wi", fi);
+      set_input(inputs, "wo", fo);
       const auto b = program.run<float>(inputs).at("f");
       const double weight = s.wi.z / s.pdf;
       const Rgb<double> unrounded = exact->eval(s.wi, wo);

@@ -8,9 +8,9 @@
 #include "analysis/albedo.h"
 #include "analysis/albedo_table.h"
 #include "analysis/probes.h"
-#include "analysis/table_file.h"
 #include "app/commands.h"
 #include "app/csv.h"
+#include "tables/table_file.h"
 
 namespace brdfc {
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/table_file.h"
 #include "app/commands.h"
 #include "app/csv.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
+#include "tables/table_file.h"
 
 namespace brdfc {
 namespace {

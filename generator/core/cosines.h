@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace brdfc {
+namespace brdfc::inline core {
 
 /// Cosines of the angles between shading normal and viewer; of all views unless told otherwise.
 struct Cosines {
@@ -18,4 +18,4 @@ struct Cosines {
   }
 };
 
-}  // namespace brdfc
+}  // namespace brdfc::inline core

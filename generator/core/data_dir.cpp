@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::inline core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,4 +59,4 @@ void note_missing(const std::string& what, const fs::path& store, const std::str
   fmt::print(stderr, "brdfc: no {} in {}: making it, which takes {}\n", what, store.string(), how_long);
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace brdfc {
+namespace brdfc::inline core {
 
 /// Bad usage or input: the message names the file, the key and what was expected. Exit status 2.
 struct InputError : std::runtime_error {
@@ -22,4 +22,4 @@ template <class... Args> [[noreturn]] void input_error(fmt::format_string<Args..
   throw InputError(fmt::format(format, std::forward<Args>(args)...));
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -6,7 +6,7 @@
 
 #include <array>
 
-namespace brdfc {
+namespace brdfc::inline core {
 
 std::string sha256(const std::string& bytes) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest;
@@ -16,4 +16,4 @@ std::string sha256(const std::string& bytes) {
   return hex;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -24,7 +24,7 @@ __float128 ldexpf128(__float128, int) noexcept;
 __float128 powf128(__float128, __float128) noexcept;
 }
 
-namespace brdfc {
+namespace brdfc::inline core {
 
 class Wide {
  public:
@@ -77,7 +77,7 @@ inline bool isfinite(const Wide& x) { return x.value() - x.value() == 0; }
 /// Smallest positive normal number.
 inline constexpr int kWideMinExponent = -16382;
 
-}  // namespace brdfc
+}  // namespace brdfc::inline core
 
 template <> class std::numeric_limits<brdfc::Wide> {
  public:

@@ -29,9 +29,9 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/expr.h"
 #include "core/vec.h"
 #include "represent/closure.h"
+#include "trace/expr.h"
 
 namespace brdfc {
 

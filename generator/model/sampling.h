@@ -9,11 +9,6 @@ namespace brdfc {
 /// True where both directions are above the surface; the BRDF is 0 elsewhere.
 template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
 
-/// A direction from one of two lobes.
-template <class Flag, class T> Vec3<T> select(const Flag& first, const Vec3<T>& a, const Vec3<T>& b) {
-  return {select(first, a.x, b.x), select(first, a.y, b.y), select(first, a.z, b.z)};
-}
-
 /// Ideal reflection of wo about the normal.
 template <class T> Vec3<T> reflect(const Vec3<T>& wo) { return {-wo.x, -wo.y, wo.z}; }
 

@@ -6,80 +6,30 @@
 #include <set>
 #include <utility>
 
-#include "core/osl_words.h"
-#include "pack/osl_library.h"
+#include "print/osl_library.h"
+#include "print/osl_text.h"
+#include "print/osl_words.h"
 #include "represent/closure_pool.h"
 #include "represent/fit.h"
 
 namespace brdfc {
 namespace {
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (c == '\n')
-      out += "\\n";
-    else
-      out += c;
-  }
-  return out + "\"";
-}
-
-std::string number(double v) {
-  std::string s = fmt::format("{}", float(v));
-  if (s.find_first_of(".e") == std::string::npos) s += ".0";
-  return s;
-}
+using print::block;
+using print::indented;
+using print::number;
 
 std::string parameter(const ParamInfo& p) {
-  const std::string meta = fmt::format(" [[ string label = {}, string help = {} ]],\n", quoted(p.label), quoted(p.doc));
+  const std::string meta =
+      fmt::format(" [[ string label = {}, string help = {} ]],\n", print::quoted(p.label), print::quoted(p.doc));
   switch (p.kind) {
     case ParamKind::Number:
       return fmt::format("    float {} = {}", p.name, number(p.value[0])) + meta;
     case ParamKind::Color:
-      return fmt::format("    color {} = color({}, {}, {})", p.name, number(p.value[0]), number(p.value[1]),
-                         number(p.value[2])) +
-             meta;
+      return fmt::format("    color {} = {}", p.name, print::color(p.value)) + meta;
     default:
       return fmt::format("    int {} = {}", p.name, int(p.value[0])) + meta;
   }
-}
-
-std::string comment(const std::string& text) {
-  std::string out = "//", line;
-  std::size_t width = 2;
-  std::size_t start = 0;
-  while (start < text.size()) {
-    std::size_t end = text.find(' ', start);
-    if (end == std::string::npos) end = text.size();
-    if (width + 1 + end - start > 118) {
-      out += "\n//";
-      width = 2;
-    }
-    out.append(" ").append(text, start, end - start);
-    width += 1 + end - start;
-    start = end + 1;
-  }
-  return out + "\n";
-}
-
-std::string indented(const std::string& text, std::size_t levels = 1) {
-  std::string out;
-  std::size_t start = 0;
-  while (start < text.size()) {
-    const std::size_t end = text.find('\n', start);
-    out += std::string(4 * levels, ' ') + text.substr(start, end + 1 - start);
-    start = end + 1;
-  }
-  return out;
-}
-
-/// In a scope of their own, so that what they declare stands in no other's way. None where there is nothing to do.
-std::string block(const std::string& statements, std::size_t levels) {
-  if (statements.empty()) return {};
-  const std::string edge(4 * levels, ' ');
-  return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
 }
 
 /// Statements that differ by combination of choices: equal ones are written once.
@@ -169,21 +119,6 @@ class SharedArrays {
   std::map<std::string, std::string> known_;
 };
 
-std::string array(const char* name, std::size_t index, const auto& values) {
-  std::string out = fmt::format("    float {}_{}[{}] = {{", name, index, values.size());
-  std::size_t width = 200;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::string v = number(values[i]);
-    if (width + v.size() + 2 > 116) {
-      out += "\n        ";
-      width = 8;
-    }
-    out += v + (i + 1 < values.size() ? ", " : "");
-    width += v.size() + 2;
-  }
-  return out + "\n    };\n";
-}
-
 /// Statements that look the albedo up.
 class AlbedoText {
  public:
@@ -217,8 +152,7 @@ class AlbedoText {
   std::string operand(const std::string& name) const {
     const auto it = fixed_.find(name);
     if (it == fixed_.end()) return name == "cos_theta_o" ? "wo_z" : name;
-    if (const auto* c = std::get_if<std::array<double, 3>>(&it->second))
-      return fmt::format("color({}, {}, {})", number((*c)[0]), number((*c)[1]), number((*c)[2]));
+    if (const auto* c = std::get_if<std::array<double, 3>>(&it->second)) return print::color(*c);
     return number(std::get<double>(it->second));
   }
 
@@ -238,7 +172,7 @@ class AlbedoText {
     const AlbedoGrid& g = table_.grids.at(std::size_t(index));
     if (g.axes.empty()) {
       if (g.channels == 1) return number(g.values[0]);
-      return fmt::format("color({}, {}, {})", number(g.values[0]), number(g.values[1]), number(g.values[2]));
+      return print::color({g.values[0], g.values[1], g.values[2]});
     }
     if (g.axes.size() > 4)
       input_error("{}: the albedo table has {} axes, and OSL look-ups exist for 4", info_.name, g.axes.size());
@@ -267,14 +201,13 @@ class AlbedoText {
       std::vector<double> knots = g.axes[a].values;
       for (double& k : knots)
         k = g.axes[a].scale == AxisScale::Log ? std::log(k) : g.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : k;
-      out += array(fmt::format("knots_{}", index).c_str(), a, knots);
+      out += print::array(fmt::format("knots_{}_{}", index, a), knots);
     }
-    if (g.channels == 1) return out + array("table", index, g.values);
+    if (g.channels == 1) return out + print::array(fmt::format("table_{}", index), {g.values.begin(), g.values.end()});
     for (std::size_t c = 0; c < 3; ++c) {
-      std::vector<float> channel;
+      std::vector<double> channel;
       for (std::size_t i = c; i < g.values.size(); i += 3) channel.push_back(g.values[i]);
-      const char* names[] = {"table_r", "table_g", "table_b"};
-      out += array(names[c], index, channel);
+      out += print::array(fmt::format("table_{}_{}", "rgb"[c], index), channel);
     }
     return out;
   }
@@ -443,15 +376,6 @@ class AimedText {
 
 }  // namespace
 
-std::string balanced_sum(const std::vector<std::string>& terms) {
-  if (terms.empty()) return "0";
-  if (terms.size() == 1) return terms[0];
-  const auto middle = terms.begin() + std::ptrdiff_t((terms.size() + 1) / 2);
-  const std::string left = balanced_sum({terms.begin(), middle}), right = balanced_sum({middle, terms.end()});
-  const auto group = [](const std::string& s, bool compound) { return compound ? "(" + s + ")" : s; };
-  return group(left, middle - terms.begin() > 1) + " + " + group(right, terms.end() - middle > 1);
-}
-
 Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
                     const Cosines& views, int max_lamps, AimedBase base) {
   const ModelInfo& info = model.info();
@@ -587,7 +511,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,
                 kMaxClosures);
-  body += "    BSDF = " + balanced_sum(terms) + ";\n\n";
+  body += "    BSDF = " + print::balanced_sum(terms) + ";\n\n";
   std::string of_albedo;
   if (model.has_scatter()) {
     of_albedo = AlbedoText(info, table, fixed).print();
@@ -605,17 +529,17 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const ParamInfo& p : info.params) {
     if (fixed.count(p.name)) continue;
     if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
-    if (is_osl_word(p.name))
+    if (print::is_osl_word(p.name))
       input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
                   p.name);
     parameters += parameter(p);
   }
   const auto text = [&](const std::string& name, const std::string& what, const std::string& sockets,
                         const std::string& statements) {
-    return comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
-           comment(fmt::format("{}. {}", what, info.equations)) + "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
-           library_for(statements) + fmt::format("\nshader {}(\n", name) + parameters + sockets + ")\n{\n" +
-           statements + "}\n";
+    return print::comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
+           print::comment(fmt::format("{}. {}", what, info.equations)) +
+           "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" + print::library_for(statements) +
+           fmt::format("\nshader {}(\n", name) + parameters + sockets + ")\n{\n" + statements + "}\n";
   };
   const char* albedo_output = "    output color Albedo = 0";
   std::string sockets;

@@ -32,9 +32,6 @@ struct Shader {
 Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
                     const Cosines& views = {}, int max_lamps = kMaxLamps, AimedBase base = AimedBase::Declared);
 
-/// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
-std::string balanced_sum(const std::vector<std::string>& terms);
-
 /// Characters of tables that a shader holds for an output that most materials leave unlinked.
 inline constexpr std::size_t kMaxAlbedoText = 4096;
 

@@ -14,13 +14,13 @@
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
-#include "analysis/table_file.h"
 #include "core/data_dir.h"
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "model/horizon.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
+#include "tables/table_file.h"
 
 namespace brdfc {
 namespace {

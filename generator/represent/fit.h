@@ -24,11 +24,11 @@
 
 #include "analysis/albedo_table.h"
 #include "core/cosines.h"
-#include "core/table.h"
 #include "model/model.h"
 #include "represent/closure.h"
 #include "represent/terms.h"
 #include "represent/view.h"
+#include "tables/table.h"
 
 namespace brdfc {
 

@@ -10,7 +10,9 @@
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
 #include "model/horizon.h"
+#include "model/inputs.h"
 #include "model/sampling.h"
+#include "print/osl_program.h"
 #include "represent/aimed.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
@@ -27,7 +29,7 @@ std::vector<std::string> parameter_names(const Model& model) {
 
 /// The shader's frame has its normal on the viewer's side. For a model of two sides z is turned outwards by `side`.
 Vec3<Expr> recorded_wo(const Model& model, const Brdf<Expr>& brdf) {
-  Vec3<Expr> wo = raise_to_horizon(Vec3<Expr>{Expr::input("wo_x"), Expr::input("wo_y"), Expr::input("wo_z")});
+  Vec3<Expr> wo = raise_to_horizon(input3("wo"));
   if (two_sided(model, brdf)) wo.z = wo.z * Expr::input("side");
   return wo;
 }
@@ -119,7 +121,7 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
 Recording finish(const Program& program, int indent, const std::vector<std::string>& taken,
                  std::vector<RecordedClosure> closures = {}) {
   Recording r{"", std::move(closures), program.operations(), program.inputs(), {}};
-  r.statements = program.print_osl(indent, taken, &r.arrays);
+  r.statements = print::osl_program(program, indent, taken, &r.arrays);
   return r;
 }
 
@@ -127,9 +129,6 @@ Recording finish(const Model& model, const Program& program, int indent, std::ve
   return finish(program, indent, parameter_names(model), std::move(closures));
 }
 
-Vec3<Expr> input3(const std::string& name) {
-  return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
-}
 /// An OSL vector.
 Vec3<Expr> input_vector(const std::string& name) {
   return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
@@ -162,22 +161,10 @@ ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf, const
   return two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(wo);
 }
 
-using FloatInputs = std::map<std::string, std::array<float, 3>>;
-
-void set_input(FloatInputs& inputs, const std::string& name, double v) {
-  inputs[name] = {float(v), float(v), float(v)};
-}
-
-FloatInputs float_inputs(const ParamValues& values, const Vec3<double>& wo) {
-  FloatInputs inputs;
-  for (const auto& [name, value] : values) {
-    if (const double* v = std::get_if<double>(&value)) set_input(inputs, name, *v);
-    if (const auto* c = std::get_if<std::array<double, 3>>(&value))
-      inputs[name] = {float((*c)[0]), float((*c)[1]), float((*c)[2])};
-  }
-  set_input(inputs, "wo_x", wo.x);
-  set_input(inputs, "wo_y", wo.y);
-  set_input(inputs, "wo_z", std::abs(wo.z));
+Inputs<float> float_inputs(const ParamValues& values, const Vec3<double>& wo) {
+  Inputs<float> inputs;
+  set_inputs(inputs, values);
+  set_input(inputs, "wo", Vec3<double>{wo.x, wo.y, std::abs(wo.z)});
   set_input(inputs, "side", wo.z > 0 ? 1 : -1);
   return inputs;
 }
@@ -479,7 +466,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
       const BoundModel truth = bind_model(model, values);
       Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
       if (two_sided(model, *truth.brdf) && view % 2 == 1) wo.z = -wo.z;
-      FloatInputs inputs = float_inputs(values, wo);
+      Inputs<float> inputs = float_inputs(values, wo);
       const double distance = model.has_medium() ? 3 * uniform(rng) : 0;
       set_input(inputs, "path_length", distance);
       const auto executed = [&](const std::map<std::string, std::array<float, 3>>& out, const std::string& name,

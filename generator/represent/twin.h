@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "core/table.h"
 #include "represent/view.h"
+#include "tables/table.h"
 
 namespace brdfc {
 

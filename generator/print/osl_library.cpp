@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pack/osl_library.h"
+#include "print/osl_library.h"
 
 #include <regex>
 #include <set>
 #include <stdexcept>
 #include <vector>
 
-#include "pack/osl_library_text.h"
+#include "print/osl_library_text.h"
 
-namespace brdfc {
+namespace brdfc::print {
 namespace {
 
 struct Function {
@@ -60,4 +60,4 @@ std::string library_for(const std::string& text) {
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::print

@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-namespace brdfc {
+namespace brdfc::print {
 
 /// Words of OSL that a parameter or a statement may not have for a name, functions and globals that shaders use, and
 /// the names of their own statements.
@@ -20,4 +20,4 @@ bool is_osl_word(const std::string& name);
 /// The name, or another if no number after it could make it one that is free.
 std::string unnumbered(const std::string& name);
 
-}  // namespace brdfc
+}  // namespace brdfc::print

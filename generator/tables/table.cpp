@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/table.h"
+#include "tables/table.h"
 
 #include <cmath>
 #include <stdexcept>
 
-namespace brdfc {
+#include "core/error.h"
+
+namespace brdfc::inline tables {
 
 std::shared_ptr<const Table> make_table(std::string name, std::vector<int> sizes, std::vector<double> values) {
   std::size_t count = 1;
@@ -31,4 +33,4 @@ std::shared_ptr<const Table> part(const Table& table, std::size_t axis, int firs
   return make_table(table.name, std::move(sizes), std::move(values));
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline tables

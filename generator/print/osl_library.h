@@ -3,10 +3,10 @@
 
 #include <string>
 
-namespace brdfc {
+namespace brdfc::print {
 
 /// The functions of osl/brdfc.osl.in that `text` calls, and those they call, in the order of the file. A call of a
 /// brdfc_ function that the library does not have is a std::logic_error.
 std::string library_for(const std::string& text);
 
-}  // namespace brdfc
+}  // namespace brdfc::print

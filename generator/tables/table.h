@@ -3,14 +3,15 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "core/expr.h"
+#include "core/scalar.h"
 
-namespace brdfc {
+namespace brdfc::inline tables {
 
 /// Values on a regular grid over [0, 1]^d, d = 1 to 4, row-major with the first axis slowest.
 struct Table {
@@ -49,12 +50,6 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
   return sum;
 }
 
-/// The recorded look-up: an array and a call in OSL.
-template <std::size_t D> Expr lookup(const std::shared_ptr<const Table>& table, const std::array<Expr, D>& x) {
-  static_assert(D >= 1 && D <= 4);
-  return detail::record_lookup(table, {x.begin(), x.end()});
-}
-
 /// The same where only the table says how many coordinates there are.
 template <Numeric T> T lookup(const std::shared_ptr<const Table>& table, const std::vector<T>& x) {
   const auto of = [&]<std::size_t D>(std::array<T, D> at) {
@@ -73,8 +68,5 @@ template <Numeric T> T lookup(const std::shared_ptr<const Table>& table, const s
       return of(std::array<T, 4>{});
   }
 }
-inline Expr lookup(const std::shared_ptr<const Table>& table, const std::vector<Expr>& x) {
-  return detail::record_lookup(table, x);
-}
 
-}  // namespace brdfc
+}  // namespace brdfc::inline tables

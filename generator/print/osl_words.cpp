@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/osl_words.h"
+#include "print/osl_words.h"
 
 #include <cctype>
 #include <iterator>
 #include <sstream>
 
-namespace brdfc {
+namespace brdfc::print {
 namespace {
 
 /// Separated by spaces, one kind after the other.
@@ -76,4 +76,4 @@ std::string unnumbered(const std::string& name) {
   return is_numbered(name) || numbered_osl_words().count(name) || is_prefixed(name) ? "model_" + name : name;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::print

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/osl_arithmetic.h"
+#include "trace/osl_arithmetic.h"
 
 #include <OpenImageIO/fmath.h>
 
 #include <cmath>
 
-namespace brdfc {
+namespace brdfc::inline trace {
 namespace {
 thread_local int alive = 0;
 }
@@ -45,4 +45,4 @@ float log1p(float x) {
 }
 
 }  // namespace osl
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/table_file.h"
+#include "tables/table_file.h"
 
 #include <OpenImageIO/imageio.h>
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::inline tables {
 namespace {
 
 constexpr const char* kMeta = "brdfc:table";
@@ -60,4 +60,4 @@ void replace_stored(const std::filesystem::path& path, const std::string& model,
   }
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline tables
