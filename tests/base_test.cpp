@@ -10,8 +10,8 @@
 #include <tuple>
 
 #include "analysis/probes.h"
+#include "closures/lobe.h"
 #include "model/choices.h"
-#include "represent/lobe.h"
 #include "support.h"
 #include "trace/program.h"
 

@@ -14,10 +14,10 @@
 
 #include "analysis/albedo.h"
 #include "analysis/probes.h"
+#include "closures/lobe.h"
 #include "core/hash.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
-#include "represent/lobe.h"
 #include "support.h"
 #include "tables/table_file.h"
 

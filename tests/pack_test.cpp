@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "closures/closure_pool.h"
 #include "model/sampling.h"
 #include "pack/shader.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
-#include "represent/closure_pool.h"
 #include "support.h"
 
 namespace brdfc {

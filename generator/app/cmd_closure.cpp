@@ -2,8 +2,8 @@
 // brdfc closure: what a closure of Cycles computes by our definition, for the tests that hold Cycles against it.
 #include "app/commands.h"
 #include "app/csv.h"
+#include "closures/lobe.h"
 #include "model/model.h"
-#include "represent/lobe.h"
 
 namespace brdfc {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace brdfc {
+namespace brdfc::inline model {
 
 std::vector<Choices> choice_combinations(const ModelInfo& info) {
   std::vector<Choices> all = {{}};
@@ -35,4 +35,4 @@ bool admits(const ModelInfo& info, const Choices& choices, const ParamValues& fi
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -5,7 +5,7 @@
 #include "model/model.h"
 #include "trace/program.h"
 
-namespace brdfc {
+namespace brdfc::inline model {
 
 /// Numbers and colours by their names.
 template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values) {
@@ -15,4 +15,4 @@ template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values)
   }
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline model

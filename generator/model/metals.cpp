@@ -8,7 +8,7 @@
 #include "model/fresnel.h"
 #include "model/spectrum.h"
 
-namespace brdfc {
+namespace brdfc::inline model {
 namespace {
 
 constexpr const char* kNoble =
@@ -166,4 +166,4 @@ const std::vector<ChannelIndices>& channel_indices() {
   return all;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline model

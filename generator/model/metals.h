@@ -7,7 +7,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
+namespace brdfc::inline model {
 
 struct Metal {
   std::string name;              ///< "cu"
@@ -37,4 +37,4 @@ struct ChannelIndices {
 /// In the order of metals(); computed once.
 const std::vector<ChannelIndices>& channel_indices();
 
-}  // namespace brdfc
+}  // namespace brdfc::inline model

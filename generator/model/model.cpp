@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace brdfc {
+namespace brdfc::inline model {
 namespace {
 
 std::map<std::string, std::unique_ptr<Model>>& registry() {
@@ -179,4 +179,4 @@ std::string format_values(const ModelInfo& info, const ParamValues& values) {
   return text;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -28,12 +28,12 @@
 #include <variant>
 #include <vector>
 
+#include "closures/closure.h"
 #include "core/error.h"
 #include "core/vec.h"
-#include "represent/closure.h"
 #include "trace/expr.h"
 
-namespace brdfc {
+namespace brdfc::inline model {
 
 enum class ParamKind { Number, Color, Choice };
 
@@ -412,9 +412,9 @@ template <template <class> class M> class ModelOf final : public Model {
 }  // namespace detail
 
 /// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this.
-#define BRDFC_MODEL(M)                                                                                  \
-  namespace {                                                                                           \
-  const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::detail::ModelOf<M>>()); \
+#define BRDFC_MODEL(M)                                                                                         \
+  namespace {                                                                                                  \
+  const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>()); \
   }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "represent/closure_pool.h"
+#include "closures/closure_pool.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
 

@@ -20,10 +20,10 @@
 #include <sstream>
 
 #include "analysis/albedo_table.h"
+#include "closures/closure_pool.h"
 #include "core/hash.h"
 #include "pack/nodes.h"
 #include "pack/shader.h"
-#include "represent/closure_pool.h"
 #include "represent/fit.h"
 #include "represent/twin.h"
 

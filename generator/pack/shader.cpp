@@ -6,10 +6,10 @@
 #include <set>
 #include <utility>
 
+#include "closures/closure_pool.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
-#include "represent/closure_pool.h"
 #include "represent/fit.h"
 
 namespace brdfc {

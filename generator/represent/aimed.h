@@ -18,8 +18,8 @@
 #include <array>
 #include <vector>
 
+#include "closures/closure.h"
 #include "model/sampling.h"
-#include "represent/closure.h"
 
 namespace brdfc {
 

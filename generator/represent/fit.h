@@ -23,9 +23,9 @@
 #include <vector>
 
 #include "analysis/albedo_table.h"
+#include "closures/closure.h"
 #include "core/cosines.h"
 #include "model/model.h"
-#include "represent/closure.h"
 #include "represent/terms.h"
 #include "represent/view.h"
 #include "tables/table.h"

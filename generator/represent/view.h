@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "analysis/albedo.h"
-#include "represent/closure.h"
+#include "closures/closure.h"
 
 namespace brdfc {
 

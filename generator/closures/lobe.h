@@ -5,9 +5,9 @@
 
 #include <string>
 
-#include "represent/closure.h"
+#include "closures/closure.h"
 
-namespace brdfc {
+namespace brdfc::inline closures {
 
 enum class LobeKind {
   Diffuse,
@@ -43,4 +43,4 @@ struct Lobe {
 /// f cos(theta_i) with its weight; delta closures are 0. Directions above the surface.
 Rgb<double> evaluate(const Lobe&, const Vec3<double>& wi, const Vec3<double>& wo);
 
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/closure.h"
+#include "closures/closure.h"
 
-namespace brdfc {
+namespace brdfc::inline closures {
 namespace {
 
 /// Linear look-up of a ramp at a position in [0, 1]; positions outside take the end entries.
@@ -37,4 +37,4 @@ int slots(ClosureKind kind) {
   }
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

@@ -10,7 +10,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
+namespace brdfc::inline closures {
 
 enum class ClosureKind {
   Diffuse,      ///< diffuse(N):             cos / pi
@@ -178,4 +178,4 @@ inline constexpr int kMaxClosures = 64;
 /// What a closure costs of those slots: a ramp needs extra storage for its colours. Measured.
 int slots(ClosureKind);
 
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

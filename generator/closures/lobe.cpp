@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/lobe.h"
+#include "closures/lobe.h"
 
 #include <algorithm>
 #include <iterator>
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::inline closures {
 namespace {
 
 constexpr std::pair<LobeKind, const char*> kNames[] = {
@@ -97,4 +97,4 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
   throw InputError("closure of unknown kind");
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::inline closures
