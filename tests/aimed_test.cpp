@@ -4,8 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "analysis/probes.h"
 #include "core/parallel.h"
+#include "core/sequence.h"
+#include "measure/probes.h"
 #include "represent/fit.h"
 #include "represent/representation.h"
 #include "support.h"
@@ -120,15 +121,15 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
     // The sky's part is drawn both ways: what differs is how lamps are met.
     const double base_lamps = base.empty() ? 0 : scene.of_lamps([&](const auto& w) { return evaluate(base, w, wo).g; });
     const double lamps = scene.of_lamps(f_cos);
-    Random random(7);
+    measure::Random random(7);
     std::vector<AimedLobe<double>> lobes;
     std::vector<double> of_lobe;
     std::vector<std::array<double, 2>> v(scene.patches.size());
     double sum = 0, squares = 0;
     for (int i = 0; i < kDraws; ++i) {
-      const Vec3<double> u = uniform_cube(random);
+      const Vec3<double> u = measure::uniform_cube(random);
       for (auto& pair : v) {
-        const Vec3<double> number = uniform_cube(random);
+        const Vec3<double> number = measure::uniform_cube(random);
         pair = {number.x, number.y};
       }
       const AimedSum s = aimed_sum(*brdf, base, scene.patches, wo, u, v);

@@ -9,8 +9,9 @@
 #include <set>
 #include <tuple>
 
-#include "analysis/probes.h"
 #include "closures/lobe.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 #include "model/choices.h"
 #include "support.h"
 #include "trace/program.h"
@@ -32,7 +33,7 @@ void give(Inputs& inputs, const std::string& name, const Vec3<double>& v) {
 
 /// Lobe is what the conformance tests hold against Cycles, with any tangent.
 TEST(Closure, StretchesFacetsAlongATangentOfTheSurface) {
-  Random random(4);
+  measure::Random random(4);
   for (const auto& [kind, lobe_kind] :
        {std::pair{ClosureKind::Ggx, LobeKind::Ggx}, {ClosureKind::Beckmann, LobeKind::Beckmann}}) {
     Recorder recorder;
@@ -46,9 +47,9 @@ TEST(Closure, StretchesFacetsAlongATangentOfTheSurface) {
     EXPECT_LE(program.operations(), 100) << "a base is evaluated for every lamp";
 
     for (int i = 0; i < 200; ++i) {
-      const Vec3<double> wi = uniform_direction(random), wo = uniform_direction(random);
-      const double angle = 6 * uniform(random), alpha = 0.05 + 0.9 * uniform(random),
-                   across = 0.05 + 0.9 * uniform(random);
+      const Vec3<double> wi = measure::uniform_direction(random), wo = measure::uniform_direction(random);
+      const double angle = 6 * measure::uniform(random), alpha = 0.05 + 0.9 * measure::uniform(random),
+                   across = 0.05 + 0.9 * measure::uniform(random);
       Closure<double> c(kind, Rgb<double>(0.2, 0.5, 1));
       c.alpha = alpha, c.alpha_across = across;
       c.tangent = {std::cos(angle), std::sin(angle), 0};
@@ -130,7 +131,7 @@ TEST(Base, CarriesWhatWasMeasured) {
     const Model& m = find_model(row.model);
     ASSERT_TRUE(m.has_base()) << row.model;
     seen.insert(row.model);
-    const BoundModel bound = bind_model(m, values_of(m, row.values));
+    const measure::BoundModel bound = measure::bind_model(m, values_of(m, row.values));
     for (const auto& [angle, most] : {std::pair{10., row.above}, {75., row.low}}) {
       const BaseWorth w = base_worth(bound, direction(std::cos(angle * kPi / 180), 0.4), 1 << 14);
       EXPECT_LE(w.relative_l1, most) << bound.label << " at " << angle;
@@ -144,23 +145,24 @@ TEST(Base, CarriesWhatWasMeasured) {
 /// In double and float, whatever the parameters and the view; over the sliders' ranges the base is never much more than
 /// the model.
 TEST(Base, HasWeightsThatClosuresMayHave) {
-  Random random(8);
+  measure::Random random(8);
   for (const auto& [name, m] : models()) {
     if (!m->has_base()) continue;
-    std::vector<ParamValues> cases = slider_cases(m->info(), 20, 3);
+    std::vector<ParamValues> cases = measure::slider_cases(m->info(), 20, 3);
     const std::size_t random_ones = cases.size();
     for (const bool sliders : {true, false})
-      for (const ParamValues& values : end_cases(m->info(), sliders)) cases.push_back(values);
+      for (const ParamValues& values : measure::end_cases(m->info(), sliders)) cases.push_back(values);
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      const BoundModel bound = bind_model(*m, cases[i]);
+      const measure::BoundModel bound = measure::bind_model(*m, cases[i]);
       const auto in_float = m->make_float(cases[i]);
       for (int view = 0; view < 12; ++view) {
-        const double height = view < 8 ? uniform(random) : std::pow(10, -view / 2.);
-        const Vec3<double> wo = direction(view == 0 ? 1 : std::max(height, 1e-6), 6 * uniform(random));
+        const double height = view < 8 ? measure::uniform(random) : std::pow(10, -view / 2.);
+        const Vec3<double> wo = direction(view == 0 ? 1 : std::max(height, 1e-6), 6 * measure::uniform(random));
         for (const Closure<double>& c : bound.brdf->base(wo))
-          require_value(c.weight, "weight of the base", bound.label, c.normal, wo);
+          measure::require_value(c.weight, "weight of the base", bound.label, c.normal, wo);
         for (const Closure<float>& c : in_float->base(Vec3<float>::from(wo))) {
-          require_value(to_double(c.weight), "weight of the base in float", bound.label, to_double(c.normal), wo);
+          measure::require_value(measure::to_double(c.weight), "weight of the base in float", bound.label,
+                                 measure::to_double(c.normal), wo);
           if (has_facets(c.kind)) {
             EXPECT_GE(c.alpha, 1e-4f) << bound.label;
             EXPECT_LE(std::max(c.alpha, c.alpha_across), 1) << bound.label;
@@ -177,7 +179,7 @@ TEST(Base, HasWeightsThatClosuresMayHave) {
 
 /// As the generator needs it, which prints one shader for all choices, and with few operations.
 TEST(Base, IsRecordedAlikeForAllChoices) {
-  Random random(9);
+  measure::Random random(9);
   for (const auto& [name, m] : models()) {
     if (!m->has_base()) continue;
     std::vector<std::tuple<ClosureKind, bool, Tangent>> kinds;
@@ -196,14 +198,14 @@ TEST(Base, IsRecordedAlikeForAllChoices) {
       program.output("f_cos", evaluate(base, recorded("wi"), wo));
       operations = std::max(operations, program.operations());
 
-      const BoundModel bound = bind_model(*m, complete(m->info(), fixed));
+      const measure::BoundModel bound = measure::bind_model(*m, complete(m->info(), fixed));
       Inputs inputs;
       for (const auto& [parameter, value] : bound.values) {
         if (const double* v = std::get_if<double>(&value)) inputs[parameter] = {*v, *v, *v};
         if (const auto* c = std::get_if<std::array<double, 3>>(&value)) inputs[parameter] = *c;
       }
       for (int i = 0; i < 20; ++i) {
-        const Vec3<double> wi = uniform_direction(random), w = uniform_direction(random);
+        const Vec3<double> wi = measure::uniform_direction(random), w = measure::uniform_direction(random);
         give(inputs, "wi", wi);
         give(inputs, "wo", w);
         const double expected = evaluate(bound.brdf->base(w), wi, w).g;

@@ -12,10 +12,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "analysis/albedo.h"
-#include "analysis/probes.h"
 #include "closures/lobe.h"
 #include "core/hash.h"
+#include "measure/albedo.h"
+#include "measure/albedo_table.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
 #include "support.h"
@@ -89,14 +91,14 @@ TEST(Fit, WeightsAddUpToTheAlbedo) {
   for (const char* name : {"phong", "blinn", "ward", "oren_nayar"}) {
     const Model& m = find_model(name);
     const ParamValues values = complete(m.info(), {});
-    const BoundModel bound = bind_model(m, values);
+    const measure::BoundModel bound = measure::bind_model(m, values);
     for (const double c : {0.15, 0.5, 0.93}) {
       Rgb<double> weights(0.0);
       for (const auto& closure : fit_of(m, values).closures(direction(c, 1))) {
         EXPECT_GE(closure.weight.r, 0);
         weights += closure.weight;
       }
-      const double albedo = brdfc::albedo(*bound.brdf, c).total().r;
+      const double albedo = measure::albedo(*bound.brdf, c).total().r;
       EXPECT_NEAR(weights.r, albedo, 0.01 * albedo) << name << " at " << c;
     }
   }
@@ -189,7 +191,8 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   ParamValues fixed = values_of(m, {"e=20"});
   fixed.erase("ks");
   for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
-    const Shader s = write_shader(m, kind, fold(albedo_table_of(m), m, fixed), fixed, {}, kMaxLamps, AimedBase::Fitted);
+    const Shader s =
+        write_shader(m, kind, fold(measure::albedo_table_of(m), m, fixed), fixed, {}, kMaxLamps, AimedBase::Fitted);
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
     const std::size_t factor = s.source.find("weight_0 *= ks;"), rest = s.source.find("excess");
     ASSERT_NE(factor, std::string::npos);
@@ -229,9 +232,9 @@ TEST(Fit, RunsAlongANumber) {
   EXPECT_LE(l1.back(), 0.03);
   for (const double sigma : {0.0, 0.013, 0.35, 0.66}) {
     const auto brdf = m.make_double(with_number(m, values, sigma));
-    Random random(5);
+    measure::Random random(5);
     double off = 0, sum = 0;
-    for (const auto& [wi, wo] : direction_pairs(*brdf, 400, random, false)) {
+    for (const auto& [wi, wo] : measure::direction_pairs(*brdf, 400, random, false)) {
       const double truth = brdf->eval(wi, wo).r * wi.z, found = evaluate(fit.closures(wo, sigma), wi, wo).r;
       EXPECT_NEAR(fit.f_cos(wi, wo, sigma).r, found, 1e-9);
       off += std::abs(found - truth);
@@ -245,7 +248,7 @@ TEST(Fit, RunsAlongANumber) {
 
   ParamValues fixed = values;
   fixed.erase("rho");
-  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, fixed), fixed);
+  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(measure::albedo_table_of(m), m, fixed), fixed);
   EXPECT_THAT(s.source, HasSubstr("float sigma = "));
   EXPECT_THAT(s.source, HasSubstr("color rho = color("));
   EXPECT_LE(s.operations, 600);
@@ -262,10 +265,10 @@ TEST(Fit, RunsAlongANumber) {
 /// it.
 TEST(Fit, StretchesFacetsAsCyclesDoes) {
   const Fit& fit = fit_of(find_model("ward"), values_of(find_model("ward"), {"ax=0.2", "ay=0.2"}));
-  Random random(4);
+  measure::Random random(4);
   double stretched = 0;
   for (int i = 0; i < 300; ++i) {
-    const Vec3<double> wo = uniform_direction(random), wi = uniform_direction(random);
+    const Vec3<double> wo = measure::uniform_direction(random), wi = measure::uniform_direction(random);
     for (const Closure<double>& c : fit.closures(wo)) {
       if (!has_facets(c.kind)) continue;
       Lobe lobe;
@@ -294,7 +297,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
     const Fit& fit = fit_of(m, values);
     EXPECT_FALSE(fit.axis());
     ASSERT_TRUE(fit.terms().has(open)) << model;
-    Random random(6);
+    measure::Random random(6);
     const auto magnitude = [](const Rgb<double>& v) {
       return Rgb<double>(std::abs(v.r), std::abs(v.g), std::abs(v.b));
     };
@@ -305,7 +308,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
       const Varied<double> varied = fit.varied(whole);
       const Fit& of_known = fit_of(m, whole);
       Rgb<double> off(0.0), off_known(0.0), sum(0.0);
-      for (const auto& [wi, wo] : direction_pairs(*brdf, 400, random, false)) {
+      for (const auto& [wi, wo] : measure::direction_pairs(*brdf, 400, random, false)) {
         const Rgb<double> truth = brdf->eval(wi, wo) * wi.z, found = evaluate(fit.closures(wo, varied), wi, wo);
         const Rgb<double> again = fit.f_cos(wi, wo, varied);
         EXPECT_NEAR(again.r, found.r, 1e-9 * (1 + truth.r));
@@ -324,7 +327,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
     const Vec3<double> wo = direction(0.7, 0);
     ParamValues whole = values;
     whole[open] = std::array<double, 3>{1, 0.5, 0.1};
-    const auto albedo = brdfc::albedo(*m.make_double(whole), 0.7).total();
+    const auto albedo = measure::albedo(*m.make_double(whole), 0.7).total();
     Rgb<double> weights(0.0);
     for (const auto& closure : fit.closures(wo, fit.varied(whole))) weights += closure.weight;
     EXPECT_NEAR(weights.r, albedo.r, 0.01 * albedo.r) << model;
@@ -336,7 +339,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
 
     ParamValues fixed = values_of(m, {});
     fixed.erase(open);
-    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, fixed), fixed);
+    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(measure::albedo_table_of(m), m, fixed), fixed);
     EXPECT_THAT(s.source, HasSubstr(fmt::format("color {} = color(", open)));
     EXPECT_THAT(s.source, HasSubstr("ramp_0[entry] /= weight_0;"));
     EXPECT_LE(s.operations, 600) << model;
@@ -360,15 +363,15 @@ TEST(StoredFits, ServeColoursThatAreKnown) {
   EXPECT_EQ(a.r, b.r);
   EXPECT_EQ(a.b, b.b);
   EXPECT_GT(a.r, 2 * a.b);
-  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, known), known);
+  const Shader s = write_shader(m, RepresentationKind::Fitted, fold(measure::albedo_table_of(m), m, known), known);
   EXPECT_THAT(s.source, testing::Not(HasSubstr("f0")));
 }
 
 /// An axis goes by factors where a number does.
 TEST(Fit, AxesAreSliders) {
-  for (const auto& [model, number, scale] : {std::tuple{"phong", "e", AxisScale::Log},
-                                             {"blinn", "e", AxisScale::Log1p},
-                                             {"oren_nayar", "sigma", AxisScale::Linear}}) {
+  for (const auto& [model, number, scale] : {std::tuple{"phong", "e", measure::AxisScale::Log},
+                                             {"blinn", "e", measure::AxisScale::Log1p},
+                                             {"oren_nayar", "sigma", measure::AxisScale::Linear}}) {
     const FitAxis axis = fit_axis(*find_model(model).info().param(number));
     EXPECT_EQ(axis.scale, scale) << model;
     for (const double x : {0.0, 0.21, 1.0}) EXPECT_NEAR(axis.place(axis.at(x)), x, 1e-12) << model;
@@ -459,8 +462,8 @@ TEST(StoredFits, StateTheirErrors) {
       for (const auto& [name, value] : term.judged) whole[name] = value;
       whole = complete(model->info(), whole);
       const Varied<double> varied = fit.varied(whole);
-      const std::vector<ViewError> found =
-          view_errors(bind_model(*model, whole), [&](const Vec3<double>& wo) { return fit.closures(wo, varied); });
+      const std::vector<ViewError> found = view_errors(
+          measure::bind_model(*model, whole), [&](const Vec3<double>& wo) { return fit.closures(wo, varied); });
       ASSERT_EQ(found.size(), stated.size()) << model->info().name;
       for (std::size_t i = 0; i < found.size(); ++i) {
         l1[i] = std::max(l1[i], found[i].relative_l1);
@@ -558,7 +561,7 @@ TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
   const double x = fit.knots()[random / all.size() % fit.knots().size()], number = fit.axis()->at(x);
   const Fit cell = fit.knot(*model, values, x);
   const ParamValues whole = complete(model->info(), with_number(*model, values, number));
-  const BoundModel bound = bind_model(*model, whole);
+  const measure::BoundModel bound = measure::bind_model(*model, whole);
   const auto l1 = [&](const Fit& of) {
     const Varied<double> varied = of.varied(whole);
     double sum = 0;
@@ -625,7 +628,7 @@ TEST(Fit, ShadersStayWithinBounds) {
   for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
     const Model& m = find_model(name);
     const ParamValues values = values_of(m, {text});
-    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, values), values);
+    const Shader s = write_shader(m, RepresentationKind::Fitted, fold(measure::albedo_table_of(m), m, values), values);
     EXPECT_LE(s.operations, 600) << name;
     EXPECT_LE(s.closures, 9) << name;
     EXPECT_THAT(s.source, HasSubstr("phong_ramp(normal_0, exponent_0, ramp_0)"));

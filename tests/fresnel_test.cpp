@@ -8,7 +8,8 @@
 
 #include <complex>
 
-#include "analysis/albedo.h"
+#include "measure/albedo.h"
+#include "measure/bound_model.h"
 #include "model/metals.h"
 #include "model/spectrum.h"
 
@@ -115,7 +116,7 @@ TEST(Metals, TheModelIsItsThreeIndices) {
   const Model& model = find_model("fresnel_conductor");
   EXPECT_FALSE(model.has_scatter());
   for (std::size_t i = 0; i < metals().size(); ++i) {
-    const BoundModel b = bind_model(model, {{"metal", metals()[i].name}});
+    const measure::BoundModel b = measure::bind_model(model, {{"metal", metals()[i].name}});
     for (const double c : {1., 0.5, 0.05}) {
       const Rgb<double> d = b.brdf->mirror(direction(c, 1)) - metals()[i].reflectance(c);
       EXPECT_LT(max_abs(d), metals()[i].name == "au" ? 0.037 : 3e-3) << b.label << " " << c;

@@ -4,28 +4,32 @@
 
 #include <cmath>
 
-#include "analysis/albedo.h"
+#include "core/sequence.h"
+#include "measure/albedo.h"
+#include "measure/bound_model.h"
 
 namespace brdfc {
 namespace {
 
-BoundModel bound(const char* name, const std::vector<std::string>& assignments) {
+measure::BoundModel bound(const char* name, const std::vector<std::string>& assignments) {
   const Model& m = find_model(name);
-  return bind_model(m, parse_values(m.info(), assignments));
+  return measure::bind_model(m, parse_values(m.info(), assignments));
 }
 
-double albedo_at(const BoundModel& b, double cosTheta) { return albedo(*b.brdf, cosTheta, 0.3, b.label).total().g; }
+double albedo_at(const measure::BoundModel& b, double cosTheta) {
+  return measure::albedo(*b.brdf, cosTheta, 0.3, b.label).total().g;
+}
 
-void expect_albedo(const BoundModel& b, double cosTheta, double wanted) {
-  const Albedo a = albedo(*b.brdf, cosTheta, 0.3, b.label);
+void expect_albedo(const measure::BoundModel& b, double cosTheta, double wanted) {
+  const measure::Albedo a = measure::albedo(*b.brdf, cosTheta, 0.3, b.label);
   EXPECT_LT(a.error, 1e-4) << b.label;
   EXPECT_NEAR(a.total().g, wanted, 1e-6 + 2 * a.error) << b.label << " cos_theta_o=" << cosTheta;
 }
 
 TEST(GlossyReflector, LostRaysHalveTheSilhouetteAndTurnedRaysDoNot) {
   // Figs. 25.5 and 25.7. A cosine lobe (e = 1) about r keeps (1 + cos theta) / 2 of itself above the surface.
-  const BoundModel lose = bound("glossy_reflector", {"kr=0.8", "e=1", "below=lose"}),
-                   mirror = bound("glossy_reflector", {"kr=0.8", "e=1", "below=mirror"});
+  const measure::BoundModel lose = bound("glossy_reflector", {"kr=0.8", "e=1", "below=lose"}),
+                            mirror = bound("glossy_reflector", {"kr=0.8", "e=1", "below=mirror"});
   for (const double c : {1., 0.7, 0.4, 0.1, 0.01, 1e-3}) {
     expect_albedo(lose, c, 0.8 * (1 + c) / 2);
     expect_albedo(mirror, c, 0.8);
@@ -37,8 +41,8 @@ TEST(GlossyReflector, LostRaysHalveTheSilhouetteAndTurnedRaysDoNot) {
 }
 
 TEST(GlossyReflector, DensityDoublesExactlyWhereThePartnerIsBelow) {
-  const BoundModel lose = bound("glossy_reflector", {"e=3", "below=lose"}),
-                   mirror = bound("glossy_reflector", {"e=3", "below=mirror"});
+  const measure::BoundModel lose = bound("glossy_reflector", {"e=3", "below=lose"}),
+                            mirror = bound("glossy_reflector", {"e=3", "below=mirror"});
   const Vec3<double> wo = direction(0.4, 0.7), r{-wo.x, -wo.y, wo.z};
   int doubled = 0, alike = 0, none = 0;
   Sequence2 sequence(1);
@@ -56,7 +60,7 @@ TEST(GlossyReflector, DensityDoublesExactlyWhereThePartnerIsBelow) {
 }
 
 TEST(GlossyReflector, IsAMirrorAtTheLargestExponent) {
-  const BoundModel b = bound("glossy_reflector", {"kr=0.9", "e=1e7"});
+  const measure::BoundModel b = bound("glossy_reflector", {"kr=0.9", "e=1e7"});
   const Vec3<double> wo = direction(0.6, 1), r{-wo.x, -wo.y, wo.z};
   Sequence3 sequence(1);
   for (int i = 0; i < 1000; ++i) EXPECT_LT(length(b.brdf->sample(wo, sequence.next()).wi - r), 2e-3);
@@ -73,7 +77,7 @@ TEST(GlossySpecular, ScaleDecidesWhetherLightIsGained) {
     EXPECT_NEAR(at_normal("normalisation=estimator"), (e + 1) / (e + 2), 1e-6);
     EXPECT_NEAR(at_normal("normalisation=conserving"), 1, 1e-6);
     // Never more at other angles: the cosine that eq. 25.7 leaves out is still there.
-    const BoundModel b = bound("glossy_specular", {"ks=1", exponent, "normalisation=conserving"});
+    const measure::BoundModel b = bound("glossy_specular", {"ks=1", exponent, "normalisation=conserving"});
     double before = 1 + 1e-6;
     for (int i = 19; i >= 1; --i) {
       const double a = albedo_at(b, i / 20.);
@@ -84,7 +88,7 @@ TEST(GlossySpecular, ScaleDecidesWhetherLightIsGained) {
 }
 
 TEST(MatteSpecular, ConstantSharesDoNotTradeWithTheAngle) {
-  const BoundModel b = bound("lambertian_specular", {"rd=0.8", "rs=0.05"});
+  const measure::BoundModel b = bound("lambertian_specular", {"rd=0.8", "rs=0.05"});
   for (const double c : {1., 0.5, 0.01}) {
     EXPECT_EQ(b.brdf->mirror(direction(c, 0)).r, 0.05);
     EXPECT_NEAR(albedo_at(b, c), 0.85, 1e-9);
@@ -93,7 +97,7 @@ TEST(MatteSpecular, ConstantSharesDoNotTradeWithTheAngle) {
 }
 
 TEST(MatteSpecular, Shirley1991IsNotReciprocal) {
-  const BoundModel b = bound("shirley_1991", {"r0=0.05", "rd=1"});
+  const measure::BoundModel b = bound("shirley_1991", {"r0=0.05", "rd=1"});
   const Vec3<double> high = direction(1, 0), low = direction(0.1, 2);
   // f(low, high) / f(high, low) = (1 - R(0)) / (1 - R(84 deg)).
   EXPECT_NEAR(b.brdf->eval(low, high).g / b.brdf->eval(high, low).g, 1 / (1 - std::pow(0.9, 5)), 1e-12);
@@ -102,7 +106,7 @@ TEST(MatteSpecular, Shirley1991IsNotReciprocal) {
 }
 
 TEST(MatteSpecular, SchlickDoubleGainsLightAtGrazingViews) {
-  const BoundModel b = bound("schlick_double", {"r0=0.05", "rd=1"});
+  const measure::BoundModel b = bound("schlick_double", {"r0=0.05", "rd=1"});
   EXPECT_NEAR(albedo_at(b, 1), 1, 1e-3);
   double most = 0;
   for (const double c : {1., 0.5, 0.2, 0.1, 0.05, 0.01, 1e-3}) most = std::max(most, albedo_at(b, c));
@@ -122,7 +126,7 @@ TEST(CoupledDielectric, LosesNothingAndHasWalshsConstant) {
   double table = 0;
   for (const double n : {1.1, 1.33, 1.5, 1.8, 2.4, 4., 10., 40.}) {
     const double r0 = sqr((n - 1) / (n + 1));
-    const BoundModel b = bound("coupled", {"fresnel=dielectric", "rm=1", fmt::format("r0={}", r0)});
+    const measure::BoundModel b = bound("coupled", {"fresnel=dielectric", "rm=1", fmt::format("r0={}", r0)});
     for (const double c : {1., 0.4, 0.05, 1e-3}) expect_albedo(b, c, 1);
     const Vec3<double> normal{0, 0, 1};
     const double wanted = sqr(1 - r0) / (kPi * (1 - mean_reflectance(n)));
@@ -141,10 +145,10 @@ TEST(AshikhminShirley, Eq12WithTheTrueAlbedoLosesNothingWhereEq14LosesHalf) {
       {"nu=0", "nv=0"}, {"nu=10", "nv=10"}, {"nu=10", "nv=1000"}, {"nu=1e4", "nv=1e4"}, {"nu=1e8", "nv=1e8"}};
   for (const auto& [nu, nv] : exponents)
     for (const char* rs : {"rs=0", "rs=0.05", "rs=1"}) {
-      const BoundModel b = bound("ashikhmin_shirley", {"diffuse=tabulated", "rd=1", rs, nu, nv});
+      const measure::BoundModel b = bound("ashikhmin_shirley", {"diffuse=tabulated", "rd=1", rs, nu, nv});
       for (const double c : {1., 0.5, 0.174, 0.05}) {
         // Samples, because sharp lobes take quadrature long.
-        const SampledAlbedo a = sampled_albedo(*b.brdf, c, 0.3, b.label, 1 << 13);
+        const measure::SampledAlbedo a = measure::sampled_albedo(*b.brdf, c, 0.3, b.label, 1 << 13);
         const double off = std::abs(a.scattered.g - 1);
         EXPECT_LE(off, stated + 4 * a.standard_error) << b.label << " cos_theta_o=" << c;
         worst = std::max(worst, off);
@@ -162,7 +166,7 @@ TEST(AshikhminShirley, Eq12WithTheTrueAlbedoLosesNothingWhereEq14LosesHalf) {
 }
 
 TEST(Coupled, Eq6IsInvertedToMachinePrecision) {
-  const BoundModel b = bound("coupled", {});
+  const measure::BoundModel b = bound("coupled", {});
   double worst = 0;
   for (int i = 0; i < 4000; ++i) {
     // Up to 1 and down to where the shape is 7/2 c^3.

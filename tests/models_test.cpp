@@ -11,9 +11,12 @@
 #include <set>
 #include <sstream>
 
-#include "analysis/stability.h"
 #include "check/check.h"
 #include "check/chi_square.h"
+#include "measure/albedo.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
+#include "measure/stability.h"
 
 namespace brdfc {
 namespace {
@@ -127,17 +130,18 @@ TEST(Registry, NamesAreTakenOnce) {
 class ModelCase : public testing::TestWithParam<Case> {
  protected:
   const Model& model() const { return find_model(GetParam().model); }
-  BoundModel bound() const { return bind_model(model(), parameters(model(), GetParam().text)); }
+  measure::BoundModel bound() const { return measure::bind_model(model(), parameters(model(), GetParam().text)); }
 };
 
 TEST_P(ModelCase, HistogramOfSamplesFollowsThePdf) {
   if (!model().has_scatter()) return;
-  const BoundModel b = bound();
+  const measure::BoundModel b = bound();
   // Sidak: the chance that a right sampler fails anywhere in this suite is 1 %.
   const double threshold = 1 - std::pow(0.99, 1. / double(std::size(kHistogramCosines) * cases("cases").size()));
   std::uint64_t seed = 1;
   for (const double c : kHistogramCosines) {
-    const ChiSquare r = chi_square(b, direction(c, 0.4 + c), std::max(10000, int(40000 * effort())), seed++);
+    const check::ChiSquare r =
+        check::chi_square(b, direction(c, 0.4 + c), std::max(10000, int(40000 * effort())), seed++);
     // More samples ask for more digits of the density than quadrature may have.
     if (!r.converged && effort() > 1) continue;
     ASSERT_TRUE(r.converged) << b.label << " cos_theta_o=" << c;
@@ -147,15 +151,15 @@ TEST_P(ModelCase, HistogramOfSamplesFollowsThePdf) {
 }
 
 TEST_P(ModelCase, AlbedoConservesAndAgreesWithSampling) {
-  const BoundModel b = bound();
+  const measure::BoundModel b = bound();
   for (const double c : {1., 0.5, 0.1}) {
-    const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
+    const measure::Albedo a = measure::albedo(*b.brdf, c, 0.3, b.label);
     EXPECT_LT(a.error, 1e-4) << b.label;
     if (model().info().properties.conserving) {
       const double tables = table_error(model().info(), parameters(model(), GetParam().text));
       EXPECT_LE(max_component(a.total()), 1 + 1e-9 + a.error + tables) << b.label;
     }
-    const SampledAlbedo s = sampled_albedo(*b.brdf, c, 0.3, b.label);
+    const measure::SampledAlbedo s = measure::sampled_albedo(*b.brdf, c, 0.3, b.label);
     const Rgb<double> d = a.scattered - s.scattered;
     EXPECT_LE(std::max({std::abs(d.r), std::abs(d.g), std::abs(d.b)}), 7 * s.standard_error + a.error + 1e-9)
         << b.label;
@@ -176,17 +180,18 @@ TEST(Sampling, FollowsThePdfAtTheExtremesToo) {
     if (find_model(c.model).has_scatter()) elsewhere += std::size(kHistogramCosines);
   }
   std::erase_if(asked, [](const auto& a) { return !find_model(a.first.model).has_scatter(); });
-  std::vector<ChiSquare> found(asked.size());
+  std::vector<check::ChiSquare> found(asked.size());
   std::vector<std::string> where(asked.size());
   tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
     const auto& [c, cosine] = asked[i];
     const Model& m = find_model(c.model);
-    const BoundModel b = bind_model(m, parameters(m, c.text));
-    found[i] = chi_square(b, direction(cosine, 0.4 + double(i)), std::max(10000, int(20000 * effort())), 100 + i);
+    const measure::BoundModel b = measure::bind_model(m, parameters(m, c.text));
+    found[i] =
+        check::chi_square(b, direction(cosine, 0.4 + double(i)), std::max(10000, int(20000 * effort())), 100 + i);
     where[i] = fmt::format("{} cos_theta_o={}", b.label, cosine);
   });
   const auto judged =
-      std::size_t(std::count_if(found.begin(), found.end(), [](const ChiSquare& r) { return r.converged; }));
+      std::size_t(std::count_if(found.begin(), found.end(), [](const check::ChiSquare& r) { return r.converged; }));
   const double threshold = 1 - std::pow(0.99, 1. / double(judged));
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (!found[i].converged) continue;
@@ -201,7 +206,8 @@ class StiffCase : public ModelCase {};
 
 TEST_P(StiffCase, RoundingStaysNearThatOfTheInputs) {
   const ParamValues v = parameters(model(), GetParam().text);
-  const Stability f = float_stability(model(), v, 512, 3), d = double_stability(model(), v, 128, 4);
+  const measure::Stability f = measure::float_stability(model(), v, 512, 3),
+                           d = measure::double_stability(model(), v, 128, 4);
   EXPECT_LE(f.amplified, GetParam().amplified) << f.amplified_where;
   EXPECT_LE(d.amplified, GetParam().amplified) << d.amplified_where;
 }
@@ -211,9 +217,9 @@ TEST_P(StiffCase, LosslessModelsLoseNothing) {
   ParamValues v = parameters(model(), GetParam().text);
   for (const ParamInfo& p : model().info().params)
     if (p.kind == ParamKind::Color) v[p.name] = 1.;
-  const BoundModel b = bind_model(model(), v);
+  const measure::BoundModel b = measure::bind_model(model(), v);
   for (const double c : {1., 0.9, 0.5, 0.1, 0.01}) {
-    const Albedo a = albedo(*b.brdf, c, 1, b.label);
+    const measure::Albedo a = measure::albedo(*b.brdf, c, 1, b.label);
     const Rgb<double> t = a.total();
     EXPECT_NEAR(t.r, 1, GetParam().lossless) << b.label << " cos_theta_o=" << c << " error=" << a.error;
     EXPECT_NEAR(t.g, 1, GetParam().lossless) << b.label;
@@ -226,8 +232,8 @@ INSTANTIATE_TEST_SUITE_P(Stiff, StiffCase, testing::ValuesIn(cases("all")), test
 class EveryModel : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryModel, HasTheDeclaredProperties) {
-  for (const CheckRow& row : check_model(find_model(GetParam()), {.effort = effort()}))
-    EXPECT_NE(row.result, CheckResult::Failed)
+  for (const check::Row& row : check::check_model(find_model(GetParam()), {.effort = effort()}))
+    EXPECT_NE(row.result, check::Result::Failed)
         << row.model << ": " << row.check << ": " << row.worst << " (limit " << row.limit << ") at " << row.where;
 }
 
@@ -247,7 +253,7 @@ TEST_P(GoldenModel, HasGoldenValuesOfEveryKindAndMatchesThem) {
   for (auto& row : read_table("golden.csv")) {
     if (row["model"] != GetParam()) continue;
     ++seen[row["kind"]];
-    const BoundModel b = bind_model(m, parameters(m, row["parameters"]));
+    const measure::BoundModel b = measure::bind_model(m, parameters(m, row["parameters"]));
     const auto vec = [&](const char* w) {
       return Vec3<double>{number(row[std::string(w) + "_x"]), number(row[std::string(w) + "_y"]),
                           number(row[std::string(w) + "_z"])};
@@ -261,7 +267,7 @@ TEST_P(GoldenModel, HasGoldenValuesOfEveryKindAndMatchesThem) {
       got = Rgb<double>(b.brdf->pdf(vec("wi"), vec("wo")));
     } else {
       ASSERT_EQ(row["kind"], "albedo");
-      const Albedo a = albedo(*b.brdf, number(row["wo_z"]), 0, b.label);
+      const measure::Albedo a = measure::albedo(*b.brdf, number(row["wo_z"]), 0, b.label);
       got = a.total();
       tolerance += 2 * a.error;
     }
@@ -287,18 +293,20 @@ INSTANTIATE_TEST_SUITE_P(Models, GoldenModel, testing::ValuesIn(golden_models())
 
 TEST(Landmarks, AshikhminShirleyLosesWhatTheFurnacePictureShows) {
   const Model& m = find_model("ashikhmin_shirley");
-  const BoundModel b = bind_model(m, parse_values(m.info(), {"part=specular", "rs=1", "nu=10", "nv=10"}));
-  EXPECT_NEAR(albedo(*b.brdf, 1).total().r, 0.6957, 5e-5);  // the paper: "about 68 %"
-  EXPECT_NEAR(albedo(*b.brdf, 0.5).total().r, 0.613, 5e-4);
-  EXPECT_NEAR(albedo(*b.brdf, std::cos(80 * kPi / 180)).total().r, 0.539, 5e-4);
-  EXPECT_NEAR(albedo(*b.brdf, 0.09).total().r, 0.52, 5e-3);
+  const measure::BoundModel b =
+      measure::bind_model(m, parse_values(m.info(), {"part=specular", "rs=1", "nu=10", "nv=10"}));
+  EXPECT_NEAR(measure::albedo(*b.brdf, 1).total().r, 0.6957, 5e-5);  // the paper: "about 68 %"
+  EXPECT_NEAR(measure::albedo(*b.brdf, 0.5).total().r, 0.613, 5e-4);
+  EXPECT_NEAR(measure::albedo(*b.brdf, std::cos(80 * kPi / 180)).total().r, 0.539, 5e-4);
+  EXPECT_NEAR(measure::albedo(*b.brdf, 0.09).total().r, 0.52, 5e-3);
 }
 
 TEST(Landmarks, CoupledWithWhiteMatteIsAPerfectFurnaceAtEveryAngle) {
   const Model& m = find_model("coupled");
   for (const char* r0 : {"r0=0", "r0=0.05", "r0=0.9"}) {
-    const BoundModel b = bind_model(m, parse_values(m.info(), {"rm=1", r0}));
-    for (int i = 1; i <= 20; ++i) EXPECT_NEAR(albedo(*b.brdf, i / 20.).total().g, 1, 1e-9) << r0 << " " << i / 20.;
+    const measure::BoundModel b = measure::bind_model(m, parse_values(m.info(), {"rm=1", r0}));
+    for (int i = 1; i <= 20; ++i)
+      EXPECT_NEAR(measure::albedo(*b.brdf, i / 20.).total().g, 1, 1e-9) << r0 << " " << i / 20.;
   }
 }
 
@@ -307,8 +315,8 @@ TEST(Landmarks, TheConstructionFromSech2IsTheClosedForm) {
   for (const double n : {0., 1e-9, 0.001, 0.3, 0.99, 1.01, 4., 25., 1e3, 1e4}) {
     const auto made = find_model("lossless").make_double({{"n", n}});
     const auto closed = find_model("radziszewski_alda").make_double({{"n", n}, {"part", std::string("latitudinal")}});
-    Random random(7);
-    for (const auto& [wi, wo] : direction_pairs(*closed, 500, random)) {
+    measure::Random random(7);
+    for (const auto& [wi, wo] : measure::direction_pairs(*closed, 500, random)) {
       const double want = closed->eval(wi, wo).r;
       // Both know x - y only to the rounding of the directions, which the gloss magnifies.
       // Below 1e-300 numbers have few digits or none.
@@ -324,7 +332,7 @@ TEST(Landmarks, EveryKernelLosesNothing) {
   for (const char* shape : {"kernel=exponential", "kernel=table", "kernel=sech2"})
     for (const char* n : {"n=3", "n=60"})
       for (const double cosine : {1., 0.5, 0.05}) {
-        const BoundModel b = bind_model(m, parse_values(m.info(), {shape, n}));
+        const measure::BoundModel b = measure::bind_model(m, parse_values(m.info(), {shape, n}));
         constexpr int kSteps = 20000;
         double sum = 0;
         for (int i = 0; i < kSteps; ++i)
@@ -336,7 +344,7 @@ TEST(Landmarks, EveryKernelLosesNothing) {
 
 TEST(Landmarks, RadziszewskiAldaIsLambertAtZeroGloss) {
   const Model& m = find_model("radziszewski_alda");
-  const BoundModel b = bind_model(m, parse_values(m.info(), {"n=0", "tint=1"}));
+  const measure::BoundModel b = measure::bind_model(m, parse_values(m.info(), {"n=0", "tint=1"}));
   for (const double c : {0.05, 0.4, 1.})
     EXPECT_NEAR(b.brdf->eval(direction(c, 1), direction(0.3, 2)).r, 1 / kPi, 1e-15);
 }

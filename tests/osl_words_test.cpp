@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <regex>
 
+#include "measure/albedo_table.h"
 #include "model/choices.h"
 #include "model/sampling.h"
 #include "pack/plan.h"
@@ -78,11 +79,11 @@ namespace {
 using namespace osl_words_test;
 using ::testing::HasSubstr;
 
-AlbedoTable table_of(const Model& model) {
-  AlbedoTable t;
+measure::AlbedoTable table_of(const Model& model) {
+  measure::AlbedoTable t;
   t.model = model.info().name;
-  t.grids.push_back({{{"cos_theta_o", AxisScale::Linear, {0, 1}}}, 3, {0, 0, 0, 1, 1, 1}, 0});
-  t.terms.assign(choice_combinations(model.info()).size(), {AlbedoTerm{}});
+  t.grids.push_back({{{"cos_theta_o", measure::AxisScale::Linear, {0, 1}}}, 3, {0, 0, 0, 1, 1, 1}, 0});
+  t.terms.assign(choice_combinations(model.info()).size(), {measure::AlbedoTerm{}});
   return t;
 }
 

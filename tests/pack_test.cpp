@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "closures/closure_pool.h"
+#include "measure/albedo_table.h"
 #include "model/sampling.h"
 #include "pack/shader.h"
 #include "print/osl_library.h"
@@ -33,8 +34,8 @@ int nesting(const std::string& sum) {
   return most;
 }
 
-AlbedoTable empty_table(const Model& model) {
-  AlbedoTable t;
+measure::AlbedoTable empty_table(const Model& model) {
+  measure::AlbedoTable t;
   t.terms.resize(choice_combinations(model.info()).size());
   return t;
 }
@@ -173,7 +174,7 @@ TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
   const std::string body = s.source.substr(s.source.find("\n{\n", s.source.find("\nshader ")));
   EXPECT_EQ(s.statements, std::count(body.begin(), body.end(), ';')) << "there is no loop";
   EXPECT_LT(measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
-  const AlbedoTable table = tabulate_albedo(model);
+  const measure::AlbedoTable table = measure::tabulate_albedo(model);
   EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
 }
 
@@ -208,7 +209,7 @@ TEST(Shader, TablesThatChoicesShareStandThereOnce) {
 /// A file holds the text and what it is compiled to, whether or not something is linked to the output.
 TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
   const Model& m = find_model("ward");
-  const AlbedoTable table = albedo_table_of(m);
+  const measure::AlbedoTable table = measure::albedo_table_of(m);
   const Shader apart = write_shader(m, RepresentationKind::Sampled, table);
   EXPECT_THAT(apart.source, Not(HasSubstr("Albedo")));
   EXPECT_THAT(apart.source, Not(HasSubstr("knots_")));
@@ -224,7 +225,7 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
   for (const auto& [name, model] : models())
     for (const RepresentationKind kind : representations(*model)) {
       if (is_fit(kind)) continue;  // holds tables of its own
-      const std::string text = write_shader(*model, kind, albedo_table_of(*model)).source;
+      const std::string text = write_shader(*model, kind, measure::albedo_table_of(*model)).source;
       // What two aimed forms hold for each of their many choices is more than it should be.
       const bool longer =
           kind == RepresentationKind::Aimed && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
@@ -253,7 +254,7 @@ TEST(Shader, TextOnlyHoldsTheLibraryItCalls) {
 TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
   const detail::ModelOf<pack_test::Broken> broken;
   try {
-    tabulate_albedo(broken);
+    measure::tabulate_albedo(broken);
     FAIL() << "NaN reached a table";
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(), HasSubstr("broken"));
@@ -270,7 +271,7 @@ TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
   ASSERT_EQ(only.size(), 1u);
   EXPECT_EQ(std::get<std::string>(only.at("fresnel")), "schlick");
   EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
-  const AlbedoTable t = empty_table(m);
+  const measure::AlbedoTable t = empty_table(m);
   EXPECT_THAT(write_shader(m, RepresentationKind::Exact, t).source, Not(HasSubstr("int fresnel")));
   EXPECT_THAT(write_shader(m, RepresentationKind::Sampled, t).source, HasSubstr("int fresnel"));
   try {
@@ -292,7 +293,8 @@ TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
   others.erase("cz");
   EXPECT_TRUE(form_values(m, RepresentationKind::Fitted, others).empty());
   EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
-  const std::string source = write_shader(m, RepresentationKind::Fitted, fold(albedo_table_of(m), m, only), {}).source;
+  const std::string source =
+      write_shader(m, RepresentationKind::Fitted, fold(measure::albedo_table_of(m), m, only), {}).source;
   for (const char* socket : {"    float e = ", "    color ks = "}) EXPECT_THAT(source, HasSubstr(socket));
   for (const char* gone : {"float cxy", "float cz"}) EXPECT_THAT(source, Not(HasSubstr(gone)));
 }

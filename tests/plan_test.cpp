@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "measure/albedo_table.h"
 #include "pack/shader.h"
 #include "represent/aimed.h"
 
@@ -82,7 +83,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
     EXPECT_THAT(reasons(all), Not(testing::Contains(HasSubstr("slots for lamps"))));
 
   const Model& m = find_model("phong");
-  const AlbedoTable table = albedo_table_of(m);
+  const measure::AlbedoTable table = measure::albedo_table_of(m);
   const auto shader = [&](int lamps) { return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps); };
   for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
@@ -326,16 +327,16 @@ TEST(Plan, FitsBasesWhereAskedToAndWhereFitsAreMadeAnyway) {
 
 TEST(Plan, FoldedTablesInterpolateToTheSame) {
   const Model& m = find_model("coupled");
-  const AlbedoTable whole = albedo_table_of(m);
+  const measure::AlbedoTable whole = measure::albedo_table_of(m);
   for (const std::vector<std::string>& fixed_text :
        {std::vector<std::string>{"r0=0.137"}, {"rm=0.9,0.5,0.1"}, {"r0=0.137", "rm=0.9,0.5,0.1"}}) {
     const ParamValues all = parse_values(m.info(), {"r0=0.137", "rm=0.9,0.5,0.1"});
     ParamValues fixed;
     for (const std::string& t : fixed_text) fixed[t.substr(0, 2)] = all.at(t.substr(0, 2));
-    const AlbedoTable cut = fold(whole, m, fixed);
+    const measure::AlbedoTable cut = fold(whole, m, fixed);
     EXPECT_LE(cut.size(), 3 * whole.size());
-    for (const AlbedoGrid& g : cut.grids)
-      for (const TableAxis& a : g.axes) EXPECT_EQ(fixed.count(a.name), 0u);
+    for (const measure::AlbedoGrid& g : cut.grids)
+      for (const measure::TableAxis& a : g.axes) EXPECT_EQ(fixed.count(a.name), 0u);
     for (const double c : {0.01, 0.3, 0.77, 1.0}) {
       const Rgb<double> want = lookup(whole, m, all, c), got = lookup(cut, m, all, c);
       EXPECT_NEAR(got.r, want.r, 1e-6) << fixed_text[0];

@@ -7,7 +7,9 @@
 
 #include <cstdlib>
 
-#include "analysis/probes.h"
+#include "measure/albedo.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 
 namespace brdfc {
 namespace {
@@ -67,11 +69,11 @@ TEST_P(Property, ReciprocalModelsAre) {
 
 TEST_P(Property, ValuesAreFiniteAndNotNegative) {
   EXPECT_TRUE(rc::check(GetParam() + ": f >= 0", [&] {
-    const BoundModel b = bind_model(model(), any_parameters(info()));
+    const measure::BoundModel b = measure::bind_model(model(), any_parameters(info()));
     const Vec3<double> wi = any_direction(), wo = any_direction();
-    require_value(b.brdf->eval(wi, wo), "f", b.label, wi, wo);
-    require_value(b.brdf->pdf(wi, wo), "pdf", b.label, wi, wo);
-    require_value(b.brdf->mirror(wo), "mirror", b.label, wi, wo);
+    measure::require_value(b.brdf->eval(wi, wo), "f", b.label, wi, wo);
+    measure::require_value(b.brdf->pdf(wi, wo), "pdf", b.label, wi, wo);
+    measure::require_value(b.brdf->mirror(wo), "mirror", b.label, wi, wo);
   }));
 }
 
@@ -79,9 +81,9 @@ TEST_P(Property, ConservingModelsGainNothing) {
   if (!info().properties.conserving) return;
   EXPECT_TRUE(rc::check(GetParam() + ": albedo <= 1", [&] {
     const ParamValues v = any_parameters(info());
-    const BoundModel b = bind_model(model(), v);
+    const measure::BoundModel b = measure::bind_model(model(), v);
     const Vec3<double> wo = any_direction();
-    const SampledAlbedo s = sampled_albedo(*b.brdf, wo.z, std::atan2(wo.y, wo.x), b.label, 2048);
+    const measure::SampledAlbedo s = measure::sampled_albedo(*b.brdf, wo.z, std::atan2(wo.y, wo.x), b.label, 2048);
     RC_ASSERT(max_component(s.scattered + b.brdf->mirror(wo)) <=
               1 + 1e-6 + 7 * s.standard_error + table_error(info(), v));
   }));

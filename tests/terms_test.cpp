@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "analysis/probes.h"
+#include "measure/probes.h"
 #include "represent/fit.h"
 #include "support.h"
 
@@ -48,7 +48,7 @@ TEST(Terms, AreFoundByEvaluatingTheModel) {
 /// For all models and any value of all that there are terms by.
 TEST(Terms, AddUpToTheModel) {
   int models_with_terms = 0;
-  Random random(8);
+  measure::Random random(8);
   for (const auto& [name, model] : models()) {
     const Terms terms = terms_of(*model, {});
     if (terms.parameters.empty()) continue;
@@ -57,7 +57,7 @@ TEST(Terms, AddUpToTheModel) {
       ParamValues values = complete(model->info(), {});
       std::map<std::string, Rgb<double>> shares;
       for (const std::string& parameter : terms.parameters) {
-        Rgb<double> c(uniform(random), uniform(random), uniform(random));
+        Rgb<double> c(measure::uniform(random), measure::uniform(random), measure::uniform(random));
         if (round == 0) c = Rgb<double>(0.0);
         if (round == 1) c = Rgb<double>(1.0);
         if (model->info().param(parameter)->kind == ParamKind::Number) c = Rgb<double>(c.r);
@@ -76,7 +76,7 @@ TEST(Terms, AddUpToTheModel) {
         for (const auto& [parameter, value] : term.values) there[parameter] = value;
         of_terms.push_back(model->make_double(there));
       }
-      for (const auto& [wi, wo] : direction_pairs(*of_terms.back(), 100, random)) {
+      for (const auto& [wi, wo] : measure::direction_pairs(*of_terms.back(), 100, random)) {
         Rgb<double> sum(0.0);
         double scale = 1e-12;
         for (std::size_t t = 0; t < weights.size(); ++t) {

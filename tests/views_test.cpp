@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "measure/albedo_table.h"
 #include "model/horizon.h"
 #include "pack/plan.h"
 #include "pack/shader.h"
@@ -159,10 +160,10 @@ constexpr Cosines kSome{0.35, 0.9};
 
 TEST(Views, CutAlbedoTablesHoldTheSameNumbers) {
   const Model& m = find_model("coupled");
-  const AlbedoTable whole = albedo_table_of(m);
+  const measure::AlbedoTable whole = measure::albedo_table_of(m);
   for (const ParamValues& fixed : {ParamValues{}, ParamValues{{"r0", 0.137}}}) {
     ParamValues values = complete(m.info(), {{"r0", 0.137}});
-    const AlbedoTable all = fold(whole, m, fixed), cut = fold(whole, m, fixed, kSome);
+    const measure::AlbedoTable all = fold(whole, m, fixed), cut = fold(whole, m, fixed, kSome);
     EXPECT_LT(cut.size(), all.size());
     for (const double c : {0.35, 0.5, 0.7123, 0.9}) {
       const Rgb<double> want = lookup(all, m, values, c), got = lookup(cut, m, values, c);
@@ -230,7 +231,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   EXPECT_EQ(plan_scene({need("a", {})}, budget)[0].forms[0], RepresentationKind::Aimed);
   EXPECT_EQ(plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], RepresentationKind::Fitted);
 
-  const AlbedoTable table = fold(albedo_table_of(m), m, values, kSome);
+  const measure::AlbedoTable table = fold(measure::albedo_table_of(m), m, values, kSome);
   for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
     const Shader whole = write_shader(m, kind, table, values, {}, 0, AimedBase::Fitted),
                  cut = write_shader(m, kind, table, values, kSome, 0, AimedBase::Fitted);

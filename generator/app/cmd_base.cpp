@@ -2,6 +2,7 @@
 // brdfc base: how much of a model its base carries, and what noise is left.
 #include "app/commands.h"
 #include "app/csv.h"
+#include "measure/bound_model.h"
 #include "represent/base.h"
 
 namespace brdfc {
@@ -34,7 +35,7 @@ void add_base_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     if (!model.has_base()) input_error("{}: has no base: expected a model that declares one", o->model);
-    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     CsvWriter out("theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest");
     for (const double angle : o->angles) {
       const BaseWorth w = base_worth(bound, direction(std::cos(angle * kPi / 180), o->phi), o->points);

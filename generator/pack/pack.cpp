@@ -19,9 +19,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "analysis/albedo_table.h"
 #include "closures/closure_pool.h"
 #include "core/hash.h"
+#include "measure/albedo_table.h"
+#include "measure/bound_model.h"
 #include "pack/nodes.h"
 #include "pack/shader.h"
 #include "represent/fit.h"
@@ -137,11 +138,11 @@ bool has_highlight(RepresentationKind kind, bool mirror, const Shader& shader) {
                      ((kind == RepresentationKind::Exact || kind == RepresentationKind::Fitted) && ramps));
 }
 
-Json table_json(const AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
+Json table_json(const measure::AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
   Json grids = Json::array(), terms = Json::array();
-  for (const AlbedoGrid& g : t.grids) {
+  for (const measure::AlbedoGrid& g : t.grids) {
     Json axes = Json::array();
-    for (const TableAxis& a : g.axes)
+    for (const measure::TableAxis& a : g.axes)
       axes.push_back({{"name", a.name}, {"scale", name_of(a.scale)}, {"values", a.values}});
     grids.push_back({{"axes", axes}, {"channels", g.channels}, {"error", g.error}, {"values", g.values}});
   }
@@ -149,7 +150,7 @@ Json table_json(const AlbedoTable& t, const std::string& file, const Model& mode
   for (std::size_t i = 0; i < t.terms.size(); ++i) {
     if (!admits(model.info(), combinations.at(i), fixed)) continue;
     Json list = Json::array();
-    for (const AlbedoTerm& term : t.terms[i])
+    for (const measure::AlbedoTerm& term : t.terms[i])
       list.push_back({{"mirror", term.mirror}, {"colors", term.colors}, {"grid", term.grid}});
     terms.push_back(list);
   }
@@ -279,7 +280,7 @@ Json highlight_json(const Model& model, const ParamValues& fixed) {
       at[over->name] = number;
       values.push_back(number);
     }
-    const BoundModel bound = bind_model(model, at);
+    const measure::BoundModel bound = measure::bind_model(model, at);
     double most = 0;
     for (const Vec3<double>& wo : {Vec3<double>{0, 0, 1}, Vec3<double>{std::sqrt(0.5), 0, std::sqrt(0.5)}}) {
       const Rgb<double> f = bound.brdf->eval({-wo.x, -wo.y, wo.z}, wo);
@@ -323,13 +324,13 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
   j["fixed"] = values_json(plan.fixed);
   if (!plan.views.all()) j["view_cosines"] = {plan.views.low, plan.views.high};
 
-  AlbedoTable table, whole_table;
+  measure::AlbedoTable table, whole_table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
-  if (has_albedo_table(model)) {
-    whole_table = albedo_table_of(model);
+  if (measure::has_albedo_table(model)) {
+    whole_table = measure::albedo_table_of(model);
     table = fold(whole_table, model, plan.fixed, plan.views);
     const fs::path exr = scratch / (info.name + ".exr");
-    write_albedo_exr(table, exr);
+    measure::write_albedo_exr(table, exr);
     built.files[table_file] = read_text(exr);
     fs::remove(exr);
   }
@@ -341,7 +342,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
     const Fit* fit = fit_in(kind, plan, fixed);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
                       of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
-    const AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
+    const measure::AlbedoTable of_form = fixed == plan.fixed ? table : fold(whole_table, model, fixed, plan.views);
     const Shader shader = twin ? write_nodes(model, fixed)
                                : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps, plan.base);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
@@ -380,7 +381,7 @@ BuiltModel build_model(const PlannedModel& plan, const Costs& costs, const fs::p
         {"albedo_shader", shader.albedo.empty() ? Json() : Json(albedo_file)},
         {"albedo_sha256", shader.albedo.empty() ? Json() : Json(sha256(shader.albedo))}};
   }
-  if (has_albedo_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
+  if (measure::has_albedo_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
   return built;
 }
 

@@ -321,8 +321,8 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
 }
 
 /// The knots over the view that `views` lie between, as lookup() takes them.
-AlbedoGrid seen(const AlbedoGrid& grid, const Cosines& views) {
-  AlbedoGrid out = grid;
+measure::AlbedoGrid seen(const measure::AlbedoGrid& grid, const Cosines& views) {
+  measure::AlbedoGrid out = grid;
   if (grid.axes.empty() || grid.axes[0].name != "cos_theta_o") return out;
   const std::vector<double>& knots = grid.axes[0].values;
   const auto last_knot = std::ptrdiff_t(knots.size()) - 1;
@@ -336,17 +336,17 @@ AlbedoGrid seen(const AlbedoGrid& grid, const Cosines& views) {
 }
 
 /// The grid at fixed coordinates: linear between two knots of the axis' scale, as lookup() does.
-AlbedoGrid sliced(const AlbedoGrid& grid, const ParamValues& fixed) {
-  AlbedoGrid out;
+measure::AlbedoGrid sliced(const measure::AlbedoGrid& grid, const ParamValues& fixed) {
+  measure::AlbedoGrid out;
   out.channels = grid.channels;
   out.error = grid.error;
-  for (const TableAxis& axis : grid.axes)
+  for (const measure::TableAxis& axis : grid.axes)
     if (!fixed.count(axis.name)) out.axes.push_back(axis);
   std::vector<std::size_t> index(out.axes.size(), 0);
   for (bool more = true; more;) {
     std::vector<double> x;
     std::size_t kept = 0;
-    for (const TableAxis& axis : grid.axes) {
+    for (const measure::TableAxis& axis : grid.axes) {
       const auto it = fixed.find(axis.name);
       x.push_back(it == fixed.end() ? axis.values[index[kept]] : std::get<double>(it->second));
       if (it == fixed.end()) ++kept;
@@ -366,7 +366,7 @@ AlbedoGrid sliced(const AlbedoGrid& grid, const ParamValues& fixed) {
   return out;
 }
 
-void multiply(AlbedoGrid& grid, const std::array<double, 3>& color) {
+void multiply(measure::AlbedoGrid& grid, const std::array<double, 3>& color) {
   if (grid.channels == 1 && color[0] == color[1] && color[1] == color[2]) {
     for (float& v : grid.values) v = float(v * color[0]);
     return;
@@ -379,16 +379,16 @@ void multiply(AlbedoGrid& grid, const std::array<double, 3>& color) {
   grid.values = std::move(values);
 }
 
-bool same_axes(const AlbedoGrid& a, const AlbedoGrid& b) {
+bool same_axes(const measure::AlbedoGrid& a, const measure::AlbedoGrid& b) {
   return std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(),
-                    [](const TableAxis& p, const TableAxis& q) {
+                    [](const measure::TableAxis& p, const measure::TableAxis& q) {
                       return p.name == q.name && p.scale == q.scale && p.values == q.values;
                     });
 }
 
-void add(AlbedoGrid& sum, AlbedoGrid other) {
+void add(measure::AlbedoGrid& sum, measure::AlbedoGrid other) {
   if (sum.channels != other.channels) {
-    AlbedoGrid& grey = sum.channels == 1 ? sum : other;
+    measure::AlbedoGrid& grey = sum.channels == 1 ? sum : other;
     std::vector<float> values;
     for (const float v : grey.values) values.insert(values.end(), 3, v);
     grey.channels = 3;
@@ -426,19 +426,20 @@ std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>& needs, con
   return plan;
 }
 
-AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues& fixed, const Cosines& views) {
+measure::AlbedoTable fold(const measure::AlbedoTable& table, const Model& model, const ParamValues& fixed,
+                          const Cosines& views) {
   if (fixed.empty() && views.all()) return table;
-  AlbedoTable out = table;
+  measure::AlbedoTable out = table;
   out.grids.clear();
   const std::vector<Choices> combinations = choice_combinations(model.info());
   for (std::size_t i = 0; i < combinations.size(); ++i) {
-    std::vector<AlbedoTerm> terms;
+    std::vector<measure::AlbedoTerm> terms;
     if (admits(model.info(), combinations[i], fixed)) {
       // Terms with the same free colours over the same axes are one.
-      std::vector<std::pair<AlbedoTerm, AlbedoGrid>> parts;
-      for (const AlbedoTerm& t : table.terms.at(i)) {
-        AlbedoTerm term = t;
-        AlbedoGrid grid = sliced(seen(table.grids.at(std::size_t(t.grid)), views), fixed);
+      std::vector<std::pair<measure::AlbedoTerm, measure::AlbedoGrid>> parts;
+      for (const measure::AlbedoTerm& t : table.terms.at(i)) {
+        measure::AlbedoTerm term = t;
+        measure::AlbedoGrid grid = sliced(seen(table.grids.at(std::size_t(t.grid)), views), fixed);
         term.colors.clear();
         for (const std::string& c : t.colors) {
           const auto it = fixed.find(c);
@@ -457,9 +458,10 @@ AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues
       }
       for (auto& [term, grid] : parts) {
         if (std::all_of(grid.values.begin(), grid.values.end(), [](float v) { return v == 0; })) continue;
-        const auto known = std::find_if(out.grids.begin(), out.grids.end(), [&, &g = grid](const AlbedoGrid& k) {
-          return k.channels == g.channels && k.values == g.values && same_axes(k, g);
-        });
+        const auto known =
+            std::find_if(out.grids.begin(), out.grids.end(), [&, &g = grid](const measure::AlbedoGrid& k) {
+              return k.channels == g.channels && k.values == g.values && same_axes(k, g);
+            });
         term.grid = int(known - out.grids.begin());
         if (known == out.grids.end()) out.grids.push_back(std::move(grid));
         terms.push_back(term);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/albedo_table.h"
+#include "measure/albedo_table.h"
 #include "pack/costs.h"
 #include "represent/aimed.h"
 #include "represent/representation.h"
@@ -84,6 +84,7 @@ std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Bud
 /// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and
 /// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out. Of the knots
 /// over the view those that these `views` lie between.
-AlbedoTable fold(const AlbedoTable&, const Model&, const ParamValues& fixed, const Cosines& views = {});
+measure::AlbedoTable fold(const measure::AlbedoTable&, const Model&, const ParamValues& fixed,
+                          const Cosines& views = {});
 
 }  // namespace brdfc

@@ -122,7 +122,7 @@ class SharedArrays {
 /// Statements that look the albedo up.
 class AlbedoText {
  public:
-  AlbedoText(const ModelInfo& info, const AlbedoTable& table, const ParamValues& fixed)
+  AlbedoText(const ModelInfo& info, const measure::AlbedoTable& table, const ParamValues& fixed)
       : info_(info), table_(table), fixed_(fixed) {}
 
   std::string print() {
@@ -138,9 +138,9 @@ class AlbedoText {
   }
 
  private:
-  std::string terms(const std::vector<AlbedoTerm>& list) {
+  std::string terms(const std::vector<measure::AlbedoTerm>& list) {
     std::string out = "    Albedo = 0.0;\n";
-    for (const AlbedoTerm& t : list) {
+    for (const measure::AlbedoTerm& t : list) {
       std::string product = lookup(t.grid);
       for (const std::string& c : t.colors) product = operand(c) + " * " + product;
       out += fmt::format("    Albedo += {};\n", product);
@@ -156,12 +156,12 @@ class AlbedoText {
     return number(std::get<double>(it->second));
   }
 
-  std::string scaled(const TableAxis& axis) const {
+  std::string scaled(const measure::TableAxis& axis) const {
     const std::string x = operand(axis.name);
     switch (axis.scale) {
-      case AxisScale::Log:
+      case measure::AxisScale::Log:
         return fmt::format("log(max({}, {}))", x, number(axis.values.front()));
-      case AxisScale::Log1p:
+      case measure::AxisScale::Log1p:
         return fmt::format("log(1.0 + {})", x);
       default:
         return x;
@@ -169,7 +169,7 @@ class AlbedoText {
   }
 
   std::string lookup(int index) {
-    const AlbedoGrid& g = table_.grids.at(std::size_t(index));
+    const measure::AlbedoGrid& g = table_.grids.at(std::size_t(index));
     if (g.axes.empty()) {
       if (g.channels == 1) return number(g.values[0]);
       return print::color({g.values[0], g.values[1], g.values[2]});
@@ -187,20 +187,22 @@ class AlbedoText {
     return fmt::format("color({}, {}, {})", call(g, index, "_r"), call(g, index, "_g"), call(g, index, "_b"));
   }
 
-  static std::string call(const AlbedoGrid& g, int index, const std::string& channel) {
+  static std::string call(const measure::AlbedoGrid& g, int index, const std::string& channel) {
     std::string text = fmt::format("brdfc_table{}(table{}_{}", g.axes.size(), channel, index);
-    for (const TableAxis& a : g.axes) text += fmt::format(", {}", a.values.size());
+    for (const measure::TableAxis& a : g.axes) text += fmt::format(", {}", a.values.size());
     for (std::size_t a = 0; a < g.axes.size(); ++a) text += fmt::format(", position_{}_{}", index, a);
     return text + ")";
   }
 
   std::string arrays(std::size_t index) const {
-    const AlbedoGrid& g = table_.grids[index];
+    const measure::AlbedoGrid& g = table_.grids[index];
     std::string out;
     for (std::size_t a = 0; a < g.axes.size(); ++a) {
       std::vector<double> knots = g.axes[a].values;
       for (double& k : knots)
-        k = g.axes[a].scale == AxisScale::Log ? std::log(k) : g.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : k;
+        k = g.axes[a].scale == measure::AxisScale::Log     ? std::log(k)
+            : g.axes[a].scale == measure::AxisScale::Log1p ? std::log1p(k)
+                                                           : k;
       out += print::array(fmt::format("knots_{}_{}", index, a), knots);
     }
     if (g.channels == 1) return out + print::array(fmt::format("table_{}", index), {g.values.begin(), g.values.end()});
@@ -213,7 +215,7 @@ class AlbedoText {
   }
 
   const ModelInfo& info_;
-  const AlbedoTable& table_;
+  const measure::AlbedoTable& table_;
   const ParamValues& fixed_;
   std::set<int> used_;
   std::string positions_;
@@ -376,8 +378,8 @@ class AimedText {
 
 }  // namespace
 
-Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
-                    const Cosines& views, int max_lamps, AimedBase base) {
+Shader write_shader(const Model& model, RepresentationKind kind, const measure::AlbedoTable& table,
+                    const ParamValues& given, const Cosines& views, int max_lamps, AimedBase base) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
   for (const auto& [name, value] : form_values(model, kind, given))

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/albedo_table.h"
+#include "measure/albedo_table.h"
 #include "represent/aimed.h"
 #include "represent/representation.h"
 
@@ -29,7 +29,7 @@ struct Shader {
 /// output, in a shader of its own where its text is longer than kMaxAlbedoText. An aimed form has parameters for
 /// `max_lamps` lamps, and the base of this kind. The form is right for these `views`. Throws InputError if the closures
 /// would exceed what Cycles keeps or the table what an array holds.
-Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
+Shader write_shader(const Model&, RepresentationKind, const measure::AlbedoTable& table, const ParamValues& given = {},
                     const Cosines& views = {}, int max_lamps = kMaxLamps, AimedBase base = AimedBase::Declared);
 
 /// Characters of tables that a shader holds for an output that most materials leave unlinked.

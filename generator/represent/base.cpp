@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/sequence.h"
+#include "measure/bound_model.h"
 #include "represent/aimed.h"
 
 namespace brdfc {
@@ -30,10 +32,11 @@ struct Moments1 {
 
 }  // namespace
 
-BaseWorth base_worth(const BoundModel& bound, const Vec3<double>& wo, int points) {
+BaseWorth base_worth(const measure::BoundModel& bound, const Vec3<double>& wo, int points) {
   const Brdf<double>& brdf = *bound.brdf;
   const ClosureSum<double> base = brdf.base(wo);
-  for (const Closure<double>& c : base) require_value(c.weight, "weight of the base", bound.label, c.normal, wo);
+  for (const Closure<double>& c : base)
+    measure::require_value(c.weight, "weight of the base", bound.label, c.normal, wo);
 
   Moments1 white_drawn, white_rest, sky_drawn, sky_rest;
   Rgb<double> lacking(0.0), of_base(0.0), both(0.0), base2(0.0);
@@ -54,7 +57,7 @@ BaseWorth base_worth(const BoundModel& bound, const Vec3<double>& wo, int points
     const Rgb<double> of_closures = evaluate(base, wi, wo);
     const Excess<double> e = excess(brdf, true, of_closures, wi, wo);
     const Rgb<double> b = of_closures / e.density, rest = e.value / e.density, f = rest + b;
-    require_value(b, "base", bound.label, wi, wo);
+    measure::require_value(b, "base", bound.label, wi, wo);
     white_rest.add(rest);
     sky_rest.add(rest * sky(wi));
     lacking += magnitude(rest);

@@ -3,7 +3,7 @@
 // measured before anything is rendered.
 #pragma once
 
-#include "analysis/albedo.h"
+#include "measure/bound_model.h"
 
 namespace brdfc {
 
@@ -21,6 +21,6 @@ struct BaseWorth {
 
 /// With `points` directions from a fixed sequence. Throws ValueError for a closure's weight that is NaN, infinite or
 /// negative.
-BaseWorth base_worth(const BoundModel&, const Vec3<double>& wo, int points);
+BaseWorth base_worth(const measure::BoundModel&, const Vec3<double>& wo, int points);
 
 }  // namespace brdfc

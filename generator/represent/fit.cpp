@@ -12,11 +12,12 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
-#include "analysis/albedo.h"
-#include "analysis/probes.h"
 #include "core/data_dir.h"
 #include "core/hash.h"
 #include "core/parallel.h"
+#include "core/sequence.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 #include "model/horizon.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -344,11 +345,11 @@ const ParamInfo* missing(const Model& model, const ParamValues& values) {
 }
 
 struct ScaledModel {
-  BoundModel model;
+  measure::BoundModel model;
   double scale;  ///< what its f has to be divided by
 };
 /// The views of a fit, for one set of parameters: f of each of `terms`, at points where `some` of all is seen.
-std::vector<View> views_of(const BoundModel& some, const std::vector<ScaledModel>& terms) {
+std::vector<View> views_of(const measure::BoundModel& some, const std::vector<ScaledModel>& terms) {
   std::vector<View> views(kViews);
   for_all(kViews, [&](std::size_t i) {
     View& v = views[i] = seen(some, view(double(i) / (kViews - 1)), kPoints);
@@ -363,24 +364,25 @@ std::vector<View> views_of(const BoundModel& some, const std::vector<ScaledModel
 }  // namespace
 
 FitAxis fit_axis(const ParamInfo& p) {
-  FitAxis axis{p.name, p.soft_min, p.soft_max, AxisScale::Linear};
+  FitAxis axis{p.name, p.soft_min, p.soft_max, measure::AxisScale::Linear};
   // What a factor of ten changes is looked at by factors.
   if (axis.low > 0 && axis.high > 10 * axis.low)
-    axis.scale = AxisScale::Log;
+    axis.scale = measure::AxisScale::Log;
   else if (axis.low >= 0 && axis.high > 10)
-    axis.scale = AxisScale::Log1p;
+    axis.scale = measure::AxisScale::Log1p;
   return axis;
 }
 
 double FitAxis::at(double x) const {
   if (x <= 0) return low;
   if (x >= 1) return high;
-  return from_scale(scale, to_scale(scale, low) + x * (to_scale(scale, high) - to_scale(scale, low)));
+  return measure::from_scale(
+      scale, measure::to_scale(scale, low) + x * (measure::to_scale(scale, high) - measure::to_scale(scale, low)));
 }
 
 template <class T> T FitAxis::place(const T& value) const {
-  const double first = to_scale(scale, low), span = to_scale(scale, high) - first;
-  return (to_scale(scale, minimum(maximum(value, T(low)), T(high))) - T(first)) * T(1 / span);
+  const double first = measure::to_scale(scale, low), span = measure::to_scale(scale, high) - first;
+  return (measure::to_scale(scale, minimum(maximum(value, T(low)), T(high))) - T(first)) * T(1 / span);
 }
 template double FitAxis::place(const double&) const;
 template Expr FitAxis::place(const Expr&) const;
@@ -460,11 +462,11 @@ class Knots {
       : model_(model), values_(values), axis_(axis), terms_(terms), grey_(grey) {}
 
   /// With these values of what there are terms by.
-  BoundModel bound(double x, const ParamValues& of_terms) const {
+  measure::BoundModel bound(double x, const ParamValues& of_terms) const {
     ParamValues values = values_;
     if (axis_) values[axis_->parameter] = axis_->at(x);
     for (const auto& [name, value] : of_terms) values[name] = value;
-    return bind_model(model_, values);
+    return measure::bind_model(model_, values);
   }
 
   /// Sees the model at these places. False where it is not grey there, or of another tint than elsewhere.
@@ -479,7 +481,7 @@ class Knots {
     if (at.empty()) return true;
     if (grey_) {
       const std::optional<Rgb<double>> found = make_grey(fresh);
-      if (!found || (tint_ && !(relative(*found, *tint_) < 1e-6))) return false;
+      if (!found || (tint_ && !(measure::relative(*found, *tint_) < 1e-6))) return false;
       tint_ = found;
     }
     for (std::size_t i = 0; i < at.size(); ++i) {

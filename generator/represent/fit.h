@@ -22,9 +22,9 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/albedo_table.h"
 #include "closures/closure.h"
 #include "core/cosines.h"
+#include "measure/albedo_table.h"
 #include "model/model.h"
 #include "represent/terms.h"
 #include "represent/view.h"
@@ -36,7 +36,7 @@ namespace brdfc {
 struct FitAxis {
   std::string parameter;
   double low, high;
-  AxisScale scale;
+  measure::AxisScale scale;
 
   /// Its value at x in [0, 1], and the other way round; values beyond the ends take places beyond [0, 1].
   double at(double x) const;

@@ -7,8 +7,9 @@
 #include <random>
 #include <set>
 
-#include "analysis/albedo.h"
-#include "analysis/probes.h"
+#include "core/sequence.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 #include "model/horizon.h"
 #include "model/inputs.h"
 #include "model/sampling.h"
@@ -30,7 +31,7 @@ std::vector<std::string> parameter_names(const Model& model) {
 /// The shader's frame has its normal on the viewer's side. For a model of two sides z is turned outwards by `side`.
 Vec3<Expr> recorded_wo(const Model& model, const Brdf<Expr>& brdf) {
   Vec3<Expr> wo = raise_to_horizon(input3("wo"));
-  if (two_sided(model, brdf)) wo.z = wo.z * Expr::input("side");
+  if (measure::two_sided(model, brdf)) wo.z = wo.z * Expr::input("side");
   return wo;
 }
 
@@ -158,7 +159,7 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
 ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf, const Fit* fit, const ParamValues& fixed) {
   const Vec3<Expr> wo = recorded_wo(model, brdf);
   if (fit) return fit->closures(wo, recorded_varied(model, *fit, fixed), Expr(1), false);
-  return two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(wo);
+  return measure::two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(wo);
 }
 
 Inputs<float> float_inputs(const ParamValues& values, const Vec3<double>& wo) {
@@ -325,7 +326,7 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
   const Vec3<Expr> wo = recorded_wo(model, *brdf);
   // The side that a model of two sides calls z > 0.
   const auto turned = [&](Vec3<Expr> w) {
-    if (two_sided(model, *brdf)) w.z = w.z * Expr::input("side");
+    if (measure::two_sided(model, *brdf)) w.z = w.z * Expr::input("side");
     return w;
   };
   AimedRecording out;
@@ -463,9 +464,9 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
 
     for (int view = 0; view < kParameterSets * kViews; ++view) {
       const ParamValues values = random_values(model.info(), choices, rng);
-      const BoundModel truth = bind_model(model, values);
+      const measure::BoundModel truth = measure::bind_model(model, values);
       Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
-      if (two_sided(model, *truth.brdf) && view % 2 == 1) wo.z = -wo.z;
+      if (measure::two_sided(model, *truth.brdf) && view % 2 == 1) wo.z = -wo.z;
       Inputs<float> inputs = float_inputs(values, wo);
       const double distance = model.has_medium() ? 3 * uniform(rng) : 0;
       set_input(inputs, "path_length", distance);

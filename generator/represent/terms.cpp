@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "analysis/probes.h"
+#include "measure/probes.h"
 
 namespace brdfc {
 namespace {
@@ -27,18 +27,19 @@ Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.
 
 /// Pairs of directions, some of them where the model with these parameters scatters to.
 std::vector<std::array<Vec3<double>, 2>> pairs(const Model& model, const ParamValues& values, int count) {
-  Random random(12);
-  return direction_pairs(*model.make_double(values), count, random, model.two_sided());
+  measure::Random random(12);
+  return measure::direction_pairs(*model.make_double(values), count, random, model.two_sided());
 }
 
 /// The degree of f in a parameter, the other ones of `open` being anything: 0, 1 or 2, else 3.
 int degree(const Model& model, const std::vector<ParamValues>& places, const ParamInfo& p,
            const std::vector<const ParamInfo*>& open) {
   int degree = 0;
-  Random random(5);
+  measure::Random random(5);
   for (ParamValues values : places) {
     for (const ParamInfo* other : open)
-      values[other->name] = as_value(*other, {uniform(random), uniform(random), uniform(random)});
+      values[other->name] =
+          as_value(*other, {measure::uniform(random), measure::uniform(random), measure::uniform(random)});
     const auto with = [&](const Rgb<double>& c) {
       values[p.name] = as_value(p, c);
       return model.make_double(values);
@@ -253,7 +254,7 @@ std::set<std::string> factors(const Model& model, const ParamValues& known) {
       const auto of_white = model.make_double(values);
       for (const auto& [wi, wo] : pairs(model, values, 256))
         proportional =
-            proportional && relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < kTolerance;
+            proportional && measure::relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < kTolerance;
     }
     if (proportional) out.insert(p.name);
   }

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "analysis/probes.h"
 #include "core/parallel.h"
+#include "measure/bound_model.h"
 #include "represent/fit.h"
 
 namespace brdfc {
@@ -143,7 +143,7 @@ Rgb<double> colour(const Channels& channels, const std::array<double, 1>& at) {
 Twin::Twin(const Model& model, const ParamValues& values) {
   // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
   const auto [white, factor] = split_factors(model, values);
-  const BoundModel bound = bind_model(model, white);
+  const measure::BoundModel bound = measure::bind_model(model, white);
   std::vector<View> views(kTwinKnots);
   for_all(kTwinKnots, [&](std::size_t k) { views[k] = seen(bound, view_at(int(k)), kPoints); });
   // A mirror has a colour of its own.
@@ -221,7 +221,7 @@ Twin::Twin(const Model& model, const ParamValues& values) {
     parts_.push_back(std::move(part));
   }
   for (const auto& channel : light.colwise()) albedo_.push_back(table("albedo", channel));
-  errors_ = view_errors(bind_model(model, values), [&](const Vec3<double>& wo) { return closures(wo); });
+  errors_ = view_errors(measure::bind_model(model, values), [&](const Vec3<double>& wo) { return closures(wo); });
 }
 
 ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <nlopt.hpp>
 
-#include "analysis/albedo.h"
-#include "analysis/probes.h"
 #include "core/parallel.h"
+#include "core/sequence.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -54,7 +55,7 @@ Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec
   return points;
 }
 
-Moments moments(const BoundModel& model, const Vec3<double>& wo) {
+Moments moments(const measure::BoundModel& model, const Vec3<double>& wo) {
   Moments m;
   for (int step = 0; step < 4; ++step) {
     const Points points = spread_points(*model.brdf, wo, beside_mirror(wo, m.offset), m.narrow, kPoints);
@@ -95,11 +96,11 @@ VectorXd weights_of(const Points& points) {
   return Eigen::Map<const VectorXd>(points.weight.data(), Eigen::Index(points.weight.size()));
 }
 
-MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<double>& wo) {
+MatrixXd scattering(const measure::BoundModel& model, const Points& points, const Vec3<double>& wo) {
   MatrixXd f(Eigen::Index(points.wi.size()), 3);
   for (std::size_t i = 0; i < points.wi.size(); ++i) {
     const Rgb<double> v = model.brdf->eval(points.wi[i], wo);
-    require_value(v, "f", model.label, points.wi[i], wo);
+    measure::require_value(v, "f", model.label, points.wi[i], wo);
     f.row(Eigen::Index(i)) << v.r * points.wi[i].z, v.g * points.wi[i].z, v.b * points.wi[i].z;
   }
   return f;
@@ -107,11 +108,11 @@ MatrixXd scattering(const BoundModel& model, const Points& points, const Vec3<do
 
 VectorXd brightest(const MatrixXd& f) { return f.rowwise().maxCoeff(); }
 
-View seen(const BoundModel& bound, const Vec3<double>& wo, int points) {
+View seen(const measure::BoundModel& bound, const Vec3<double>& wo, int points) {
   return seen(bound, wo, points, moments(bound, wo));
 }
 
-View seen(const BoundModel& bound, const Vec3<double>& wo, int points, const Moments& lobe) {
+View seen(const measure::BoundModel& bound, const Vec3<double>& wo, int points, const Moments& lobe) {
   View v{wo, lobe, {}, {}};
   v.points = spread_points(*bound.brdf, wo, beside_mirror(wo, v.lobe.offset), v.lobe.narrow, points);
   v.f = scattering(bound, v.points, wo);
@@ -242,7 +243,7 @@ std::vector<double> argmin(const std::vector<Variable>& variables,
   return x;
 }
 
-std::vector<ViewError> view_errors(const BoundModel& bound,
+std::vector<ViewError> view_errors(const measure::BoundModel& bound,
                                    const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures) {
   std::vector<ViewError> errors(kErrorViews);
   for_all(errors.size(), [&](std::size_t i) {
@@ -280,11 +281,11 @@ std::vector<ViewError> view_errors(const BoundModel& bound,
 }
 
 bool turns(const Brdf<double>& brdf) {
-  Random random(11);
+  measure::Random random(11);
   const double c = std::cos(1.0), s = std::sin(1.0);
-  for (const auto& [wi, wo] : direction_pairs(brdf, 256, random, false)) {
+  for (const auto& [wi, wo] : measure::direction_pairs(brdf, 256, random, false)) {
     const Rgb<double> f = brdf.eval(wi, wo), turned = brdf.eval(rotate_z(wi, c, s), rotate_z(wo, c, s));
-    if (relative(f, turned) > 1e-4 && max_component(f + turned) > 1e-6) return true;
+    if (measure::relative(f, turned) > 1e-4 && max_component(f + turned) > 1e-6) return true;
   }
   return false;
 }

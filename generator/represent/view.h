@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/albedo.h"
 #include "closures/closure.h"
+#include "measure/bound_model.h"
 
 namespace brdfc {
 
@@ -54,15 +54,15 @@ struct View {
   Eigen::MatrixXd f;  ///< f cos(theta_i) of the points, a column a channel; of several models one after the other
 };
 /// Throws ValueError where the model gives a value that is NaN, infinite or negative.
-View seen(const BoundModel&, const Vec3<double>& wo, int points);
+View seen(const measure::BoundModel&, const Vec3<double>& wo, int points);
 /// The same where the lobe is known.
-View seen(const BoundModel&, const Vec3<double>& wo, int points, const Moments& lobe);
+View seen(const measure::BoundModel&, const Vec3<double>& wo, int points, const Moments& lobe);
 
 /// The largest channel of each point.
 Eigen::VectorXd brightest(const Eigen::MatrixXd& f);
 
 /// f cos(theta_i), three columns. Throws ValueError where the model gives a value that is NaN, infinite or negative.
-Eigen::MatrixXd scattering(const BoundModel&, const Points&, const Vec3<double>& wo);
+Eigen::MatrixXd scattering(const measure::BoundModel&, const Points&, const Vec3<double>& wo);
 
 /// Where the channels of all views, and of all models in each, differ by a factor alone, leaves one column of a model
 /// that serves them all, and returns the factors.
@@ -94,7 +94,7 @@ struct ViewError {
   double number = 0;       ///< value of the axis, of a fit that has one
 };
 /// At cosines evenly spaced from 1 to 0.
-std::vector<ViewError> view_errors(const BoundModel&,
+std::vector<ViewError> view_errors(const measure::BoundModel&,
                                    const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures);
 
 /// The form of these values, made at first use and kept while the program runs.

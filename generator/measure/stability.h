@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "analysis/probes.h"
+#include "measure/probes.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 /// How far a scalar type strays from a wider one. `amplified` is the relative error of eval() in units of
 /// epsilon (1 + condition), where the condition is the sum over all inputs (components of the directions, renormalised,
@@ -54,4 +54,4 @@ struct SinglePrecision {
 };
 std::map<int, SinglePrecision> single_precision_by_decade(const Model&, int cases, int samples, std::uint64_t seed);
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

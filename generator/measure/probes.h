@@ -8,9 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "analysis/albedo.h"
+#include "core/vec.h"
+#include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 using Random = std::mt19937_64;
 
@@ -58,4 +59,4 @@ std::vector<ParamValues> end_cases(const ModelInfo&, bool sliders);
 /// At most `most` of them: the first ones cover every pair of choices as far as possible.
 std::vector<ParamValues> thin_out(const ModelInfo&, const std::vector<ParamValues>&, std::size_t most);
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "analysis/probes.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 /// A pair of directions above the surface for which f is 0, proven not to be an underflow: on the way from a place with
 /// f > 0 the last positive value is far above the smallest number there is. Nothing if none was found.
@@ -55,4 +56,4 @@ ModelFacts measure_facts(const Model&);
 /// A row a registered model.
 std::string property_table(bool markdown);
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/albedo_table.h"
+#include "measure/albedo_table.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -11,15 +11,16 @@
 #include <random>
 #include <utility>
 
-#include "analysis/albedo.h"
 #include "core/data_dir.h"
 #include "core/hash.h"
 #include "core/parallel.h"
+#include "core/sequence.h"
+#include "measure/albedo.h"
 #include "model/choices.h"
 #include "print/osl_program.h"
 #include "tables/table_file.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
 // Below this cosine the end of the axis serves: a view direction within 0.06 degrees of the horizon.
@@ -955,4 +956,4 @@ AlbedoTable read_albedo_exr(const std::filesystem::path& path) {
   return table;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/stability_page.h"
+#include "report/stability_page.h"
 
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
@@ -12,8 +12,8 @@
 #include <limits>
 #include <optional>
 
-#include "analysis/probes.h"
 #include "core/parallel.h"
+#include "measure/probes.h"
 
 namespace brdfc {
 namespace {
@@ -185,11 +185,11 @@ Figure figure_of(const Model& model) {
     const auto wide = model.make_wide(v);
     const auto ours = model.make_double(v);
     const Vec3<double> wo = direction(by_factors(1e-6, 1, x), 0.7);
-    Random random(std::uint64_t(1000 * x) * 1000 + std::uint64_t(1000 * y));
+    measure::Random random(std::uint64_t(1000 * x) * 1000 + std::uint64_t(1000 * y));
     double worst = -1;
     for (int i = 0; i < 5; ++i) {
-      Vec3<double> wi = i == 0 ? Vec3<double>{-wo.x, -wo.y, wo.z} : uniform_direction(random);
-      if (const Sample<double> s = ours->sample(wo, uniform_cube(random)); i > 2 && s.pdf > 0) wi = s.wi;
+      Vec3<double> wi = i == 0 ? Vec3<double>{-wo.x, -wo.y, wo.z} : measure::uniform_direction(random);
+      if (const Sample<double> s = ours->sample(wo, measure::uniform_cube(random)); i > 2 && s.pdf > 0) wi = s.wi;
       if (!(wi.z > 0)) continue;
       const Rgb<double> f = ours->eval(wi, wo);
       const Rgb<Wide> t = wide->eval(exact(wi), exact(wo));

@@ -17,7 +17,7 @@
 
 #include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 /// How a value is mapped before a grid is interpolated linearly between two neighbouring knots.
 enum class AxisScale {
@@ -98,4 +98,4 @@ void write_albedo_exr(const AlbedoTable&, const std::filesystem::path&);
 /// What write_albedo_exr() wrote, number for number. Throws InputError naming the path if it can't be read.
 AlbedoTable read_albedo_exr(const std::filesystem::path&);
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -7,7 +7,7 @@
 
 #include "core/sequence.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 struct Rect {
   double x0 = 0, x1 = 1, y0 = 0, y1 = 1;
@@ -38,4 +38,4 @@ CubatureResult integrate(const Integrand2&, std::size_t components, const std::v
 /// the places where they crowd. Points outside are ignored. Parts cover the rectangle.
 std::vector<Rect> partition(const Rect&, const std::vector<Point2>& points, std::size_t most);
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

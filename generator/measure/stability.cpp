@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/stability.h"
+#include "measure/stability.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,11 @@
 #include <cmath>
 #include <limits>
 
+#include "measure/bound_model.h"
 #include "model/inputs.h"
 #include "model/sampling.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
 template <class T> std::unique_ptr<Brdf<T>> make(const Model& m, const ParamValues& v) {
@@ -391,4 +392,4 @@ std::map<int, SinglePrecision> single_precision_by_decade(const Model& model, in
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

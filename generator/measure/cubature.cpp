@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/cubature.h"
+#include "measure/cubature.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <queue>
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
 struct Cell {
@@ -199,4 +199,4 @@ std::vector<Rect> partition(const Rect& whole, const std::vector<Point2>& points
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

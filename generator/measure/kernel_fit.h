@@ -8,7 +8,7 @@
 #include "model/kernel_lobe.h"
 #include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 /// A kernel k(u), linear between its points and constant outside them.
 struct KernelCurve {
@@ -29,4 +29,4 @@ struct KernelFit {
 /// model's range and is not 0.
 KernelFit fit_kernel(const KernelCurve&, double n);
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/kernel_fit.h"
+#include "measure/kernel_fit.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/albedo.h"
+#include "measure/albedo.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
 constexpr std::size_t kHeights = 4;
@@ -218,4 +218,4 @@ KernelFit fit_kernel(const KernelCurve& drawn, double n) {
   return fit;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/properties.h"
+#include "measure/properties.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,9 @@
 #include <cmath>
 #include <limits>
 
-namespace brdfc {
+#include "measure/albedo.h"
+
+namespace brdfc::measure {
 namespace {
 
 double sum(const Rgb<double>& c) { return c.r + c.g + c.b; }
@@ -286,4 +288,4 @@ std::string property_table(bool markdown) {
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::measure

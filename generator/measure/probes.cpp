@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/probes.h"
+#include "measure/probes.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "model/choices.h"
 #include "model/sampling.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
 double random_number(const ParamInfo& p, Random& random) {
@@ -142,4 +142,4 @@ std::vector<ParamValues> thin_out(const ModelInfo& info, const std::vector<Param
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::measure
