@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Base, lamps and rest add up to the model.
-#include "represent/aimed.h"
+#include "forms/aimed.h"
 
 #include <gtest/gtest.h>
 
 #include "core/parallel.h"
 #include "core/sequence.h"
+#include "fit/fit.h"
+#include "forms/representation.h"
 #include "measure/probes.h"
-#include "represent/fit.h"
-#include "represent/representation.h"
 #include "support.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 namespace {
 
 /// Axes across a direction, of any length.
@@ -116,8 +116,9 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
     const Vec3<double> wo = direction(cosTheta_o, 0.3);
     const Scene scene = scene_for(wo);
     const auto f_cos = [&](const Vec3<double>& w) { return brdf->eval(w, wo).g * std::max(w.z, 0.0); };
-    const ClosureSum<double> base =
-        from == AimedBase::Fitted ? fit_of(m, values).closures(wo, fit_of(m, values).varied(values)) : brdf->base(wo);
+    const ClosureSum<double> base = from == AimedBase::Fitted
+                                        ? fit::fit_of(m, values).closures(wo, fit::fit_of(m, values).varied(values))
+                                        : brdf->base(wo);
     // The sky's part is drawn both ways: what differs is how lamps are met.
     const double base_lamps = base.empty() ? 0 : scene.of_lamps([&](const auto& w) { return evaluate(base, w, wo).g; });
     const double lamps = scene.of_lamps(f_cos);
@@ -226,4 +227,4 @@ TEST(Aimed, ProfileIsLevelAndFalls) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::forms

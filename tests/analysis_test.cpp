@@ -18,7 +18,7 @@
 #include "measure/guides.h"
 #include "model/sampling.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace faulty {
@@ -137,24 +137,24 @@ using testing::HasSubstr;
 // ---- cubature --------------------------------------------------------------------------------------------
 
 TEST(Cubature, IsExactForPolynomialsOfDegreeSeven) {
-  const measure::Integrand2 f = [](double x, double y, double* out) {
+  const Integrand2 f = [](double x, double y, double* out) {
     out[0] = std::pow(x, 4) * std::pow(y, 3);
     out[1] = 1;
   };
-  const measure::CubatureResult r = measure::integrate(f, 2, {{0, 2, 1, 3}}, {1e300, 0, 1});
+  const CubatureResult r = integrate(f, 2, {{0, 2, 1, 3}}, {1e300, 0, 1});
   EXPECT_NEAR(r.value[0], 32. / 5 * (81 - 1) / 4, 1e-12);
   EXPECT_NEAR(r.value[1], 4, 1e-14);
   EXPECT_EQ(r.cells, 1);
 }
 
 TEST(Cubature, ReachesItsToleranceAtAKinkAndSaysWhenItCannot) {
-  const measure::Integrand2 kink = [](double x, double y, double* out) { out[0] = std::abs(x + y - 0.9); };
+  const Integrand2 kink = [](double x, double y, double* out) { out[0] = std::abs(x + y - 0.9); };
   // Over the unit square: 2 * 0.9^3 / 6 + (mean of x + y - 0.9 = 0.1)
   const double exact = 0.1 + std::pow(0.9, 3) / 3;
-  const measure::CubatureResult r = measure::integrate(kink, 1, {{}}, {1e-7, 0, 100000});
+  const CubatureResult r = integrate(kink, 1, {{}}, {1e-7, 0, 100000});
   EXPECT_TRUE(r.converged);
   EXPECT_NEAR(r.value[0], exact, 1e-7);
-  const measure::CubatureResult few = measure::integrate(kink, 1, {{}}, {1e-12, 0, 20});
+  const CubatureResult few = integrate(kink, 1, {{}}, {1e-12, 0, 20});
   EXPECT_FALSE(few.converged);
   EXPECT_GT(few.error[0], 1e-12);
 }
@@ -162,24 +162,24 @@ TEST(Cubature, ReachesItsToleranceAtAKinkAndSaysWhenItCannot) {
 TEST(Cubature, PartitionCoversTheRectangleAndClosesInOnCrowds) {
   std::vector<Point2> points;
   for (int i = 0; i < 64; ++i) points.push_back({0.3 + 1e-9 * i, 0.7 - 1e-9 * (i % 8)});
-  const std::vector<measure::Rect> parts = measure::partition({0, 1, 0, 2}, points, 4);
+  const std::vector<Rect> parts = partition({0, 1, 0, 2}, points, 4);
   double area = 0, smallest = 1;
-  for (const measure::Rect& r : parts) {
+  for (const Rect& r : parts) {
     area += (r.x1 - r.x0) * (r.y1 - r.y0);
     smallest = std::min(smallest, r.x1 - r.x0);
   }
   EXPECT_NEAR(area, 2, 1e-12);
   EXPECT_LT(smallest, 1e-7);
   // Points that coincide end the search.
-  EXPECT_LT(measure::partition({0, 1, 0, 1}, std::vector<Point2>(100, {0.3, 0.3}), 4).size(), 200u);
+  EXPECT_LT(partition({0, 1, 0, 1}, std::vector<Point2>(100, {0.3, 0.3}), 4).size(), 200u);
 }
 
 TEST(Cubature, FindsAPeakFarNarrowerThanTheNodesAreApart) {
   // A density on the hemisphere that only its sampler knows the place of.
   const Model& m = find_model("radziszewski_alda");
-  const measure::BoundModel b = measure::bind_model(m, parse_values(m.info(), {"n=1e7", "tint=1"}));
+  const BoundModel b = bind_model(m, parse_values(m.info(), {"n=1e7", "tint=1"}));
   const Vec3<double> wo = direction(0.6, 2);
-  const measure::CubatureResult r = measure::integrate_hemisphere(
+  const CubatureResult r = integrate_hemisphere(
       *b.brdf, wo, 1, [&](const Vec3<double>& wi, double* out) { out[0] = b.brdf->pdf(wi, wo); }, {1e-8, 0, 10000});
   EXPECT_TRUE(r.converged);
   EXPECT_NEAR(r.value[0], 1, 1e-7);
@@ -293,9 +293,8 @@ TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
   const detail::ModelOf<Faulty<kNegative>::Type> negative;
   const detail::ModelOf<Faulty<kNan>::Type> nan;
   for (const std::string& text : {row_of(negative, "values").where, row_of(negative, "conserving").where,
-                                  message([&] { measure::tabulate_albedo(negative); }), message([&] {
-                                    measure::albedo(*measure::bind_model(negative, {}).brdf, 0.5, 0,
-                                                    measure::bind_model(negative, {}).label);
+                                  message([&] { tabulate_albedo(negative); }), message([&] {
+                                    albedo(*bind_model(negative, {}).brdf, 0.5, 0, bind_model(negative, {}).label);
                                   })}) {
     EXPECT_THAT(text, HasSubstr("faulty rho="));
     EXPECT_THAT(text, HasSubstr("level="));
@@ -305,7 +304,7 @@ TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
     EXPECT_THAT(text, HasSubstr("expected finite and >= 0"));
   }
   // Only at some parameters, which the table has to come across.
-  EXPECT_THAT(message([&] { measure::tabulate_albedo(nan); }), HasSubstr("nan"));
+  EXPECT_THAT(message([&] { tabulate_albedo(nan); }), HasSubstr("nan"));
   // One bad value fails the checks that meet it, and no other.
   for (const char* check : {"values", "conserving"})
     EXPECT_EQ(row_of(negative, check).result, check::Result::Failed) << check;
@@ -316,9 +315,9 @@ TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
 
 TEST(AlbedoValue, CountsMirrorApart) {
   const Model& m = find_model("coupled");
-  const measure::BoundModel b = measure::bind_model(m, parse_values(m.info(), {"r0=0.2", "rm=1,0.5,0"}));
+  const BoundModel b = bind_model(m, parse_values(m.info(), {"r0=0.2", "rm=1,0.5,0"}));
   const double c = 0.3, rf = 0.2 + 0.8 * std::pow(0.7, 5);
-  const measure::Albedo a = measure::albedo(*b.brdf, c);
+  const Albedo a = albedo(*b.brdf, c);
   EXPECT_NEAR(a.mirror.r, rf, 1e-15);
   EXPECT_NEAR(a.scattered.r, 1 - rf, 1e-9);
   EXPECT_NEAR(a.scattered.g, 0.5 * (1 - rf), 1e-9);
@@ -331,9 +330,9 @@ TEST(AlbedoValue, IsGoodToItsErrorForRidgesThatAreThinAndCurved) {
   const Model& m = find_model("ashikhmin_shirley");
   for (const auto& values : {std::vector<std::string>{"nu=1e8", "nv=1"}, {"nu=1", "nv=1e5"}, {"nu=10", "nv=1e5"}})
     for (const double c : {1., 0.5, 0.05}) {
-      const measure::BoundModel b = measure::bind_model(m, parse_values(m.info(), values));
-      const measure::Albedo a = measure::albedo(*b.brdf, c, 0.3, b.label);
-      const measure::MeanAlbedo mean = measure::mean_albedos(*b.brdf, {b.brdf.get()}, c, 0.3, b.label, 1 << 19, 77);
+      const BoundModel b = bind_model(m, parse_values(m.info(), values));
+      const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
+      const MeanAlbedo mean = mean_albedos(*b.brdf, {b.brdf.get()}, c, 0.3, b.label, 1 << 19, 77);
       EXPECT_LT(a.error, 2e-3) << b.label << " cos_theta_o=" << c;
       EXPECT_NEAR(a.scattered.r, mean.scattered[0].r, 2 * a.error + 10 * mean.error) << b.label << " cos_theta_o=" << c;
     }
@@ -345,9 +344,9 @@ TEST(AlbedoValue, FindsAThinPeakThatHoldsLittleOfTheLight) {
     for (const char* n : {"n=60", "n=1000", "n=1e4"})
       for (const double c : {1., 0.7, 0.3, 0.03}) {
         const std::string height = shape;
-        const measure::BoundModel b = measure::bind_model(
-            m, parse_values(m.info(), {"kernel=table", n, "h1=" + height, "h2=" + height, "h3=" + height}));
-        const measure::Albedo a = measure::albedo(*b.brdf, c, 0.3, b.label);
+        const BoundModel b =
+            bind_model(m, parse_values(m.info(), {"kernel=table", n, "h1=" + height, "h2=" + height, "h3=" + height}));
+        const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
         EXPECT_NEAR(a.scattered.r, 1, 2 * a.error) << b.label << " cos_theta_o=" << c;
         EXPECT_LT(a.error, 2e-5) << b.label << " cos_theta_o=" << c;
       }
@@ -355,9 +354,9 @@ TEST(AlbedoValue, FindsAThinPeakThatHoldsLittleOfTheLight) {
 
 TEST(AlbedoValue, AdmitsASpikeThatItMissed) {
   const detail::ModelOf<Spiked> model;
-  const measure::BoundModel b = measure::bind_model(model, {});
+  const BoundModel b = bind_model(model, {});
   for (const double c : {1., 0.5, 0.05}) {
-    const measure::Albedo a = measure::albedo(*b.brdf, c, 0.3, b.label);
+    const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
     EXPECT_NEAR(a.scattered.r, 1, a.error) << c;
     // It is not spread over the whole range either.
     EXPECT_LT(a.error, 0.01) << c;
@@ -368,7 +367,7 @@ TEST(AlbedoValue, AdmitsASpikeThatItMissed) {
 
 TEST(AlbedoTableOf, LambertIsOneNumberTimesItsColour) {
   const Model& m = find_model("lambert");
-  const measure::AlbedoTable t = measure::tabulate_albedo(m);
+  const AlbedoTable t = tabulate_albedo(m);
   ASSERT_EQ(t.terms.size(), 1u);
   ASSERT_EQ(t.terms[0].size(), 1u);
   EXPECT_THAT(t.terms[0][0].colors, testing::ElementsAre("rho"));
@@ -381,7 +380,7 @@ TEST(AlbedoTableOf, LambertIsOneNumberTimesItsColour) {
 
 TEST(AlbedoTableOf, CoupledHasTheClosedFormsTermsAndStatedError) {
   const Model& m = find_model("coupled");
-  const measure::AlbedoTable t = measure::tabulate_albedo(m);
+  const AlbedoTable t = tabulate_albedo(m);
   ASSERT_EQ(t.terms.size(), 2u);  // schlick, dielectric
   ASSERT_EQ(t.terms[0].size(), 2u);
   EXPECT_LT(t.error, 1e-3);
@@ -400,18 +399,18 @@ TEST(AlbedoTableOf, CoupledHasTheClosedFormsTermsAndStatedError) {
 
 TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts) {
   const Model& m = find_model("ashikhmin_shirley");
-  const measure::AlbedoTable t = measure::tabulate_albedo(m);
+  const AlbedoTable t = tabulate_albedo(m);
   EXPECT_LE(t.size(), 32768u);
   EXPECT_LT(t.error, 0.05);
   EXPECT_GT(t.anisotropy, 0.01);
   EXPECT_THAT(t.doc, HasSubstr("azimuth"));
-  for (const measure::AlbedoGrid& g : t.grids)
-    for (const measure::TableAxis& a : g.axes) EXPECT_NE(a.name, "rotation");
+  for (const AlbedoGrid& g : t.grids)
+    for (const TableAxis& a : g.axes) EXPECT_NE(a.name, "rotation");
   const auto& both = t.terms_for(m, parse_values(m.info(), {"part=both"}));
   const auto& specular = t.terms_for(m, parse_values(m.info(), {"part=specular"}));
   std::set<int> in_both;
-  for (const measure::AlbedoTerm& term : both) in_both.insert(term.grid);
-  for (const measure::AlbedoTerm& term : specular) EXPECT_TRUE(in_both.count(term.grid));
+  for (const AlbedoTerm& term : both) in_both.insert(term.grid);
+  for (const AlbedoTerm& term : specular) EXPECT_TRUE(in_both.count(term.grid));
   // Of the tabulated diffuse term the grids are those of the specular term, taken from 1: nothing is left to lose.
   const auto& same = t.terms_for(m, parse_values(m.info(), {"part=specular", "diffuse=tabulated"}));
   ASSERT_EQ(same.size(), specular.size());
@@ -428,7 +427,7 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
   for (int i = 0; i < 24; ++i) {
     const double n = std::expm1(std::log1p(1e4) * u(random)), c = 0.02 + 0.98 * u(random);
     const ParamValues v{{"nu", n}, {"nv", n}, {"rs", u(random)}, {"rd", u(random)}, {"rotation", u(random)}};
-    const measure::Albedo a = measure::albedo(*measure::bind_model(m, v).brdf, c, 0.2, "", {1e-6, 4000, 1 << 15});
+    const Albedo a = albedo(*bind_model(m, v).brdf, c, 0.2, "", {1e-6, 4000, 1 << 15});
     worst = std::max(worst, std::abs(lookup(t, m, v, c).r - a.total().r));
   }
   EXPECT_LT(worst, t.error + 1e-3);
@@ -436,7 +435,7 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
 
 TEST(AlbedoTableOf, OrenNayarsColourEntersSquared) {
   const Model& m = find_model("oren_nayar");
-  const measure::AlbedoTable t = measure::tabulate_albedo(m);
+  const AlbedoTable t = tabulate_albedo(m);
   const auto& full = t.terms_for(m, parse_values(m.info(), {"form=full"}));
   ASSERT_EQ(full.size(), 2u);
   EXPECT_THAT(full[0].colors, testing::ElementsAre("rho"));
@@ -446,19 +445,19 @@ TEST(AlbedoTableOf, OrenNayarsColourEntersSquared) {
 
 TEST(AlbedoTableOf, AModelOfThirdDegreeInItsColoursIsRefused) {
   const detail::ModelOf<Faulty<kColorCubed>::Type> model;
-  EXPECT_THAT(message([&] { measure::tabulate_albedo(model); }), HasSubstr("of degree two at most in each"));
+  EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("of degree two at most in each"));
 }
 
 TEST(AlbedoTableOf, APdfThatIsNotTheSamplersIsRefused) {
   const detail::ModelOf<Faulty<kPdf>::Type> model;
-  EXPECT_THAT(message([&] { measure::tabulate_albedo(model); }), HasSubstr("quadrature over directions"));
+  EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("quadrature over directions"));
 }
 
 TEST(AlbedoTableFile, HoldsTheNumbersAndTheirMeaning) {
   const Model& m = find_model("coupled");
-  const measure::AlbedoTable t = measure::tabulate_albedo(m);
+  const AlbedoTable t = tabulate_albedo(m);
   const auto path = std::filesystem::temp_directory_path() / fmt::format("brdfc_albedo_{}.exr", ::getpid());
-  measure::write_albedo_exr(t, path.string());
+  write_albedo_exr(t, path.string());
   const auto in = OIIO::ImageInput::open(path.string());
   ASSERT_TRUE(in) << OIIO::geterror();
   const OIIO::ImageSpec& spec = in->spec();
@@ -477,12 +476,12 @@ TEST(AlbedoTableFile, HoldsTheNumbersAndTheirMeaning) {
     for (std::size_t i = 0; i < t.grids[g].values.size(); ++i)
       EXPECT_EQ(pixels[(g * std::size_t(spec.width) + i) * std::size_t(spec.nchannels)], t.grids[g].values[i]);
   }
-  EXPECT_THROW(measure::write_albedo_exr(t, "/nowhere/at/all.exr"), InputError);
+  EXPECT_THROW(write_albedo_exr(t, "/nowhere/at/all.exr"), InputError);
 }
 
 TEST(AlbedoTableFile, LookUpClampsAtItsEndsAndMeetsItsKnots) {
-  measure::AlbedoGrid g;
-  g.axes = {{"a", measure::AxisScale::Linear, {0, 1, 4}}, {"b", measure::AxisScale::Log1p, {0, 9, 99}}};
+  AlbedoGrid g;
+  g.axes = {{"a", AxisScale::Linear, {0, 1, 4}}, {"b", AxisScale::Log1p, {0, 9, 99}}};
   g.values = {0, 1, 2, 10, 11, 12, 40, 41, 42};
   EXPECT_NEAR(lookup(g, {1, 9}).r, 11, 1e-12);
   EXPECT_NEAR(lookup(g, {2.5, 0}).r, 25, 1e-12);
@@ -492,4 +491,4 @@ TEST(AlbedoTableFile, LookUpClampsAtItsEndsAndMeetsItsKnots) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The closures that a model declares as its base.
-#include "represent/base.h"
+#include "forms/base.h"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@
 #include "support.h"
 #include "trace/program.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 namespace {
 
 Vec3<Expr> recorded(const char* name) {
@@ -218,4 +218,4 @@ TEST(Base, IsRecordedAlikeForAllChoices) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::forms

@@ -6,9 +6,9 @@
 
 #include <random>
 
+#include "forms/representation.h"
 #include "model/choices.h"
 #include "print/osl_program.h"
-#include "represent/representation.h"
 #include "tables/table.h"
 
 namespace brdfc {

@@ -7,11 +7,11 @@
 #include "measure/albedo.h"
 #include "measure/kernel_fit.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
-measure::KernelCurve sech2(double end, int count) {
-  measure::KernelCurve c;
+KernelCurve sech2(double end, int count) {
+  KernelCurve c;
   for (int i = 0; i < count; ++i) {
     c.u.push_back(end * i / (count - 1));
     c.k.push_back(1 / sqr(std::cosh(c.u.back())));
@@ -19,14 +19,14 @@ measure::KernelCurve sech2(double end, int count) {
   return c;
 }
 
-double number(const measure::KernelFit& fit, const char* name) { return std::get<double>(fit.values.at(name)); }
+double number(const KernelFit& fit, const char* name) { return std::get<double>(fit.values.at(name)); }
 
 const double kCosines[] = {1, 0.95, 0.71, 0.7, 0.3, 0.05, 0.001};
 
 TEST(KernelLobeOf, FourPointsIsTheModel) {
   const Model& m = find_model("lossless");
   for (const double n : {0.3, 4., 60., 1e4}) {
-    const auto lobe = measure::kernel_lobe({{0, 1, 2, 3}, {2, 1.8, 0.4, 0.6}}, n);
+    const auto lobe = kernel_lobe({{0, 1, 2, 3}, {2, 1.8, 0.4, 0.6}}, n);
     const auto model =
         m.make_double({{"kernel", std::string("table")}, {"n", n}, {"h0", 1.}, {"h1", 0.9}, {"h2", 0.2}, {"h3", 0.3}});
     for (const double o : kCosines) {
@@ -44,7 +44,7 @@ TEST(KernelLobeOf, FourPointsIsTheModel) {
 TEST(KernelLobeOf, ManyPointsOfSech2IsItsClosedForm) {
   const Model& m = find_model("lossless");
   for (const double n : {0.5, 4., 20.}) {
-    const auto lobe = measure::kernel_lobe(sech2(n, 4001), n);
+    const auto lobe = kernel_lobe(sech2(n, 4001), n);
     const auto model = m.make_double({{"n", n}});
     for (const double o : kCosines)
       for (const double i : kCosines) {
@@ -57,10 +57,10 @@ TEST(KernelLobeOf, ManyPointsOfSech2IsItsClosedForm) {
 }
 
 TEST(KernelLobeOf, UnevenPointsLosesNothingAndIsSampled) {
-  const measure::KernelCurve curve{{0.2, 0.25, 1, 3.5, 70}, {0.3, 5, 0.7, 0.7, 0.01}};
+  const KernelCurve curve{{0.2, 0.25, 1, 3.5, 70}, {0.3, 5, 0.7, 0.7, 0.01}};
   for (const double n : {0.6, 5., 90.})
     for (const double cosine : {1., 0.6, 0.05}) {
-      const auto lobe = measure::kernel_lobe(curve, n);
+      const auto lobe = kernel_lobe(curve, n);
       const Vec3<double> wo = direction(cosine, 0);
       // The share of light below x = cos^2 theta_i, and the random numbers that give those x.
       constexpr int kSteps = 20000, kStops = 8;
@@ -81,14 +81,14 @@ TEST(KernelLobeOf, UnevenPointsLosesNothingAndIsSampled) {
 
 TEST(KernelFitOf, ADrawnModelGivesItBack) {
   // Also where the curve is stretched, higher, or has points that change nothing.
-  const measure::KernelCurve curves[] = {{{0, 1, 2, 3}, {1, 0.9, 0.2, 0.3}},
-                                         {{0, 0.5, 1, 1.5}, {2, 1.8, 0.4, 0.6}},
-                                         {{0, 7, 14, 21, 22}, {10, 9, 2, 3, 3}},
-                                         {{0, 0.5, 1, 1.25, 2, 3}, {1, 0.95, 0.9, 0.725, 0.2, 0.3}}};
+  const KernelCurve curves[] = {{{0, 1, 2, 3}, {1, 0.9, 0.2, 0.3}},
+                                {{0, 0.5, 1, 1.5}, {2, 1.8, 0.4, 0.6}},
+                                {{0, 7, 14, 21, 22}, {10, 9, 2, 3, 3}},
+                                {{0, 0.5, 1, 1.25, 2, 3}, {1, 0.95, 0.9, 0.725, 0.2, 0.3}}};
   const double stretch[] = {1, 0.5, 7, 1};
   for (int i = 0; i < 4; ++i)
     for (const double n : {30., 400.}) {
-      const measure::KernelFit fit = measure::fit_kernel(curves[i], n);
+      const KernelFit fit = fit_kernel(curves[i], n);
       EXPECT_NEAR(number(fit, "n"), n / stretch[i], 1e-5 * n) << i;
       EXPECT_NEAR(number(fit, "h0"), 1, 1e-5) << i;
       EXPECT_NEAR(number(fit, "h1"), 0.9, 1e-5) << i;
@@ -102,14 +102,14 @@ TEST(KernelFitOf, ADrawnModelGivesItBack) {
 
 TEST(KernelFitOf, StatesTheErrorThatSamplesFind) {
   struct Case {
-    measure::KernelCurve curve;
+    KernelCurve curve;
     double n;
   };
   // The last has a peak that holds little of the light.
   for (const auto& [curve, n] :
        {Case{sech2(5, 50), 4}, Case{sech2(5, 50), 300}, Case{{{0, 0.01, 10}, {1, 0.1, 0.05}}, 4}}) {
-    const measure::KernelFit fit = measure::fit_kernel(curve, n);
-    const auto truth = measure::kernel_lobe(curve, n);
+    const KernelFit fit = fit_kernel(curve, n);
+    const auto truth = kernel_lobe(curve, n);
     const auto model = find_model("lossless").make_double(fit.values);
     double worst = 0, mean = 0;
     for (int view = 0; view < 8; ++view) {
@@ -138,4 +138,4 @@ TEST(KernelFitOf, StatesTheErrorThatSamplesFind) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -10,15 +10,22 @@
 #include <sstream>
 
 #include "closures/closure_pool.h"
+#include "forms/aimed.h"
+#include "forms/representation.h"
 #include "measure/albedo_table.h"
+#include "measure/fold.h"
 #include "model/sampling.h"
 #include "pack/shader.h"
+#include "plan/costs.h"
+#include "plan/plan.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
 #include "support.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 namespace {
+
+using forms::RepresentationKind;
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
@@ -117,7 +124,7 @@ TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
 
 TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
   for (const auto& [name, model] : models())
-    for (RepresentationKind kind : representations(*model)) {
+    for (RepresentationKind kind : forms::representations(*model)) {
       const Shader s = write_shader(*model, kind, empty_table(*model));
       EXPECT_LE(s.slots, kMaxClosures) << s.name;
       // Aimed forms hold what is done with lamps, a base and the model's value beside its sampling; lossless' value is
@@ -130,7 +137,7 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
 
 /// Sizes by hand from Cycles' structs: see pool_bytes().
 TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
-  const auto bytes = [](const char* name, RepresentationKind kind, int lamps = kMaxLamps) {
+  const auto bytes = [](const char* name, RepresentationKind kind, int lamps = forms::kMaxLamps) {
     const Model& m = find_model(name);
     const Shader s = write_shader(m, kind, empty_table(m), {}, {}, lamps);
     return std::pair(s.closure_bytes, s.lamp_bytes);
@@ -152,8 +159,8 @@ TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
 
 TEST(Shader, AnAimedFormHasAtLeastALampInAGpusPool) {
   for (const auto& [name, model] : models())
-    for (const RepresentationKind kind : representations(*model)) {
-      if (is_fit(kind)) continue;  // eight closures, most of them ramps
+    for (const RepresentationKind kind : forms::representations(*model)) {
+      if (forms::is_fit(kind)) continue;  // eight closures, most of them ramps
       const Shader s = write_shader(*model, kind, empty_table(*model));
       EXPECT_LE(s.closure_bytes + s.lamp_bytes, kPoolBytes) << s.name;
     }
@@ -168,12 +175,12 @@ TEST(Shader, AnAimedFormWithoutABaseHasNoEmptyBlock) {
 TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
   const detail::ModelOf<pack_test::MirrorOnly> model;
   EXPECT_FALSE(model.has_scatter());
-  EXPECT_EQ(representations(model), std::vector{RepresentationKind::Exact});
+  EXPECT_EQ(forms::representations(model), std::vector{RepresentationKind::Exact});
   const Shader s = write_shader(model, RepresentationKind::Exact, empty_table(model));
   EXPECT_THAT(s.source, HasSubstr("BSDF = weight_0 * reflection(frame_n);"));
   const std::string body = s.source.substr(s.source.find("\n{\n", s.source.find("\nshader ")));
   EXPECT_EQ(s.statements, std::count(body.begin(), body.end(), ';')) << "there is no loop";
-  EXPECT_LT(measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
+  EXPECT_LT(forms::measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
   const measure::AlbedoTable table = measure::tabulate_albedo(model);
   EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
 }
@@ -219,12 +226,12 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
   EXPECT_THAT(apart.albedo, HasSubstr("float ax = "));
   EXPECT_THAT(apart.albedo, Not(HasSubstr("BSDF")));
   const ParamValues known = {{"ax", 0.2}, {"ay", 0.2}, {"normalisation", std::string("bounded")}};
-  const Shader small = write_shader(m, RepresentationKind::Sampled, fold(table, m, known), known);
+  const Shader small = write_shader(m, RepresentationKind::Sampled, measure::fold(table, m, known), known);
   EXPECT_EQ(small.albedo, "");
   EXPECT_THAT(small.source, HasSubstr("output color Albedo = 0)"));
   for (const auto& [name, model] : models())
-    for (const RepresentationKind kind : representations(*model)) {
-      if (is_fit(kind)) continue;  // holds tables of its own
+    for (const RepresentationKind kind : forms::representations(*model)) {
+      if (forms::is_fit(kind)) continue;  // holds tables of its own
       const std::string text = write_shader(*model, kind, measure::albedo_table_of(*model)).source;
       // What two aimed forms hold for each of their many choices is more than it should be.
       const bool longer =
@@ -238,8 +245,8 @@ TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
   const ParamValues both = {{"part", std::string("both")}};
   ParamValues black = both;
   black["rd"] = 0.0;
-  const Recording with = record(m, RepresentationKind::Sampled, both, 0);
-  const Recording without = record(m, RepresentationKind::Sampled, black, 0);
+  const forms::Recording with = forms::record(m, RepresentationKind::Sampled, both, 0);
+  const forms::Recording without = forms::record(m, RepresentationKind::Sampled, black, 0);
   EXPECT_LT(without.operations, with.operations);
   EXPECT_EQ(std::count(without.inputs.begin(), without.inputs.end(), "rd"), 0);
 }
@@ -262,15 +269,15 @@ TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
     EXPECT_THAT(e.what(), HasSubstr("wi"));
     EXPECT_THAT(e.what(), HasSubstr("nan"));
   }
-  EXPECT_THROW(measure_error(broken, RepresentationKind::Sampled), ValueError);
+  EXPECT_THROW(forms::measure_error(broken, RepresentationKind::Sampled), ValueError);
 }
 
 TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
   const Model& m = find_model("coupled");
-  const ParamValues only = form_values(m, RepresentationKind::Exact);
+  const ParamValues only = forms::form_values(m, RepresentationKind::Exact);
   ASSERT_EQ(only.size(), 1u);
   EXPECT_EQ(std::get<std::string>(only.at("fresnel")), "schlick");
-  EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Sampled).empty());
   const measure::AlbedoTable t = empty_table(m);
   EXPECT_THAT(write_shader(m, RepresentationKind::Exact, t).source, Not(HasSubstr("int fresnel")));
   EXPECT_THAT(write_shader(m, RepresentationKind::Sampled, t).source, HasSubstr("int fresnel"));
@@ -284,37 +291,37 @@ TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
 
 TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
   const Model& m = find_model("lafortune");
-  const ParamValues only = form_values(m, RepresentationKind::Fitted);
+  const ParamValues only = forms::form_values(m, RepresentationKind::Fitted);
   EXPECT_EQ(only, (ParamValues{{"cxy", -1.0}, {"cz", 0.8}}));
   ParamValues others = complete(m.info(), {});
   others.erase("e");
-  EXPECT_TRUE(form_values(m, RepresentationKind::Fitted, others).empty()) << "one number is open, any may be";
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Fitted, others).empty()) << "one number is open, any may be";
   others["e"] = 4.0;
   others.erase("cz");
-  EXPECT_TRUE(form_values(m, RepresentationKind::Fitted, others).empty());
-  EXPECT_TRUE(form_values(m, RepresentationKind::Sampled).empty());
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Fitted, others).empty());
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Sampled).empty());
   const std::string source =
-      write_shader(m, RepresentationKind::Fitted, fold(measure::albedo_table_of(m), m, only), {}).source;
+      write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, only), {}).source;
   for (const char* socket : {"    float e = ", "    color ks = "}) EXPECT_THAT(source, HasSubstr(socket));
   for (const char* gone : {"float cxy", "float cz"}) EXPECT_THAT(source, Not(HasSubstr(gone)));
 }
 
 class PackFiles : public ::testing::Test {
  protected:
-  PackOptions options(const fs::path& out) const {
-    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan_models({"lambert"}), {}, {}};
+  Options options(const fs::path& out) const {
+    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan::plan_models({"lambert"}), {}, {}};
   }
   TempFolder temp;
 };
 
 TEST_F(PackFiles, TheSameModelsGiveTheSameBytes) {
-  const PackResult a = build_pack(options(temp.path() / "a")), b = build_pack(options(temp.path() / "b"));
+  const Result a = build_pack(options(temp.path() / "a")), b = build_pack(options(temp.path() / "b"));
   EXPECT_EQ(read(a.zip), read(b.zip));
   EXPECT_FALSE(read(a.zip).empty());
 }
 
 TEST_F(PackFiles, ManifestAndFilesAgree) {
-  const PackResult pack = build_pack(options(temp.path()));
+  const Result pack = build_pack(options(temp.path()));
   const auto manifest = nlohmann::json::parse(read(pack.folder / "manifest.json"));
   EXPECT_EQ(manifest.at("format"), 1);
   const auto& lambert = manifest.at("models").at("lambert");
@@ -332,8 +339,8 @@ TEST_F(PackFiles, ManifestAndFilesAgree) {
 TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {
   const fs::path table = temp.path() / "costs.csv";
   std::ofstream(table) << "model,form,cost,cost_min\nlambert,glossy,1,1\nlambert,exact,0.75,0.7\n";
-  PackOptions o = options(temp.path() / "out");
-  o.costs = Costs(table);
+  Options o = options(temp.path() / "out");
+  o.costs = plan::Costs(table);
   const auto manifest = nlohmann::json::parse(read(build_pack(o).folder / "manifest.json"));
   const auto& forms = manifest.at("models").at("lambert").at("representations");
   EXPECT_EQ(forms.at("exact").at("cost"), 0.75);
@@ -342,11 +349,12 @@ TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {
 
 TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
   const fs::path table = temp.path() / "costs.csv";
-  EXPECT_EQ(Costs(table).of(find_model("lambert"), RepresentationKind::Exact), std::nullopt) << "there is no file";
+  EXPECT_EQ(plan::Costs(table).of(find_model("lambert"), RepresentationKind::Exact), std::nullopt)
+      << "there is no file";
   const auto refusal = [&](const std::string& text) -> std::string {
     std::ofstream(table) << text;
     try {
-      const Costs costs(table);
+      const plan::Costs costs(table);
     } catch (const InputError& e) {
       return e.what();
     }
@@ -365,7 +373,7 @@ TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
 }
 
 TEST(Costs, ThoseOfTheExtensionAreMeasured) {
-  const Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
+  const plan::Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
   for (const auto& [model, kind] :
        {std::pair("coupled", RepresentationKind::Exact), std::pair("ward", RepresentationKind::Sampled),
         std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Aimed),
@@ -377,9 +385,9 @@ TEST(Costs, ThoseOfTheExtensionAreMeasured) {
   }
 }
 TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
-  const PackResult pack = build_pack(options(temp.path()));
+  const Result pack = build_pack(options(temp.path()));
   const std::string before = read(pack.zip);
-  PackOptions bad = options(temp.path());
+  Options bad = options(temp.path());
   bad.models[0].fixed["rho"] =
       std::array<double, 3>{7, 7, 7};  // refused when the shader is written, after the build has begun
   EXPECT_THROW(build_pack(bad), InputError);
@@ -404,4 +412,4 @@ TEST_F(PackFiles, AnOutputThatIsAFileIsAnErrorThatNamesIt) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::pack

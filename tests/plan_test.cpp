@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A pack cut to a scene holds what its materials need, and computes the same.
-#include "pack/plan.h"
+#include "plan/plan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,12 +8,16 @@
 #include <filesystem>
 #include <fstream>
 
+#include "forms/aimed.h"
+#include "forms/representation.h"
 #include "measure/albedo_table.h"
+#include "measure/fold.h"
 #include "pack/shader.h"
-#include "represent/aimed.h"
 
-namespace brdfc {
+namespace brdfc::plan {
 namespace {
+
+using forms::RepresentationKind;
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -41,7 +45,7 @@ TEST(Plan, EverythingIsEveryModelInEveryForm) {
   const auto plan = plan_models({});
   EXPECT_EQ(plan.size(), models().size());
   for (const PlannedModel& p : plan) {
-    EXPECT_EQ(p.forms, representations(*p.model));
+    EXPECT_EQ(p.forms, forms::representations(*p.model));
     EXPECT_TRUE(p.fixed.empty() && p.reasons.empty());
   }
   EXPECT_THROW(plan_models({"nonesuch"}), InputError);
@@ -74,7 +78,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
     Budget budget;
     budget.lamps = lamps;
     const PlannedModel plan = plan_scene(needs, budget)[0];
-    EXPECT_EQ(plan.max_lamps, std::min(lamps.value_or(kMaxLamps), kMaxLamps));
+    EXPECT_EQ(plan.max_lamps, std::min(lamps.value_or(forms::kMaxLamps), forms::kMaxLamps));
     return plan.reasons;
   };
   EXPECT_THAT(reasons(0), testing::Contains("slots for lamps: the scene has none"));
@@ -84,7 +88,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
 
   const Model& m = find_model("phong");
   const measure::AlbedoTable table = measure::albedo_table_of(m);
-  const auto shader = [&](int lamps) { return write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps); };
+  const auto shader = [&](int lamps) { return pack::write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps); };
   for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
   EXPECT_EQ(shader(0).slots, slots(ClosureKind::PhongRamp));
@@ -311,12 +315,12 @@ TEST(Plan, FitsBasesWhereAskedToAndWhereFitsAreMadeAnyway) {
     return plan_scene(needs, budget)[0].base;
   };
   const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})};
-  EXPECT_EQ(base(phong, {}), AimedBase::Declared) << "nothing is fitted unasked";
-  EXPECT_EQ(base(phong, asked), AimedBase::Fitted);
-  EXPECT_EQ(base(phong, error), AimedBase::Fitted);
-  EXPECT_EQ(base(phong, both), AimedBase::Declared) << "its cost is not known";
-  EXPECT_EQ(base({need("a", "ward", {"ax=0.5"})}, asked), AimedBase::Declared) << "it is anisotropic";
-  EXPECT_EQ(base({need("a", "phong", {"e=20"}, "sampled")}, asked), AimedBase::Declared) << "nothing is aimed";
+  EXPECT_EQ(base(phong, {}), forms::AimedBase::Declared) << "nothing is fitted unasked";
+  EXPECT_EQ(base(phong, asked), forms::AimedBase::Fitted);
+  EXPECT_EQ(base(phong, error), forms::AimedBase::Fitted);
+  EXPECT_EQ(base(phong, both), forms::AimedBase::Declared) << "its cost is not known";
+  EXPECT_EQ(base({need("a", "ward", {"ax=0.5"})}, asked), forms::AimedBase::Declared) << "it is anisotropic";
+  EXPECT_EQ(base({need("a", "phong", {"e=20"}, "sampled")}, asked), forms::AimedBase::Declared) << "nothing is aimed";
   EXPECT_EQ(why(plan_scene(phong, asked)[0], kAimed), "a: the form is left open; closures fitted to it are its base");
   const PlannedModel planned = plan_scene(phong, asked)[0];
   for (const FormChoice& c : planned.choices)
@@ -333,7 +337,7 @@ TEST(Plan, FoldedTablesInterpolateToTheSame) {
     const ParamValues all = parse_values(m.info(), {"r0=0.137", "rm=0.9,0.5,0.1"});
     ParamValues fixed;
     for (const std::string& t : fixed_text) fixed[t.substr(0, 2)] = all.at(t.substr(0, 2));
-    const measure::AlbedoTable cut = fold(whole, m, fixed);
+    const measure::AlbedoTable cut = measure::fold(whole, m, fixed);
     EXPECT_LE(cut.size(), 3 * whole.size());
     for (const measure::AlbedoGrid& g : cut.grids)
       for (const measure::TableAxis& a : g.axes) EXPECT_EQ(fixed.count(a.name), 0u);
@@ -347,4 +351,4 @@ TEST(Plan, FoldedTablesInterpolateToTheSame) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::plan

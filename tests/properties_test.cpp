@@ -11,7 +11,7 @@
 #include "measure/bound_model.h"
 #include "measure/probes.h"
 
-namespace brdfc {
+namespace brdfc::check {
 namespace {
 
 // The same in every run, unless somebody asks for something else; read when the first property is checked.
@@ -125,4 +125,4 @@ TEST(PropertyChecks, FindAFailureAndShrinkIt) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::check

@@ -14,7 +14,7 @@
 #include "reference/procedural.h"
 #include "reference/render.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 namespace reference_test {
 
 /// Reflects like Lambert, but not a number where the light comes from the left.
@@ -643,4 +643,4 @@ TEST_F(ImageTest, PreviewIsSrgb) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -11,9 +11,13 @@
 #include <regex>
 
 #include "core/error.h"
+#include "reference/image.h"
 
-namespace brdfc {
+namespace brdfc::report {
 namespace {
+
+using reference::Image;
+using reference::Rendering;
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -48,10 +52,10 @@ class ReportTest : public testing::Test {
     folder_ = fs::path(testing::TempDir()) / (std::string("brdfc-report-") + info->name());
     fs::remove_all(folder_);
     fs::create_directories(folder_ / "ball");
-    write_rendering(folder_ / "ball/reference.exr", reference());
+    reference::write_rendering(folder_ / "ball/reference.exr", reference());
     for (unsigned i = 0; i < 4; ++i) {
-      write_rendering(folder_ / fmt::format("ball/glossy-{}.exr", i), picture(1.1, kNoise, 10 + i));
-      write_rendering(folder_ / fmt::format("ball/exact-{}.exr", i), picture(1, kNoise, 20 + i));
+      reference::write_rendering(folder_ / fmt::format("ball/glossy-{}.exr", i), picture(1.1, kNoise, 10 + i));
+      reference::write_rendering(folder_ / fmt::format("ball/exact-{}.exr", i), picture(1, kNoise, 20 + i));
     }
     runs_ = json::parse(R"({
       "format": 1, "scene": "ball", "description": "a <ball> & more",
@@ -107,7 +111,7 @@ TEST_F(ReportTest, RelMseOfKnownPictures) {
   runs_["runs"][0]["images"] = {"brighter.exr"};
   runs_["runs"][0]["cpu_seconds"] = {1};
   runs_["runs"][0]["wall_seconds"] = {1};
-  write_rendering(folder_ / "ball/brighter.exr", picture(1.5, 0, 0));
+  reference::write_rendering(folder_ / "ball/brighter.exr", picture(1.5, 0, 0));
   double expected = 0;
   for (int x = 0; x < kSize; ++x) {
     const double b = 0.2 + 0.6 * x / (kSize - 1);
@@ -153,7 +157,7 @@ TEST_F(ReportTest, WritesPageJsonAndCsv) {
   EXPECT_THAT(page, HasSubstr("a &lt;ball&gt; &amp; more"));
   for (const char* name : {"ball/reference.png", "ball/exact.png", "ball/exact-difference.png", "ball/glossy.png"}) {
     EXPECT_THAT(page, HasSubstr(fmt::format("src=\"{}\"", name)));
-    const Image preview = read_image(folder_ / name);
+    const Image preview = reference::read_image(folder_ / name);
     EXPECT_EQ(preview.width, kSize);
   }
   EXPECT_THAT(page, testing::Not(HasSubstr("http")));  // self-contained
@@ -225,9 +229,9 @@ TEST_F(ReportTest, ShowsWhatTheClosuresOfEachVersionDo) {
 TEST_F(ReportTest, PreviewsShowThePicturesAndTheSignOfTheDifference) {
   load();
   write_report(folder_);
-  const Image shown = read_image(folder_ / "ball/reference.png");
+  const Image shown = reference::read_image(folder_ / "ball/reference.png");
   EXPECT_NEAR(shown.pixel(kSize / 2, 3)[0], reference().mean.pixel(kSize / 2, 3)[0], 0.01);
-  const Image difference = read_image(folder_ / "ball/glossy-difference.png");
+  const Image difference = reference::read_image(folder_ / "ball/glossy-difference.png");
   double red = 0, blue = 0;
   for (int y = 0; y < kSize; ++y) {
     red += difference.pixel(kSize - 1, y)[0];
@@ -261,7 +265,7 @@ TEST_F(ReportTest, ErrorsNameFileAndKey) {
   runs_ = good;
   Rendering broken = picture(1, 0, 0);
   broken.mean.pixel(5, 7)[1] = std::nanf("");
-  write_rendering(folder_ / "ball/exact-0.exr", broken);
+  reference::write_rendering(folder_ / "ball/exact-0.exr", broken);
   EXPECT_THAT(load_error(), HasSubstr("(5, 7)"));
 }
 
@@ -363,7 +367,8 @@ TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
       for (unsigned i = 0; i < 4; ++i) {
         const std::string name = fmt::format("{}-{}-{}.exr", form, spp, i);
         const float noise = kNoise * float(std::sqrt((native ? 1. : 2.) * 16 / spp));
-        write_rendering(folder_ / "ball" / name, picture(1, noise, 1000 + unsigned(spp) * 10 + i + (native ? 0 : 5)));
+        reference::write_rendering(folder_ / "ball" / name,
+                                   picture(1, noise, 1000 + unsigned(spp) * 10 + i + (native ? 0 : 5)));
         images.push_back(name);
       }
       runs_["convergence"].push_back(
@@ -403,4 +408,4 @@ TEST_F(ReportTest, ReadsFlipBesideTheRuns) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::report

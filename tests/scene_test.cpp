@@ -12,7 +12,7 @@
 #include "reference/json_view.h"
 #include "reference/procedural.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 namespace {
 
 namespace fs = std::filesystem;
@@ -403,4 +403,4 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::reference

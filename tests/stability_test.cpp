@@ -10,7 +10,7 @@
 
 #include "model/sampling.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace fragile {
@@ -60,7 +60,7 @@ double effort() {
 }
 
 template <Formula F> double amplified() {
-  return measure::hunt_rounding(detail::ModelOf<Fragile<F>::template Type>(), {.points = 5000}).amplified;
+  return hunt_rounding(detail::ModelOf<Fragile<F>::template Type>(), {.points = 5000}).amplified;
 }
 
 TEST(Rounding, OfGoodFormulasIsSmall) { EXPECT_LT(amplified<kGood>(), 4); }
@@ -70,7 +70,7 @@ TEST(Rounding, SeesAHighPowerOfARoundedCosine) { EXPECT_GT(amplified<kHighPower>
 TEST(Rounding, RareBadValuesAreNamed) {
   const detail::ModelOf<Fragile<kNegativeRarely>::Type> model;
   try {
-    measure::evaluate_everywhere(model, 100000, 1);
+    evaluate_everywhere(model, 100000, 1);
     FAIL() << "a negative value passed";
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(), testing::HasSubstr("fragile e="));
@@ -93,7 +93,7 @@ class Everywhere : public testing::TestWithParam<std::string> {
 };
 
 TEST_P(Everywhere, DoubleKeepsItsDigits) {
-  const measure::Stability s = measure::hunt_rounding(model(), {.points = long(20000 * effort())});
+  const Stability s = hunt_rounding(model(), {.points = long(20000 * effort())});
   EXPECT_GE(s.points, long(19000 * effort()));
   EXPECT_LE(s.amplified, allowed(GetParam())) << s.amplified_where;
 }
@@ -101,7 +101,7 @@ TEST_P(Everywhere, DoubleKeepsItsDigits) {
 TEST_P(Everywhere, NoValueIsNanInfiniteOrNegative) {
   // Over all models more than 1e7.
   const long calls = std::max<long>(20000, long(1.2e7 * effort() / double(models().size())));
-  EXPECT_GE(measure::evaluate_everywhere(model(), calls, 1), calls);
+  EXPECT_GE(evaluate_everywhere(model(), calls, 1), calls);
 }
 
 /// Rare places where single precision once gave NaN or infinity, which only the long run meets by itself.
@@ -146,8 +146,7 @@ TEST(SinglePrecision, StaysFiniteBetweenOppositeDirectionsLowAboveTheSurface) {
 }
 
 TEST_P(Everywhere, SinglePrecisionAndTheRecordedProgramFollow) {
-  for (const auto& [decade, row] :
-       measure::single_precision_by_decade(model(), std::max(4, int(40 * effort())), 100, 1)) {
+  for (const auto& [decade, row] : single_precision_by_decade(model(), std::max(4, int(40 * effort())), 100, 1)) {
     const double limit = decade <= 5 ? 1e-3 : 1e-2;
     // What the rounding of the directions alone does to a lobe as narrow as that is no fault of a formula.
     EXPECT_LE(row.native, std::max(limit, 4 * row.inherent)) << "1e" << decade << ": " << row.where;
@@ -164,4 +163,4 @@ INSTANTIATE_TEST_SUITE_P(Models, Everywhere, testing::ValuesIn(model_names()),
                          [](const testing::TestParamInfo<std::string>& info) { return info.param; });
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::measure

@@ -16,12 +16,12 @@
 #include "support.h"
 #include "tables/table_file.h"
 
-namespace brdfc {
+namespace brdfc::measure {
 namespace {
 
 using testing::HasSubstr;
 
-void expect_equal(const measure::AlbedoTable& a, const measure::AlbedoTable& b) {
+void expect_equal(const AlbedoTable& a, const AlbedoTable& b) {
   EXPECT_EQ(a.model, b.model);
   EXPECT_EQ(a.choices, b.choices);
   EXPECT_EQ(a.choice_sizes, b.choice_sizes);
@@ -55,14 +55,14 @@ void expect_equal(const measure::AlbedoTable& a, const measure::AlbedoTable& b) 
 std::vector<const Model*> stored() {
   std::vector<const Model*> out;
   for (const auto& [name, model] : models())
-    if (measure::has_albedo_table(*model)) out.push_back(model.get());
+    if (has_albedo_table(*model)) out.push_back(model.get());
   return out;
 }
 
 /// None is of a formula that is no more; script/fits makes them anew. A model without one is tabulated for each pack.
 TEST(StoredAlbedos, BelongToTheFormulas) {
   std::set<std::filesystem::path> expected, found;
-  for (const Model* model : stored()) expected.insert(measure::stored_albedo(*model));
+  for (const Model* model : stored()) expected.insert(stored_albedo(*model));
   for (const auto& entry : std::filesystem::directory_iterator(expected.begin()->parent_path()))
     found.insert(entry.path());
   EXPECT_THAT(found, testing::IsSubsetOf(expected));
@@ -72,22 +72,22 @@ TEST(StoredAlbedos, BelongToTheFormulas) {
 TEST(StoredAlbedos, AreReadNumberForNumber) {
   const TempFolder folder;
   const std::filesystem::path file = folder.path() / "table.exr";
-  measure::AlbedoTable made = measure::tabulate_albedo(find_model("coupled"));
-  const auto expect_kept = [&](const measure::AlbedoTable& table) {
-    measure::write_albedo_exr(table, file);
-    expect_equal(measure::read_albedo_exr(file), table);
+  AlbedoTable made = tabulate_albedo(find_model("coupled"));
+  const auto expect_kept = [&](const AlbedoTable& table) {
+    write_albedo_exr(table, file);
+    expect_equal(read_albedo_exr(file), table);
   };
   expect_kept(made);
-  measure::AlbedoGrid& grid = made.grids.front();
+  AlbedoGrid& grid = made.grids.front();
   grid.channels = 3;
   for (std::size_t i = 0, n = 2 * grid.values.size(); i < n; ++i) grid.values.push_back(0.01f * float(i));
   expect_kept(made);
-  std::set<measure::AxisScale> scales;
+  std::set<AxisScale> scales;
   for (const Model* model : stored()) {
-    const measure::AlbedoTable kept = measure::albedo_table_of(*model);
+    const AlbedoTable kept = albedo_table_of(*model);
     expect_kept(kept);
-    for (const measure::AlbedoGrid& g : kept.grids)
-      for (const measure::TableAxis& axis : g.axes) scales.insert(axis.scale);
+    for (const AlbedoGrid& g : kept.grids)
+      for (const TableAxis& axis : g.axes) scales.insert(axis.scale);
   }
   EXPECT_EQ(scales.size(), 3u) << "linear, log and log1p";
 }
@@ -99,21 +99,19 @@ TEST(StoredAlbedos, AreWhatIsMadeAnew) {
   const std::string choice = given ? given : "";
   const std::vector<const Model*> all = stored();
   const Model& model = *all[std::stoull(sha256(choice).substr(0, 15), nullptr, 16) % all.size()];
-  const measure::AlbedoTable kept = measure::albedo_table_of(model), anew = measure::tabulate_albedo(model);
+  const AlbedoTable kept = albedo_table_of(model), anew = tabulate_albedo(model);
   std::mt19937_64 random(37);
   std::uniform_real_distribution<double> uniform;
   double off = 0;
   for (int i = 0; i < 2000; ++i) {
     ParamValues values;
     for (const ParamInfo& p : model.info().params) {
-      if (p.kind == ParamKind::Number)
-        values[p.name] = p.soft_min + (p.soft_max - p.soft_min) * measure::uniform(random);
+      if (p.kind == ParamKind::Number) values[p.name] = p.soft_min + (p.soft_max - p.soft_min) * uniform(random);
       if (p.kind == ParamKind::Color)
-        values[p.name] =
-            std::array<double, 3>{measure::uniform(random), measure::uniform(random), measure::uniform(random)};
+        values[p.name] = std::array<double, 3>{uniform(random), uniform(random), uniform(random)};
       if (p.kind == ParamKind::Choice) values[p.name] = p.choices[random() % p.choices.size()];
     }
-    const double c = measure::uniform(random);
+    const double c = uniform(random);
     const Rgb<double> a = lookup(kept, model, values, c), b = lookup(anew, model, values, c);
     off = std::max(off, max_component(Rgb<double>(std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b))) /
                             std::max(1.0, max_component(b)));
@@ -128,14 +126,14 @@ TEST(StoredAlbedos, OfAnotherShapeAreRefused) {
   const TempFolder folder;
   const std::filesystem::path file = folder.path() / "table.exr";
   const auto refusal = [&](const std::string& from, const std::string& to) -> std::string {
-    measure::write_albedo_exr(measure::albedo_table_of(find_model("phong")), file);
+    write_albedo_exr(albedo_table_of(find_model("phong")), file);
     TableImage image = read_table_image(file);
     const std::size_t at = image.meta.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     image.meta.replace(at, from.size(), to);
     write_table_image(image, file);
     try {
-      measure::read_albedo_exr(file);
+      read_albedo_exr(file);
     } catch (const InputError& e) {
       return e.what();
     }
@@ -148,8 +146,8 @@ TEST(StoredAlbedos, OfAnotherShapeAreRefused) {
   EXPECT_THAT(refusal("\"grid\":0", "\"grid\":7"), HasSubstr("table.exr: terms: there is no grid 7"));
   EXPECT_THAT(refusal("\"channels\":1", "\"channels\":4"), HasSubstr("table.exr: grids: 0 has other numbers"));
   std::ofstream(file) << "no picture";
-  EXPECT_THROW(measure::read_albedo_exr(file), InputError);
+  EXPECT_THROW(read_albedo_exr(file), InputError);
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::measure

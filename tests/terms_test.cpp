@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/terms.h"
+#include "fit/terms.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "fit/fit.h"
 #include "measure/probes.h"
-#include "represent/fit.h"
 #include "support.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 namespace {
 
 using testing::ElementsAre;
@@ -95,4 +95,4 @@ TEST(Terms, AddUpToTheModel) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::fit

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Twins come as close to their models as they say, with weights that Blender's nodes take.
-#include "represent/twin.h"
+#include "fit/twin.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include "pack/nodes.h"
 #include "support.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 namespace {
 
 struct Row {
@@ -68,7 +68,7 @@ TEST(Twin, StatesItsError) {
 TEST(Twin, TakesWhatNodesAccept) {
   for (const Row& row : kRows) {
     const Model& m = find_model(row.model);
-    const auto j = nlohmann::json::parse(write_nodes(m, values_of(m, row.values)).source);
+    const auto j = nlohmann::json::parse(pack::write_nodes(m, values_of(m, row.values)).source);
     for (const auto& closure : j.at("closures")) {
       for (const auto& channel : closure.at("weight")) {
         ASSERT_EQ(channel.size(), std::size_t(kTwinKnots));
@@ -84,4 +84,4 @@ TEST(Twin, TakesWhatNodesAccept) {
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::fit

@@ -8,13 +8,15 @@
 #include <cmath>
 #include <random>
 
+#include "fit/fit.h"
+#include "forms/representation.h"
 #include "measure/albedo_table.h"
+#include "measure/fold.h"
 #include "model/horizon.h"
-#include "pack/plan.h"
 #include "pack/shader.h"
-#include "represent/fit.h"
+#include "plan/plan.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 namespace {
 
 using testing::HasSubstr;
@@ -163,7 +165,7 @@ TEST(Views, CutAlbedoTablesHoldTheSameNumbers) {
   const measure::AlbedoTable whole = measure::albedo_table_of(m);
   for (const ParamValues& fixed : {ParamValues{}, ParamValues{{"r0", 0.137}}}) {
     ParamValues values = complete(m.info(), {{"r0", 0.137}});
-    const measure::AlbedoTable all = fold(whole, m, fixed), cut = fold(whole, m, fixed, kSome);
+    const measure::AlbedoTable all = measure::fold(whole, m, fixed), cut = measure::fold(whole, m, fixed, kSome);
     EXPECT_LT(cut.size(), all.size());
     for (const double c : {0.35, 0.5, 0.7123, 0.9}) {
       const Rgb<double> want = lookup(all, m, values, c), got = lookup(cut, m, values, c);
@@ -171,7 +173,7 @@ TEST(Views, CutAlbedoTablesHoldTheSameNumbers) {
       EXPECT_NEAR(got.b, want.b, 1e-7) << c;
     }
   }
-  EXPECT_EQ(fold(whole, m, {}, {0, 1}).size(), whole.size());
+  EXPECT_EQ(measure::fold(whole, m, {}, {0, 1}).size(), whole.size());
 }
 
 TEST(Views, CutFitsHoldTheSameNumbers) {
@@ -179,12 +181,12 @@ TEST(Views, CutFitsHoldTheSameNumbers) {
     const Model& m = find_model("phong");
     ParamValues known = complete(m.info(), {{"e", 20.0}});
     if (axis) known.erase("e");
-    const ParamValues values = without_factors(m, known);
-    const Fit& whole = fit_of(m, values);
-    const Varied<double> varied(20);
+    const ParamValues values = fit::without_factors(m, known);
+    const fit::Fit& whole = fit::fit_of(m, values);
+    const fit::Varied<double> varied(20);
     // Also less than what lies between two knots, and what ends at the last.
     for (const Cosines& views : {kSome, Cosines{0.5, 0.501}, Cosines{0, 0.1}, Cosines{0.99, 1}}) {
-      const Fit cut = fit_of(m, values, views);
+      const fit::Fit cut = fit::fit_of(m, values, views);
       EXPECT_LT(cut.size(), whole.size());
       EXPECT_FALSE(cut.errors().empty());
       for (const double c : {views.low, 0.3 * views.low + 0.7 * views.high, views.high}) {
@@ -203,9 +205,9 @@ TEST(Views, CutFitsHoldTheSameNumbers) {
     }
     // Grazing views are what is off.
     const double of_all = whole.mean_l1(20.0);
-    EXPECT_LT(fit_of(m, values, {0.7, 1}).mean_l1(20.0), of_all);
-    EXPECT_GT(fit_of(m, values, {0, 0.1}).mean_l1(20.0), of_all);
-    EXPECT_EQ(fit_of(m, values, {}).size(), whole.size());
+    EXPECT_LT(fit::fit_of(m, values, {0.7, 1}).mean_l1(20.0), of_all);
+    EXPECT_GT(fit::fit_of(m, values, {0, 0.1}).mean_l1(20.0), of_all);
+    EXPECT_EQ(fit::fit_of(m, values, {}).size(), whole.size());
   }
 }
 
@@ -213,32 +215,32 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   const Model& m = find_model("phong");
   const ParamValues values = complete(m.info(), {{"e", 20.0}});
   const auto need = [&](const char* id, const Cosines& views) {
-    MaterialNeed need{id, &m, values, {}};
+    plan::MaterialNeed need{id, &m, values, {}};
     need.views = views;
     return need;
   };
-  const PlannedModel plan = plan_scene({need("a", {0.4, 0.6}), need("b", {0.5, 0.97})})[0];
+  const plan::PlannedModel plan = plan::plan_scene({need("a", {0.4, 0.6}), need("b", {0.5, 0.97})})[0];
   EXPECT_EQ(plan.views.low, 0.4);
   EXPECT_EQ(plan.views.high, 0.97);
   EXPECT_THAT(plan.reasons, testing::Contains("view angles below 14 and beyond 67 degrees: never seen"));
-  EXPECT_THAT(plan_scene({need("a", {0.4, 1})})[0].reasons,
+  EXPECT_THAT(plan::plan_scene({need("a", {0.4, 1})})[0].reasons,
               testing::Contains("view angles beyond 67 degrees: never seen"));
-  const PlannedModel all = plan_scene({need("a", {0.4, 0.6}), need("b", {})})[0];
+  const plan::PlannedModel all = plan::plan_scene({need("a", {0.4, 0.6}), need("b", {})})[0];
   EXPECT_THAT(all.reasons, testing::Each(Not(HasSubstr("never seen"))));
   // What is off at views that nobody has does not count.
-  Budget budget;
+  plan::Budget budget;
   budget.error = 0.006;
-  EXPECT_EQ(plan_scene({need("a", {})}, budget)[0].forms[0], RepresentationKind::Aimed);
-  EXPECT_EQ(plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], RepresentationKind::Fitted);
+  EXPECT_EQ(plan::plan_scene({need("a", {})}, budget)[0].forms[0], forms::RepresentationKind::Aimed);
+  EXPECT_EQ(plan::plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], forms::RepresentationKind::Fitted);
 
-  const measure::AlbedoTable table = fold(measure::albedo_table_of(m), m, values, kSome);
-  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
-    const Shader whole = write_shader(m, kind, table, values, {}, 0, AimedBase::Fitted),
-                 cut = write_shader(m, kind, table, values, kSome, 0, AimedBase::Fitted);
+  const measure::AlbedoTable table = measure::fold(measure::albedo_table_of(m), m, values, kSome);
+  for (const forms::RepresentationKind kind : {forms::RepresentationKind::Fitted, forms::RepresentationKind::Aimed}) {
+    const pack::Shader whole = pack::write_shader(m, kind, table, values, {}, 0, forms::AimedBase::Fitted),
+                       cut = pack::write_shader(m, kind, table, values, kSome, 0, forms::AimedBase::Fitted);
     EXPECT_LT(cut.source.size(), whole.source.size());
     EXPECT_EQ(cut.operations, whole.operations);
   }
 }
 
 }  // namespace
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -6,14 +6,14 @@
 #include <optional>
 
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
 #include "measure/albedo.h"
 #include "measure/albedo_table.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
 #include "tables/table_file.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_albedo_command(CLI::App& app) {
   struct Options {
@@ -78,4 +78,4 @@ void add_albedo_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -7,7 +7,7 @@
 #include "check/check.h"
 #include "measure/properties.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_check_command(CLI::App& app) {
   struct Options {
@@ -90,4 +90,4 @@ void add_check_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -3,10 +3,10 @@
 #include <iostream>
 
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
 #include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_eval_command(CLI::App& app) {
   struct Options {
@@ -41,4 +41,4 @@ void add_eval_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

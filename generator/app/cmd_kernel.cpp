@@ -3,10 +3,10 @@
 #include <fstream>
 
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
 #include "measure/kernel_fit.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
 measure::KernelCurve read_curve(const std::string& path) {
@@ -66,4 +66,4 @@ void add_kernel_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

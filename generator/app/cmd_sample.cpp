@@ -4,10 +4,10 @@
 #include <random>
 
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
 #include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
 void write_sample(const measure::BoundModel& bound, const std::string& where, const Vec3<double>& wo,
@@ -76,4 +76,4 @@ void add_sample_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -7,7 +7,7 @@
 #include "measure/stability.h"
 #include "report/stability_page.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_stability_command(CLI::App& app) {
   struct Options {
@@ -52,7 +52,7 @@ void add_stability_command(CLI::App& app) {
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), hunted);
     }
     if (!o->page.empty()) {
-      write_stability_page(o->page);
+      report::write_stability_page(o->page);
       fmt::print(stderr, "{}/index.html\n", o->page);
     }
     std::fflush(stdout);
@@ -60,4 +60,4 @@ void add_stability_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -19,6 +19,7 @@
 #include "model/choices.h"
 #include "print/osl_program.h"
 #include "tables/table_file.h"
+#include "trace/program.h"
 
 namespace brdfc::measure {
 namespace {

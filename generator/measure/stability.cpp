@@ -11,6 +11,7 @@
 #include "measure/bound_model.h"
 #include "model/inputs.h"
 #include "model/sampling.h"
+#include "trace/program.h"
 
 namespace brdfc::measure {
 namespace {

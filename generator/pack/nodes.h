@@ -4,7 +4,7 @@
 
 #include "pack/shader.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 
 /// The twin of a model with these parameters, which are all but factors() (fit.h): its file, JSON with the file name's
 /// extension left out of `name`, and what its nodes make of closures. `closures`: kind, and tables over the cosine of
@@ -12,4 +12,4 @@ namespace brdfc {
 /// multiplies them. Factors multiply all but a mirror's weight.
 Shader write_nodes(const Model&, const ParamValues& fixed);
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

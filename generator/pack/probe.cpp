@@ -6,7 +6,7 @@
 #include "print/osl_program.h"
 #include "trace/osl_arithmetic.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 namespace {
 
 struct Recorded {
@@ -121,4 +121,4 @@ std::vector<std::array<ProbeValues, 4>> run_probe(const Model& model, const Para
   return all;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

@@ -7,13 +7,16 @@
 #include <utility>
 
 #include "closures/closure_pool.h"
+#include "fit/fit.h"
+#include "fit/terms.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
-#include "represent/fit.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 namespace {
+
+using forms::RepresentationKind;
 
 using print::block;
 using print::indented;
@@ -101,7 +104,7 @@ class ChoiceSwitch {
 class SharedArrays {
  public:
   /// The statements, before which stand the arrays whose names other ones have taken.
-  std::string without_shared(const Recording& r) {
+  std::string without_shared(const forms::Recording& r) {
     std::string own;
     for (const std::string& array : r.arrays) {
       const std::string name = array.substr(0, array.find('['));
@@ -221,7 +224,7 @@ class AlbedoText {
   std::string positions_;
 };
 
-std::string closure_text(const RecordedClosure& closure, std::size_t i) {
+std::string closure_text(const forms::RecordedClosure& closure, std::size_t i) {
   const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
   const auto microfacet = [&](const char* distribution) {
     // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
@@ -264,7 +267,7 @@ class AimedText {
       : draw_(info, fixed), value_(info, fixed), lamps_(lamps) {}
 
   /// The base's recording.
-  Recording add(const Choices& choices, const AimedRecording& r, SharedArrays& arrays) {
+  forms::Recording add(const Choices& choices, const forms::AimedRecording& r, SharedArrays& arrays) {
     draw_.add(choices, arrays.without_shared(r.draw));
     value_.add(choices, arrays.without_shared(r.value));
     operations_ = std::max(operations_, r.draw.operations + r.value.operations);
@@ -272,14 +275,14 @@ class AimedText {
   }
 
   int operations() const {
-    const AimedSteps& steps = aimed_steps(0);
+    const forms::AimedSteps& steps = forms::aimed_steps(0);
     return operations_ + steps.rest.operations +
            (lamps_ > 0 ? steps.room.operations + steps.aim.operations + steps.less.operations + steps.send.operations
                        : 0);
   }
 
   std::string print() const {
-    const AimedSteps& steps = aimed_steps(0);
+    const forms::AimedSteps& steps = forms::aimed_steps(0);
     std::string out = std::string(kDraws) + "    float drawn_x, drawn_y, drawn_z;\n" + block(draw_.print(0), 1) +
                       "    color rest_colour;\n    float rest_weight;\n";
     if (lamps_ == 0)
@@ -336,7 +339,7 @@ class AimedText {
         "        ray_x = drawn_x;\n        ray_y = drawn_y;\n        ray_z = drawn_z;\n    }\n";
     // Each joins the sum from the left: Cycles walks it without a stack. The weight is a colour: see kPoolNode.
     std::string ramp;
-    for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
+    for (const double c : forms::aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
     out += fmt::format(
         "    closure color aimed = 0;\n"
         "    for (int lamp = 0; lamp < lamps; lamp++)\n"
@@ -379,17 +382,17 @@ class AimedText {
 }  // namespace
 
 Shader write_shader(const Model& model, RepresentationKind kind, const measure::AlbedoTable& table,
-                    const ParamValues& given, const Cosines& views, int max_lamps, AimedBase base) {
+                    const ParamValues& given, const Cosines& views, int max_lamps, forms::AimedBase base) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
-  for (const auto& [name, value] : form_values(model, kind, given))
+  for (const auto& [name, value] : forms::form_values(model, kind, given))
     if (fixed.emplace(name, value).first->second != value)
       input_error("{}: the {} form exists only for {}", info.name, name_of(kind), format_values(info, {{name, value}}));
   const bool sampled = kind == RepresentationKind::Sampled, aimed = kind == RepresentationKind::Aimed;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
 
-  std::vector<RecordedClosure> kinds;
+  std::vector<forms::RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
   AimedText aimed_text(info, fixed, max_lamps);
   SharedArrays arrays;
@@ -399,15 +402,16 @@ Shader write_shader(const Model& model, RepresentationKind kind, const measure::
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    const Recording r = aimed ? aimed_text.add(choices, record_aimed(model, values, 0, base, views), arrays)
-                              : record(model, kind, values, 4, views);
+    const forms::Recording r = aimed
+                                   ? aimed_text.add(choices, forms::record_aimed(model, values, 0, base, views), arrays)
+                                   : forms::record(model, kind, values, 4, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, arrays.without_shared(r));
     if (!kinds.empty() && kinds != r.closures)
       throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
     kinds = r.closures;
     if ((sampled || aimed) && model.has_mirror()) {
-      const Recording m = record_mirror(model, values, 0);
+      const forms::Recording m = forms::record_mirror(model, values, 0);
       mirror_operations = std::max(mirror_operations, m.operations);
       mirror.add(choices, arrays.without_shared(m));
     }
@@ -416,7 +420,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const measure::
 
   std::string normal = "    vector frame_n = normalize(Normal);\n";
   if (kind == RepresentationKind::Fitted)
-    normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", kLowestView);
+    normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", fit::kLowestView);
   std::string body = normal;
   body +=
       "    vector frame_t, frame_b;\n"
@@ -456,15 +460,15 @@ Shader write_shader(const Model& model, RepresentationKind kind, const measure::
     }
     body += aimed ? block(statements.print(0), 1) : statements.print(4);
     for (std::size_t c = 0; c < kinds.size(); ++c)
-      if (kinds[c].division != Division::Done) {
+      if (kinds[c].division != forms::Division::Done) {
         const std::string weight = fmt::format("weight_{}", c);
         body += fmt::format(
             "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
-            kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
+            kinds[c].division == forms::Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
-    if (is_fit(kind) || (aimed && base == AimedBase::Fitted))
-      for (const std::string& name : factors(model, fixed)) {
+    if (forms::is_fit(kind) || (aimed && base == forms::AimedBase::Fitted))
+      for (const std::string& name : fit::factors(model, fixed)) {
         if (fixed.count(name)) continue;
         for (std::size_t c = 0; c < kinds.size(); ++c)
           if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
@@ -560,4 +564,4 @@ Shader write_shader(const Model& model, RepresentationKind kind, const measure::
   return shader;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "forms/aimed.h"
+#include "forms/representation.h"
 #include "measure/albedo_table.h"
-#include "represent/aimed.h"
-#include "represent/representation.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 
 struct Shader {
   std::string name;       ///< of the shader and, with .osl, of its file
@@ -29,8 +29,9 @@ struct Shader {
 /// output, in a shader of its own where its text is longer than kMaxAlbedoText. An aimed form has parameters for
 /// `max_lamps` lamps, and the base of this kind. The form is right for these `views`. Throws InputError if the closures
 /// would exceed what Cycles keeps or the table what an array holds.
-Shader write_shader(const Model&, RepresentationKind, const measure::AlbedoTable& table, const ParamValues& given = {},
-                    const Cosines& views = {}, int max_lamps = kMaxLamps, AimedBase base = AimedBase::Declared);
+Shader write_shader(const Model&, forms::RepresentationKind, const measure::AlbedoTable& table,
+                    const ParamValues& given = {}, const Cosines& views = {}, int max_lamps = forms::kMaxLamps,
+                    forms::AimedBase base = forms::AimedBase::Declared);
 
 /// Characters of tables that a shader holds for an output that most materials leave unlinked.
 inline constexpr std::size_t kMaxAlbedoText = 4096;
@@ -38,4 +39,4 @@ inline constexpr std::size_t kMaxAlbedoText = 4096;
 /// Numbers in one OSL array; more compile slowly.
 inline constexpr std::size_t kMaxArray = 32768;
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

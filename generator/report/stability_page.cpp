@@ -14,8 +14,9 @@
 
 #include "core/parallel.h"
 #include "measure/probes.h"
+#include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::report {
 namespace {
 
 constexpr int kWidth = 240, kHeight = 160, kScale = 2;
@@ -246,4 +247,4 @@ void write_stability_page(const std::string& dir) {
   if (!out) throw InputError(fmt::format("{}: expected a place that can be written", path));
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

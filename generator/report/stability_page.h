@@ -4,9 +4,9 @@
 
 #include <string>
 
-namespace brdfc {
+namespace brdfc::report {
 
 /// Writes DIR/index.html and its pictures. Throws InputError naming the path that can't be written.
 void write_stability_page(const std::string& dir);
 
-}  // namespace brdfc
+}  // namespace brdfc::report

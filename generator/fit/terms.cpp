@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/terms.h"
+#include "fit/terms.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include "measure/probes.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 namespace {
 
 using Powers = std::vector<int>;  ///< of each parameter
@@ -312,4 +312,4 @@ template <class T> std::vector<Rgb<T>> Terms::weights(const std::map<std::string
 template std::vector<Rgb<double>> Terms::weights(const std::map<std::string, Rgb<double>>&) const;
 template std::vector<Rgb<Expr>> Terms::weights(const std::map<std::string, Rgb<Expr>>&) const;
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/base.h"
+#include "forms/base.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/sequence.h"
+#include "forms/aimed.h"
 #include "measure/bound_model.h"
-#include "represent/aimed.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 namespace {
 
 double mean(const Rgb<double>& c) { return (c.r + c.g + c.b) / 3; }
@@ -80,4 +80,4 @@ BaseWorth base_worth(const measure::BoundModel& bound, const Vec3<double>& wo, i
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::forms

@@ -5,7 +5,7 @@
 
 #include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 
 /// One view. Variances are those of one drawn direction, in squares of the albedo; channels are averaged.
 struct BaseWorth {
@@ -23,4 +23,4 @@ struct BaseWorth {
 /// negative.
 BaseWorth base_worth(const measure::BoundModel&, const Vec3<double>& wo, int points);
 
-}  // namespace brdfc
+}  // namespace brdfc::forms

@@ -24,13 +24,14 @@
 
 #include "closures/closure.h"
 #include "core/cosines.h"
+#include "fit/terms.h"
+#include "fit/view.h"
 #include "measure/albedo_table.h"
 #include "model/model.h"
-#include "represent/terms.h"
-#include "represent/view.h"
 #include "tables/table.h"
+#include "trace/expr.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 
 /// The number that a fit runs over, from one end of its slider to the other.
 struct FitAxis {
@@ -193,4 +194,4 @@ extern template ClosureSum<Expr> Fit::closures(const Vec3<Expr>&, const Varied<E
 extern template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const Varied<double>&) const;
 extern template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Varied<Expr>&) const;
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

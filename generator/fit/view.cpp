@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/view.h"
+#include "fit/view.h"
 
 #include <algorithm>
 #include <nlopt.hpp>
@@ -11,7 +11,7 @@
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 namespace {
 
 using Eigen::MatrixXd;
@@ -290,4 +290,4 @@ bool turns(const Brdf<double>& brdf) {
   return false;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

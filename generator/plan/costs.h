@@ -8,9 +8,10 @@
 #include <string>
 #include <utility>
 
-#include "represent/representation.h"
+#include "forms/representation.h"
+#include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::plan {
 
 /// CPU time of forms with their model's default parameters, sampled ones with one direction, at equal samples and in
 /// units of Blender's Glossy node.
@@ -22,10 +23,10 @@ class Costs {
   /// file, line, column and what was expected.
   explicit Costs(const std::filesystem::path&);
 
-  std::optional<double> of(const Model&, RepresentationKind) const;
+  std::optional<double> of(const Model&, forms::RepresentationKind) const;
 
  private:
   std::map<std::pair<std::string, std::string>, double> costs_;  // by model and form
 };
 
-}  // namespace brdfc
+}  // namespace brdfc::plan

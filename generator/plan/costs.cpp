@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pack/costs.h"
+#include "plan/costs.h"
 
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 
-namespace brdfc {
+#include "core/error.h"
+
+namespace brdfc::plan {
 namespace {
+
+using forms::RepresentationKind;
 
 /// The unit of cost has a row of its own beside the forms of a model.
 constexpr const char* kUnit = "glossy";
@@ -30,7 +34,7 @@ Costs::Costs(const std::filesystem::path& path) {
     const std::string where = fmt::format("{}: line {}", path.string(), number);
     if (model.empty()) input_error("{}: model: expected a name, got none", where);
     try {
-      if (form != kUnit) representation_named(form);
+      if (form != kUnit) forms::representation_named(form);
     } catch (const InputError& e) {
       input_error("{}: form: {}", where, e.what());
     }
@@ -49,4 +53,4 @@ std::optional<double> Costs::of(const Model& model, RepresentationKind kind) con
   return it == costs_.end() ? std::nullopt : std::optional(it->second);
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::plan

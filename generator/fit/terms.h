@@ -13,8 +13,9 @@
 #include <vector>
 
 #include "model/model.h"
+#include "trace/expr.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 
 /// Parameters that f is proportional to, the other parameters being as they are: colours, and numbers that may be 1.
 /// Closures are fitted without them, and take them as factors of their weights, so they need not be known. Those that
@@ -56,4 +57,4 @@ Terms terms_of(const Model&, const ParamValues& known);
 extern template std::vector<Rgb<double>> Terms::weights(const std::map<std::string, Rgb<double>>&) const;
 extern template std::vector<Rgb<Expr>> Terms::weights(const std::map<std::string, Rgb<Expr>>&) const;
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/csv.h"
+#include "core/csv.h"
 
 #include <charconv>
 #include <cmath>
-#include <iostream>
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::inline core {
 namespace {
 
 std::string trim(const std::string& s) {
@@ -26,12 +25,6 @@ std::vector<std::string> split(const std::string& line) {
   }
 }
 
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& n : names) text += (text.empty() ? "" : ",") + n;
-  return text;
-}
-
 }  // namespace
 
 CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::string> columns)
@@ -46,7 +39,7 @@ CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::stri
     std::size_t i = 0;
     while (i < header.size() && header[i] != c) ++i;
     if (i == header.size())
-      input_error("{}: expected a header with the columns {}; '{}' is missing", where(), join(columns_), c);
+      input_error("{}: expected a header with the columns {}; '{}' is missing", where(), fmt::join(columns_, ","), c);
     where_.push_back(i);
   }
 }
@@ -111,18 +104,4 @@ void CsvWriter::finish() {
   if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
 }
 
-void print_f_cos(const std::function<Rgb<double>(const Vec3<double>& wi, const Vec3<double>& wo)>& f_cos) {
-  CsvReader in(std::cin, "stdin", {"wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"});
-  if (in.empty()) input_error("stdin: expected a CSV table with the header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z");
-  CsvWriter out("f_cos_r,f_cos_g,f_cos_b");
-  std::vector<double> row;
-  while (in.next(row)) {
-    const Vec3<double> wi = in.unit_vector(row, 0), wo = in.unit_vector(row, 3);
-    if (!(wi.z > 0 && wo.z > 0)) input_error("{}: expected directions above the surface", in.where());
-    const Rgb<double> f = f_cos(wi, wo);
-    out.row({f.r, f.g, f.b});
-  }
-  out.finish();
-}
-
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "represent/view.h"
+#include "fit/view.h"
 #include "tables/table.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 
 /// Cosines of the view, evenly spaced from 0 to 1, at which a twin is given. A curve node of Blender is a table of 256
 /// values, linear between: every fifth is a knot.
@@ -59,4 +59,4 @@ class Twin {
 /// The twin for these values, made at first use and kept while the program runs.
 const Twin& twin_of(const Model&, const ParamValues& values);
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/representation.h"
+#include "forms/representation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,17 +8,20 @@
 #include <set>
 
 #include "core/sequence.h"
+#include "fit/fit.h"
+#include "fit/terms.h"
+#include "fit/twin.h"
+#include "fit/view.h"
+#include "forms/aimed.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
 #include "model/horizon.h"
 #include "model/inputs.h"
 #include "model/sampling.h"
 #include "print/osl_program.h"
-#include "represent/aimed.h"
-#include "represent/fit.h"
-#include "represent/twin.h"
+#include "trace/program.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 namespace {
 
 /// What a shader has for parameters: statements may not declare them, not even those that they do not read.
@@ -56,8 +59,8 @@ ClosureSum<Expr> with_mirror(const Model& model, const Brdf<Expr>& brdf, Closure
 }
 
 /// What the closures of a fit vary by: inputs, but for what is fixed.
-Varied<Expr> recorded_varied(const Model& model, const Fit& fit, const ParamValues& fixed) {
-  Varied<Expr> out;
+fit::Varied<Expr> recorded_varied(const Model& model, const fit::Fit& fit, const ParamValues& fixed) {
+  fit::Varied<Expr> out;
   if (fit.axis()) out.number = Expr::input(fit.axis()->parameter);
   for (const std::string& name : fit.terms().parameters) {
     const auto it = fixed.find(name);
@@ -65,19 +68,20 @@ Varied<Expr> recorded_varied(const Model& model, const Fit& fit, const ParamValu
       const bool grey = model.info().param(name)->kind == ParamKind::Number;
       out.parameters[name] = grey ? Rgb<Expr>(Expr::input(name)) : Rgb<Expr>::input(name);
     } else {
-      const Rgb<double> c = as_rgb(it->second);
+      const Rgb<double> c = fit::as_rgb(it->second);
       out.parameters[name] = {c.r, c.g, c.b};
     }
   }
   return out;
 }
 
-Division division_of(const Fit& fit) {
+Division division_of(const fit::Fit& fit) {
   return fit.terms().parameters.empty() ? Division::ByLargest : Division::ByChannel;
 }
 
-ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const Fit& fit, const ParamValues& fixed) {
-  const Varied<Expr> varied = recorded_varied(model, fit, fixed);
+ClosureSum<Expr> recorded_fit(const Model& model, const Brdf<Expr>& brdf, const fit::Fit& fit,
+                              const ParamValues& fixed) {
+  const fit::Varied<Expr> varied = recorded_varied(model, fit, fixed);
   return with_mirror(model, brdf, fit.closures(recorded_wo(model, brdf), varied, Expr(1), false));
 }
 
@@ -156,7 +160,8 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
 }
 
 /// The base of an aimed form; none for what lies on both sides of the surface.
-ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf, const Fit* fit, const ParamValues& fixed) {
+ClosureSum<Expr> recorded_base(const Model& model, const Brdf<Expr>& brdf, const fit::Fit* fit,
+                               const ParamValues& fixed) {
   const Vec3<Expr> wo = recorded_wo(model, brdf);
   if (fit) return fit->closures(wo, recorded_varied(model, *fit, fixed), Expr(1), false);
   return measure::two_sided(model, brdf) ? ClosureSum<Expr>() : brdf.base(wo);
@@ -179,12 +184,12 @@ void require_finite(const Model& model, const ParamValues& values, const Vec3<do
 }
 
 /// Fits are in double precision; what single precision adds is rounding.
-RepresentationError fitted_error(const std::vector<ViewError>& errors, const std::string& what,
-                                 const std::optional<FitAxis>& axis = {}) {
+RepresentationError fitted_error(const std::vector<fit::ViewError>& errors, const std::string& what,
+                                 const std::optional<fit::FitAxis>& axis = {}) {
   RepresentationError out;
   double sum1 = 0, sum2 = 0;
-  ViewError worst;
-  for (const ViewError& e : errors) {
+  fit::ViewError worst;
+  for (const fit::ViewError& e : errors) {
     sum1 += e.relative_l1 / double(errors.size());
     sum2 += e.relative_l2 / double(errors.size());
     out.albedo = std::max(out.albedo, e.albedo);
@@ -221,8 +226,8 @@ ParamValues fit_values(const Model& model, const ParamValues& fixed) {
   ParamValues known = fixed;
   for (const ParamInfo& p : info.params)
     if (p.kind == ParamKind::Choice) known.insert(*defaults.find(p.name));
-  const std::set<std::string> free = factors(model, known);
-  const Terms terms = terms_of(model, known);
+  const std::set<std::string> free = fit::factors(model, known);
+  const fit::Terms terms = fit::terms_of(model, known);
   std::vector<const ParamInfo*> open;
   for (const ParamInfo& p : info.params)
     if (!known.count(p.name) && !free.count(p.name) && !terms.has(p.name)) open.push_back(&p);
@@ -306,7 +311,7 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
     if (!sum) input_error("{}: has no exact representation", model.info().name);
     output_closures(*sum, program, closures);
   } else if (kind == RepresentationKind::Fitted) {
-    const Fit fit = fit_of(model, without_factors(model, fixed), views);
+    const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, fixed), views);
     output_closures(recorded_fit(model, *brdf, fit, fixed), program, closures, division_of(fit));
   } else {
     output_sampled(model, *brdf, program);
@@ -330,8 +335,8 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     return w;
   };
   AimedRecording out;
-  std::optional<Fit> fit;
-  if (from == AimedBase::Fitted) fit = fit_of(model, without_factors(model, fixed), views);
+  std::optional<fit::Fit> fit;
+  if (from == AimedBase::Fitted) fit = fit::fit_of(model, fit::without_factors(model, fixed), views);
   const ClosureSum<Expr> base = recorded_base(model, *brdf, fit ? &*fit : nullptr, fixed);
   {
     Program program;
@@ -440,11 +445,11 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,
                                   const Cosines& views) {
   if (kind == RepresentationKind::Fitted) {
-    const Fit fit = fit_of(model, without_factors(model, fixed), views);
+    const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, fixed), views);
     return fitted_error(fit.errors(), "closures", fit.axis());
   }
   if (kind == RepresentationKind::Twin)
-    return fitted_error(twin_of(model, without_factors(model, fixed)).errors(), "Blender's nodes");
+    return fitted_error(fit::twin_of(model, fit::without_factors(model, fixed)).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   std::mt19937_64 rng(20260101);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -529,4 +534,4 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
   return {std::nullopt, std::nullopt, albedo_error, "equals the model in expectation, with the noise of sampling it"};
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::forms

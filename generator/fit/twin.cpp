@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/twin.h"
+#include "fit/twin.h"
 
 #include <algorithm>
 #include <limits>
 
 #include "core/parallel.h"
+#include "fit/fit.h"
 #include "measure/bound_model.h"
-#include "represent/fit.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 namespace {
 
 using Eigen::MatrixXd;
@@ -244,4 +244,4 @@ ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {
 
 const Twin& twin_of(const Model& model, const ParamValues& values) { return made_once<Twin>(model, values); }
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/aimed.h"
+#include "forms/aimed.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 
 AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
                    const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
@@ -39,4 +39,4 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::forms

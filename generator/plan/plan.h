@@ -7,12 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "measure/albedo_table.h"
-#include "pack/costs.h"
-#include "represent/aimed.h"
-#include "represent/representation.h"
+#include "core/cosines.h"
+#include "forms/aimed.h"
+#include "forms/representation.h"
+#include "model/model.h"
+#include "plan/costs.h"
 
-namespace brdfc {
+namespace brdfc::plan {
 
 /// A material as a scene uses it.
 struct MaterialNeed {
@@ -26,7 +27,7 @@ struct MaterialNeed {
 
 /// Why a form of a model is in a pack, or is not.
 struct FormChoice {
-  RepresentationKind form;
+  forms::RepresentationKind form;
   bool taken = false;
   bool exists = true;          ///< for these materials
   std::optional<double> cost;  ///< as Costs has it
@@ -38,18 +39,18 @@ struct FormChoice {
 /// What a budget makes of the form of a material.
 struct FormChange {
   std::string id;
-  RepresentationKind before, after;               ///< without a budget, as in a pack of everything; and with it
+  forms::RepresentationKind before, after;        ///< without a budget, as in a pack of everything; and with it
   std::optional<double> cost_before, cost_after;  ///< none where they were not measured
 };
 
 /// What a pack holds of one model.
 struct PlannedModel {
   const Model* model = nullptr;
-  std::vector<std::string> materials;      ///< that need it; none in a pack of everything
-  ParamValues fixed;                       ///< folded into shaders and tables: no sockets
-  std::vector<RepresentationKind> forms;   ///< preferred first
-  int max_lamps = kMaxLamps;               ///< that aimed forms can be told of
-  AimedBase base = AimedBase::Declared;    ///< of an aimed form
+  std::vector<std::string> materials;                  ///< that need it; none in a pack of everything
+  ParamValues fixed;                                   ///< folded into shaders and tables: no sockets
+  std::vector<forms::RepresentationKind> forms;        ///< preferred first
+  int max_lamps = forms::kMaxLamps;                    ///< that aimed forms can be told of
+  forms::AimedBase base = forms::AimedBase::Declared;  ///< of an aimed form
   Cosines views;                           ///< that one of the materials can be seen from; tables have no others
   std::vector<FormChoice> choices;         ///< every form, where materials were planned for
   std::vector<FormChange> material_forms;  ///< of `materials`
@@ -81,10 +82,4 @@ struct Budget {
 /// The first is taken that keeps the time, or where none does the one of the least cost that is known.
 std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>&, const Budget& = {});
 
-/// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and
-/// colours, terms over the same axes added up, and empty for combinations of choices that are ruled out. Of the knots
-/// over the view those that these `views` lie between.
-measure::AlbedoTable fold(const measure::AlbedoTable&, const Model&, const ParamValues& fixed,
-                          const Cosines& views = {});
-
-}  // namespace brdfc
+}  // namespace brdfc::plan

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CSV with a header, in and out, for the commands that work on tables.
+// CSV with a header, in and out.
 #pragma once
 
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <functional>
 #include <istream>
 #include <string>
 #include <vector>
 
 #include "core/vec.h"
 
-namespace brdfc {
+namespace brdfc::inline core {
 
 /// Numbers in named columns. Columns may come in any order; others than those asked for are ignored, so that the
 /// output of one command can be the input of the next. Every error is an InputError naming line, column and what
@@ -55,8 +54,4 @@ class CsvWriter {
   std::string text_;
 };
 
-/// Reads direction pairs above the surface, wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, from stdin and prints
-/// f_cos_r,f_cos_g,f_cos_b.
-void print_f_cos(const std::function<Rgb<double>(const Vec3<double>& wi, const Vec3<double>& wo)>& f_cos);
-
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -9,7 +9,7 @@
 #include "core/cosines.h"
 #include "model/choices.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 
 enum class RepresentationKind {
   Exact,    ///< closures that equal the model
@@ -105,4 +105,4 @@ struct RepresentationError {
 RepresentationError measure_error(const Model&, RepresentationKind, const ParamValues& fixed = {},
                                   const Cosines& views = {});
 
-}  // namespace brdfc
+}  // namespace brdfc::forms

@@ -14,7 +14,7 @@
 #include "closures/closure.h"
 #include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 
 /// Directions above the surface with the solid angle that each stands for.
 struct Points {
@@ -110,4 +110,4 @@ template <class Form> const Form& made_once(const Model& model, const ParamValue
 /// Whether f changes when both directions turn about the normal.
 bool turns(const Brdf<double>&);
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

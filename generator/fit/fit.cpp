@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "represent/fit.h"
+#include "fit/fit.h"
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@
 #include "model/sampling.h"
 #include "tables/table_file.h"
 
-namespace brdfc {
+namespace brdfc::fit {
 namespace {
 
 using Eigen::MatrixXd;
@@ -848,7 +848,7 @@ std::vector<std::shared_ptr<const Table>> Fit::tables() const {
 }
 
 Fit Fit::seen(const Cosines& views) const {
-  const auto knot = [](double cosine) { return brdfc::place(direction(cosine, 0)) * (kViews - 1); };
+  const auto knot = [](double cosine) { return fit::place(direction(cosine, 0)) * (kViews - 1); };
   Fit out = *this;
   const int first = std::min(int(std::floor(knot(views.high))), kViews - 2),
             last = std::clamp(int(std::ceil(knot(views.low))), first + 1, kViews - 1);
@@ -1044,7 +1044,7 @@ double Fit::l1_at(const View& view, double number) const {
 template <class T> std::vector<T> Fit::place(const Vec3<T>& wo, const T& number) const {
   std::vector<T> at;
   if (axis_) at.push_back(named("place_on_axis", lookup(position_, std::vector<T>{axis_->place(number)})));
-  at.push_back(named("place", brdfc::place(wo, first_view_, views_)));
+  at.push_back(named("place", fit::place(wo, first_view_, views_)));
   return at;
 }
 
@@ -1214,4 +1214,4 @@ Fit fit_of(const Model& model, const ParamValues& values, const Cosines& views) 
   return views.all() ? whole : whole.seen(views);
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::fit

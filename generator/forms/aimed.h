@@ -21,7 +21,7 @@
 #include "closures/closure.h"
 #include "model/sampling.h"
 
-namespace brdfc {
+namespace brdfc::forms {
 
 /// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample;
 /// empty ones cost nothing.
@@ -287,4 +287,4 @@ struct AimedSum {
 AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
                    const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 2>>& v);
 
-}  // namespace brdfc
+}  // namespace brdfc::forms

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pack/plan.h"
+#include "plan/plan.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "pack/shader.h"
-#include "represent/fit.h"
+#include "core/error.h"
+#include "fit/fit.h"
+#include "fit/terms.h"
 
-namespace brdfc {
+namespace brdfc::plan {
 namespace {
+
+using forms::RepresentationKind;
 
 std::string value_text(const ModelInfo& info, const std::string& name, const ParamValue& value) {
   return format_values(info, {{name, value}});
@@ -44,17 +47,17 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
   // What it lacks at any values comes before what the values are.
-  if (!model.has_scatter()) return unfit(model, fixed);
+  if (!model.has_scatter()) return fit::unfit(model, fixed);
   std::optional<std::string> axis;
-  const std::set<std::string> may_vary = factors(model, fixed);
-  const Terms terms = kind == RepresentationKind::Twin ? Terms{} : terms_of(model, fixed);
+  const std::set<std::string> may_vary = fit::factors(model, fixed);
+  const fit::Terms terms = kind == RepresentationKind::Twin ? fit::Terms{} : fit::terms_of(model, fixed);
   for (const ParamInfo& p : model.info().params) {
     if (fixed.count(p.name) || may_vary.count(p.name) || terms.has(p.name)) continue;
     const std::string how = how_it_varies(p.name, needs);
     if (p.kind != ParamKind::Number || kind == RepresentationKind::Twin) return how;
     if (axis) return fmt::format("{}; {}", *axis, how);
     axis = how;
-    const FitAxis range = fit_axis(p);
+    const fit::FitAxis range = fit::fit_axis(p);
     for (const MaterialNeed* need : needs) {
       const double value = std::get<double>(need->values.at(p.name));
       if (!need->textured.count(p.name) && (value < range.low || value > range.high))
@@ -62,7 +65,7 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
                            range.high);
     }
   }
-  return unfit(model, without_factors(model, fixed));
+  return fit::unfit(model, fit::without_factors(model, fixed));
 }
 
 /// What one of the materials can be seen from.
@@ -75,7 +78,7 @@ Cosines views_of(const Needs& needs) {
 /// Of the material that is off by most. The mean along an axis says little of a material at one end of it.
 double fitted_error(const Needs& needs) {
   const Model& model = *needs.front()->model;
-  const Fit fit = fit_of(model, without_factors(model, constants(needs)), views_of(needs));
+  const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, constants(needs)), views_of(needs));
   double worst = 0;
   for (const MaterialNeed* need : needs) {
     std::optional<double> number;
@@ -92,7 +95,7 @@ bool fits(const Needs& needs, const Budget& budget) {
 
 /// A form may exist for some choices only: the one that a material would need; empty if it has all.
 std::string lacking(const MaterialNeed& need, RepresentationKind kind) {
-  for (const auto& [name, value] : form_values(*need.model, kind))
+  for (const auto& [name, value] : forms::form_values(*need.model, kind))
     if (need.values.at(name) != value) return value_text(need.model->info(), name, value);
   return {};
 }
@@ -137,7 +140,7 @@ std::vector<RepresentationKind> aimed_or_fitted(const Needs& needs, const Budget
 }
 
 /// That an aimed form has for the lamps there are.
-int lamp_slots(const Budget& budget) { return std::min(budget.lamps.value_or(kMaxLamps), kMaxLamps); }
+int lamp_slots(const Budget& budget) { return std::min(budget.lamps.value_or(forms::kMaxLamps), forms::kMaxLamps); }
 
 /// What lamps without a size make of an aimed form.
 std::string under_aimed(const Budget& budget) {
@@ -161,11 +164,11 @@ std::string under_lamps(RepresentationKind kind, const Budget& budget) {
 }
 
 Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& budget) {
-  const std::vector<RepresentationKind> known = representations(*need.model);
+  const std::vector<RepresentationKind> known = forms::representations(*need.model);
   if (need.representation == "auto") {
     std::vector<RepresentationKind> order;
     for (RepresentationKind kind : known) {
-      if (is_fit(kind) || !lacking(need, kind).empty()) continue;
+      if (forms::is_fit(kind) || !lacking(need, kind).empty()) continue;
       // Nothing has to be fitted for a material that has what comes first.
       if (!order.empty() && over_time(needs, order.front(), budget).empty()) break;
       if (kind == RepresentationKind::Aimed)
@@ -175,8 +178,8 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
     }
     return within_time(needs, order, budget);
   }
-  const RepresentationKind kind = representation_named(need.representation);
-  if (is_fit(kind)) {
+  const RepresentationKind kind = forms::representation_named(need.representation);
+  if (forms::is_fit(kind)) {
     if (const auto reason = unfit(needs, kind))
       input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
                   *reason);
@@ -194,7 +197,7 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
 std::string why_not(RepresentationKind kind, const Needs& needs, const std::vector<Chosen>& chosen,
                     const Budget& budget) {
   const bool fitted = kind == RepresentationKind::Fitted;
-  if (is_fit(kind) && !fitted) return "only where it is asked for";
+  if (forms::is_fit(kind) && !fitted) return "only where it is asked for";
   if (fitted && !budget.error && !budget.time) return "nothing is fitted unasked";
   // A fit is of whatever choices the materials have.
   const auto open = std::find_if(needs.begin(), needs.end(), [&](const MaterialNeed* need) {
@@ -251,8 +254,8 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
     if (choice.taken) choice.why += under_lamps(kind, budget);
     choices.push_back(std::move(choice));
   };
-  for (const RepresentationKind kind : representations(model)) {
-    if (is_fit(kind)) continue;
+  for (const RepresentationKind kind : forms::representations(model)) {
+    if (forms::is_fit(kind)) continue;
     std::optional<std::string> missing;
     if (std::all_of(needs.begin(), needs.end(), [&](const auto* need) { return !lacking(*need, kind).empty(); }))
       missing = "only for " + lacking(*needs.front(), kind);
@@ -293,14 +296,14 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   // A fit that an error was asked about is there anyway. Its costs were not measured, so that a time leaves it out.
   const bool aimed = std::find(plan.forms.begin(), plan.forms.end(), RepresentationKind::Aimed) != plan.forms.end();
   if (aimed && (budget.fit_bases || budget.error) && !budget.time && !unfit(needs, RepresentationKind::Fitted))
-    plan.base = AimedBase::Fitted;
+    plan.base = forms::AimedBase::Fitted;
   for (FormChoice& choice : plan.choices)
-    if (choice.form == RepresentationKind::Aimed && plan.base == AimedBase::Fitted) {
+    if (choice.form == RepresentationKind::Aimed && plan.base == forms::AimedBase::Fitted) {
       choice.why += "; closures fitted to it are its base";
       choice.cost = std::nullopt;
     }
   plan.max_lamps = lamp_slots(budget);
-  if (aimed && plan.max_lamps < kMaxLamps)
+  if (aimed && plan.max_lamps < forms::kMaxLamps)
     plan.reasons.push_back(plan.max_lamps == 0
                                ? std::string("slots for lamps: the scene has none")
                                : fmt::format("slots for lamps beyond {}: the scene has no more", plan.max_lamps));
@@ -320,84 +323,6 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   return plan;
 }
 
-/// The knots over the view that `views` lie between, as lookup() takes them.
-measure::AlbedoGrid seen(const measure::AlbedoGrid& grid, const Cosines& views) {
-  measure::AlbedoGrid out = grid;
-  if (grid.axes.empty() || grid.axes[0].name != "cos_theta_o") return out;
-  const std::vector<double>& knots = grid.axes[0].values;
-  const auto last_knot = std::ptrdiff_t(knots.size()) - 1;
-  const auto first =
-      std::clamp(std::ranges::upper_bound(knots, views.low) - knots.begin() - 1, std::ptrdiff_t(0), last_knot - 1);
-  const auto last = std::clamp(std::ranges::lower_bound(knots, views.high) - knots.begin(), first + 1, last_knot);
-  const auto row = std::ptrdiff_t(grid.values.size() / knots.size());
-  out.axes[0].values.assign(knots.begin() + first, knots.begin() + last + 1);
-  out.values.assign(grid.values.begin() + first * row, grid.values.begin() + (last + 1) * row);
-  return out;
-}
-
-/// The grid at fixed coordinates: linear between two knots of the axis' scale, as lookup() does.
-measure::AlbedoGrid sliced(const measure::AlbedoGrid& grid, const ParamValues& fixed) {
-  measure::AlbedoGrid out;
-  out.channels = grid.channels;
-  out.error = grid.error;
-  for (const measure::TableAxis& axis : grid.axes)
-    if (!fixed.count(axis.name)) out.axes.push_back(axis);
-  std::vector<std::size_t> index(out.axes.size(), 0);
-  for (bool more = true; more;) {
-    std::vector<double> x;
-    std::size_t kept = 0;
-    for (const measure::TableAxis& axis : grid.axes) {
-      const auto it = fixed.find(axis.name);
-      x.push_back(it == fixed.end() ? axis.values[index[kept]] : std::get<double>(it->second));
-      if (it == fixed.end()) ++kept;
-    }
-    const Rgb<double> v = lookup(grid, x);
-    out.values.push_back(float(v.r));
-    if (grid.channels == 3) {
-      out.values.push_back(float(v.g));
-      out.values.push_back(float(v.b));
-    }
-    more = false;
-    for (std::size_t a = out.axes.size(); a-- > 0 && !more;) {
-      more = ++index[a] < out.axes[a].values.size();
-      if (!more) index[a] = 0;
-    }
-  }
-  return out;
-}
-
-void multiply(measure::AlbedoGrid& grid, const std::array<double, 3>& color) {
-  if (grid.channels == 1 && color[0] == color[1] && color[1] == color[2]) {
-    for (float& v : grid.values) v = float(v * color[0]);
-    return;
-  }
-  std::vector<float> values;
-  const std::size_t step = std::size_t(grid.channels);
-  for (std::size_t i = 0; i < grid.values.size(); i += step)
-    for (std::size_t c = 0; c < 3; ++c) values.push_back(float(grid.values[i + (step == 1 ? 0 : c)] * color[c]));
-  grid.channels = 3;
-  grid.values = std::move(values);
-}
-
-bool same_axes(const measure::AlbedoGrid& a, const measure::AlbedoGrid& b) {
-  return std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(),
-                    [](const measure::TableAxis& p, const measure::TableAxis& q) {
-                      return p.name == q.name && p.scale == q.scale && p.values == q.values;
-                    });
-}
-
-void add(measure::AlbedoGrid& sum, measure::AlbedoGrid other) {
-  if (sum.channels != other.channels) {
-    measure::AlbedoGrid& grey = sum.channels == 1 ? sum : other;
-    std::vector<float> values;
-    for (const float v : grey.values) values.insert(values.end(), 3, v);
-    grey.channels = 3;
-    grey.values = std::move(values);
-  }
-  for (std::size_t i = 0; i < sum.values.size(); ++i) sum.values[i] += other.values[i];
-  sum.error += other.error;
-}
-
 }  // namespace
 
 std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
@@ -405,7 +330,7 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
   const auto add_model = [&](const Model& m) {
     PlannedModel p;
     p.model = &m;
-    p.forms = representations(m);
+    p.forms = forms::representations(m);
     plan.push_back(p);
   };
   if (names.empty())
@@ -426,50 +351,4 @@ std::vector<PlannedModel> plan_scene(const std::vector<MaterialNeed>& needs, con
   return plan;
 }
 
-measure::AlbedoTable fold(const measure::AlbedoTable& table, const Model& model, const ParamValues& fixed,
-                          const Cosines& views) {
-  if (fixed.empty() && views.all()) return table;
-  measure::AlbedoTable out = table;
-  out.grids.clear();
-  const std::vector<Choices> combinations = choice_combinations(model.info());
-  for (std::size_t i = 0; i < combinations.size(); ++i) {
-    std::vector<measure::AlbedoTerm> terms;
-    if (admits(model.info(), combinations[i], fixed)) {
-      // Terms with the same free colours over the same axes are one.
-      std::vector<std::pair<measure::AlbedoTerm, measure::AlbedoGrid>> parts;
-      for (const measure::AlbedoTerm& t : table.terms.at(i)) {
-        measure::AlbedoTerm term = t;
-        measure::AlbedoGrid grid = sliced(seen(table.grids.at(std::size_t(t.grid)), views), fixed);
-        term.colors.clear();
-        for (const std::string& c : t.colors) {
-          const auto it = fixed.find(c);
-          if (it == fixed.end())
-            term.colors.push_back(c);
-          else
-            multiply(grid, std::get<std::array<double, 3>>(it->second));
-        }
-        const auto like = std::find_if(parts.begin(), parts.end(), [&](const auto& p) {
-          return p.first.colors == term.colors && p.first.mirror == term.mirror && same_axes(p.second, grid);
-        });
-        if (like == parts.end())
-          parts.emplace_back(term, std::move(grid));
-        else
-          add(like->second, std::move(grid));
-      }
-      for (auto& [term, grid] : parts) {
-        if (std::all_of(grid.values.begin(), grid.values.end(), [](float v) { return v == 0; })) continue;
-        const auto known =
-            std::find_if(out.grids.begin(), out.grids.end(), [&, &g = grid](const measure::AlbedoGrid& k) {
-              return k.channels == g.channels && k.values == g.values && same_axes(k, g);
-            });
-        term.grid = int(known - out.grids.begin());
-        if (known == out.grids.end()) out.grids.push_back(std::move(grid));
-        terms.push_back(term);
-      }
-    }
-    out.terms[i] = std::move(terms);
-  }
-  return out;
-}
-
-}  // namespace brdfc
+}  // namespace brdfc::plan
