@@ -73,7 +73,7 @@ def test_data_elsewhere_are_named_by_the_environment(installed, own, tmp_path):
 
 
 def test_a_table_that_is_not_stored_is_made_and_said(installed, own, tmp_path):
-    (table,) = (own / "albedos").glob("lambert_*.exr")
+    (table,) = (own / "data" / "albedos").glob("lambert_*.exr")
     table.unlink()
     program = installed / "bin" / "brdfc"
     done = run(program, "build", "--model", "lambert", "--out", tmp_path, BRDFC_DATA=str(own))
@@ -82,7 +82,7 @@ def test_a_table_that_is_not_stored_is_made_and_said(installed, own, tmp_path):
 
 
 def test_a_fit_that_is_not_stored_is_announced_before_it_is_made(installed, own):
-    shutil.rmtree(own / "fits")
+    shutil.rmtree(own / "data" / "fits")
     command = [installed / "bin" / "brdfc", "fit", "phong", "--over", "e"]
     environment = ENVIRONMENT | {"BRDFC_DATA": str(own)}
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:

@@ -39,7 +39,7 @@ void add_albedo_command(CLI::App& app) {
   cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
   cmd->add_flag("--store", o->store,
                 "Instead makes the table of all parameters anew that packs are built of, and keeps it in\n"
-                "generator/albedos, in place of what is kept of the model")
+                "data/albedos, in place of what is kept of the model")
       ->excludes("values", "--count", "--phi");
   cmd->callback([o] {
     const Model& model = find_model(o->model);

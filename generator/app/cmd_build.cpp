@@ -198,7 +198,7 @@ void run(const Options& options) {
                                       {"--twin", options.twin}})
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
   const std::filesystem::path addon =
-      options.addon.empty() ? data_dir("blender_addon") : std::filesystem::path(options.addon);
+      options.addon.empty() ? data_dir() / "blender_addon" : std::filesystem::path(options.addon);
   const std::filesystem::path costs = addon / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
   plan::Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, plan::Costs(costs)};

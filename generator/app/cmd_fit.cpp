@@ -66,7 +66,7 @@ void add_fit_command(CLI::App& app) {
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
                 "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
   cmd->add_flag("--store", o->store,
-                "With --over: makes the fit anew and keeps it in generator/fits, in place of what is kept of the model")
+                "With --over: makes the fit anew and keeps it in data/fits, in place of what is kept of the model")
       ->needs("--over")
       ->excludes("--pairs", "--twin");
   cmd->add_option(

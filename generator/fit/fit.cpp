@@ -620,7 +620,7 @@ std::string hash_of(const Model& model, const ParamValues& values) {
 }
 
 std::filesystem::path path_of(const Model& model, const std::string& hash) {
-  return data_dir("fits") / fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
+  return data_dir() / "data" / "fits" / fmt::format("{}_{}.exr", model.info().name, hash.substr(0, 16));
 }
 
 ViewError worse(const ViewError& a, const ViewError& b) {

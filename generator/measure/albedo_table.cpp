@@ -802,7 +802,7 @@ bool has_albedo_table(const Model& model) {
 }
 
 std::filesystem::path stored_albedo(const Model& model) {
-  return data_dir("albedos") / fmt::format("{}_{}.exr", model.info().name, hash_of(model).substr(0, 16));
+  return data_dir() / "data" / "albedos" / fmt::format("{}_{}.exr", model.info().name, hash_of(model).substr(0, 16));
 }
 
 AlbedoTable albedo_table_of(const Model& model) {

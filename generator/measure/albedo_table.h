@@ -80,7 +80,7 @@ AlbedoTable tabulate_albedo(const Model&);
 /// Does a pack have the table? Delta terms alone need none: the shader adds up their weights. With few parameters they
 /// still get one, for the panel, which can't run the formula.
 bool has_albedo_table(const Model&);
-/// Where the table of a model is kept: generator/albedos/MODEL_HASH.exr, by hash of what the model computes, its
+/// Where the table of a model is kept: data/albedos/MODEL_HASH.exr, by hash of what the model computes, its
 /// parameters and the settings of tables.
 std::filesystem::path stored_albedo(const Model&);
 /// tabulate_albedo(), or what is kept of it. Throws InputError naming the file if that is damaged.
