@@ -7,7 +7,8 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TOOL = os.environ.get("BRDFC_TOOL", str(ROOT / "build" / "brdfc"))
+#: Absolute: some tests run it elsewhere.
+TOOL = str(Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve())
 MODELS = [
     m["name"]
     for m in json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)

@@ -78,7 +78,7 @@ def test_a_table_that_is_not_stored_is_made_and_said(installed, own, tmp_path):
     program = installed / "bin" / "brdfc"
     done = run(program, "build", "--model", "lambert", "--out", tmp_path, BRDFC_DATA=str(own))
     assert done.returncode == 0, done.stderr
-    assert f"no stored albedo of lambert in {own / 'albedos'}: making it" in done.stderr
+    assert f"no stored albedo of lambert in {own / 'data' / 'albedos'}: making it" in done.stderr
 
 
 def test_a_fit_that_is_not_stored_is_announced_before_it_is_made(installed, own):
@@ -91,4 +91,4 @@ def test_a_fit_that_is_not_stored_is_announced_before_it_is_made(installed, own)
         finally:
             process.kill()
     assert line.startswith("brdfc: no stored fit of phong")
-    assert f"in {own / 'fits'}: making it, which takes about a minute" in line
+    assert f"in {own / 'data' / 'fits'}: making it, which takes about a minute" in line
