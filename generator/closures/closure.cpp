@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "closures/closure.h"
 
-namespace brdfc::inline closures {
+namespace brdfc {
+inline namespace closures {
 namespace {
 
 /// Linear look-up of a ramp at a position in [0, 1]; positions outside take the end entries.
@@ -37,4 +38,5 @@ int slots(ClosureKind kind) {
   }
 }
 
-}  // namespace brdfc::inline closures
+}  // namespace closures
+}  // namespace brdfc

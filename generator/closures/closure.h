@@ -10,7 +10,8 @@
 
 #include "core/vec.h"
 
-namespace brdfc::inline closures {
+namespace brdfc {
+inline namespace closures {
 
 enum class ClosureKind {
   Diffuse,      ///< diffuse(N):             cos / pi
@@ -178,4 +179,5 @@ inline constexpr int kMaxClosures = 64;
 /// What a closure costs of those slots: a ramp needs extra storage for its colours. Measured.
 int slots(ClosureKind);
 
-}  // namespace brdfc::inline closures
+}  // namespace closures
+}  // namespace brdfc

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "closures/closure_pool.h"
 
-namespace brdfc::inline closures {
+namespace brdfc {
+inline namespace closures {
 
 int pool_bytes(ClosureKind kind) {
   // OSLClosureComponent, which is an identifier and a weight; then a pointer to a label and the parameters, filled up
@@ -27,4 +28,5 @@ int pool_bytes(ClosureKind kind) {
   throw std::logic_error("closure of unknown kind");
 }
 
-}  // namespace brdfc::inline closures
+}  // namespace closures
+}  // namespace brdfc

@@ -4,7 +4,8 @@
 
 #include "closures/closure.h"
 
-namespace brdfc::inline closures {
+namespace brdfc {
+inline namespace closures {
 
 /// On OptiX the closures of a shading point lie in a pool of 1,024 bytes, and Cycles does not check whether they fit:
 /// what is too much overwrites other data. (osl_eval_nodes() in Cycles' kernel/osl/osl.h, osl_allocate_*() and
@@ -17,4 +18,5 @@ inline constexpr int kPoolNode = 24;
 /// What a closure with its weight takes of it, in bytes.
 int pool_bytes(ClosureKind);
 
-}  // namespace brdfc::inline closures
+}  // namespace closures
+}  // namespace brdfc

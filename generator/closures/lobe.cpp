@@ -6,7 +6,8 @@
 
 #include "core/error.h"
 
-namespace brdfc::inline closures {
+namespace brdfc {
+inline namespace closures {
 namespace {
 
 constexpr std::pair<LobeKind, const char*> kNames[] = {
@@ -97,4 +98,5 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
   throw InputError("closure of unknown kind");
 }
 
-}  // namespace brdfc::inline closures
+}  // namespace closures
+}  // namespace brdfc

@@ -7,7 +7,8 @@
 
 #include "closures/closure.h"
 
-namespace brdfc::inline closures {
+namespace brdfc {
+inline namespace closures {
 
 enum class LobeKind {
   Diffuse,
@@ -43,4 +44,5 @@ struct Lobe {
 /// f cos(theta_i) with its weight; delta closures are 0. Directions above the surface.
 Rgb<double> evaluate(const Lobe&, const Vec3<double>& wi, const Vec3<double>& wo);
 
-}  // namespace brdfc::inline closures
+}  // namespace closures
+}  // namespace brdfc

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 /// Cosines of the angles between shading normal and viewer; of all views unless told otherwise.
 struct Cosines {
@@ -18,4 +19,5 @@ struct Cosines {
   }
 };
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

@@ -6,7 +6,8 @@
 
 #include "core/error.h"
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 namespace {
 
 std::string trim(const std::string& s) {
@@ -104,4 +105,5 @@ void CsvWriter::finish() {
   if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
 }
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

@@ -11,7 +11,8 @@
 
 #include "core/vec.h"
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 /// Numbers in named columns. Columns may come in any order; others than those asked for are ignored, so that the
 /// output of one command can be the input of the next. Every error is an InputError naming line, column and what
@@ -54,4 +55,5 @@ class CsvWriter {
   std::string text_;
 };
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

@@ -9,7 +9,8 @@
 
 #include "core/error.h"
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -54,4 +55,5 @@ void note_missing(const std::string& what, const fs::path& store, const std::str
   fmt::print(stderr, "brdfc: no {} in {}: making it, which takes {}\n", what, store.string(), how_long);
 }
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

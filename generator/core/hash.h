@@ -3,9 +3,11 @@
 
 #include <string>
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 /// SHA-256 of the bytes, as 64 hexadecimal digits.
 std::string sha256(const std::string& bytes);
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

@@ -3,7 +3,8 @@
 
 #include <random>
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 Sequence3::Sequence3(std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -34,4 +35,5 @@ Point2 Sequence2::next() {
   return u;
 }
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

@@ -7,7 +7,8 @@
 
 #include "core/vec.h"
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 struct Point2 {
   double x = 0, y = 0;
@@ -37,4 +38,5 @@ class Sequence2 {
   Point2 state_;
 };
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

@@ -6,7 +6,8 @@
 
 #include "core/scalar.h"
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 /// A direction or vector. Local shading frame: z is the normal, x the tangent.
 template <class T> struct Vec3 {
@@ -86,4 +87,5 @@ template <class T> Vec3<T> seen_along_axis(const Vec3<T>& w, const Vec3<T>& s) {
   return {dot(u, s), dot(v, s), dot(w, s)};
 }
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc

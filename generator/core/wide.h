@@ -24,7 +24,8 @@ __float128 ldexpf128(__float128, int) noexcept;
 __float128 powf128(__float128, __float128) noexcept;
 }
 
-namespace brdfc::inline core {
+namespace brdfc {
+inline namespace core {
 
 class Wide {
  public:
@@ -77,7 +78,8 @@ inline bool isfinite(const Wide& x) { return x.value() - x.value() == 0; }
 /// Smallest positive normal number.
 inline constexpr int kWideMinExponent = -16382;
 
-}  // namespace brdfc::inline core
+}  // namespace core
+}  // namespace brdfc
 
 template <> class std::numeric_limits<brdfc::Wide> {
  public:

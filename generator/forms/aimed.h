@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The aimed form: base + lamps + rest. Equal to the model in expectation, whatever the base and wherever the lamps.
 //
-//   base   closures that carry most of the model: those that it declares (Brdf::base), a fit (fit.h), or none
+//   base   closures that carry most of the model: those that it declares (Brdf::base), a fit (fit/fit.h), or none
 //   lamps  one closure a lamp, aimed at it, whose value there is the model's own f cos less the base, so that light
 //          sampling meets the model itself
 //   rest   a direction that the shader draws, as a lobe as narrow as those of a sampled form, which carries what the

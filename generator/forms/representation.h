@@ -15,13 +15,13 @@ enum class RepresentationKind {
   Exact,    ///< closures that equal the model
   Aimed,    ///< closures aimed at lamps that carry the model there, and one drawn direction for the rest (aimed.h)
   Sampled,  ///< the shader samples the model itself, one narrow lobe per sample
-  Fitted,   ///< closures that come close to the model, for one set of parameters or along a number (fit.h)
-  Twin      ///< no shader but Blender's own nodes, close to the model for one set of parameters (twin.h)
+  Fitted,   ///< closures that come close to the model, for one set of parameters or along a number (fit/fit.h)
+  Twin      ///< no shader but Blender's own nodes, close to the model for one set of parameters (fit/twin.h)
 };
 
 const char* name_of(RepresentationKind);
-/// Made of a fit: for parameters that must be known, but for factors(), those that it has terms by (terms.h), and one
-/// number.
+/// Made of a fit: for parameters that must be known, but for factors(), those that it has terms by (fit/terms.h), and
+/// one number.
 inline bool is_fit(RepresentationKind kind) {
   return kind == RepresentationKind::Fitted || kind == RepresentationKind::Twin;
 }

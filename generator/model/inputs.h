@@ -5,7 +5,8 @@
 #include "model/model.h"
 #include "trace/program.h"
 
-namespace brdfc::inline model {
+namespace brdfc {
+inline namespace model {
 
 /// Numbers and colours by their names.
 template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values) {
@@ -15,4 +16,5 @@ template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values)
   }
 }
 
-}  // namespace brdfc::inline model
+}  // namespace model
+}  // namespace brdfc

@@ -8,7 +8,8 @@
 #include "model/fresnel.h"
 #include "model/spectrum.h"
 
-namespace brdfc::inline model {
+namespace brdfc {
+inline namespace model {
 namespace {
 
 constexpr const char* kNoble =
@@ -166,4 +167,5 @@ const std::vector<ChannelIndices>& channel_indices() {
   return all;
 }
 
-}  // namespace brdfc::inline model
+}  // namespace model
+}  // namespace brdfc

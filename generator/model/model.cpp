@@ -5,7 +5,8 @@
 #include <charconv>
 #include <cmath>
 
-namespace brdfc::inline model {
+namespace brdfc {
+inline namespace model {
 namespace {
 
 std::map<std::string, std::unique_ptr<Model>>& registry() {
@@ -179,4 +180,5 @@ std::string format_values(const ModelInfo& info, const ParamValues& values) {
   return text;
 }
 
-}  // namespace brdfc::inline model
+}  // namespace model
+}  // namespace brdfc

@@ -33,7 +33,8 @@
 #include "core/vec.h"
 #include "trace/expr.h"
 
-namespace brdfc::inline model {
+namespace brdfc {
+inline namespace model {
 
 enum class ParamKind { Number, Color, Choice };
 
@@ -70,7 +71,7 @@ struct ModelProperties {
   /// Assignments ("n=1e8") at which nearly all of the light leaves in the direction of ideal reflection; "" if none do.
   std::string specular_limit = "";
   TabulatedChoice tabulated = {};
-  /// The number over which the repository keeps a fit (represent/fit.h), what multiplies or mixes open and the others
+  /// The number over which the repository keeps a fit (fit/fit.h), what multiplies or mixes open and the others
   /// at their defaults; "" if none.
   std::string fit_axis = "";
 };
@@ -417,4 +418,5 @@ template <template <class> class M> class ModelOf final : public Model {
   const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>()); \
   }
 
-}  // namespace brdfc::inline model
+}  // namespace model
+}  // namespace brdfc

@@ -6,7 +6,8 @@
 
 #include "core/error.h"
 
-namespace brdfc::inline tables {
+namespace brdfc {
+inline namespace tables {
 
 std::shared_ptr<const Table> make_table(std::string name, std::vector<int> sizes, std::vector<double> values) {
   std::size_t count = 1;
@@ -33,4 +34,5 @@ std::shared_ptr<const Table> part(const Table& table, std::size_t axis, int firs
   return make_table(table.name, std::move(sizes), std::move(values));
 }
 
-}  // namespace brdfc::inline tables
+}  // namespace tables
+}  // namespace brdfc

@@ -11,7 +11,8 @@
 
 #include "core/scalar.h"
 
-namespace brdfc::inline tables {
+namespace brdfc {
+inline namespace tables {
 
 /// Values on a regular grid over [0, 1]^d, d = 1 to 4, row-major with the first axis slowest.
 struct Table {
@@ -69,4 +70,5 @@ template <Numeric T> T lookup(const std::shared_ptr<const Table>& table, const s
   }
 }
 
-}  // namespace brdfc::inline tables
+}  // namespace tables
+}  // namespace brdfc

@@ -5,7 +5,8 @@
 
 #include "core/error.h"
 
-namespace brdfc::inline tables {
+namespace brdfc {
+inline namespace tables {
 namespace {
 
 constexpr const char* kMeta = "brdfc:table";
@@ -60,4 +61,5 @@ void replace_stored(const std::filesystem::path& path, const std::string& model,
   }
 }
 
-}  // namespace brdfc::inline tables
+}  // namespace tables
+}  // namespace brdfc

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-namespace brdfc::inline tables {
+namespace brdfc {
+inline namespace tables {
 
 /// Rows of numbers, padded with zeros, and what they mean.
 struct TableImage {
@@ -27,4 +28,5 @@ TableImage read_table_image(const std::filesystem::path&);
 void replace_stored(const std::filesystem::path&, const std::string& model,
                     const std::function<void(const std::filesystem::path&)>& write);
 
-}  // namespace brdfc::inline tables
+}  // namespace tables
+}  // namespace brdfc

@@ -8,7 +8,8 @@
 
 #include "trace/op.h"
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 namespace {
 
 using Value = std::array<double, 3>;
@@ -253,10 +254,9 @@ std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& ini
   return out;
 }
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
 
 // Of a template of core's.
-namespace brdfc {
 
 Rgb<Expr>::Rgb(const Expr& r, const Expr& g, const Expr& b) {
   if (r.is_literal() && g.is_literal() && b.is_literal())

@@ -17,7 +17,8 @@
 #include "tables/table.h"
 #include "trace/graph.h"
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 
 class Condition;
 
@@ -84,9 +85,7 @@ Expr maximum(const Expr&, const Expr&);
 Expr select(const Condition&, const Expr&, const Expr&);
 Expr named(const char* name, const Expr&);
 
-}  // namespace brdfc::inline trace
-
-namespace brdfc {
+}  // namespace trace
 
 /// A recorded colour: one node, so that the printed text works on colours as the paper does.
 template <> struct Rgb<Expr> {
@@ -103,9 +102,7 @@ template <> struct Rgb<Expr> {
   std::array<double, 3> literal_{};
 };
 
-}  // namespace brdfc
-
-namespace brdfc::inline trace {
+inline namespace trace {
 
 Rgb<Expr> operator+(const Rgb<Expr>&, const Rgb<Expr>&);
 Rgb<Expr> operator-(const Rgb<Expr>&, const Rgb<Expr>&);
@@ -154,4 +151,5 @@ std::array<Expr, N> iterate(int count, const std::array<Expr, N>& state, Step st
   return result;
 }
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

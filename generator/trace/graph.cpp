@@ -3,7 +3,8 @@
 
 #include <algorithm>
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 namespace {
 
 thread_local Recorder* current_recorder = nullptr;
@@ -64,4 +65,5 @@ int Recorder::open_loop() {
 }
 void Recorder::close_loop() { in_loop_ = false; }
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

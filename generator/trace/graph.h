@@ -13,7 +13,8 @@
 
 #include "tables/table.h"
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 
 /// A formula that a recording cannot express.
 struct ExprError : std::logic_error {
@@ -102,4 +103,5 @@ class Recorder {
   Recorder* outer_;
 };
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

@@ -7,7 +7,8 @@
 #include "core/scalar.h"
 #include "trace/graph.h"
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 
 template <class T> T apply(Op op, const T* a) {
   switch (op) {
@@ -64,4 +65,5 @@ template <class T> T apply(Op op, const T* a) {
   }
 }
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

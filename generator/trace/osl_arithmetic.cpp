@@ -5,7 +5,8 @@
 
 #include <cmath>
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 namespace {
 thread_local int alive = 0;
 }
@@ -45,4 +46,5 @@ float log1p(float x) {
 }
 
 }  // namespace osl
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

@@ -2,7 +2,8 @@
 // The arithmetic that OSL uses in Blender, to tell what it costs from what a recording gets wrong.
 #pragma once
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 
 /// While one is alive on this thread, Program::run<float> uses the functions that OSL calls (OpenImageIO's fast ones,
 /// quotients and roots that are 0 where they are not defined, and the shaders' own expm1 and log1p).
@@ -29,4 +30,5 @@ float atan(float);
 float pow(float base, float exponent);
 }  // namespace osl
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

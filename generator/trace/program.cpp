@@ -6,7 +6,8 @@
 #include "trace/op.h"
 #include "trace/osl_arithmetic.h"
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 namespace {
 
 /// The same as OSL computes it.
@@ -178,4 +179,5 @@ template <class T> std::map<std::string, std::array<T, 3>> Program::run(const In
 template std::map<std::string, std::array<float, 3>> Program::run(const Inputs<float>&) const;
 template std::map<std::string, std::array<double, 3>> Program::run(const Inputs<double>&) const;
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

@@ -10,7 +10,8 @@
 
 #include "trace/expr.h"
 
-namespace brdfc::inline trace {
+namespace brdfc {
+inline namespace trace {
 
 /// Values by the names of inputs; a real is grey.
 template <class T> using Inputs = std::map<std::string, std::array<T, 3>>;
@@ -47,4 +48,5 @@ class Program {
   mutable std::size_t outputs_seen_ = 0;
 };
 
-}  // namespace brdfc::inline trace
+}  // namespace trace
+}  // namespace brdfc

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BLENDER_PYTHON = Path(
     os.environ.get("BRDFC_BLENDER_PYTHON", ROOT / ".env" / "blender-4.5" / "bin" / "python")
 )

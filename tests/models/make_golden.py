@@ -3,7 +3,7 @@
 
 The formulas are typed in from the papers as printed (with their errata, see the models'
 headers) and evaluated with mpmath in as many digits as they need; albedos are integrated by
-mpmath. Run it after adding a model:  python3 tests/make_golden.py [MODEL...]
+mpmath. Run it after adding a model:  python3 tests/models/make_golden.py [MODEL...]
 With models named, the rows of the others stay as they are.
 
 A row's tolerance is what the rounding of its inputs to double precision can cause (measured

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Quadrature against closed forms, tables against quadrature, and the checks against models that are wrong on purpose.
+// Quadrature against closed forms, and tables against quadrature.
+#include "measure/albedo.h"
+
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,96 +12,18 @@
 #include <random>
 #include <set>
 
-#include "check/check.h"
-#include "measure/albedo.h"
+#include "faulty.h"
 #include "measure/albedo_table.h"
 #include "measure/bound_model.h"
 #include "measure/cubature.h"
 #include "measure/guides.h"
 #include "model/sampling.h"
+#include "support.h"
 
 namespace brdfc::measure {
 
 // Not in the anonymous namespace: the model adapter has members of these types.
-namespace faulty {
-
-// ---- models made for these tests: they are not registered ------------------------------------------------
-
-// Lambert's reflector with one thing wrong at a time.
-enum Defect {
-  kNone,
-  kPdf,
-  kSampler,
-  kReciprocity,
-  kNegative,
-  kNan,
-  kUnstable,
-  kGain,
-  kTurn,
-  kColorCubed,
-  kClosure,
-  kDark,
-  kEdge,
-  kShadow,
-  kModest
-};
-
-template <Defect D> struct Faulty {
-  template <class T> struct Type {
-    Rgb<T> rho;
-    T level;
-
-    static ModelInfo info() {
-      return {.name = "faulty",
-              .label = "Faulty",
-              .paper = "",
-              .equations = "",
-              .doc = "",
-              .properties = D == kModest ? ModelProperties{.reciprocal = false,
-                                                           .conserving = false,
-                                                           .lossless = false,
-                                                           .isotropic = false,
-                                                           .positive = false,
-                                                           .smooth = false,
-                                                           .exact_sampling = false,
-                                                           .specular_limit = "level=1000"}
-                                         : ModelProperties{.lossless = true, .diffuse_limit = "level=1"},
-              .params = {}};
-    }
-    template <class Visitor> void parameters(const Visitor& v) {
-      v(rho, ColorSpec{"rho", "Reflectance", {0.8, 0.8, 0.8}, ""});
-      v(level, NumberSpec{"level", "Level", 1, 0, 1000, 0, 1000, ""});
-    }
-    Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
-      Rgb<T> f = rho / pi<T>();
-      if (D == kReciprocity) f = f * (T(1) + T(0.01) * wo.x);
-      if (D == kNegative) f = f * select(wi.z < T(0.2), T(-1e-3), T(1));
-      if (D == kNan) f = f * select(wi.z < T(0.2) && level > T(900), T(std::numeric_limits<double>::quiet_NaN()), T(1));
-      if (D == kUnstable) f = f * (T(1) + (T(1e6) + wi.z * wi.z) - (T(1e6) + wi.z * wi.z * T(0.999)));
-      if (D == kGain) f = f * T(1.01);
-      if (D == kTurn) f = f * (T(1) + T(0.01) * wi.x * wo.x);
-      if (D == kColorCubed) f = f * rho * rho;
-      if (D == kDark) f = f * sqr(maximum(wi.x * wo.x + wi.y * wo.y + T(0.5), T(0)));
-      if (D == kEdge) f = f * (T(1) - T(0.05) * abs(wi.x + wo.x));
-      // Fades so quickly that it underflows, and smoothly.
-      if (D == kShadow) f = f * exp(-level * level * (sqr(wi.x) + sqr(wo.x)));
-      return select(above(wi, wo), f, Rgb<T>(T(0)));
-    }
-    T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
-      return select(above(wi, wo), D == kPdf ? T(1) / (T(2) * pi<T>()) : cosine_pdf(wi), T(0));
-    }
-    Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-      const Vec3<T> wi = sample_cosine(D == kSampler ? T(0.98) * u.y : u.y, u.z);
-      const T p = pdf(wi, wo);
-      return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
-    }
-    ClosureSum<T> exact(const Vec3<T>&) const {
-      Closure<T> c(ClosureKind::Diffuse, rho);
-      if (D == kClosure) c.weight = c.weight * T(1.0001);
-      return {c};
-    }
-  };
-};
+namespace albedo_test {
 
 // Matte, but for a spike of half a hundredth of the light in a place that no convention leads to.
 template <class T> struct Spiked {
@@ -126,11 +50,12 @@ template <class T> struct Spiked {
   }
 };
 
-}  // namespace faulty
+}  // namespace albedo_test
 
 namespace {
 
-using namespace faulty;
+using albedo_test::Spiked;
+using faulty::Faulty;
 
 using testing::HasSubstr;
 
@@ -183,132 +108,6 @@ TEST(Cubature, FindsAPeakFarNarrowerThanTheNodesAreApart) {
       *b.brdf, wo, 1, [&](const Vec3<double>& wi, double* out) { out[0] = b.brdf->pdf(wi, wo); }, {1e-8, 0, 10000});
   EXPECT_TRUE(r.converged);
   EXPECT_NEAR(r.value[0], 1, 1e-7);
-}
-
-// ---- checks ----------------------------------------------------------------------------------------------
-
-/// Of the checks that apply.
-template <Defect D> std::map<std::string, bool> outcome() {
-  const detail::ModelOf<Faulty<D>::template Type> model;
-  std::map<std::string, bool> passed;
-  for (const check::Row& r : check::check_model(model))
-    if (r.result != check::Result::Skipped) passed[r.check] = r.result == check::Result::Passed;
-  return passed;
-}
-check::Row row_of(const Model& model, const std::string& check) {
-  for (const check::Row& r : check::check_model(model, {.effort = 0.1}))
-    if (r.check == check) return r;
-  throw InputError(check + ": no such check");
-}
-
-TEST(Checks, PassARightModel) {
-  for (const auto& [check, passed] : outcome<kNone>()) EXPECT_TRUE(passed) << check;
-}
-TEST(Checks, SeeAPdfThatIsNotTheSamplers) {
-  const auto r = outcome<kPdf>();
-  EXPECT_FALSE(r.at("chi-square"));
-  EXPECT_FALSE(r.at("sampled albedo"));
-  EXPECT_TRUE(r.at("pdf integral"));
-}
-TEST(Checks, SeeASamplerThatLeavesTwoPercentOut) {
-  // All its weights are the reflectance, so that no furnace can tell.
-  const auto r = outcome<kSampler>();
-  EXPECT_FALSE(r.at("chi-square"));
-  EXPECT_TRUE(r.at("sampled albedo"));
-}
-TEST(Checks, SeeMissingReciprocity) { EXPECT_FALSE(outcome<kReciprocity>().at("reciprocal")); }
-TEST(Checks, SeeMissingIsotropy) { EXPECT_FALSE(outcome<kTurn>().at("isotropic")); }
-TEST(Checks, SeeEnergyFromNowhere) {
-  const auto r = outcome<kGain>();
-  EXPECT_FALSE(r.at("conserving"));
-  EXPECT_FALSE(r.at("lossless"));
-}
-TEST(Checks, SeeCancellation) {
-  const auto r = outcome<kUnstable>();
-  EXPECT_FALSE(r.at("float rounding"));
-  EXPECT_FALSE(r.at("double rounding"));
-}
-TEST(Checks, SeeClosuresThatAreNotTheModel) { EXPECT_FALSE(outcome<kClosure>().at("exact closures")); }
-TEST(Checks, SeePropertiesDeclaredAbsentThatHold) {
-  const auto passed = outcome<kModest>();
-  EXPECT_FALSE(passed.at("not reciprocal"));
-  EXPECT_FALSE(passed.at("not conserving"));
-  EXPECT_FALSE(passed.at("not lossless"));
-  EXPECT_FALSE(passed.at("not isotropic"));
-  EXPECT_FALSE(passed.at("not positive"));
-  EXPECT_FALSE(passed.at("not smooth"));
-  EXPECT_FALSE(passed.at("not exact sampling"));
-}
-
-TEST(Checks, SeeDarkPlacesAndTellThemFromUnderflow) {
-  EXPECT_FALSE(outcome<kDark>().at("positive"));
-  const auto r = outcome<kShadow>();
-  EXPECT_TRUE(r.at("positive"));
-  EXPECT_TRUE(r.at("smooth"));
-}
-TEST(Checks, SeeEdgesOfAFewPercent) {
-  const auto r = outcome<kEdge>();
-  EXPECT_FALSE(r.at("smooth"));
-  EXPECT_TRUE(r.at("positive"));
-}
-TEST(Checks, SeeLimitsThatAreNone) {
-  EXPECT_FALSE(outcome<kShadow>().at("diffuse limit"));
-  const auto r = outcome<kModest>();
-  EXPECT_FALSE(r.at("specular limit"));
-  EXPECT_FALSE(r.at("no diffuse limit"));
-}
-TEST(Checks, SeeWeightsThatVary) { EXPECT_FALSE(outcome<kPdf>().at("exact sampling")); }
-TEST(Checks, SeeALobeThatItsSamplerDoesNotKnow) {
-  EXPECT_FALSE(outcome<kShadow>().at("sampling variance"));
-  EXPECT_TRUE(outcome<kDark>().at("sampling variance"));
-}
-TEST(Checks, SayWhyOneDoesNotApply) {
-  const check::Row skipped = row_of(find_model("fresnel_dielectric"), "chi-square");
-  EXPECT_EQ(skipped.result, check::Result::Skipped);
-  EXPECT_EQ(skipped.cases, 0);
-  EXPECT_EQ(skipped.reason, "the model has delta terms alone");
-  EXPECT_EQ(row_of(find_model("phong"), "exact closures").reason, "no closures equal the model");
-  EXPECT_EQ(row_of(find_model("lambert"), "exact closures").reason, "");
-}
-TEST(Checks, AreTheSameNumberForEveryModelAndHaveALimit) {
-  std::set<std::size_t> numbers;
-  for (const auto& [name, model] : models()) {
-    const std::vector<check::Row> rows = check::check_model(*model, {.effort = 0.01});
-    numbers.insert(rows.size());
-    for (const check::Row& r : rows) EXPECT_LT(std::abs(r.limit), 100) << name << ": " << r.check;
-  }
-  EXPECT_EQ(numbers.size(), 1u);
-}
-
-template <class F> std::string message(const F& f) {
-  try {
-    f();
-  } catch (const ValueError& e) {
-    return e.what();
-  }
-  return "no ValueError";
-}
-
-TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
-  const detail::ModelOf<Faulty<kNegative>::Type> negative;
-  const detail::ModelOf<Faulty<kNan>::Type> nan;
-  for (const std::string& text : {row_of(negative, "values").where, row_of(negative, "conserving").where,
-                                  message([&] { tabulate_albedo(negative); }), message([&] {
-                                    albedo(*bind_model(negative, {}).brdf, 0.5, 0, bind_model(negative, {}).label);
-                                  })}) {
-    EXPECT_THAT(text, HasSubstr("faulty rho="));
-    EXPECT_THAT(text, HasSubstr("level="));
-    EXPECT_THAT(text, testing::ContainsRegex("(f|weight)\\(wi=\\("));
-    EXPECT_THAT(text, HasSubstr("wo=("));
-    EXPECT_THAT(text, HasSubstr("= -0.00"));
-    EXPECT_THAT(text, HasSubstr("expected finite and >= 0"));
-  }
-  // Only at some parameters, which the table has to come across.
-  EXPECT_THAT(message([&] { tabulate_albedo(nan); }), HasSubstr("nan"));
-  // One bad value fails the checks that meet it, and no other.
-  for (const char* check : {"values", "conserving"})
-    EXPECT_EQ(row_of(negative, check).result, check::Result::Failed) << check;
-  EXPECT_EQ(row_of(negative, "sample weight").result, check::Result::Passed);
 }
 
 // ---- albedo ----------------------------------------------------------------------------------------------
@@ -444,12 +243,12 @@ TEST(AlbedoTableOf, OrenNayarsColourEntersSquared) {
 }
 
 TEST(AlbedoTableOf, AModelOfThirdDegreeInItsColoursIsRefused) {
-  const detail::ModelOf<Faulty<kColorCubed>::Type> model;
+  const detail::ModelOf<Faulty<faulty::kColorCubed>::Type> model;
   EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("of degree two at most in each"));
 }
 
 TEST(AlbedoTableOf, APdfThatIsNotTheSamplersIsRefused) {
-  const detail::ModelOf<Faulty<kPdf>::Type> model;
+  const detail::ModelOf<Faulty<faulty::kPdf>::Type> model;
   EXPECT_THAT(message([&] { tabulate_albedo(model); }), HasSubstr("quadrature over directions"));
 }
 

@@ -18,6 +18,7 @@
 #include "measure/bound_model.h"
 #include "measure/probes.h"
 #include "measure/stability.h"
+#include "support.h"
 
 namespace brdfc {
 namespace {
@@ -35,7 +36,7 @@ std::vector<std::string> split(const std::string& text, char separator) {
 
 /// Rows of a CSV without quotes in tests/, by column name.
 std::vector<std::map<std::string, std::string>> read_table(const std::string& name) {
-  std::ifstream in(std::string(BRDFC_SOURCE_DIR) + "/tests/" + name);
+  std::ifstream in(std::string(BRDFC_SOURCE_DIR) + "/tests/models/" + name);
   EXPECT_TRUE(in) << name;
   std::string line;
   std::getline(in, line);
@@ -109,7 +110,7 @@ TEST(Registry, EveryModelHasACaseAndARowOfTheDocsAndNoneIsLeftOver) {
   for (std::string line; std::getline(docs, line);)
     if (line.starts_with("| `")) in_docs.insert(line.substr(3, line.find('`', 3) - 3));
   EXPECT_FALSE(registered.empty());
-  EXPECT_EQ(in_cases, registered) << "tests/cases.csv needs one row a model";
+  EXPECT_EQ(in_cases, registered) << "tests/models/cases.csv needs one row a model";
   for (const std::string& name : registered)
     EXPECT_TRUE(in_docs.count(name)) << "docs/models.md needs a table row starting with | `" << name << "`";
 }
@@ -238,11 +239,6 @@ TEST_P(EveryModel, HasTheDeclaredProperties) {
         << row.model << ": " << row.check << ": " << row.worst << " (limit " << row.limit << ") at " << row.where;
 }
 
-std::vector<std::string> model_names() {
-  std::vector<std::string> names;
-  for (const auto& [name, model] : models()) names.push_back(name);
-  return names;
-}
 std::string name_itself(const testing::TestParamInfo<std::string>& info) { return info.param; }
 INSTANTIATE_TEST_SUITE_P(Models, EveryModel, testing::ValuesIn(model_names()), name_itself);
 
@@ -278,7 +274,7 @@ TEST_P(GoldenModel, HasGoldenValuesOfEveryKindAndMatchesThem) {
           << " wo=" << row["wo_x"] << "," << row["wo_y"] << "," << row["wo_z"];
   }
   if (m.has_scatter()) {
-    EXPECT_GE(seen["f"], 10) << "tests/make_golden.py lacks this model";
+    EXPECT_GE(seen["f"], 10) << "tests/models/make_golden.py lacks this model";
     EXPECT_GE(seen["pdf"], 10);
   }
   EXPECT_GE(seen["albedo"], 4);

@@ -2,9 +2,11 @@
 """The page that script/noise makes of its rows."""
 
 import importlib.util
+from pathlib import Path
 
 import pytest
-from support import ROOT
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The built tool's help, and what it says of scenes, files and wrong use.
 
-tests/test_cli.py has list, eval, sample, albedo and check.
+test_cli.py has list, eval, sample, albedo and check.
 """
 
 import csv

@@ -2,9 +2,11 @@
 """The version stands in CMakeLists.txt; other files name the same one."""
 
 import re
+from pathlib import Path
 
 import pytest
-from support import ROOT
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def found(name, pattern):

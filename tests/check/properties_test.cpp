@@ -10,6 +10,7 @@
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
+#include "support.h"
 
 namespace brdfc::check {
 namespace {
@@ -99,11 +100,6 @@ TEST_P(Property, IsotropicModelsDoNotKnowTheTangent) {
   }));
 }
 
-std::vector<std::string> model_names() {
-  std::vector<std::string> names;
-  for (const auto& [name, model] : models()) names.push_back(name);
-  return names;
-}
 INSTANTIATE_TEST_SUITE_P(Models, Property, testing::ValuesIn(model_names()),
                          [](const testing::TestParamInfo<std::string>& info) { return info.param; });
 

@@ -6,7 +6,7 @@ import os
 import subprocess
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 #: Absolute: some tests run it elsewhere.
 TOOL = str(Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve())
 MODELS = [

@@ -9,6 +9,7 @@
 #include "forms/representation.h"
 #include "model/choices.h"
 #include "print/osl_program.h"
+#include "support.h"
 #include "tables/table.h"
 
 namespace brdfc {
@@ -235,11 +236,6 @@ TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
   }
 }
 
-std::vector<std::string> model_names() {
-  std::vector<std::string> names;
-  for (const auto& [name, model] : models()) names.push_back(name);
-  return names;
-}
 INSTANTIATE_TEST_SUITE_P(EveryModel, RecordedFormula, ::testing::ValuesIn(model_names()),
                          [](const auto& info) { return info.param; });
 

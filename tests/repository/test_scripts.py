@@ -2,9 +2,11 @@
 """What the scripts of the report and of the conditions' page decide without Blender."""
 
 import importlib.util
+from pathlib import Path
 
 import pytest
-from support import ROOT
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def script(name):

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "model/sampling.h"
+#include "support.h"
 
 namespace brdfc::measure {
 
@@ -80,10 +81,10 @@ TEST(Rounding, RareBadValuesAreNamed) {
 
 /// Column `amplified` of cases.csv: units of epsilon that a model's formula may add to what rounding its inputs causes.
 double allowed(const std::string& model) {
-  std::ifstream in(std::string(BRDFC_SOURCE_DIR) + "/tests/cases.csv");
+  std::ifstream in(std::string(BRDFC_SOURCE_DIR) + "/tests/models/cases.csv");
   for (std::string line; std::getline(in, line);)
     if (line.starts_with(model + ",")) return std::strtod(line.substr(line.rfind(',') + 1).c_str(), nullptr);
-  ADD_FAILURE() << "tests/cases.csv has no row for " << model;
+  ADD_FAILURE() << "tests/models/cases.csv has no row for " << model;
   return 0;
 }
 
@@ -154,11 +155,6 @@ TEST_P(Everywhere, SinglePrecisionAndTheRecordedProgramFollow) {
   }
 }
 
-std::vector<std::string> model_names() {
-  std::vector<std::string> names;
-  for (const auto& [name, model] : models()) names.push_back(name);
-  return names;
-}
 INSTANTIATE_TEST_SUITE_P(Models, Everywhere, testing::ValuesIn(model_names()),
                          [](const testing::TestParamInfo<std::string>& info) { return info.param; });
 
