@@ -9,6 +9,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/error.h"
 #include "model/model.h"
 
 namespace brdfc {
@@ -16,6 +17,23 @@ namespace brdfc {
 /// All parameters of a model, those in `text` as name=value, the others as they are by default.
 inline ParamValues values_of(const Model& m, const std::vector<std::string>& text) {
   return complete(m.info(), parse_values(m.info(), text));
+}
+
+/// Of all that are registered.
+inline std::vector<std::string> model_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, model] : models()) names.push_back(name);
+  return names;
+}
+
+/// What the error says that f throws.
+template <class F> std::string message(const F& f) {
+  try {
+    f();
+  } catch (const ValueError& e) {
+    return e.what();
+  }
+  return "no ValueError";
 }
 
 /// A new folder that goes with it.

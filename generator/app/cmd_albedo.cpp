@@ -5,14 +5,15 @@
 #include <iostream>
 #include <optional>
 
-#include "analysis/albedo.h"
-#include "analysis/albedo_table.h"
-#include "analysis/probes.h"
-#include "analysis/table_file.h"
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
+#include "measure/albedo.h"
+#include "measure/albedo_table.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
+#include "tables/table_file.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_albedo_command(CLI::App& app) {
   struct Options {
@@ -38,24 +39,24 @@ void add_albedo_command(CLI::App& app) {
   cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
   cmd->add_flag("--store", o->store,
                 "Instead makes the table of all parameters anew that packs are built of, and keeps it in\n"
-                "generator/albedos, in place of what is kept of the model")
+                "data/albedos, in place of what is kept of the model")
       ->excludes("values", "--count", "--phi");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     if (o->store) {
-      if (!has_albedo_table(model)) {
+      if (!measure::has_albedo_table(model)) {
         std::cerr << "brdfc albedo: " << o->model << " has no table: its shader adds the albedo up\n";
         return;
       }
-      const AlbedoTable table = tabulate_albedo(model);
-      replace_stored(stored_albedo(model), o->model,
-                     [&](const std::filesystem::path& path) { write_albedo_exr(table, path); });
+      const measure::AlbedoTable table = measure::tabulate_albedo(model);
+      replace_stored(measure::stored_albedo(model), o->model,
+                     [&](const std::filesystem::path& path) { measure::write_albedo_exr(table, path); });
       return;
     }
-    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     CsvWriter out("cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate");
     const auto write = [&](double cos_theta_o) {
-      const Albedo a = albedo(*bound.brdf, cos_theta_o, o->phi, bound.label);
+      const measure::Albedo a = measure::albedo(*bound.brdf, cos_theta_o, o->phi, bound.label);
       const Rgb<double> t = a.total();
       out.row({cos_theta_o, t.r, t.g, t.b, a.mirror.r, a.mirror.g, a.mirror.b, a.error});
     };
@@ -67,7 +68,7 @@ void add_albedo_command(CLI::App& app) {
     } else {
       std::vector<double> row;
       while (in->next(row)) {
-        const bool inside = two_sided(model, *bound.brdf) && row[0] < 0 && row[0] >= -1;
+        const bool inside = measure::two_sided(model, *bound.brdf) && row[0] < 0 && row[0] >= -1;
         if (!inside && !(row[0] > 0 && row[0] <= 1))
           input_error("{}: cos_theta_o: expected a number in (0, 1], got {}", in->where(), row[0]);
         write(row[0]);
@@ -77,4 +78,4 @@ void add_albedo_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

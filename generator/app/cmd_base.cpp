@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc base: how much of a model its base carries, and what noise is left.
 #include "app/commands.h"
-#include "app/csv.h"
-#include "represent/base.h"
+#include "core/csv.h"
+#include "forms/base.h"
+#include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_base_command(CLI::App& app) {
   struct Options {
@@ -34,10 +35,10 @@ void add_base_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     if (!model.has_base()) input_error("{}: has no base: expected a model that declares one", o->model);
-    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     CsvWriter out("theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest");
     for (const double angle : o->angles) {
-      const BaseWorth w = base_worth(bound, direction(std::cos(angle * kPi / 180), o->phi), o->points);
+      const forms::BaseWorth w = forms::base_worth(bound, direction(std::cos(angle * kPi / 180), o->phi), o->points);
       out.row({angle, w.relative_l1, w.share, w.best_scale, w.white_drawn, w.white_rest, w.sky_drawn, w.sky_rest,
                w.largest});
     }
@@ -45,4 +46,4 @@ void add_base_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -13,12 +13,18 @@
 
 #include "app/commands.h"
 #include "core/data_dir.h"
+#include "forms/aimed.h"
+#include "forms/representation.h"
 #include "pack/pack.h"
+#include "plan/costs.h"
+#include "plan/plan.h"
 #include "reference/scene.h"
 #include "reference/views.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
+
+using forms::RepresentationKind;
 
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false;
@@ -27,10 +33,10 @@ struct Options {
   std::vector<std::string> models;
 };
 
-void print_table(const PackResult& result) {
+void print_table(const pack::Result& result) {
   fmt::print("{:<20} {:<8} {:>8} {:>6} {:>10} {:>11} {:>11} {:>12} {:>11} {:>8} {:>12}\n", "model", "form", "closures",
              "slots", "operations", "relative_l1", "albedo", "table_floats", "table_error", "bytes", "albedo_bytes");
-  for (const PackLine& l : result.lines)
+  for (const pack::Line& l : result.lines)
     fmt::print("{:<20} {:<8} {:>8} {:>6} {:>10} {:>11} {:>11.2e} {:>12} {:>11.2e} {:>8} {:>12}\n", l.model,
                l.representation, l.closures, l.slots, l.operations,
                l.error.relative_l1 ? fmt::format("{:.2e}", *l.error.relative_l1) : "expectation", l.error.albedo,
@@ -38,10 +44,10 @@ void print_table(const PackResult& result) {
 }
 
 /// How materials are used.
-std::vector<MaterialNeed> needs_of(const std::vector<Material>& materials) {
-  std::vector<MaterialNeed> needs;
-  for (const Material& m : materials) {
-    MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation};
+std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>& materials) {
+  std::vector<plan::MaterialNeed> needs;
+  for (const reference::Material& m : materials) {
+    plan::MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation};
     for (const auto& [name, image] : m.textures) need.textured.insert(name);
     needs.push_back(std::move(need));
   }
@@ -50,16 +56,18 @@ std::vector<MaterialNeed> needs_of(const std::vector<Material>& materials) {
 
 /// Relative L1, or that a form equals the model in expectation. Nothing for a form that these materials can't have, nor
 /// for a fit that is neither in the pack nor asked for by a budget.
-nlohmann::ordered_json error_of(const PlannedModel& plan, const FormChoice& choice, const PackResult& result) {
+nlohmann::ordered_json error_of(const plan::PlannedModel& plan, const plan::FormChoice& choice,
+                                const pack::Result& result) {
   constexpr const char* kExpectation = "expectation";
   if (!choice.exists) return nullptr;
   if (choice.form == RepresentationKind::Fitted)
     return choice.error ? nlohmann::ordered_json(*choice.error) : nlohmann::ordered_json(nullptr);
-  for (const PackLine& l : result.lines)
+  for (const pack::Line& l : result.lines)
     if (l.model == plan.model->info().name && l.representation == name_of(choice.form))
       return l.error.relative_l1 ? nlohmann::ordered_json(*l.error.relative_l1) : kExpectation;
   if (choice.form == RepresentationKind::Twin) return nullptr;
-  if (choice.form == RepresentationKind::Exact) return *measure_error(*plan.model, choice.form, plan.fixed).relative_l1;
+  if (choice.form == RepresentationKind::Exact)
+    return *forms::measure_error(*plan.model, choice.form, plan.fixed).relative_l1;
   return kExpectation;
 }
 
@@ -67,22 +75,22 @@ nlohmann::ordered_json cost_json(const std::optional<double>& cost) {
   return cost ? nlohmann::ordered_json(*cost) : nullptr;
 }
 
-nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& result) {
+nlohmann::ordered_json explanation(const plan::PlannedModel& plan, const pack::Result& result) {
   const ModelInfo& info = plan.model->info();
   nlohmann::ordered_json choices = nlohmann::ordered_json::array();
-  for (const FormChoice& c : plan.choices)
+  for (const plan::FormChoice& c : plan.choices)
     choices.push_back({{"form", name_of(c.form)},
                        {"taken", c.taken},
                        {"cost", cost_json(c.cost)},
                        {"error", error_of(plan, c, result)},
                        {"why", c.why}});
   nlohmann::ordered_json of_materials = nlohmann::ordered_json::array();
-  for (const FormChange& m : plan.material_forms)
+  for (const plan::FormChange& m : plan.material_forms)
     of_materials.push_back({{"material", m.id},
                             {"before", {{"form", name_of(m.before)}, {"cost", cost_json(m.cost_before)}}},
                             {"after", {{"form", name_of(m.after)}, {"cost", cost_json(m.cost_after)}}}});
   nlohmann::ordered_json forms = nlohmann::ordered_json::array(), free = nlohmann::ordered_json::array();
-  for (const PackLine& l : result.lines)
+  for (const pack::Line& l : result.lines)
     if (l.model == info.name)
       forms.push_back({{"form", l.representation},
                        {"before",
@@ -117,7 +125,7 @@ nlohmann::ordered_json explanation(const PlannedModel& plan, const PackResult& r
 }
 
 /// What forms there are and which is taken, why each thing is left out, and what that saves.
-void explain(const Options& options, const std::vector<PlannedModel>& plan, const PackResult& result) {
+void explain(const Options& options, const std::vector<plan::PlannedModel>& plan, const pack::Result& result) {
   std::vector<std::string> unused;
   for (const auto& [name, model] : models())
     if (std::none_of(plan.begin(), plan.end(), [&, &n = name](const auto& p) { return p.model->info().name == n; }))
@@ -125,14 +133,14 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
   if (options.json) {
     nlohmann::ordered_json out{{"scene", options.scene.empty() ? options.materials : options.scene},
                                {"models", nlohmann::ordered_json::array()}};
-    for (const PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
+    for (const plan::PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
     out["unused_models"] = unused;
     fmt::print("{}\n", out.dump(2));
     return;
   }
-  for (const PlannedModel& p : plan) {
+  for (const plan::PlannedModel& p : plan) {
     fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
-    for (const FormChoice& c : p.choices) {
+    for (const plan::FormChoice& c : p.choices) {
       const nlohmann::ordered_json error = error_of(p, c, result);
       fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", name_of(c.form), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
                  error.is_number()   ? fmt::format("{:.2e}", error.get<double>())
@@ -141,7 +149,7 @@ void explain(const Options& options, const std::vector<PlannedModel>& plan, cons
                  c.taken ? "taken:" : "not taken:", c.why);
     }
     for (const std::string& reason : p.reasons) fmt::print("  without {}\n", reason);
-    for (const PackLine& l : result.lines)
+    for (const pack::Line& l : result.lines)
       if (l.model == p.model->info().name)
         fmt::print(
             "  {}: {} -> {} bytes, {} -> {} operations, {} -> {} statements, {} -> {} closures, {} -> {} floats of "
@@ -190,43 +198,43 @@ void run(const Options& options) {
                                       {"--twin", options.twin}})
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
   const std::filesystem::path addon =
-      options.addon.empty() ? data_dir("blender_addon") : std::filesystem::path(options.addon);
+      options.addon.empty() ? data_dir() / "blender_addon" : std::filesystem::path(options.addon);
   const std::filesystem::path costs = addon / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
-  Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, Costs(costs)};
+  plan::Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, plan::Costs(costs)};
   if (options.error) budget.error = parse_error(*options.error);
   if (options.time) {
     budget.time = parse_time(*options.time);
     if (!std::filesystem::exists(costs))
       input_error("{}: no such file, and --time needs what forms cost", costs.string());
   }
-  std::vector<PlannedModel> plan;
+  std::vector<plan::PlannedModel> plan;
   if (!options.scene.empty()) {
-    const Scene scene = load_scene(options.scene);
-    for (const Light& l : scene.lights)
-      if ((l.kind == Light::Kind::Point || l.kind == Light::Kind::Sun) && l.radius == 0)
+    const reference::Scene scene = reference::load_scene(options.scene);
+    for (const reference::Light& l : scene.lights)
+      if ((l.kind == reference::Light::Kind::Point || l.kind == reference::Light::Kind::Sun) && l.radius == 0)
         budget.sizeless.push_back(l.key);
     // The extension finds bright spots of an image as well, and aims at them if there is room.
-    budget.lamps = int(scene.lights.size()) + (scene.environment.image ? kMaxLamps : 0);
-    std::vector<MaterialNeed> needs = needs_of(scene.materials);
-    const std::vector<Cosines> views = seen_cosines(scene);
+    budget.lamps = int(scene.lights.size()) + (scene.environment.image ? forms::kMaxLamps : 0);
+    std::vector<plan::MaterialNeed> needs = needs_of(scene.materials);
+    const std::vector<Cosines> views = reference::seen_cosines(scene);
     for (std::size_t i = 0; i < needs.size(); ++i) needs[i].views = views[i];
-    plan = plan_scene(needs, budget);
+    plan = plan::plan_scene(needs, budget);
   } else if (!options.materials.empty()) {
-    const UsedMaterials used = load_materials(options.materials);
+    const reference::UsedMaterials used = reference::load_materials(options.materials);
     budget.sizeless = used.sizeless_lamps;
     budget.lamps = used.lamps;
-    plan = plan_scene(needs_of(used.materials), budget);
+    plan = plan::plan_scene(needs_of(used.materials), budget);
   } else {
-    plan = plan_models(options.models);
+    plan = plan::plan_models(options.models);
   }
-  PackOptions pack{options.out, addon, plan, budget.costs, {}};
+  pack::Options pack{options.out, addon, plan, budget.costs, {}};
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     fmt::print(stderr, "brdfc build: {}/{} {:<20} {:6.1f} s\n", done, total, what, seconds);
   };
-  const PackResult result = build_pack(pack);
+  const pack::Result result = pack::build_pack(pack);
   if (options.scene.empty() && options.materials.empty())
     print_table(result);
   else
@@ -270,4 +278,4 @@ void add_build_command(CLI::App& app) {
   c->callback([options] { run(*options); });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -3,17 +3,17 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "analysis/properties.h"
 #include "app/commands.h"
 #include "check/check.h"
+#include "measure/properties.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_check_command(CLI::App& app) {
   struct Options {
     std::string model;
     bool all = false, json = false, markdown = false;
-    CheckOptions check;
+    check::Options check;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
@@ -36,7 +36,7 @@ void add_check_command(CLI::App& app) {
   cmd->add_option("--seed", o->check.seed, "Seed of the random parameters and directions");
   cmd->callback([o] {
     if (o->markdown) {
-      fmt::print("{}", property_table(true));
+      fmt::print("{}", measure::property_table(true));
       return;
     }
     std::vector<const Model*> chosen;
@@ -50,17 +50,17 @@ void add_check_command(CLI::App& app) {
     for (const Model* m : chosen) {
       fmt::print(stderr, "checking {} ...\n", m->info().name);
       const auto start = std::chrono::steady_clock::now();
-      const std::vector<CheckRow> rows = check_model(*m, o->check);
+      const std::vector<check::Row> rows = check::check_model(*m, o->check);
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       if (!o->json)
         fmt::print("{} ({:.1f} s)\n  {:<18} {:>6} {:>7} {:>11} {:>11}  {:<7}  {}\n", m->info().name, seconds, "check",
                    "cases", "skipped", "worst", "limit", "result", "expected");
-      for (const CheckRow& r : rows) {
-        const bool skipped = r.result == CheckResult::Skipped;
-        failed += r.result == CheckResult::Failed ? 1 : 0;
+      for (const check::Row& r : rows) {
+        const bool skipped = r.result == check::Result::Skipped;
+        failed += r.result == check::Result::Failed ? 1 : 0;
         if (o->json) {
           const nlohmann::ordered_json passed =
-              skipped ? nlohmann::ordered_json() : nlohmann::ordered_json(r.result == CheckResult::Passed);
+              skipped ? nlohmann::ordered_json() : nlohmann::ordered_json(r.result == check::Result::Passed);
           all.push_back({{"model", r.model},
                          {"check", r.check},
                          {"expected", r.expected},
@@ -79,15 +79,15 @@ void add_check_command(CLI::App& app) {
           continue;
         }
         fmt::print("  {:<18} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<7}  {}\n", r.check, r.cases, r.skipped, r.worst,
-                   r.limit, r.result == CheckResult::Passed ? "ok" : "FAILED", r.expected);
-        if (r.result == CheckResult::Failed) fmt::print("    at {}\n", r.where);
+                   r.limit, r.result == check::Result::Passed ? "ok" : "FAILED", r.expected);
+        if (r.result == check::Result::Failed) fmt::print("    at {}\n", r.where);
       }
     }
     if (o->json) fmt::print("{}\n", all.dump(2));
-    if (!o->json && o->model.empty()) fmt::print("\n{}", property_table(false));
+    if (!o->json && o->model.empty()) fmt::print("\n{}", measure::property_table(false));
     std::fflush(stdout);
     if (failed > 0) throw CheckFailed(fmt::format("{} of the declared properties failed", failed));
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc closure: what a closure of Cycles computes by our definition, for the tests that hold Cycles against it.
 #include "app/commands.h"
-#include "app/csv.h"
+#include "app/f_cos.h"
+#include "closures/lobe.h"
 #include "model/model.h"
-#include "represent/lobe.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
 ParamInfo parameter(std::string name, double min, double max, std::array<double, 3> value, ParamKind kind) {
@@ -88,4 +88,4 @@ void add_closure_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -6,25 +6,25 @@
 #include "reference/image.h"
 #include "report/statistics.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 namespace {
 
 /// Brighter or darker throughout: a known bias, to learn whether a test would find one.
-void inject(Rendering& r, double bias) {
+void inject(reference::Rendering& r, double bias) {
   for (float& v : r.mean.rgb) v = float(v * (1 + bias));
 }
 
 /// What a person needs to see why two renderers disagree.
-void keep_evidence(const std::filesystem::path& folder, const Rendering& picture, const Rendering& reference,
-                   const WelchTest& test) {
-  write_rendering(folder / "picture.exr", picture);
-  write_rendering(folder / "reference.exr", reference);
-  write_image(folder / "p-values.exr", test.p);
-  write_preview(folder / "picture.png", picture.mean, 0);
-  write_preview(folder / "reference.png", reference.mean, 0);
-  write_display(folder / "difference.png", difference_image(picture.mean, reference.mean, 0.1));
-  write_display(folder / "p-values.png", test.p);
+void keep_evidence(const std::filesystem::path& folder, const reference::Rendering& picture,
+                   const reference::Rendering& reference, const report::WelchTest& test) {
+  reference::write_rendering(folder / "picture.exr", picture);
+  reference::write_rendering(folder / "reference.exr", reference);
+  reference::write_image(folder / "p-values.exr", test.p);
+  reference::write_preview(folder / "picture.png", picture.mean, 0);
+  reference::write_preview(folder / "reference.png", reference.mean, 0);
+  reference::write_display(folder / "difference.png", reference::difference_image(picture.mean, reference.mean, 0.1));
+  reference::write_display(folder / "p-values.png", test.p);
 }
 
 }  // namespace
@@ -61,24 +61,25 @@ void add_compare_command(CLI::App& app) {
       ->needs(test);
   command->callback([options] {
     const std::string name_a = options->files.front(), name_b = options->files.back();
-    std::vector<Rendering> pictures;
+    std::vector<reference::Rendering> pictures;
     for (std::size_t i = 0; i + 1 < options->files.size(); ++i) {
-      pictures.push_back(read_rendering(options->files[i]));
+      pictures.push_back(reference::read_rendering(options->files[i]));
       if (pictures.back().mean.width != pictures.front().mean.width ||
           pictures.back().mean.height != pictures.front().mean.height)
         input_error("{}: expected {} x {} pixels as in {}", options->files[i], pictures.front().mean.width,
                     pictures.front().mean.height, name_a);
       inject(pictures.back(), options->inject);
     }
-    const Rendering a = mean_of(pictures), b = read_rendering(name_b);
-    const Comparison c = compare(a, b, name_a, name_b);
-    std::optional<WelchTest> t;
+    const reference::Rendering a = report::mean_of(pictures), b = reference::read_rendering(name_b);
+    const reference::Comparison c = reference::compare(a, b, name_a, name_b);
+    std::optional<report::WelchTest> t;
     if (options->test) {
       if (pictures.size() < 2) input_error("--test: expected at least two pictures and a reference");
       if (!b.variance) input_error("{}: --test needs a variance layer, as `brdfc render` writes", name_b);
-      t = welch_test(pictures, b, name_a, name_b);
+      t = report::welch_test(pictures, b, name_a, name_b);
     }
-    if (!options->diff.empty()) write_display(options->diff, difference_image(a.mean, b.mean, options->scale));
+    if (!options->diff.empty())
+      reference::write_display(options->diff, reference::difference_image(a.mean, b.mean, options->scale));
     if (t && !t->passed() && !options->keep.empty()) keep_evidence(options->keep, a, b, *t);
     if (options->json) {
       nlohmann::ordered_json out = to_json(c);
@@ -103,4 +104,4 @@ void add_compare_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -2,11 +2,11 @@
 // brdfc eval: the BRDF and its sampling density for pairs of directions.
 #include <iostream>
 
-#include "analysis/albedo.h"
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
+#include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_eval_command(CLI::App& app) {
   struct Options {
@@ -23,7 +23,7 @@ void add_eval_command(CLI::App& app) {
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
-    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     CsvReader in(std::cin, "stdin", {"wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"});
     if (in.empty()) input_error("stdin: expected a CSV table with the header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z");
     CsvWriter out("f_r,f_g,f_b,pdf");
@@ -33,12 +33,12 @@ void add_eval_command(CLI::App& app) {
       const Rgb<double> f = bound.brdf->eval(wi, wo);
       const double pdf = bound.brdf->pdf(wi, wo);
       const std::string label = in.where() + ": " + bound.label;
-      require_value(f, "f", label, wi, wo);
-      require_value(pdf, "pdf", label, wi, wo);
+      measure::require_value(f, "f", label, wi, wo);
+      measure::require_value(pdf, "pdf", label, wi, wo);
       out.row({f.r, f.g, f.b, pdf});
     }
     out.finish();
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -4,26 +4,29 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/table_file.h"
 #include "app/commands.h"
-#include "app/csv.h"
-#include "represent/fit.h"
-#include "represent/twin.h"
+#include "app/f_cos.h"
+#include "core/csv.h"
+#include "fit/fit.h"
+#include "fit/terms.h"
+#include "fit/twin.h"
+#include "fit/view.h"
+#include "tables/table_file.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
 /// `axis`: the number that the fit runs over, or empty.
-void print_errors(const std::vector<ViewError>& errors, const std::string& axis, const std::string& label) {
+void print_errors(const std::vector<fit::ViewError>& errors, const std::string& axis, const std::string& label) {
   std::vector<double> l1;
-  for (const ViewError& e : errors) l1.push_back(e.relative_l1);
+  for (const fit::ViewError& e : errors) l1.push_back(e.relative_l1);
   std::sort(l1.begin(), l1.end());
   // The least that so large a part of the views does not exceed.
   const auto quantile = [&](double q) { return 100 * l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]; };
   fmt::print(stderr, "{}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
              label, quantile(0.5), quantile(0.95), quantile(1));
   CsvWriter out((axis.empty() ? "" : axis + ",") + "cos_theta_o,relative_l1,relative_l2,albedo,negative");
-  for (const ViewError& e : errors) {
+  for (const fit::ViewError& e : errors) {
     std::vector<double> row = {e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative};
     if (!axis.empty()) row.insert(row.begin(), e.number);
     out.row(row);
@@ -63,7 +66,7 @@ void add_fit_command(CLI::App& app) {
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
                 "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
   cmd->add_flag("--store", o->store,
-                "With --over: makes the fit anew and keeps it in generator/fits, in place of what is kept of the model")
+                "With --over: makes the fit anew and keeps it in data/fits, in place of what is kept of the model")
       ->needs("--over")
       ->excludes("--pairs", "--twin");
   cmd->add_option(
@@ -96,21 +99,21 @@ void add_fit_command(CLI::App& app) {
       values.erase(name);
     }
     if (!o->any.empty() || !o->over.empty()) {
-      const Terms terms = terms_of(model, values);
+      const fit::Terms terms = fit::terms_of(model, values);
       for (const std::string& name : o->any)
-        if (!terms.has(name) && !factors(model, values).count(name))
+        if (!terms.has(name) && !fit::factors(model, values).count(name))
           input_error("fit: --any {}: expected a parameter that f of {} is a polynomial of, with at most {} terms",
-                      name, o->model, kMaxTerms);
+                      name, o->model, fit::kMaxTerms);
       if (terms.has(o->over))
         input_error("fit: --over {0}: f of {1} is proportional to it or a sum with it: take --any {0}", o->over,
                     o->model);
-      values = without_factors(model, values);
+      values = fit::without_factors(model, values);
     }
     // What the fit is for, as it says of itself.
     const auto label = [&] {
-      return o->model + " " + format_values(model.info(), o->over.empty() ? values : along_axis(model, values));
+      return o->model + " " + format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values));
     };
-    if (const auto reason = unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
+    if (const auto reason = fit::unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
     const auto print = [&](const auto& form, const auto& closures) {
       if (o->pairs)
         print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) { return evaluate(closures(wo), wi, wo); });
@@ -118,21 +121,21 @@ void add_fit_command(CLI::App& app) {
         print_errors(form.errors(), o->over, label());
     };
     if (o->store) {
-      values = along_axis(model, values);
-      const Fit fit(model, values, Fit::From::Scratch);
-      replace_stored(stored_fit(model, values), model.info().name,
+      values = fit::along_axis(model, values);
+      const fit::Fit fit(model, values, fit::Fit::From::Scratch);
+      replace_stored(fit::stored_fit(model, values), model.info().name,
                      [&](const std::filesystem::path& path) { fit.store(model, values, path); });
       print_errors(fit.errors(), o->over, label());
     } else if (o->twin) {
-      const Twin& twin = twin_of(model, values);
+      const fit::Twin& twin = fit::twin_of(model, values);
       print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo); });
     } else {
-      const Fit& fit = fit_of(model, values);
-      const Varied<double> varied = fit.varied(asked);
+      const fit::Fit& fit = fit::fit_of(model, values);
+      const fit::Varied<double> varied = fit.varied(asked);
       if (!o->exr.empty()) fit.store(model, values, o->exr);
       print(fit, [&](const Vec3<double>& wo) { return fit.closures(wo, varied); });
     }
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -2,19 +2,19 @@
 // brdfc kernel: a drawn curve as parameters of `lossless`.
 #include <fstream>
 
-#include "analysis/kernel_fit.h"
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
+#include "measure/kernel_fit.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
-KernelCurve read_curve(const std::string& path) {
+measure::KernelCurve read_curve(const std::string& path) {
   std::ifstream file(path);
   if (!file) input_error("{}: expected a CSV file with the header u,k that can be read", path);
   CsvReader in(file, path, {"u", "k"});
   if (in.empty()) input_error("{}: expected a CSV file with the header u,k", path);
-  KernelCurve curve;
+  measure::KernelCurve curve;
   std::vector<double> row;
   while (in.next(row)) {
     if (!(row[0] >= 0)) input_error("{}: u: expected a distance of at least 0, got {}", in.where(), row[0]);
@@ -50,7 +50,7 @@ void add_kernel_command(CLI::App& app) {
   cmd->add_option("--n", o->n, "Glossiness for which the curve is drawn")->capture_default_str();
   cmd->callback([o, &n] {
     if (!(o->n > 0 && o->n <= n.max)) input_error("--n: expected a number in (0, {}], got {}", n.max, o->n);
-    const KernelFit fit = fit_kernel(read_curve(o->file), o->n);
+    const measure::KernelFit fit = measure::fit_kernel(read_curve(o->file), o->n);
     std::string line;
     for (const char* name : {"n", "kernel", "h0", "h1", "h2", "h3"}) {
       const ParamValue& value = fit.values.at(name);
@@ -66,4 +66,4 @@ void add_kernel_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -4,11 +4,13 @@
 
 #include "app/commands.h"
 #include "core/error.h"
+#include "forms/representation.h"
 #include "model/model.h"
-#include "represent/representation.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
+
+using forms::RepresentationKind;
 
 using Json = nlohmann::ordered_json;
 
@@ -18,7 +20,7 @@ const char* kind_name(ParamKind k) {
 
 std::vector<std::string> names_of_forms(const Model& m) {
   std::vector<std::string> names;
-  for (RepresentationKind kind : representations(m)) names.push_back(name_of(kind));
+  for (RepresentationKind kind : forms::representations(m)) names.push_back(name_of(kind));
   return names;
 }
 
@@ -70,9 +72,9 @@ void print_text(const Model& m) {
   const ModelInfo& info = m.info();
   fmt::print("{}  {}\n  {} ({})\n  {}\n", info.name, info.label, info.paper, info.equations, info.doc);
   std::string forms;
-  for (RepresentationKind kind : representations(m)) {
+  for (RepresentationKind kind : forms::representations(m)) {
     forms += (forms.empty() ? "" : ", ") + std::string(name_of(kind));
-    if (const ParamValues only = form_values(m, kind); !only.empty())
+    if (const ParamValues only = forms::form_values(m, kind); !only.empty())
       forms += fmt::format(" (only {})", format_values(info, only));
   }
   fmt::print("  representations: {}\n", forms);
@@ -108,4 +110,4 @@ void add_list_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

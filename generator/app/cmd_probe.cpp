@@ -6,10 +6,10 @@
 #include <iostream>
 
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
 #include "pack/probe.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
 void run_points(const Model& model, const ParamValues& choices) {
@@ -21,7 +21,7 @@ void run_points(const Model& model, const ParamValues& choices) {
   }
   CsvReader in(std::cin, "stdin", columns);
   if (in.empty()) input_error("stdin: expected a CSV table with the header {}", fmt::join(columns, ","));
-  std::vector<ProbePoint> points;
+  std::vector<pack::ProbePoint> points;
   std::vector<double> row;
   while (in.next(row)) {
     ParamValues values = choices;
@@ -42,12 +42,12 @@ void run_points(const Model& model, const ParamValues& choices) {
   const char* const names[] = {"f_r",  "f_g",      "f_b",      "pdf",      "wi_x",      "wi_y",
                                "wi_z", "weight_r", "weight_g", "weight_b", "sample_pdf"};
   std::string out;
-  for (ProbeRun run : kProbeRuns)
+  for (pack::ProbeRun run : pack::kProbeRuns)
     for (const char* name : names) out += fmt::format("{}{}_{}", out.empty() ? "" : ",", name_of(run), name);
   out += "\n";
-  for (const auto& runs : run_probe(model, choices, points)) {
-    for (const ProbeValues& values : runs)
-      for (double v : values) out += fmt::format("{:.17g},", std::isfinite(v) ? v : kNotFinite);
+  for (const auto& runs : pack::run_probe(model, choices, points)) {
+    for (const pack::ProbeValues& values : runs)
+      for (double v : values) out += fmt::format("{:.17g},", std::isfinite(v) ? v : pack::kNotFinite);
     out.back() = '\n';
   }
   if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size()) input_error("stdout: cannot be written");
@@ -87,8 +87,8 @@ void add_probe_command(CLI::App& app) {
     if (o->run)
       run_points(model, choices);
     else
-      fmt::print("{}", probe_source(model, choices));
+      fmt::print("{}", pack::probe_source(model, choices));
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

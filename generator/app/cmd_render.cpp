@@ -8,9 +8,11 @@
 #include <csignal>
 
 #include "app/commands.h"
+#include "reference/image.h"
 #include "reference/render.h"
+#include "reference/scene.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 namespace {
 
@@ -46,7 +48,7 @@ std::string clock_text(double seconds) {
 class ProgressLine {
  public:
   explicit ProgressLine(std::string name) : name_(std::move(name)), terminal_(::isatty(2)) {}
-  void show(const Progress& p) {
+  void show(const reference::Progress& p) {
     if (!terminal_ && p.seconds < next_) return;
     next_ = p.seconds + 10;
     fmt::print(stderr, "{}{}: {:3.0f} %, {} of {} samples, {:.2f} Mpaths/s, {} left{}", terminal_ ? "\r\x1b[K" : "",
@@ -102,8 +104,8 @@ void add_render_command(CLI::App& app) {
     if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());
     if (!options->preview.empty() && std::filesystem::path(options->preview).extension() != ".png")
       input_error("--preview {}: expected a file name that ends in .png", options->preview);
-    const Scene scene = load_scene(options->scene);
-    RenderOptions r;
+    const reference::Scene scene = reference::load_scene(options->scene);
+    reference::RenderOptions r;
     r.settings = scene.settings;
     if (options->spp) r.settings.spp = options->spp;
     if (options->seed >= 0) r.settings.seed = options->seed;
@@ -112,21 +114,21 @@ void add_render_command(CLI::App& app) {
     r.settings.height = options->height ? options->height : scaled(scene.settings.height);
     r.threads = options->threads;
     r.max_seconds = options->max_seconds;
-    r.strategy = options->strategy == "brdf"    ? Strategy::Brdf
-                 : options->strategy == "light" ? Strategy::Light
-                                                : Strategy::Mis;
+    r.strategy = options->strategy == "brdf"    ? reference::Strategy::Brdf
+                 : options->strategy == "light" ? reference::Strategy::Light
+                                                : reference::Strategy::Mis;
     ProgressLine line(scene.name);
-    r.progress = [&](const Progress& p) { line.show(p); };
-    RenderResult result;
+    r.progress = [&](const reference::Progress& p) { line.show(p); };
+    reference::RenderResult result;
     {
       const InterruptGuard guard;
       r.cancel = &interrupted;
-      result = render(scene, r);
+      result = reference::render(scene, r);
     }
     line.close();
     result.rendering.metadata["strategy"] = options->strategy;
-    write_rendering(out, result.rendering);
-    if (!options->preview.empty()) write_preview(options->preview, result.rendering.mean, options->exposure);
+    reference::write_rendering(out, result.rendering);
+    if (!options->preview.empty()) reference::write_preview(options->preview, result.rendering.mean, options->exposure);
     const std::string summary =
         fmt::format("{} has {} of {} samples a pixel", out.string(), result.samples, r.settings.spp);
     if (result.cancelled) throw CheckFailed("interrupted: " + summary);
@@ -135,4 +137,4 @@ void add_render_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

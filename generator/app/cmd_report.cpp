@@ -6,7 +6,7 @@
 #include "app/commands.h"
 #include "report/report.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_report_command(CLI::App& app) {
   auto* command = app.add_subcommand(
@@ -16,10 +16,10 @@ void add_report_command(CLI::App& app) {
   const auto folder = std::make_shared<std::string>();
   command->add_option("DIR", *folder, "A folder with one folder a scene, each holding runs.json")->required();
   command->callback([folder] {
-    const std::vector<SceneReport> scenes = write_report(*folder);
-    fmt::print(stdout, "{}", report_csv(scenes));
+    const std::vector<report::SceneReport> scenes = report::write_report(*folder);
+    fmt::print(stdout, "{}", report::report_csv(scenes));
     fmt::print(stderr, "wrote {}/index.html, report.json and report.csv\n", *folder);
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

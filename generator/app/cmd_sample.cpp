@@ -3,19 +3,19 @@
 #include <iostream>
 #include <random>
 
-#include "analysis/albedo.h"
 #include "app/commands.h"
-#include "app/csv.h"
+#include "core/csv.h"
+#include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::app {
 namespace {
 
-void write_sample(const BoundModel& bound, const std::string& where, const Vec3<double>& wo, const Vec3<double>& u,
-                  CsvWriter& out) {
+void write_sample(const measure::BoundModel& bound, const std::string& where, const Vec3<double>& wo,
+                  const Vec3<double>& u, CsvWriter& out) {
   const Sample<double> s = bound.brdf->sample(wo, u);
   const std::string label = where + ": " + bound.label;
-  require_value(s.pdf, "pdf", label, s.wi, wo);
-  require_value(s.weight, "weight", label, s.wi, wo);
+  measure::require_value(s.pdf, "pdf", label, s.wi, wo);
+  measure::require_value(s.weight, "weight", label, s.wi, wo);
   out.row({s.wi.x, s.wi.y, s.wi.z, s.weight.r, s.weight.g, s.weight.b, s.pdf});
 }
 
@@ -44,7 +44,7 @@ void add_sample_command(CLI::App& app) {
   cmd->add_option("--wo", o->wo, "View direction x,y,z")->delimiter(',')->expected(3)->needs(count);
   cmd->callback([o] {
     const Model& model = find_model(o->model);
-    const BoundModel bound = bind_model(model, parse_values(model.info(), o->values));
+    const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     if (!model.has_scatter())
       input_error("{}: expected a model that scatters; this one has ideal reflection alone", o->model);
     CsvWriter out("wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
@@ -76,4 +76,4 @@ void add_sample_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

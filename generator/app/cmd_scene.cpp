@@ -4,7 +4,7 @@
 #include "app/commands.h"
 #include "reference/scene.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_scene_command(CLI::App& app) {
   struct Options {
@@ -16,12 +16,12 @@ void add_scene_command(CLI::App& app) {
   command->add_option("SCENE", options->scene, "Scene file (.json)")->required();
   command->add_option("--out", options->out, "Folder to write scene.json to")->required();
   command->callback([options] {
-    const Scene scene = load_scene(options->scene);
-    write_resolved(scene, options->out);
+    const reference::Scene scene = reference::load_scene(options->scene);
+    reference::write_resolved(scene, options->out);
     fmt::print(stderr, "{}: {} objects, {} meshes, {} images, hash {} -> {}\n", scene.name, scene.objects.size(),
                scene.mesh_files.size(), scene.image_files.size(), scene.hash,
                (std::filesystem::path(options->out) / "scene.json").string());
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <chrono>
 
-#include "analysis/stability.h"
-#include "analysis/stability_page.h"
 #include "app/commands.h"
+#include "measure/stability.h"
+#include "report/stability_page.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_stability_command(CLI::App& app) {
   struct Options {
     std::string model, page;
-    Hunt hunt;
+    measure::Hunt hunt;
     long calls = 1000000;
     double limit = 32;
   };
@@ -39,20 +39,20 @@ void add_stability_command(CLI::App& app) {
     for (const Model* m : chosen) {
       fmt::print(stderr, "{} ...\n", m->info().name);
       const auto start = std::chrono::steady_clock::now();
-      const Stability s = hunt_rounding(*m, o->hunt);
+      const measure::Stability s = measure::hunt_rounding(*m, o->hunt);
       const double hunted = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      const long calls = evaluate_everywhere(*m, o->calls / long(chosen.size()), o->hunt.seed);
+      const long calls = measure::evaluate_everywhere(*m, o->calls / long(chosen.size()), o->hunt.seed);
       fmt::print("{}: {} places, {:.3g} units at {}\n  largest relative error {:.2g} at {}\n  {} calls, no bad value\n",
                  m->info().name, s.points, s.amplified, s.amplified_where, s.relative, s.where, calls);
       if (s.amplified > o->limit) ++failed, fmt::print("  FAILED: expected at most {:g} units\n", o->limit);
-      for (const auto& [decade, row] : single_precision_by_decade(*m, 200, 200, o->hunt.seed))
+      for (const auto& [decade, row] : measure::single_precision_by_decade(*m, 200, 200, o->hunt.seed))
         fmt::print("  numbers from 1e{}: float {:.2g}, recorded {:.2g}, rounded directions alone {:.2g}\n", decade,
                    row.native, row.recorded, row.inherent);
       fmt::print("  {:.1f} s, {:.1f} s of them for rounding\n",
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), hunted);
     }
     if (!o->page.empty()) {
-      write_stability_page(o->page);
+      report::write_stability_page(o->page);
       fmt::print(stderr, "{}/index.html\n", o->page);
     }
     std::fflush(stdout);
@@ -60,4 +60,4 @@ void add_stability_command(CLI::App& app) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

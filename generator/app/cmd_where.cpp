@@ -5,7 +5,7 @@
 #include "app/commands.h"
 #include "core/data_dir.h"
 
-namespace brdfc {
+namespace brdfc::app {
 
 void add_where_command(CLI::App& app) {
   app.add_subcommand("where",
@@ -15,4 +15,4 @@ void add_where_command(CLI::App& app) {
       ->callback([] { fmt::print("{}\n", data_dir().string()); });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::app

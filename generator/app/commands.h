@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <stdexcept>
 
-namespace brdfc {
+namespace brdfc::app {
 
 /// A check ran and failed. Exit status 1.
 struct CheckFailed : std::runtime_error {
@@ -31,4 +31,4 @@ void add_scene_command(CLI::App&);
 void add_compare_command(CLI::App&);
 void add_report_command(CLI::App&);
 
-}  // namespace brdfc
+}  // namespace brdfc::app

@@ -6,20 +6,21 @@
 #include <cmath>
 
 #include "check/claim.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 
-namespace brdfc {
-namespace checks {
+namespace brdfc::check {
 
-Trial::Trial(const Model& model, const CheckOptions& options)
-    : model_(model), seed_(options.seed), effort_(options.effort) {
+Trial::Trial(const Model& model, const Options& options) : model_(model), seed_(options.seed), effort_(options.effort) {
   std::vector<ParamValues> chosen =
-      thin_out(info(), slider_cases(info(), 3, seed_), std::size_t(std::max(6, scaled(16))));
+      measure::thin_out(info(), measure::slider_cases(info(), 3, seed_), std::size_t(std::max(6, scaled(16))));
   const std::size_t usual = chosen.size();
-  for (const ParamValues& v : thin_out(info(), end_cases(info(), false), std::size_t(std::max(4, scaled(16)))))
+  for (const ParamValues& v :
+       measure::thin_out(info(), measure::end_cases(info(), false), std::size_t(std::max(4, scaled(16)))))
     chosen.push_back(v);
   const std::size_t stride = std::max<std::size_t>(1, chosen.size() / std::size_t(scaled(12)));
   for (std::size_t i = 0; i < chosen.size(); ++i)
-    cases_.push_back({i, i < usual, i % stride == 0, bind_model(model, chosen[i]), model.make_float(chosen[i]),
+    cases_.push_back({i, i < usual, i % stride == 0, measure::bind_model(model, chosen[i]), model.make_float(chosen[i]),
                       model.make_wide(chosen[i])});
 }
 
@@ -50,13 +51,13 @@ void Verdict::skip() {
   ++skipped_;
 }
 
-void Verdict::report(CheckRow& row) const {
+void Verdict::report(Row& row) const {
   row.cases = cases_;
   row.skipped = skipped_;
   row.worst = worst_;
   row.limit = cases_ == 0 ? limit_.value : limit_there_;
   row.where = cases_ == 0 ? "no case could be judged" : where_;
-  row.result = passed_ ? CheckResult::Passed : CheckResult::Failed;
+  row.result = passed_ ? Result::Passed : Result::Failed;
 }
 
 std::string without_lobe(const Trial& t) { return t.model().has_scatter() ? "" : "the model has delta terms alone"; }
@@ -80,14 +81,14 @@ std::vector<Check> all_checks(const ModelProperties& claims) {
   return all;
 }
 
-CheckRow run(const Check& check, const Trial& trial) {
-  CheckRow row;
+Row run(const Check& check, const Trial& trial) {
+  Row row;
   row.model = trial.info().name;
   row.check = check.name;
   row.expected = check.expected;
   row.reason = check.inapplicable(trial);
   if (!row.reason.empty()) {
-    row.result = CheckResult::Skipped;
+    row.result = Result::Skipped;
     return row;
   }
   Verdict verdict(check.limit);
@@ -96,20 +97,19 @@ CheckRow run(const Check& check, const Trial& trial) {
     verdict.report(row);
   } catch (const ValueError& e) {
     verdict.report(row);
-    row.result = CheckResult::Failed;
+    row.result = Result::Failed;
     row.where = e.what();
   }
   return row;
 }
 
 }  // namespace
-}  // namespace checks
 
-std::vector<CheckRow> check_model(const Model& model, const CheckOptions& options) {
-  const checks::Trial trial(model, options);
-  std::vector<CheckRow> rows;
-  for (const checks::Check& check : checks::all_checks(trial.claims())) rows.push_back(checks::run(check, trial));
+std::vector<Row> check_model(const Model& model, const Options& options) {
+  const Trial trial(model, options);
+  std::vector<Row> rows;
+  for (const Check& check : all_checks(trial.claims())) rows.push_back(run(check, trial));
   return rows;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::check

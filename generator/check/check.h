@@ -8,16 +8,16 @@
 
 #include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::check {
 
-enum class CheckResult {
+enum class Result {
   Passed,
   Failed,
   Skipped,  ///< the check does not apply to the model: nothing was judged
 };
 
 /// Outcome of one check of one model over all cases.
-struct CheckRow {
+struct Row {
   std::string model;
   std::string check;
   std::string expected;  ///< the limit in words, "<= 1 + error"
@@ -25,18 +25,18 @@ struct CheckRow {
   int skipped = 0;       ///< where quadrature did not converge well enough to judge
   double worst = 0;      ///< value nearest to failing, or beyond
   double limit = 0;      ///< what it is compared with
-  CheckResult result = CheckResult::Passed;
+  Result result = Result::Passed;
   std::string where;   ///< parameters and directions of the worst value
   std::string reason;  ///< why the check was skipped, else empty
 };
 
-struct CheckOptions {
+struct Options {
   std::uint64_t seed = 1;
   double effort = 1;  ///< scales the numbers of cases, directions and samples
 };
 /// Rows for one model: what it declares, tried at defaults, random and extreme parameters, and what every model must
 /// keep. A property declared absent must visibly be absent somewhere. A value that is NaN, infinite or negative fails
 /// every check that meets it, with model, parameters, directions and value in `where`.
-std::vector<CheckRow> check_model(const Model&, const CheckOptions& = {});
+std::vector<Row> check_model(const Model&, const Options& = {});
 
-}  // namespace brdfc
+}  // namespace brdfc::check

@@ -4,28 +4,30 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 
-#include "analysis/probes.h"
+#include "measure/cubature.h"
+#include "measure/guides.h"
+#include "measure/probes.h"
 
-namespace brdfc {
+namespace brdfc::check {
 
-ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int samples, std::uint64_t seed) {
+ChiSquare chi_square(const measure::BoundModel& bound, const Vec3<double>& wo, int samples, std::uint64_t seed) {
   const Brdf<double>& brdf = *bound.brdf;
-  const Guides guides(brdf, wo, 8192);
-  const auto draw = [&](Random& random, Point2& p) {
-    const Sample<double> s = brdf.sample(wo, uniform_cube(random));
-    require_value(s.pdf, "pdf", bound.label, s.wi, wo);
+  const measure::Guides guides(brdf, wo, 8192);
+  const auto draw = [&](measure::Random& random, Point2& p) {
+    const Sample<double> s = brdf.sample(wo, measure::uniform_cube(random));
+    measure::require_value(s.pdf, "pdf", bound.label, s.wi, wo);
     if (!(s.pdf > 0)) return false;
     p = guides.angles(s.wi);
     return true;
   };
   // A tree of medians of pilot samples: cells of about equal probability.
   constexpr int kPilots = 4096, kDepth = 6;
-  Random random(seed);
+  measure::Random random(seed);
   std::vector<Point2> pilots;
   for (int i = 0; i < kPilots; ++i)
     if (Point2 p; draw(random, p)) pilots.push_back(p);
   struct Cell {
-    Rect rect;
+    measure::Rect rect;
     std::vector<Point2> pilots;
   };
   std::vector<Cell> cells{{{0, brdf.scatters_through() ? kPi : kPi / 2, 0, 2 * kPi}, pilots}};
@@ -52,10 +54,10 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
     cells = std::move(halves);
   }
 
-  const Integrand2 density = [&](double theta, double phi, double* out) {
+  const measure::Integrand2 density = [&](double theta, double phi, double* out) {
     const Vec3<double> wi = guides.direction_at(theta, phi);
     const double pdf = brdf.pdf(wi, wo);
-    require_value(pdf, "pdf", bound.label, wi, wo);
+    measure::require_value(pdf, "pdf", bound.label, wi, wo);
     out[0] = pdf * std::sin(theta);
   };
   std::vector<double> expected;
@@ -64,11 +66,11 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
   for (const Cell& c : cells) {
     // Twice, because what one mesh misses another does not.
     const auto probability = [&](std::size_t most) {
-      return integrate(density, 1, guides.cells(c.rect, most), {1e-7, 0, 1500});
+      return measure::integrate(density, 1, guides.cells(c.rect, most), {1e-7, 0, 1500});
     };
     // An error of the expected counts must stay small beside their fluctuation. It only grows.
     const auto known = [&] { return uncertain * samples < 0.1 * std::sqrt(double(samples) / double(cells.size())); };
-    const CubatureResult r = probability(4);
+    const measure::CubatureResult r = probability(4);
     uncertain += r.error[0];
     if (known()) uncertain += std::abs(r.value[0] - probability(16).value[0]);
     result.converged = known();
@@ -92,7 +94,7 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
       continue;
     }
     for (std::size_t k = 0; k < cells.size(); ++k) {
-      const Rect& r = cells[k].rect;
+      const measure::Rect& r = cells[k].rect;
       if (p.x >= r.x0 && p.x < r.x1 && p.y >= r.y0 && p.y < r.y1) {
         ++observed[k];
         break;
@@ -118,4 +120,4 @@ ChiSquare chi_square(const BoundModel& bound, const Vec3<double>& wo, int sample
   return result;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::check

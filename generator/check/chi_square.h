@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "analysis/albedo.h"
+#include "measure/bound_model.h"
 
-namespace brdfc {
+namespace brdfc::check {
 
 struct ChiSquare {
   double p = 1;  ///< probability of a statistic at least as large
@@ -17,6 +17,6 @@ struct ChiSquare {
 /// Compares a histogram of sample() with the integral of pdf() over the same cells, lost samples being one more cell.
 /// The cells are drawn around other samples, so that every lobe, however narrow, is cut into several. Cells with fewer
 /// than 5 expected samples are pooled. Same seed, same result.
-ChiSquare chi_square(const BoundModel&, const Vec3<double>& wo, int samples, std::uint64_t seed);
+ChiSquare chi_square(const measure::BoundModel&, const Vec3<double>& wo, int samples, std::uint64_t seed);
 
-}  // namespace brdfc
+}  // namespace brdfc::check

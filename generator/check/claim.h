@@ -10,18 +10,19 @@
 #include <string>
 #include <vector>
 
-#include "analysis/probes.h"
 #include "check/check.h"
 #include "core/parallel.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 
 /// The model with one set of parameters, in all precisions.
 struct Case {
   std::size_t index = 0;
   bool within = true;     ///< the sliders' ranges: what a model declares of its lobe holds there
   bool thorough = false;  ///< one of the few that quadrature and histograms are made for, which cost most
-  BoundModel bound;
+  measure::BoundModel bound;
   std::unique_ptr<Brdf<float>> single;
   std::unique_ptr<Brdf<Wide>> wide;
 };
@@ -60,7 +61,7 @@ enum class Purpose : std::uint64_t {
 /// A model and what it is tried with. Checks run one after the other, each over the cases side by side.
 class Trial {
  public:
-  Trial(const Model&, const CheckOptions&);
+  Trial(const Model&, const Options&);
   const Model& model() const { return model_; }
   const ModelInfo& info() const { return model_.info(); }
   const ModelProperties& claims() const { return model_.info().properties; }
@@ -70,10 +71,10 @@ class Trial {
   template <class F> void for_each(const F& f) const {
     for_all(cases_.size(), [&](std::size_t i) { f(cases_[i]); });
   }
-  Random random(const Case& c, Purpose what) const {
-    return Random(seed_ * 7919 + c.index * 101 + std::uint64_t(what));
+  measure::Random random(const Case& c, Purpose what) const {
+    return measure::Random(seed_ * 7919 + c.index * 101 + std::uint64_t(what));
   }
-  Random random() const { return Random(seed_); }
+  measure::Random random() const { return measure::Random(seed_); }
   /// A number of directions or samples, scaled by the effort.
   int scaled(int) const;
   /// Of the views that sampling found worst, and of some others. Measured once, for several checks.
@@ -108,7 +109,7 @@ class Verdict {
   /// A case that could not be judged: quadrature did not converge well enough.
   void skip();
   /// Without a case that could be judged a check has failed.
-  void report(CheckRow&) const;
+  void report(Row&) const;
 
  private:
   Limit limit_;
@@ -149,4 +150,4 @@ inline constexpr double kVisible = 1e-3;
 /// Weights or values that are equal but for rounding.
 inline constexpr double kEven = 1e-6;
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

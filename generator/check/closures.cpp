@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A sum of Cycles' closures that a model claims to equal.
 #include "check/claim.h"
+#include "measure/probes.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 namespace {
 
 /// As published, closures are exact to rounding.
@@ -11,10 +12,10 @@ constexpr double kExact = 1e-12;
 std::string without_closures(const Trial& t) { return t.model().has_exact() ? "" : "no closures equal the model"; }
 
 /// Relative L1 of f cos, or the difference of the weights of delta terms if that is larger.
-double apart(const Brdf<double>& f, const ClosureSum<double>& sum, const Vec3<double>& wo, Random& random) {
+double apart(const Brdf<double>& f, const ClosureSum<double>& sum, const Vec3<double>& wo, measure::Random& random) {
   double apart = 0, all = 0;
   for (int j = 0; j < 64; ++j) {
-    const Vec3<double> wi = uniform_direction(random);
+    const Vec3<double> wi = measure::uniform_direction(random);
     const Rgb<double> got = evaluate(sum, wi, wo), want = f.eval(wi, wo) * wi.z, d = got - want;
     apart += std::abs(d.r) + std::abs(d.g) + std::abs(d.b);
     all += want.r + want.g + want.b;
@@ -24,7 +25,8 @@ double apart(const Brdf<double>& f, const ClosureSum<double>& sum, const Vec3<do
     if (c.kind == ClosureKind::Reflection) mirror += c.weight;
     if (c.kind == ClosureKind::Refraction) transmit += c.weight;
   }
-  return std::max({all > 0 ? apart / all : apart, relative(mirror, f.mirror(wo)), relative(transmit, f.transmit(wo))});
+  return std::max({all > 0 ? apart / all : apart, measure::relative(mirror, f.mirror(wo)),
+                   measure::relative(transmit, f.transmit(wo))});
 }
 
 void exact(const Trial& t, Verdict& verdict) {
@@ -32,14 +34,15 @@ void exact(const Trial& t, Verdict& verdict) {
     const Brdf<double>& f = *c.bound.brdf;
     // Closures may be known for some choices only, but then for every view direction.
     if (!f.exact({0, 0, 1})) return;
-    Random random = t.random(c, Purpose::Closures);
+    measure::Random random = t.random(c, Purpose::Closures);
     for (int k = 0; k < 4; ++k) {
-      Vec3<double> wo = k == 0 ? direction(0.01, 1) : uniform_direction(random);
-      if (two_sided(t.model(), f) && k % 2 == 1) wo.z = -wo.z;
+      Vec3<double> wo = k == 0 ? direction(0.01, 1) : measure::uniform_direction(random);
+      if (measure::two_sided(t.model(), f) && k % 2 == 1) wo.z = -wo.z;
       const auto sum = f.exact(wo);
       if (!sum)
-        throw ValueError(fmt::format("{} wo={}: expected closures for every view direction", c.bound.label, text(wo)));
-      verdict.add(apart(f, *sum, wo, random), fmt::format("{} wo={}", c.bound.label, text(wo)));
+        throw ValueError(
+            fmt::format("{} wo={}: expected closures for every view direction", c.bound.label, measure::text(wo)));
+      verdict.add(apart(f, *sum, wo, random), fmt::format("{} wo={}", c.bound.label, measure::text(wo)));
     }
   });
 }
@@ -51,4 +54,4 @@ std::vector<Check> closure_checks() {
            without_closures}};
 }
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

@@ -3,22 +3,26 @@
 #include <algorithm>
 
 #include "check/claim.h"
+#include "measure/albedo.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 namespace {
 
 /// Quadrature's own error is added to it.
 constexpr double kAlbedo = 1e-6;
-constexpr AlbedoOptions kAlbedoOptions{.absolute = 1e-7, .max_cells = 4000, .witnesses = 1 << 16};
+constexpr measure::AlbedoOptions kAlbedoOptions{.absolute = 1e-7, .max_cells = 4000, .witnesses = 1 << 16};
 /// Standard errors that a mean of samples may be off: thousands of means are judged.
 constexpr double kStandardErrors = 7;
 
 double off_one(const Rgb<double>& t) { return std::max({std::abs(t.r - 1), std::abs(t.g - 1), std::abs(t.b - 1)}); }
 
 /// One view of a case, its azimuth being phi_o.
-AlbedoFound measure(const Trial& t, const Case& c, const BoundModel& m, double cos_o, double phi, bool white) {
-  const Albedo a = albedo(*m.brdf, cos_o, phi, m.label, kAlbedoOptions);
-  const SampledAlbedo s = sampled_albedo(*m.brdf, cos_o, phi, m.label, std::max(1024, t.scaled(1 << 13)));
+AlbedoFound measure(const Trial& t, const Case& c, const measure::BoundModel& m, double cos_o, double phi, bool white) {
+  const measure::Albedo a = measure::albedo(*m.brdf, cos_o, phi, m.label, kAlbedoOptions);
+  const measure::SampledAlbedo s =
+      measure::sampled_albedo(*m.brdf, cos_o, phi, m.label, std::max(1024, t.scaled(1 << 13)));
   const Rgb<double> d = a.scattered - s.scattered;
   return {max_component(a.total()),
           off_one(a.total()),
@@ -37,16 +41,16 @@ std::vector<AlbedoFound> albedos_of(const Trial& t, const Case& c) {
   ParamValues white = c.bound.values;
   for (const ParamInfo& p : t.info().params)
     if (p.kind == ParamKind::Color) white[p.name] = 1.;
-  const BoundModel white_bound = bind_model(t.model(), white);
-  Random random = t.random(c, Purpose::Albedo);
+  const measure::BoundModel white_bound = measure::bind_model(t.model(), white);
+  measure::Random random = t.random(c, Purpose::Albedo);
   double highest = 0, highest_cos = 1, lowest = 2, lowest_cos = 1;
-  const double phi = 2 * kPi * uniform(random);
-  std::vector<double> cosines{1., 0.2 + 0.7 * uniform(random), 0.05};
-  if (two_sided(t.model(), f)) cosines.insert(cosines.end(), {-1., -0.2 - 0.7 * uniform(random)});
+  const double phi = 2 * kPi * measure::uniform(random);
+  std::vector<double> cosines{1., 0.2 + 0.7 * measure::uniform(random), 0.05};
+  if (measure::two_sided(t.model(), f)) cosines.insert(cosines.end(), {-1., -0.2 - 0.7 * measure::uniform(random)});
   for (const double cos_o : cosines) {
-    const Rgb<double> sum = sampled_albedo(*white_bound.brdf, cos_o, phi, white_bound.label, t.scaled(2048)).scattered +
-                            white_bound.brdf->mirror(direction(cos_o, phi)) +
-                            white_bound.brdf->transmit(direction(cos_o, phi));
+    const Rgb<double> sum =
+        measure::sampled_albedo(*white_bound.brdf, cos_o, phi, white_bound.label, t.scaled(2048)).scattered +
+        white_bound.brdf->mirror(direction(cos_o, phi)) + white_bound.brdf->transmit(direction(cos_o, phi));
     const double top = max_component(sum), bottom = std::min({sum.r, sum.g, sum.b});
     if (top > highest) highest = top, highest_cos = cos_o;
     if (bottom < lowest) lowest = bottom, lowest_cos = cos_o;
@@ -55,7 +59,7 @@ std::vector<AlbedoFound> albedos_of(const Trial& t, const Case& c) {
   std::vector<AlbedoFound> found;
   if (c.thorough || highest > 1.01) found.push_back(measure(t, c, white_bound, highest_cos, phi, true));
   if (t.claims().lossless ? loses : c.thorough) found.push_back(measure(t, c, white_bound, lowest_cos, phi, true));
-  if (c.thorough && !gains) found.push_back(measure(t, c, c.bound, 0.05 + 0.95 * uniform(random), phi, false));
+  if (c.thorough && !gains) found.push_back(measure(t, c, c.bound, 0.05 + 0.95 * measure::uniform(random), phi, false));
   return found;
 }
 
@@ -98,4 +102,4 @@ std::vector<Check> energy_checks(const ModelProperties& claims) {
           {"sampled albedo", "mean weight = albedo by quadrature", at_most(kAlbedo), sampled, without_lobe}};
 }
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

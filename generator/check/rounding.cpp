@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Errors of formulas in float and double.
-#include "analysis/stability.h"
 #include "check/claim.h"
+#include "measure/stability.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 namespace {
 
 /// Rounding errors a good formula may add to those of its inputs, in units of them.
 constexpr double kAmplified = 32;
 
-void add(const Stability& s, Verdict& verdict) {
+void add(const measure::Stability& s, Verdict& verdict) {
   verdict.add(s.amplified, fmt::format("{} (largest relative error {:.2g})", s.amplified_where, s.relative));
 }
 
 void single(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
-    add(float_stability(t.model(), c.bound.values, t.scaled(128), t.random(c, Purpose::FloatRounding)()), verdict);
+    add(measure::float_stability(t.model(), c.bound.values, t.scaled(128), t.random(c, Purpose::FloatRounding)()),
+        verdict);
   });
 }
 
 void twice(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
-    add(double_stability(t.model(), c.bound.values, t.scaled(48), t.random(c, Purpose::DoubleRounding)()), verdict);
+    add(measure::double_stability(t.model(), c.bound.values, t.scaled(48), t.random(c, Purpose::DoubleRounding)()),
+        verdict);
   });
 }
 
@@ -33,4 +35,4 @@ std::vector<Check> rounding_checks() {
           {"double rounding", kExpected, at_most(kAmplified), twice}};
 }
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

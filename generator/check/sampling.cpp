@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Drawn directions: their weights, their density, and that they follow it.
-#include "analysis/properties.h"
 #include "check/chi_square.h"
 #include "check/claim.h"
+#include "measure/albedo.h"
+#include "measure/bound_model.h"
+#include "measure/cubature.h"
+#include "measure/guides.h"
+#include "measure/probes.h"
+#include "measure/properties.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 namespace {
 
 /// The error of quadrature is added to it.
@@ -21,21 +26,21 @@ constexpr double kVariance = 16;
 template <class F> void for_each_view(const Trial& t, const F& f) {
   t.for_each([&](const Case& c) {
     if (!c.within || c.bound.brdf->scatters_through()) return;
-    Random random = t.random(c, Purpose::Spread);
-    for (const double cos_o : {1., 0.2 + 0.7 * uniform(random), 0.05}) {
-      const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
-      const Weights w = sampled_weights(c.bound, wo, t.scaled(512), random);
-      if (w.kept >= 2) f(w, fmt::format("{} wo={}", c.bound.label, text(wo)));
+    measure::Random random = t.random(c, Purpose::Spread);
+    for (const double cos_o : {1., 0.2 + 0.7 * measure::uniform(random), 0.05}) {
+      const Vec3<double> wo = direction(cos_o, 2 * kPi * measure::uniform(random));
+      const measure::Weights w = measure::sampled_weights(c.bound, wo, t.scaled(512), random);
+      if (w.kept >= 2) f(w, fmt::format("{} wo={}", c.bound.label, measure::text(wo)));
     }
   });
 }
 
 void even(const Trial& t, Verdict& verdict) {
-  for_each_view(t, [&](const Weights& w, const std::string& where) { verdict.add(w.spread, where); });
+  for_each_view(t, [&](const measure::Weights& w, const std::string& where) { verdict.add(w.spread, where); });
 }
 
 void variance(const Trial& t, Verdict& verdict) {
-  for_each_view(t, [&](const Weights& w, const std::string& where) { verdict.add(w.variance, where); });
+  for_each_view(t, [&](const measure::Weights& w, const std::string& where) { verdict.add(w.variance, where); });
 }
 
 void normalised(const Trial& t, Verdict& verdict) {
@@ -43,45 +48,47 @@ void normalised(const Trial& t, Verdict& verdict) {
     if (!c.thorough) return;
     const Brdf<double>& f = *c.bound.brdf;
     const std::string& label = c.bound.label;
-    Random random = t.random(c, Purpose::Density);
-    const double cos_o = c.index % 3 == 0 ? 1 : c.index % 3 == 1 ? 0.2 + 0.7 * uniform(random) : 0.05;
-    const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
-    const auto drawn = [&](int samples) { return sampled_albedo(f, cos_o, std::atan2(wo.y, wo.x), label, samples); };
-    SampledAlbedo s = drawn(std::max(1024, t.scaled(1 << 13)));
+    measure::Random random = t.random(c, Purpose::Density);
+    const double cos_o = c.index % 3 == 0 ? 1 : c.index % 3 == 1 ? 0.2 + 0.7 * measure::uniform(random) : 0.05;
+    const Vec3<double> wo = direction(cos_o, 2 * kPi * measure::uniform(random));
+    const auto drawn = [&](int samples) {
+      return measure::sampled_albedo(f, cos_o, std::atan2(wo.y, wo.x), label, samples);
+    };
+    measure::SampledAlbedo s = drawn(std::max(1024, t.scaled(1 << 13)));
     const auto integral = [&](int guides) {
-      return integrate_hemisphere(
+      return measure::integrate_hemisphere(
           f, wo, 1,
           [&](const Vec3<double>& wi, double* out) {
             out[0] = f.pdf(wi, wo);
-            require_value(out[0], "pdf", label, wi, wo);
+            measure::require_value(out[0], "pdf", label, wi, wo);
           },
           {1e-7, 0, 2000}, guides);
     };
-    const CubatureResult p = integral(512);
-    const CubatureResult q = p.converged ? integral(4096) : p;
+    const measure::CubatureResult p = integral(512);
+    const measure::CubatureResult q = p.converged ? integral(4096) : p;
     const double moved = std::abs(p.value[0] - q.value[0]);
     if (!p.converged || !q.converged || !(moved < kMeshes)) return verdict.skip();
     const double uncertain = q.error[0] + moved;
     // A loss rarer than one sample in those drawn shows only among more.
     if (s.lost_error == 0 && std::abs(q.value[0] + s.lost - 1) > kNormalisation + uncertain) s = drawn(1 << 20);
-    verdict.add(std::abs(q.value[0] + s.lost - 1), fmt::format("{} wo={}", label, text(wo)),
+    verdict.add(std::abs(q.value[0] + s.lost - 1), fmt::format("{} wo={}", label, measure::text(wo)),
                 uncertain + 7 * s.lost_error);
   });
 }
 
 void weights(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
-    Random random = t.random(c, Purpose::Weights);
+    measure::Random random = t.random(c, Purpose::Weights);
     for (int k = 0; k < t.scaled(24); ++k) {
-      Vec3<double> wo = uniform_direction(random);
-      const Vec3<double> u = uniform_cube(random);
-      if (two_sided(t.model(), *c.bound.brdf) && k % 2 == 1) wo.z = -wo.z;
+      Vec3<double> wo = measure::uniform_direction(random);
+      const Vec3<double> u = measure::uniform_cube(random);
+      if (measure::two_sided(t.model(), *c.bound.brdf) && k % 2 == 1) wo.z = -wo.z;
       const Vec3<Wide> wide_wo = Vec3<Wide>::from(wo);
       const Sample<Wide> s = c.wide->sample(wide_wo, Vec3<Wide>::from(u));
       if (!(s.pdf > Wide(0))) continue;
       const Rgb<Wide> value = c.wide->eval(s.wi, wide_wo) * Wide(abs(s.wi.z)), by_weight = s.weight * s.pdf;
-      verdict.add(std::max(relative(value, by_weight), relative(s.pdf, c.wide->pdf(s.wi, wide_wo))),
-                  fmt::format("{} wo={} u={}", c.bound.label, text(wo), text(u)));
+      verdict.add(std::max(measure::relative(value, by_weight), measure::relative(s.pdf, c.wide->pdf(s.wi, wide_wo))),
+                  fmt::format("{} wo={} u={}", c.bound.label, measure::text(wo), measure::text(u)));
     }
   });
 }
@@ -95,15 +102,15 @@ void histogram(const Trial& t, Verdict& verdict) {
   std::mutex mutex;
   t.for_each([&](const Case& c) {
     if (!c.thorough) return;
-    Random random = t.random(c, Purpose::Histogram);
-    double cos_o = c.index % 4 == 0 ? 1 : 0.15 + 0.8 * uniform(random);
-    if (two_sided(t.model(), *c.bound.brdf) && c.index % 4 > 1) cos_o = -cos_o;
-    const Vec3<double> wo = direction(cos_o, 2 * kPi * uniform(random));
+    measure::Random random = t.random(c, Purpose::Histogram);
+    double cos_o = c.index % 4 == 0 ? 1 : 0.15 + 0.8 * measure::uniform(random);
+    if (measure::two_sided(t.model(), *c.bound.brdf) && c.index % 4 > 1) cos_o = -cos_o;
+    const Vec3<double> wo = direction(cos_o, 2 * kPi * measure::uniform(random));
     const ChiSquare of = chi_square(c.bound, wo, std::max(10000, t.scaled(30000)), random());
     if (!of.converged) return verdict.skip();
     const std::lock_guard lock(mutex);
-    found.push_back(
-        {of, fmt::format("{} wo={} statistic={:.4g} degrees={}", c.bound.label, text(wo), of.statistic, of.degrees)});
+    found.push_back({of, fmt::format("{} wo={} statistic={:.4g} degrees={}", c.bound.label, measure::text(wo),
+                                     of.statistic, of.degrees)});
   });
   // The smallest of m independent ones is below p with probability 1 - (1 - p)^m.
   for (const Found& one : found) verdict.add(-std::expm1(double(found.size()) * std::log1p(-one.of.p)), one.where);
@@ -123,4 +130,4 @@ std::vector<Check> sampling_checks(const ModelProperties& claims) {
           {"chi-square", "p > 0.01 over all cases (Sidak)", at_least(kSignificance), histogram, without_lobe}};
 }
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

@@ -2,10 +2,12 @@
 // The shape of the lobe above the surface, and what it becomes at the ends of its ranges.
 #include <sstream>
 
-#include "analysis/properties.h"
 #include "check/claim.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
+#include "measure/properties.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 namespace {
 
 /// A jump of a derivative that is rounding or a curvature, and one that the eye sees as an edge.
@@ -18,7 +20,7 @@ constexpr double kMirror = 0.99;
 template <class F> void for_each_upper(const Trial& t, Purpose what, const F& f) {
   t.for_each([&](const Case& c) {
     if (c.bound.brdf->scatters_through()) return;
-    Random random = t.random(c, what);
+    measure::Random random = t.random(c, what);
     f(c, random);
   });
 }
@@ -35,52 +37,54 @@ ParamValues with_inner_colors(const Trial& t, const Case& c) {
 // Claims about the lobe hold where sliders lead; a failure that is declared may also show at the end of a range.
 
 void positive(const Trial& t, Verdict& verdict) {
-  for_each_upper(t, Purpose::Positive, [&](const Case& c, Random& random) {
+  for_each_upper(t, Purpose::Positive, [&](const Case& c, measure::Random& random) {
     if (!c.within && t.claims().positive) return;
-    const auto place = find_dark_place(t.model(), with_inner_colors(t, c), t.scaled(256), random);
+    const auto place = measure::find_dark_place(t.model(), with_inner_colors(t, c), t.scaled(256), random);
     verdict.add(place ? 1 : 0, place.value_or(c.bound.label));
   });
 }
 
 void smooth(const Trial& t, Verdict& verdict) {
-  for_each_upper(t, Purpose::Smooth, [&](const Case& c, Random& random) {
+  for_each_upper(t, Purpose::Smooth, [&](const Case& c, measure::Random& random) {
     if (!c.within && t.claims().smooth) return;
-    const Edge e = sharpest_edge(bind_model(t.model(), with_inner_colors(t, c)), t.scaled(24), random);
+    const measure::Edge e =
+        measure::sharpest_edge(measure::bind_model(t.model(), with_inner_colors(t, c)), t.scaled(24), random);
     verdict.add(e.jump, e.where);
   });
 }
 
 void not_matte(const Trial& t, Verdict& verdict) {
-  for_each_upper(t, Purpose::Matte, [&](const Case& c, Random& random) {
-    if (const auto u = unevenness(*c.bound.brdf, 128, random)) verdict.add(*u, c.bound.label);
+  for_each_upper(t, Purpose::Matte, [&](const Case& c, measure::Random& random) {
+    if (const auto u = measure::unevenness(*c.bound.brdf, 128, random)) verdict.add(*u, c.bound.label);
   });
 }
 
 void not_mirror(const Trial& t, Verdict& verdict) {
-  for_each_upper(t, Purpose::Mirror, [&](const Case& c, Random& random) {
-    if (const auto share = least_mirror_share(*c.bound.brdf, t.scaled(512), random)) verdict.add(*share, c.bound.label);
+  for_each_upper(t, Purpose::Mirror, [&](const Case& c, measure::Random& random) {
+    if (const auto share = measure::least_mirror_share(*c.bound.brdf, t.scaled(512), random))
+      verdict.add(*share, c.bound.label);
   });
 }
 
 /// "n=0 m=1" as values.
-BoundModel at_limit(const Trial& t, const std::string& limit) {
+measure::BoundModel at_limit(const Trial& t, const std::string& limit) {
   std::vector<std::string> assignments;
   std::istringstream in(limit);
   for (std::string one; in >> one;) assignments.push_back(one);
-  return bind_model(t.model(), parse_values(t.info(), assignments));
+  return measure::bind_model(t.model(), parse_values(t.info(), assignments));
 }
 
 void matte(const Trial& t, Verdict& verdict) {
-  const BoundModel b = at_limit(t, t.claims().diffuse_limit);
-  Random random = t.random();
-  const auto u = unevenness(*b.brdf, 1024, random);
+  const measure::BoundModel b = at_limit(t, t.claims().diffuse_limit);
+  measure::Random random = t.random();
+  const auto u = measure::unevenness(*b.brdf, 1024, random);
   verdict.add(u.value_or(1), u ? b.label : b.label + ": f is 0");
 }
 
 void mirror(const Trial& t, Verdict& verdict) {
-  const BoundModel b = at_limit(t, t.claims().specular_limit);
-  Random random = t.random();
-  const auto share = least_mirror_share(*b.brdf, 8192, random);
+  const measure::BoundModel b = at_limit(t, t.claims().specular_limit);
+  measure::Random random = t.random();
+  const auto share = measure::least_mirror_share(*b.brdf, 8192, random);
   verdict.add(1 - share.value_or(0), share ? b.label : b.label + ": no light");
 }
 
@@ -106,4 +110,4 @@ std::vector<Check> shape_checks(const ModelProperties& claims) {
                                 smooth, without_upper_lobe}};
 }
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

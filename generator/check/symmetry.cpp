@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What f does when directions are swapped or turned.
 #include "check/claim.h"
+#include "measure/probes.h"
 #include "model/sampling.h"
 
-namespace brdfc::checks {
+namespace brdfc::check {
 namespace {
 
 /// In double: swapping only reorders operations.
@@ -13,11 +14,11 @@ constexpr double kReciprocity = 1e-9;
 double swapped(const Case& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   const Brdf<double>& f = *c.bound.brdf;
   const double n2i = wi.z > 0 ? 1 : sqr(f.ior()), n2o = wo.z > 0 ? 1 : sqr(f.ior());
-  const double d = relative(f.eval(wi, wo) * n2o, f.eval(wo, wi) * n2i);
+  const double d = measure::relative(f.eval(wi, wo) * n2o, f.eval(wo, wi) * n2i);
   if (d <= kReciprocity) return d;
   // High powers amplify the rounding of a half vector: then the formulas themselves are compared.
   const Vec3<Wide> a = Vec3<Wide>::from(wi), b = Vec3<Wide>::from(wo);
-  return relative(c.wide->eval(a, b) * Wide(n2o), c.wide->eval(b, a) * Wide(n2i));
+  return measure::relative(c.wide->eval(a, b) * Wide(n2o), c.wide->eval(b, a) * Wide(n2i));
 }
 
 /// Of delta terms, along the path of light towards wo. Nothing beyond the critical angle.
@@ -26,30 +27,32 @@ std::optional<double> swapped_path(const Model& model, const Case& c, const Vec3
   Vec3<Wide> from{-to.x, -to.y, to.z};
   if ((wi.z > 0) != (wo.z > 0)) from = refract(to, c.wide->ior());
   if (from.z == 0) return std::nullopt;
-  return relative(value_of(model, *c.wide, from, to), value_of(model, *c.wide, to, from));
+  return measure::relative(measure::value_of(model, *c.wide, from, to), measure::value_of(model, *c.wide, to, from));
 }
 
 void reciprocal(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
-    Random random = t.random(c, Purpose::Reciprocity);
+    measure::Random random = t.random(c, Purpose::Reciprocity);
     const Brdf<double>& f = *c.bound.brdf;
-    for (const auto& [wi, wo] : direction_pairs(f, t.scaled(128), random, two_sided(t.model(), f))) {
+    for (const auto& [wi, wo] : measure::direction_pairs(f, t.scaled(128), random, measure::two_sided(t.model(), f))) {
       const std::optional<double> d = t.model().has_scatter() ? swapped(c, wi, wo) : swapped_path(t.model(), c, wi, wo);
-      if (d) verdict.add(*d, fmt::format("{} wi={} wo={}", c.bound.label, text(wi), text(wo)));
+      if (d) verdict.add(*d, fmt::format("{} wi={} wo={}", c.bound.label, measure::text(wi), measure::text(wo)));
     }
   });
 }
 
 void isotropic(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
-    Random random = t.random(c, Purpose::Isotropy);
+    measure::Random random = t.random(c, Purpose::Isotropy);
     const Brdf<double>& f = *c.bound.brdf;
-    for (const auto& [wi, wo] : direction_pairs(f, 16, random, two_sided(t.model(), f))) {
-      const Wide angle(2 * kPi * uniform(random)), cosine = cos(angle), sine = sin(angle);
+    for (const auto& [wi, wo] : measure::direction_pairs(f, 16, random, measure::two_sided(t.model(), f))) {
+      const Wide angle(2 * kPi * measure::uniform(random)), cosine = cos(angle), sine = sin(angle);
       const Vec3<Wide> i0 = Vec3<Wide>::from(wi), o0 = Vec3<Wide>::from(wo);
-      const Rgb<Wide> before = value_of(t.model(), *c.wide, i0, o0);
-      const Rgb<Wide> after = value_of(t.model(), *c.wide, rotate_z(i0, cosine, sine), rotate_z(o0, cosine, sine));
-      verdict.add(relative(before, after), fmt::format("{} wi={} wo={}", c.bound.label, text(wi), text(wo)));
+      const Rgb<Wide> before = measure::value_of(t.model(), *c.wide, i0, o0);
+      const Rgb<Wide> after =
+          measure::value_of(t.model(), *c.wide, rotate_z(i0, cosine, sine), rotate_z(o0, cosine, sine));
+      verdict.add(measure::relative(before, after),
+                  fmt::format("{} wi={} wo={}", c.bound.label, measure::text(wi), measure::text(wo)));
     }
   });
 }
@@ -65,4 +68,4 @@ std::vector<Check> symmetry_checks(const ModelProperties& claims) {
                                    somewhere_at_least(kVisible), isotropic}};
 }
 
-}  // namespace brdfc::checks
+}  // namespace brdfc::check

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 namespace brdfc {
+inline namespace core {
 
 /// Cosines of the angles between shading normal and viewer; of all views unless told otherwise.
 struct Cosines {
@@ -18,4 +19,5 @@ struct Cosines {
   }
 };
 
+}  // namespace core
 }  // namespace brdfc

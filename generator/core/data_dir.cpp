@@ -10,6 +10,7 @@
 #include "core/error.h"
 
 namespace brdfc {
+inline namespace core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -50,13 +51,9 @@ fs::path data_dir() {
               tried);
 }
 
-fs::path data_dir(const std::string& name) {
-  const fs::path root = data_dir(), of_sources = root / "generator";
-  return name != "blender_addon" && fs::is_directory(of_sources) ? of_sources / name : root / name;
-}
-
 void note_missing(const std::string& what, const fs::path& store, const std::string& how_long) {
   fmt::print(stderr, "brdfc: no {} in {}: making it, which takes {}\n", what, store.string(), how_long);
 }
 
+}  // namespace core
 }  // namespace brdfc

@@ -7,6 +7,7 @@
 #include <array>
 
 namespace brdfc {
+inline namespace core {
 
 std::string sha256(const std::string& bytes) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest;
@@ -16,4 +17,5 @@ std::string sha256(const std::string& bytes) {
   return hex;
 }
 
+}  // namespace core
 }  // namespace brdfc

@@ -4,8 +4,10 @@
 #include <string>
 
 namespace brdfc {
+inline namespace core {
 
 /// SHA-256 of the bytes, as 64 hexadecimal digits.
 std::string sha256(const std::string& bytes);
 
+}  // namespace core
 }  // namespace brdfc

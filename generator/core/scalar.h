@@ -2,7 +2,7 @@
 // The scalar types a model is instantiated for, and the vocabulary its formulas are written in.
 //
 //   double  truth            float  what OSL computes
-//   Wide    113-bit mantissa Expr   records the formula (expr.h)
+//   Wide    113-bit mantissa Expr   records the formula (trace/expr.h)
 //
 // A model formula is a template over the scalar T and uses only the functions named here, so that one
 // text serves all four. There are no data-dependent branches: select() evaluates both arms, hence guard
@@ -17,6 +17,7 @@
 #include "core/wide.h"
 
 namespace brdfc {
+inline namespace core {
 
 /// float, double, Wide: types whose comparisons are decided at once.
 template <class T>
@@ -75,4 +76,5 @@ template <class T> constexpr int newton_steps() { return std::same_as<T, double>
 /// Gives a subexpression the name it has in the paper; only the recorded form keeps it.
 template <Numeric T> const T& named(const char*, const T& x) { return x; }
 
+}  // namespace core
 }  // namespace brdfc

@@ -7,6 +7,7 @@
 #include "core/scalar.h"
 
 namespace brdfc {
+inline namespace core {
 
 /// A direction or vector. Local shading frame: z is the normal, x the tangent.
 template <class T> struct Vec3 {
@@ -34,6 +35,16 @@ template <class T> T sin2_theta(const Vec3<T>& w) { return w.x * w.x + w.y * w.y
 /// Rotates the frame by -angle about the normal, so that a lobe turned by +angle is axis-aligned.
 template <class T> Vec3<T> rotate_z(const Vec3<T>& w, const T& cos_angle, const T& sin_angle) {
   return {cos_angle * w.x + sin_angle * w.y, cos_angle * w.y - sin_angle * w.x, w.z};
+}
+
+template <class Flag, class T> Vec3<T> select(const Flag& first, const Vec3<T>& a, const Vec3<T>& b) {
+  return {select(first, a.x, b.x), select(first, a.y, b.y), select(first, a.z, b.z)};
+}
+
+/// Unit vector with z = cos_theta (0 < |cos_theta| <= 1) and azimuth phi from the tangent.
+inline Vec3<double> direction(double cos_theta, double phi) {
+  const double s = std::sqrt((1 - cos_theta) * (1 + cos_theta));
+  return {s * std::cos(phi), s * std::sin(phi), cos_theta};
 }
 
 /// Linear scene-referred RGB reflectance or radiance.
@@ -76,4 +87,5 @@ template <class T> Vec3<T> seen_along_axis(const Vec3<T>& w, const Vec3<T>& s) {
   return {dot(u, s), dot(v, s), dot(w, s)};
 }
 
+}  // namespace core
 }  // namespace brdfc

@@ -25,6 +25,7 @@ __float128 powf128(__float128, __float128) noexcept;
 }
 
 namespace brdfc {
+inline namespace core {
 
 class Wide {
  public:
@@ -77,6 +78,7 @@ inline bool isfinite(const Wide& x) { return x.value() - x.value() == 0; }
 /// Smallest positive normal number.
 inline constexpr int kWideMinExponent = -16382;
 
+}  // namespace core
 }  // namespace brdfc
 
 template <> class std::numeric_limits<brdfc::Wide> {

@@ -4,9 +4,10 @@
 // and of its square, over the view and the sliders' ranges. base_worth() measures both.
 #pragma once
 
-#include "represent/closure.h"
+#include "closures/closure.h"
 
 namespace brdfc {
+inline namespace model {
 
 /// The least roughness that Cycles takes; below it facets are this rough.
 inline constexpr double kLeastRoughness = 1e-4;
@@ -43,4 +44,5 @@ template <class T> Closure<T> power_closure(const Rgb<T>& weight, const T& expon
 /// weight that is divided by a height, or a Fresnel term of one, takes this.
 template <class T> T lobe_height(const T& z, const T& variance) { return sqrt(z * z + variance); }
 
+}  // namespace model
 }  // namespace brdfc

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 namespace brdfc {
+inline namespace model {
 
 std::vector<Choices> choice_combinations(const ModelInfo& info) {
   std::vector<Choices> all = {{}};
@@ -35,4 +36,5 @@ bool admits(const ModelInfo& info, const Choices& choices, const ParamValues& fi
   });
 }
 
+}  // namespace model
 }  // namespace brdfc

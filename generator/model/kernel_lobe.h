@@ -22,6 +22,7 @@
 #include "model/sampling.h"
 
 namespace brdfc {
+inline namespace model {
 
 /// iterate(), ended early where numbers can tell that nothing changes any more.
 template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
@@ -294,4 +295,5 @@ template <class T, class Knots> struct KernelLobe {
   }
 };
 
+}  // namespace model
 }  // namespace brdfc

@@ -9,6 +9,7 @@
 #include "model/spectrum.h"
 
 namespace brdfc {
+inline namespace model {
 namespace {
 
 constexpr const char* kNoble =
@@ -166,4 +167,5 @@ const std::vector<ChannelIndices>& channel_indices() {
   return all;
 }
 
+}  // namespace model
 }  // namespace brdfc

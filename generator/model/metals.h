@@ -8,6 +8,7 @@
 #include "core/vec.h"
 
 namespace brdfc {
+inline namespace model {
 
 struct Metal {
   std::string name;              ///< "cu"
@@ -37,4 +38,5 @@ struct ChannelIndices {
 /// In the order of metals(); computed once.
 const std::vector<ChannelIndices>& channel_indices();
 
+}  // namespace model
 }  // namespace brdfc

@@ -6,6 +6,7 @@
 #include <cmath>
 
 namespace brdfc {
+inline namespace model {
 namespace {
 
 std::map<std::string, std::unique_ptr<Model>>& registry() {
@@ -179,4 +180,5 @@ std::string format_values(const ModelInfo& info, const ParamValues& values) {
   return text;
 }
 
+}  // namespace model
 }  // namespace brdfc

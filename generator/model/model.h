@@ -28,12 +28,13 @@
 #include <variant>
 #include <vector>
 
+#include "closures/closure.h"
 #include "core/error.h"
-#include "core/expr.h"
 #include "core/vec.h"
-#include "represent/closure.h"
+#include "trace/expr.h"
 
 namespace brdfc {
+inline namespace model {
 
 enum class ParamKind { Number, Color, Choice };
 
@@ -70,7 +71,7 @@ struct ModelProperties {
   /// Assignments ("n=1e8") at which nearly all of the light leaves in the direction of ideal reflection; "" if none do.
   std::string specular_limit = "";
   TabulatedChoice tabulated = {};
-  /// The number over which the repository keeps a fit (represent/fit.h), what multiplies or mixes open and the others
+  /// The number over which the repository keeps a fit (fit/fit.h), what multiplies or mixes open and the others
   /// at their defaults; "" if none.
   std::string fit_axis = "";
 };
@@ -412,9 +413,10 @@ template <template <class> class M> class ModelOf final : public Model {
 }  // namespace detail
 
 /// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this.
-#define BRDFC_MODEL(M)                                                                                  \
-  namespace {                                                                                           \
-  const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::detail::ModelOf<M>>()); \
+#define BRDFC_MODEL(M)                                                                                         \
+  namespace {                                                                                                  \
+  const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>()); \
   }
 
+}  // namespace model
 }  // namespace brdfc

@@ -5,14 +5,10 @@
 #include "model/model.h"
 
 namespace brdfc {
+inline namespace model {
 
 /// True where both directions are above the surface; the BRDF is 0 elsewhere.
 template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
-
-/// A direction from one of two lobes.
-template <class Flag, class T> Vec3<T> select(const Flag& first, const Vec3<T>& a, const Vec3<T>& b) {
-  return {select(first, a.x, b.x), select(first, a.y, b.y), select(first, a.z, b.z)};
-}
 
 /// Ideal reflection of wo about the normal.
 template <class T> Vec3<T> reflect(const Vec3<T>& wo) { return {-wo.x, -wo.y, wo.z}; }
@@ -82,4 +78,5 @@ template <class T> T one_minus_schlick_weight(const T& c) {
   return select(c < T(0.25), polynomial, T(1) - pow5(T(1) - c));
 }
 
+}  // namespace model
 }  // namespace brdfc

@@ -21,9 +21,9 @@
 // 1 / (n + 1) along the axes; what counts are its variances along and across the plane of incidence and the correlation
 // of the two. A cosine alone would not do: where the lobe begins to sink below the surface moves with the lobe's width.
 // Interpolation errs by at most 0.02 of the incident light, 0.003 on average; that is what R_d = 1 gains or loses.
-#include "core/table.h"
 #include "model/base_terms.h"
 #include "model/half_vector.h"
+#include "tables/table.h"
 
 namespace brdfc {
 

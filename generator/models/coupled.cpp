@@ -21,8 +21,8 @@
 // stalls near 0; below xi = 0.02 the start is c = t (1 + t/2), t = cbrt(2 xi / 7), from the leading terms of eq. 6.
 #include <boost/math/quadrature/gauss.hpp>
 
-#include "core/table.h"
 #include "model/sampling.h"
+#include "tables/table.h"
 
 namespace brdfc {
 

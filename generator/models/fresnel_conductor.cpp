@@ -7,8 +7,8 @@
 //
 // Three channels stand for the spectrum. For each, the index is chosen whose reflectance is as near as can be to the
 // integral over all wavelengths, so that one formula serves published metals and indices of one's own. It is off by
-// at most 3e-3 (tests/fresnel_test.cpp prints it) but for gold's red: gold lies outside of Rec.709, its red is 1.035,
-// and no index reflects more than all the light; there it is 0.036 too dark.
+// at most 3e-3 (tests/model/fresnel_test.cpp prints it) but for gold's red: gold lies outside of Rec.709, its red
+// is 1.035, and no index reflects more than all the light; there it is 0.036 too dark.
 #include "model/fresnel.h"
 #include "model/metals.h"
 #include "model/sampling.h"

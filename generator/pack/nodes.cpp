@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "represent/closure_pool.h"
-#include "represent/fit.h"
-#include "represent/twin.h"
+#include "closures/closure_pool.h"
+#include "fit/fit.h"
+#include "fit/twin.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -33,7 +33,7 @@ std::vector<float> floats(const std::shared_ptr<const Table>& table) {
   return {table->values.begin(), table->values.end()};
 }
 
-Json by_channel(const Channels& tables) {
+Json by_channel(const fit::Channels& tables) {
   Json channels = Json::array();
   for (const auto& table : tables) channels.push_back(floats(table));
   return channels;
@@ -42,11 +42,11 @@ Json by_channel(const Channels& tables) {
 }  // namespace
 
 Shader write_nodes(const Model& model, const ParamValues& fixed) {
-  const Twin& twin = twin_of(model, without_factors(model, fixed));
+  const fit::Twin& twin = fit::twin_of(model, fit::without_factors(model, fixed));
   Shader out;
   out.name = fmt::format("brdfc_{}_twin", model.info().name);
   Json closures = Json::array();
-  for (const TwinClosure& part : twin.parts()) {
+  for (const fit::TwinClosure& part : twin.parts()) {
     Json j = {{"kind", node_of(part.kind)}, {"weight", by_channel(part.weight)}};
     if (has_facets(part.kind)) {
       j["lean"] = floats(part.lean);
@@ -72,4 +72,4 @@ Shader write_nodes(const Model& model, const ParamValues& fixed) {
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

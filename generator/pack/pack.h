@@ -7,23 +7,25 @@
 #include <string>
 #include <vector>
 
-#include "pack/plan.h"
+#include "forms/representation.h"
+#include "plan/costs.h"
+#include "plan/plan.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 
-struct PackOptions {
-  std::filesystem::path out;         ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
-  std::filesystem::path addon;       ///< folder with the add-on's Python and blender_manifest.toml
-  std::vector<PlannedModel> models;  ///< what of each model
-  Costs costs = {};                  ///< for the panel
+struct Options {
+  std::filesystem::path out;               ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
+  std::filesystem::path addon;             ///< folder with the add-on's Python and blender_manifest.toml
+  std::vector<plan::PlannedModel> models;  ///< what of each model
+  plan::Costs costs = {};                  ///< for the panel
   std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty
 };
 
 /// A line of the table that a build prints.
-struct PackLine {
+struct Line {
   std::string model, representation;
   int closures = 0, slots = 0, operations = 0, statements = 0;
-  RepresentationError error;
+  forms::RepresentationError error;
   std::size_t table_floats = 0;
   double table_error = 0;
   std::size_t bytes = 0;         ///< of the shader's text
@@ -33,13 +35,13 @@ struct PackLine {
   std::size_t whole_table_floats = 0, whole_bytes = 0;
 };
 
-struct PackResult {
+struct Result {
   std::filesystem::path folder, zip;
-  std::vector<PackLine> lines;
+  std::vector<Line> lines;
 };
 
 /// Builds beside the target and renames, so that a target is whole or untouched. The same models give the same
 /// bytes. Throws InputError (paths, names) or ValueError (a model that gives a bad value).
-PackResult build_pack(const PackOptions&);
+Result build_pack(const Options&);
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/probe.h"
 
-#include "core/osl_arithmetic.h"
-#include "pack/osl_library.h"
+#include "model/inputs.h"
+#include "print/osl_library.h"
+#include "print/osl_program.h"
+#include "trace/osl_arithmetic.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 namespace {
-
-Vec3<Expr> input3(const std::string& name) {
-  return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
-}
 
 struct Recorded {
   Program eval, sample;
@@ -42,20 +40,13 @@ template <class T> ProbeValues direct(const Brdf<T>& brdf, const ProbePoint& p) 
 }
 
 ProbeValues executed(const Recorded& r, const ProbePoint& p) {
-  std::map<std::string, std::array<float, 3>> in;
-  const auto set = [&](const std::string& name, double v) { in[name] = {float(v), float(v), float(v)}; };
-  for (const auto& [name, value] : p.values) {
-    if (const double* v = std::get_if<double>(&value)) set(name, *v);
-    if (const auto* c = std::get_if<std::array<double, 3>>(&value))
-      in[name] = {float((*c)[0]), float((*c)[1]), float((*c)[2])};
-  }
-  const char* const axes[] = {"_x", "_y", "_z"};
-  const double wi[] = {p.wi.x, p.wi.y, p.wi.z}, wo[] = {p.wo.x, p.wo.y, p.wo.z}, u[] = {p.u.x, p.u.y, p.u.z};
-  for (int i = 0; i < 3; ++i) {
-    set(std::string("wi") + axes[i], wi[i]);
-    set(std::string("wo") + axes[i], wo[i]);
-    set(fmt::format("u_{}", i), u[i]);
-  }
+  Inputs<float> in;
+  set_inputs(in, p.values);
+  set_input(in, "wi", p.wi);
+  set_input(in, "wo", p.wo);
+  set_input(in, "u_0", p.u.x);
+  set_input(in, "u_1", p.u.y);
+  set_input(in, "u_2", p.u.z);
   const auto f = r.eval.run<float>(in), s = r.sample.run<float>(in);
   const auto& rgb = f.at("shown_f");
   const auto& weight = s.at("shown_weight");
@@ -99,18 +90,18 @@ std::string probe_source(const Model& model, const ParamValues& choices) {
   }
   body +=
       "    color first = 0;\n    if (show < 0.5 || show > 2.5) {\n        color shown_f;\n        float shown_pdf;\n" +
-      r.eval.print_osl(8, taken) +
+      print::osl_program(r.eval, 8, taken) +
       "        first = show > 2.5 ? color(shown_pdf) : shown_f;\n    } else {\n"
       "        float shown_x, shown_y, shown_z, shown_pdf;\n        color shown_weight;\n" +
-      r.sample.print_osl(8, taken) +
+      print::osl_program(r.sample, 8, taken) +
       "        first = show < 1.25 ? color(shown_x, shown_y, shown_z) : show < 1.75 ? color(shown_pdf) : "
       "shown_weight;\n"
       "    }\n"
       "    for (int i = 0; i < 3; i++)\n"
       "        if (!isfinite(first[i]))\n            first[i] = -31337.0;\n"
       "    BSDF = first * emission();\n";
-  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + library_for(body) + "\nshader brdfc_probe(\n" + parameters +
-         "    output closure color BSDF = 0)\n{\n" + body + "}\n";
+  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + print::library_for(body) + "\nshader brdfc_probe(\n" +
+         parameters + "    output closure color BSDF = 0)\n{\n" + body + "}\n";
 }
 
 std::vector<std::array<ProbeValues, 4>> run_probe(const Model& model, const ParamValues& choices,
@@ -130,4 +121,4 @@ std::vector<std::array<ProbeValues, 4>> run_probe(const Model& model, const Para
   return all;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

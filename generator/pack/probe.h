@@ -8,7 +8,7 @@
 
 #include "model/model.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 
 /// Numbers that a probe shows: f (3), pdf, and of a sample wi (3), weight (3), pdf.
 inline constexpr int kProbeNumbers = 11;
@@ -34,4 +34,4 @@ const char* name_of(ProbeRun);
 std::vector<std::array<ProbeValues, 4>> run_probe(const Model&, const ParamValues& choices,
                                                   const std::vector<ProbePoint>&);
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

@@ -6,80 +6,33 @@
 #include <set>
 #include <utility>
 
-#include "core/osl_words.h"
-#include "pack/osl_library.h"
-#include "represent/closure_pool.h"
-#include "represent/fit.h"
+#include "closures/closure_pool.h"
+#include "fit/fit.h"
+#include "fit/terms.h"
+#include "print/osl_library.h"
+#include "print/osl_text.h"
+#include "print/osl_words.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 namespace {
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (c == '\n')
-      out += "\\n";
-    else
-      out += c;
-  }
-  return out + "\"";
-}
+using forms::RepresentationKind;
 
-std::string number(double v) {
-  std::string s = fmt::format("{}", float(v));
-  if (s.find_first_of(".e") == std::string::npos) s += ".0";
-  return s;
-}
+using print::block;
+using print::indented;
+using print::number;
 
 std::string parameter(const ParamInfo& p) {
-  const std::string meta = fmt::format(" [[ string label = {}, string help = {} ]],\n", quoted(p.label), quoted(p.doc));
+  const std::string meta =
+      fmt::format(" [[ string label = {}, string help = {} ]],\n", print::quoted(p.label), print::quoted(p.doc));
   switch (p.kind) {
     case ParamKind::Number:
       return fmt::format("    float {} = {}", p.name, number(p.value[0])) + meta;
     case ParamKind::Color:
-      return fmt::format("    color {} = color({}, {}, {})", p.name, number(p.value[0]), number(p.value[1]),
-                         number(p.value[2])) +
-             meta;
+      return fmt::format("    color {} = {}", p.name, print::color(p.value)) + meta;
     default:
       return fmt::format("    int {} = {}", p.name, int(p.value[0])) + meta;
   }
-}
-
-std::string comment(const std::string& text) {
-  std::string out = "//", line;
-  std::size_t width = 2;
-  std::size_t start = 0;
-  while (start < text.size()) {
-    std::size_t end = text.find(' ', start);
-    if (end == std::string::npos) end = text.size();
-    if (width + 1 + end - start > 118) {
-      out += "\n//";
-      width = 2;
-    }
-    out.append(" ").append(text, start, end - start);
-    width += 1 + end - start;
-    start = end + 1;
-  }
-  return out + "\n";
-}
-
-std::string indented(const std::string& text, std::size_t levels = 1) {
-  std::string out;
-  std::size_t start = 0;
-  while (start < text.size()) {
-    const std::size_t end = text.find('\n', start);
-    out += std::string(4 * levels, ' ') + text.substr(start, end + 1 - start);
-    start = end + 1;
-  }
-  return out;
-}
-
-/// In a scope of their own, so that what they declare stands in no other's way. None where there is nothing to do.
-std::string block(const std::string& statements, std::size_t levels) {
-  if (statements.empty()) return {};
-  const std::string edge(4 * levels, ' ');
-  return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
 }
 
 /// Statements that differ by combination of choices: equal ones are written once.
@@ -151,7 +104,7 @@ class ChoiceSwitch {
 class SharedArrays {
  public:
   /// The statements, before which stand the arrays whose names other ones have taken.
-  std::string without_shared(const Recording& r) {
+  std::string without_shared(const forms::Recording& r) {
     std::string own;
     for (const std::string& array : r.arrays) {
       const std::string name = array.substr(0, array.find('['));
@@ -169,25 +122,10 @@ class SharedArrays {
   std::map<std::string, std::string> known_;
 };
 
-std::string array(const char* name, std::size_t index, const auto& values) {
-  std::string out = fmt::format("    float {}_{}[{}] = {{", name, index, values.size());
-  std::size_t width = 200;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::string v = number(values[i]);
-    if (width + v.size() + 2 > 116) {
-      out += "\n        ";
-      width = 8;
-    }
-    out += v + (i + 1 < values.size() ? ", " : "");
-    width += v.size() + 2;
-  }
-  return out + "\n    };\n";
-}
-
 /// Statements that look the albedo up.
 class AlbedoText {
  public:
-  AlbedoText(const ModelInfo& info, const AlbedoTable& table, const ParamValues& fixed)
+  AlbedoText(const ModelInfo& info, const measure::AlbedoTable& table, const ParamValues& fixed)
       : info_(info), table_(table), fixed_(fixed) {}
 
   std::string print() {
@@ -203,9 +141,9 @@ class AlbedoText {
   }
 
  private:
-  std::string terms(const std::vector<AlbedoTerm>& list) {
+  std::string terms(const std::vector<measure::AlbedoTerm>& list) {
     std::string out = "    Albedo = 0.0;\n";
-    for (const AlbedoTerm& t : list) {
+    for (const measure::AlbedoTerm& t : list) {
       std::string product = lookup(t.grid);
       for (const std::string& c : t.colors) product = operand(c) + " * " + product;
       out += fmt::format("    Albedo += {};\n", product);
@@ -217,17 +155,16 @@ class AlbedoText {
   std::string operand(const std::string& name) const {
     const auto it = fixed_.find(name);
     if (it == fixed_.end()) return name == "cos_theta_o" ? "wo_z" : name;
-    if (const auto* c = std::get_if<std::array<double, 3>>(&it->second))
-      return fmt::format("color({}, {}, {})", number((*c)[0]), number((*c)[1]), number((*c)[2]));
+    if (const auto* c = std::get_if<std::array<double, 3>>(&it->second)) return print::color(*c);
     return number(std::get<double>(it->second));
   }
 
-  std::string scaled(const TableAxis& axis) const {
+  std::string scaled(const measure::TableAxis& axis) const {
     const std::string x = operand(axis.name);
     switch (axis.scale) {
-      case AxisScale::Log:
+      case measure::AxisScale::Log:
         return fmt::format("log(max({}, {}))", x, number(axis.values.front()));
-      case AxisScale::Log1p:
+      case measure::AxisScale::Log1p:
         return fmt::format("log(1.0 + {})", x);
       default:
         return x;
@@ -235,10 +172,10 @@ class AlbedoText {
   }
 
   std::string lookup(int index) {
-    const AlbedoGrid& g = table_.grids.at(std::size_t(index));
+    const measure::AlbedoGrid& g = table_.grids.at(std::size_t(index));
     if (g.axes.empty()) {
       if (g.channels == 1) return number(g.values[0]);
-      return fmt::format("color({}, {}, {})", number(g.values[0]), number(g.values[1]), number(g.values[2]));
+      return print::color({g.values[0], g.values[1], g.values[2]});
     }
     if (g.axes.size() > 4)
       input_error("{}: the albedo table has {} axes, and OSL look-ups exist for 4", info_.name, g.axes.size());
@@ -253,40 +190,41 @@ class AlbedoText {
     return fmt::format("color({}, {}, {})", call(g, index, "_r"), call(g, index, "_g"), call(g, index, "_b"));
   }
 
-  static std::string call(const AlbedoGrid& g, int index, const std::string& channel) {
+  static std::string call(const measure::AlbedoGrid& g, int index, const std::string& channel) {
     std::string text = fmt::format("brdfc_table{}(table{}_{}", g.axes.size(), channel, index);
-    for (const TableAxis& a : g.axes) text += fmt::format(", {}", a.values.size());
+    for (const measure::TableAxis& a : g.axes) text += fmt::format(", {}", a.values.size());
     for (std::size_t a = 0; a < g.axes.size(); ++a) text += fmt::format(", position_{}_{}", index, a);
     return text + ")";
   }
 
   std::string arrays(std::size_t index) const {
-    const AlbedoGrid& g = table_.grids[index];
+    const measure::AlbedoGrid& g = table_.grids[index];
     std::string out;
     for (std::size_t a = 0; a < g.axes.size(); ++a) {
       std::vector<double> knots = g.axes[a].values;
       for (double& k : knots)
-        k = g.axes[a].scale == AxisScale::Log ? std::log(k) : g.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : k;
-      out += array(fmt::format("knots_{}", index).c_str(), a, knots);
+        k = g.axes[a].scale == measure::AxisScale::Log     ? std::log(k)
+            : g.axes[a].scale == measure::AxisScale::Log1p ? std::log1p(k)
+                                                           : k;
+      out += print::array(fmt::format("knots_{}_{}", index, a), knots);
     }
-    if (g.channels == 1) return out + array("table", index, g.values);
+    if (g.channels == 1) return out + print::array(fmt::format("table_{}", index), {g.values.begin(), g.values.end()});
     for (std::size_t c = 0; c < 3; ++c) {
-      std::vector<float> channel;
+      std::vector<double> channel;
       for (std::size_t i = c; i < g.values.size(); i += 3) channel.push_back(g.values[i]);
-      const char* names[] = {"table_r", "table_g", "table_b"};
-      out += array(names[c], index, channel);
+      out += print::array(fmt::format("table_{}_{}", "rgb"[c], index), channel);
     }
     return out;
   }
 
   const ModelInfo& info_;
-  const AlbedoTable& table_;
+  const measure::AlbedoTable& table_;
   const ParamValues& fixed_;
   std::set<int> used_;
   std::string positions_;
 };
 
-std::string closure_text(const RecordedClosure& closure, std::size_t i) {
+std::string closure_text(const forms::RecordedClosure& closure, std::size_t i) {
   const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
   const auto microfacet = [&](const char* distribution) {
     // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
@@ -330,7 +268,7 @@ class AimedText {
       : draw_(info, fixed), value_(info, fixed), lamps_(lamps), through_(through) {}
 
   /// The base's recording.
-  Recording add(const Choices& choices, const AimedRecording& r, SharedArrays& arrays) {
+  forms::Recording add(const Choices& choices, const forms::AimedRecording& r, SharedArrays& arrays) {
     draw_.add(choices, arrays.without_shared(r.draw));
     value_.add(choices, arrays.without_shared(r.value));
     operations_ = std::max(operations_, r.draw.operations + r.value.operations);
@@ -338,16 +276,17 @@ class AimedText {
   }
 
   int operations() const {
-    const AimedSteps& steps = aimed_steps(0);
+    const forms::AimedSteps& steps = forms::aimed_steps(0);
     if (lamps_ == 0) return operations_ + steps.alone.operations;
     int all = operations_ + steps.rest.operations;
-    for (const Recording* r : {&steps.above, &steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
+    for (const forms::Recording* r :
+         {&steps.above, &steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
       all += r->operations;
     return all;
   }
 
   std::string print() const {
-    const AimedSteps& steps = aimed_steps(0);
+    const forms::AimedSteps& steps = forms::aimed_steps(0);
     std::string out =
         std::string(kDraws) + "    float drawn_x, drawn_y, drawn_z;\n    color rest_colour;\n    float rest_weight;\n";
     if (lamps_ == 0)
@@ -415,7 +354,7 @@ class AimedText {
         "        ray_x = drawn_x;\n        ray_y = drawn_y;\n        ray_z = drawn_z;\n    }\n";
     // Each joins the sum from the left: Cycles walks it without a stack. The weight is a colour: see kPoolNode.
     std::string ramp;
-    for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
+    for (const double c : forms::aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
     out += fmt::format(
         "    closure color aimed = 0;\n"
         "    for (int lamp = 0; lamp < lobes; lamp++)\n"
@@ -456,27 +395,18 @@ class AimedText {
 
 }  // namespace
 
-std::string balanced_sum(const std::vector<std::string>& terms) {
-  if (terms.empty()) return "0";
-  if (terms.size() == 1) return terms[0];
-  const auto middle = terms.begin() + std::ptrdiff_t((terms.size() + 1) / 2);
-  const std::string left = balanced_sum({terms.begin(), middle}), right = balanced_sum({middle, terms.end()});
-  const auto group = [](const std::string& s, bool compound) { return compound ? "(" + s + ")" : s; };
-  return group(left, middle - terms.begin() > 1) + " + " + group(right, terms.end() - middle > 1);
-}
-
-Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTable& table, const ParamValues& given,
-                    const Cosines& views, int max_lamps, AimedBase base) {
+Shader write_shader(const Model& model, RepresentationKind kind, const measure::AlbedoTable& table,
+                    const ParamValues& given, const Cosines& views, int max_lamps, forms::AimedBase base) {
   const ModelInfo& info = model.info();
   ParamValues fixed = given;
-  for (const auto& [name, value] : form_values(model, kind, given))
+  for (const auto& [name, value] : forms::form_values(model, kind, given))
     if (fixed.emplace(name, value).first->second != value)
       input_error("{}: the {} form exists only for {}", info.name, name_of(kind), format_values(info, {{name, value}}));
   const bool sampled = kind == RepresentationKind::Sampled, aimed = kind == RepresentationKind::Aimed;
   Shader shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name_of(kind));
 
-  std::vector<RecordedClosure> kinds;
+  std::vector<forms::RecordedClosure> kinds;
   ChoiceSwitch statements(info, fixed), mirror(info, fixed);
   AimedText aimed_text(info, fixed, max_lamps, model.has_through());
   SharedArrays arrays;
@@ -486,15 +416,16 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, fixed)) continue;
     const ParamValues values = with_choices(info, choices, fixed);
-    const Recording r = aimed ? aimed_text.add(choices, record_aimed(model, values, 0, base, views), arrays)
-                              : record(model, kind, values, 4, views);
+    const forms::Recording r = aimed
+                                   ? aimed_text.add(choices, forms::record_aimed(model, values, 0, base, views), arrays)
+                                   : forms::record(model, kind, values, 4, views);
     operations = std::max(operations, r.operations);
     statements.add(choices, arrays.without_shared(r));
     if (!kinds.empty() && kinds != r.closures)
       throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
     kinds = r.closures;
     if ((sampled || aimed) && model.has_mirror()) {
-      const Recording m = record_mirror(model, values, 0);
+      const forms::Recording m = forms::record_mirror(model, values, 0);
       mirror_operations = std::max(mirror_operations, m.operations);
       mirror.add(choices, arrays.without_shared(m));
     }
@@ -503,7 +434,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
 
   std::string normal = "    vector frame_n = normalize(Normal);\n";
   if (kind == RepresentationKind::Fitted)
-    normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", kLowestView);
+    normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", fit::kLowestView);
   std::string body = normal;
   body +=
       "    vector frame_t, frame_b;\n"
@@ -544,15 +475,15 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
     }
     body += aimed ? block(statements.print(0), 1) : statements.print(4);
     for (std::size_t c = 0; c < kinds.size(); ++c)
-      if (kinds[c].division != Division::Done) {
+      if (kinds[c].division != forms::Division::Done) {
         const std::string weight = fmt::format("weight_{}", c);
         body += fmt::format(
             "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
-            kinds[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
+            kinds[c].division == forms::Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
         ++shader.operations;
       }
-    if (is_fit(kind) || (aimed && base == AimedBase::Fitted))
-      for (const std::string& name : factors(model, fixed)) {
+    if (forms::is_fit(kind) || (aimed && base == forms::AimedBase::Fitted))
+      for (const std::string& name : fit::factors(model, fixed)) {
         if (fixed.count(name)) continue;
         for (std::size_t c = 0; c < kinds.size(); ++c)
           if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
@@ -601,7 +532,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name_of(kind), shader.slots,
                 kMaxClosures);
-  body += "    BSDF = " + balanced_sum(terms) + ";\n\n";
+  body += "    BSDF = " + print::balanced_sum(terms) + ";\n\n";
   std::string of_albedo;
   if (model.has_scatter()) {
     of_albedo = AlbedoText(info, table, fixed).print();
@@ -619,17 +550,17 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   for (const ParamInfo& p : info.params) {
     if (fixed.count(p.name)) continue;
     if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
-    if (is_osl_word(p.name))
+    if (print::is_osl_word(p.name))
       input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
                   p.name);
     parameters += parameter(p);
   }
   const auto text = [&](const std::string& name, const std::string& what, const std::string& sockets,
                         const std::string& statements) {
-    return comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
-           comment(fmt::format("{}. {}", what, info.equations)) + "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
-           library_for(statements) + fmt::format("\nshader {}(\n", name) + parameters + sockets + ")\n{\n" +
-           statements + "}\n";
+    return print::comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
+           print::comment(fmt::format("{}. {}", what, info.equations)) +
+           "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" + print::library_for(statements) +
+           fmt::format("\nshader {}(\n", name) + parameters + sockets + ")\n{\n" + statements + "}\n";
   };
   const char* albedo_output = "    output color Albedo = 0";
   std::string sockets;
@@ -648,4 +579,4 @@ Shader write_shader(const Model& model, RepresentationKind kind, const AlbedoTab
   return shader;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "analysis/albedo_table.h"
-#include "represent/aimed.h"
-#include "represent/representation.h"
+#include "forms/aimed.h"
+#include "forms/representation.h"
+#include "measure/albedo_table.h"
 
-namespace brdfc {
+namespace brdfc::pack {
 
 struct Shader {
   std::string name;       ///< of the shader and, with .osl, of its file
@@ -29,11 +29,9 @@ struct Shader {
 /// output, in a shader of its own where its text is longer than kMaxAlbedoText. An aimed form has parameters for
 /// `max_lamps` lamps, and the base of this kind. The form is right for these `views`. Throws InputError if the closures
 /// would exceed what Cycles keeps or the table what an array holds.
-Shader write_shader(const Model&, RepresentationKind, const AlbedoTable& table, const ParamValues& given = {},
-                    const Cosines& views = {}, int max_lamps = kMaxLamps, AimedBase base = AimedBase::Declared);
-
-/// OSL text of a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
-std::string balanced_sum(const std::vector<std::string>& terms);
+Shader write_shader(const Model&, forms::RepresentationKind, const measure::AlbedoTable& table,
+                    const ParamValues& given = {}, const Cosines& views = {}, int max_lamps = forms::kMaxLamps,
+                    forms::AimedBase base = forms::AimedBase::Declared);
 
 /// Characters of tables that a shader holds for an output that most materials leave unlinked.
 inline constexpr std::size_t kMaxAlbedoText = 4096;
@@ -41,4 +39,4 @@ inline constexpr std::size_t kMaxAlbedoText = 4096;
 /// Numbers in one OSL array; more compile slowly.
 inline constexpr std::size_t kMaxArray = 32768;
 
-}  // namespace brdfc
+}  // namespace brdfc::pack

@@ -15,7 +15,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 namespace fs = std::filesystem;
 
@@ -351,4 +351,4 @@ Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wr
           w00 * p00[2] + w10 * p10[2] + w01 * p01[2] + w11 * p11[2]};
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

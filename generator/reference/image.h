@@ -10,7 +10,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// Linear RGB pixels. Row 0 is the top row. rgb.size() == 3 * width * height.
 struct Image {
@@ -94,4 +94,4 @@ enum class Wrap { Repeat, Clamp };
 /// Bilinear value at (u, v), v upwards from the bottom edge, texel centres at (i + 1/2) / size, as in Blender.
 Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical);
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

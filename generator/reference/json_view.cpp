@@ -6,7 +6,7 @@
 #include <set>
 #include <sstream>
 
-namespace brdfc {
+namespace brdfc::reference {
 
 namespace {
 
@@ -139,4 +139,4 @@ std::string JsonView::choice(const std::vector<std::string>& choices) const {
   return s;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// Reads a whole file. Throws InputError for a missing file, bad syntax (with line and column), a key given
 /// twice in one object, a number that double can't hold, and nesting deeper than 32 levels.
@@ -67,4 +67,4 @@ class JsonView {
   std::string file_, key_;
 };
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -6,7 +6,7 @@
 
 #include "reference/procedural.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 namespace {
 
@@ -289,4 +289,4 @@ double Lights::pdf_of_hit(std::size_t i, const Vector& p, const Vector& w, doubl
   }
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -7,7 +7,7 @@
 
 #include "reference/scene.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -103,4 +103,4 @@ class Lights {
   std::size_t count_ = 0;
 };
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -19,7 +19,7 @@
 #include "core/scalar.h"
 #include "reference/image.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 static_assert(std::endian::native == std::endian::little, "the .npy code writes memory as it is");
 
@@ -281,4 +281,4 @@ template void write_npy<std::int32_t>(const std::filesystem::path&, const std::i
 template std::vector<float> read_npy<float>(const std::filesystem::path&, std::size_t);
 template std::vector<std::int32_t> read_npy<std::int32_t>(const std::filesystem::path&, std::size_t);
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

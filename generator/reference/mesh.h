@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// Object space. The corners of a triangle are anticlockwise seen from the front.
 struct Mesh {
@@ -39,4 +39,4 @@ template <class T> std::vector<T> read_npy(const std::filesystem::path& path, st
 /// Checks indices, counts and that all is finite; throws InputError that starts with `name`.
 void check_mesh(const Mesh& mesh, const std::string& name);
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace brdfc {
+namespace brdfc::reference {
 
 void direction_to_equirectangular(const Vec3<double>& d, double& u, double& v) {
   u = 0.5 - atan2(d.y, d.x) / (2 * kPi);
@@ -134,4 +134,4 @@ Image checker_texture(const Rgb<double>& a, const Rgb<double>& b, int cells) {
   return image;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

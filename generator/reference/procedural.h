@@ -4,7 +4,7 @@
 
 #include "reference/image.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// Blender's equirectangular convention, seen from inside: u = 1/2 - atan2(y, x) / (2 pi), so that +x is the
 /// middle of the picture and +y a quarter to the left; v = atan2(z, hypot(x, y)) / pi + 1/2.
@@ -20,4 +20,4 @@ Image procedural_environment(const std::string& name, int width);
 /// Squares of two colours in turn, `cells` along each side of the unit square of uv, 16 texels a cell.
 Image checker_texture(const Rgb<double>& a, const Rgb<double>& b, int cells);
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -5,7 +5,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// xoshiro256++ (D. Blackman, S. Vigna, 2019), started by SplitMix64 from a hash of seed, pixel and sample: a stream
 /// of its own for each path, so that a picture does not depend on the order or number of threads.
@@ -48,4 +48,4 @@ class Random {
   std::uint64_t state_[4];
 };
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -16,7 +16,7 @@
 #include "reference/random.h"
 #include "reference/tracer.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 namespace {
 
@@ -397,4 +397,4 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
   return result;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -14,7 +14,7 @@
 #include "reference/image.h"
 #include "reference/scene.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// Which samples are taken of light that does not come from a mirror; all give the same mean.
 enum class Strategy {
@@ -53,4 +53,4 @@ struct RenderResult {
 /// or not finite.
 RenderResult render(const Scene& scene, const RenderOptions& options);
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -11,7 +11,7 @@
 #include "reference/json_view.h"
 #include "reference/procedural.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -537,4 +537,4 @@ void write_resolved(const Scene& scene, const fs::path& folder) {
   });
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

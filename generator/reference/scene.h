@@ -22,7 +22,7 @@
 #include "reference/image.h"
 #include "reference/mesh.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 struct RenderSettings {
   int width = 256, height = 256;
@@ -123,4 +123,4 @@ UsedMaterials load_materials(const std::filesystem::path& path);
 /// Writes scene.json, the meshes as .npy and the images as .exr into the folder, scene.json last.
 void write_resolved(const Scene& scene, const std::filesystem::path& folder);
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

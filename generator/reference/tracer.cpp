@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace brdfc {
+namespace brdfc::reference {
 
 namespace {
 
@@ -138,4 +138,4 @@ Vec3<double> Tracer::leave(const Vector& p, const Vector& geometric, const Vecto
   return p + geometric * (dot(geometric, direction) > 0 ? step : -step);
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

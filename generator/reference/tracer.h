@@ -7,7 +7,7 @@
 #include "reference/lights.h"
 #include "reference/scene.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 
 /// A point on a surface as seen along a ray. Unit vectors, both normals on the viewer's side.
 struct Hit {
@@ -46,4 +46,4 @@ class Tracer {
   std::vector<Part> parts_;
 };
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

@@ -7,7 +7,7 @@
 
 #include "model/horizon.h"
 
-namespace brdfc {
+namespace brdfc::reference {
 namespace {
 
 using Vector = Vec3<double>;
@@ -68,7 +68,7 @@ class Viewer {
   }
   Cone cone(const Corners& c) const {
     if (camera_.orthographic) return {-camera_.forward, 0};
-    return brdfc::cone(from(c[0].p), from(c[1].p), from(c[2].p));
+    return reference::cone(from(c[0].p), from(c[1].p), from(c[2].p));
   }
   bool orthographic() const { return camera_.orthographic; }
 
@@ -185,4 +185,4 @@ std::vector<Cosines> seen_cosines(const Scene& scene) {
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::reference

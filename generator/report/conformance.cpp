@@ -6,7 +6,7 @@
 #include "report/html.h"
 #include "report/report.h"
 
-namespace brdfc {
+namespace brdfc::report {
 
 namespace fs = std::filesystem;
 
@@ -18,11 +18,11 @@ std::vector<ConformanceTable> load_conformance(const fs::path& folder) {
   std::sort(files.begin(), files.end());
   std::vector<ConformanceTable> tables;
   for (const fs::path& file : files) {
-    const nlohmann::json json = read_json(file);
-    const JsonView top(json, file.string());
+    const nlohmann::json json = reference::read_json(file);
+    const reference::JsonView top(json, file.string());
     ConformanceTable table;
     table.blender = top.at("blender").text();
-    for (const JsonView& row : top.at("closures").elements()) {
+    for (const reference::JsonView& row : top.at("closures").elements()) {
       ConformanceRow r;
       r.closure = row.at("closure").text();
       r.verdict = row.at("verdict").choice({"ok", "mended", "fault"});
@@ -71,4 +71,4 @@ void put_conformance(std::string& out, const std::vector<ConformanceTable>& tabl
   out += "</tbody></table></div></section>\n";
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

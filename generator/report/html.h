@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-namespace brdfc {
+namespace brdfc::report {
 
 /// Appends formatted text.
 template <class... Args> void put(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
@@ -62,4 +62,4 @@ inline std::string scientific(double v) {
 
 template <class T> std::string or_dash(const std::optional<T>& v, const std::string& text) { return v ? text : kDash; }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -4,11 +4,15 @@
 #include <set>
 
 #include "core/error.h"
+#include "reference/image.h"
 #include "reference/json_view.h"
 #include "report/report.h"
 
-namespace brdfc {
+namespace brdfc::report {
 namespace {
+
+using reference::JsonView;
+using reference::Rendering;
 
 namespace fs = std::filesystem;
 
@@ -24,7 +28,7 @@ double median(std::vector<double> v) {
 Rendering read_picture(const fs::path& folder, const JsonView& name) {
   const fs::path file = folder / name.text();
   if (!fs::exists(file)) name.fail("the name of an image in " + folder.string());
-  return read_rendering(file);
+  return reference::read_rendering(file);
 }
 
 std::vector<double> read_times(const JsonView& view, std::size_t count) {
@@ -70,7 +74,7 @@ FormImages read_form(const fs::path& folder, const JsonView& view, const SceneRe
   for (const JsonView& image : images.elements()) {
     form.images.push_back(image.text());
     pictures.push_back(read_picture(folder, image));
-    const Image& mean = pictures.back().mean;
+    const reference::Image& mean = pictures.back().mean;
     if (mean.width != scene.width || mean.height != scene.height)
       image.error(fmt::format("expected an image of {} x {} pixels, this one has {} x {}", scene.width, scene.height,
                               mean.width, mean.height));
@@ -189,7 +193,7 @@ void set_equal_error(std::vector<FormReport>& forms) {
 
 void read_flip(const fs::path& file, std::vector<FormReport>& forms) {
   if (!fs::exists(file)) return;
-  const nlohmann::json content = read_json(file);
+  const nlohmann::json content = reference::read_json(file);
   const JsonView top(content, file.string());
   for (FormReport& form : forms)
     if (const auto v = top.find(form.form)) form.flip = v->number(0, 1);
@@ -198,7 +202,7 @@ void read_flip(const fs::path& file, std::vector<FormReport>& forms) {
 SceneReport load_scene(const fs::path& folder) {
   const fs::path file = folder / "runs.json";
   if (!fs::exists(file)) input_error("{}: missing, although {} holds a scene", file.string(), folder.string());
-  const nlohmann::json content = read_json(file);
+  const nlohmann::json content = reference::read_json(file);
   const JsonView top(content, file.string());
   top.at("format").integer(1, 1);
 
@@ -281,4 +285,4 @@ std::vector<SceneReport> load_report(const fs::path& folder) {
   return scenes;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

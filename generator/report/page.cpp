@@ -9,7 +9,7 @@
 #include "report/page_style.h"
 #include "report/report.h"
 
-namespace brdfc {
+namespace brdfc::report {
 namespace {
 
 std::string cost(const FormReport& f) { return or_dash(f.cost, fmt::format("{:.2f}", f.cost.value_or(0))); }
@@ -304,4 +304,4 @@ std::string report_html(const std::vector<SceneReport>& scenes, const std::vecto
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -2,7 +2,7 @@
 // The style sheet of the report page. Inlined into the page, which loads nothing but its images.
 #pragma once
 
-namespace brdfc {
+namespace brdfc::report {
 
 inline constexpr const char* kPageStyle = R"css(
 :root { color-scheme: light dark;
@@ -52,4 +52,4 @@ code, .mono { font-family: ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, mo
 td.mono { white-space: normal; overflow-wrap: anywhere; }
 )css";
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -2,9 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reference/image.h"
 #include "report/report.h"
 
-namespace brdfc {
+namespace brdfc::report {
 namespace {
 
 namespace fs = std::filesystem;
@@ -16,7 +17,7 @@ double quantile(std::vector<double> values, double fraction) {
   return *nth;
 }
 
-template <class PerPixel> std::vector<double> per_pixel(const Image& image, PerPixel value) {
+template <class PerPixel> std::vector<double> per_pixel(const reference::Image& image, PerPixel value) {
   std::vector<double> out;
   out.reserve(image.rgb.size() / 3);
   for (int y = 0; y < image.height; ++y)
@@ -35,7 +36,7 @@ double round_up_125(double x) {
 }  // namespace
 
 Previews write_previews(const fs::path& folder, const SceneReport& scene) {
-  const Image& reference = scene.reference.mean;
+  const reference::Image& reference = scene.reference.mean;
   Previews out;
   const auto luminances = per_pixel(reference, [&](int x, int y) { return luminance(reference.color(x, y)); });
   // Scenes that fit into [0, 1] but for noise, furnaces above all, are shown as they are.
@@ -47,7 +48,7 @@ Previews write_previews(const fs::path& folder, const SceneReport& scene) {
   double largest = 1e-6, mean = 0;
   for (const FormReport& form : scene.forms) {
     if (form.form == kNativeForm && scene.forms.size() > 1) continue;
-    const Image& picture = form.picture.mean;
+    const reference::Image& picture = form.picture.mean;
     largest = std::max(largest, quantile(per_pixel(reference,
                                                    [&](int x, int y) {
                                                      return std::abs(luminance(picture.color(x, y)) -
@@ -60,19 +61,19 @@ Previews write_previews(const fs::path& folder, const SceneReport& scene) {
   out.difference_at = round_up_125(largest);
 
   out.reference = scene.scene + "/reference.png";
-  write_preview(folder / out.reference, reference, out.exposure);
+  reference::write_preview(folder / out.reference, reference, out.exposure);
   for (const FormReport& form : scene.forms) {
     const std::string stem = scene.scene + "/" + form.form;
     out.forms.push_back({stem + ".png", stem + "-difference.png", form.test ? stem + "-p-values.png" : "",
                          form.equal_time_images > 0 ? stem + "-equal-time.png" : ""});
-    write_preview(folder / out.forms.back().picture, form.picture.mean, out.exposure);
-    write_display(folder / out.forms.back().difference,
-                  difference_image(form.picture.mean, reference, out.difference_at / mean));
+    reference::write_preview(folder / out.forms.back().picture, form.picture.mean, out.exposure);
+    reference::write_display(folder / out.forms.back().difference,
+                             reference::difference_image(form.picture.mean, reference, out.difference_at / mean));
     if (form.equal_time_images > 0)
-      write_preview(folder / out.forms.back().equal_time, form.equal_time_picture.mean, out.exposure);
-    if (form.test) write_display(folder / out.forms.back().p_values, form.test->p);
+      reference::write_preview(folder / out.forms.back().equal_time, form.equal_time_picture.mean, out.exposure);
+    if (form.test) reference::write_display(folder / out.forms.back().p_values, form.test->p);
   }
   return out;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -47,9 +47,10 @@
 #include <string>
 #include <vector>
 
+#include "reference/image.h"
 #include "report/statistics.h"
 
-namespace brdfc {
+namespace brdfc::report {
 
 /// The form that is Blender's own Glossy node.
 inline constexpr const char* kNativeForm = "glossy";
@@ -88,11 +89,11 @@ struct FormReport {
   /// What the time that Blender's Glossy node takes for all its images is enough for: this many of them, their mean
   /// and its difference from the reference. 0 if the cost is not known.
   int equal_time_images = 0;
-  Rendering equal_time_picture;
+  reference::Rendering equal_time_picture;
   Difference equal_time;
   /// CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered, or in less than kShortestTime.
   std::optional<double> cost;
-  Rendering picture;  ///< mean of the images
+  reference::Rendering picture;  ///< mean of the images
 
   /// Largest over the materials; nothing if there is none.
   std::optional<int> closures() const;
@@ -105,7 +106,7 @@ struct SceneReport {
   std::string reference_image;
   int reference_spp = 0;
   double reference_seconds = 0;
-  Rendering reference;
+  reference::Rendering reference;
   std::vector<FormReport> forms;
   std::map<std::string, std::string> provenance;
   std::vector<std::string> commands;
@@ -162,4 +163,4 @@ std::string report_csv(const std::vector<SceneReport>& scenes);
 /// folder can't be written. Returns what it measured.
 std::vector<SceneReport> write_report(const std::filesystem::path& folder);
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -10,7 +10,10 @@
 
 #include "core/error.h"
 
-namespace brdfc {
+namespace brdfc::report {
+
+using reference::Image;
+using reference::Rendering;
 
 Rendering mean_of(std::span<const Rendering> renderings) {
   if (renderings.empty()) throw std::invalid_argument("no rendering");
@@ -36,7 +39,7 @@ Rendering mean_of(std::span<const Rendering> renderings) {
 
 Difference measure_difference(const Rendering& picture, const Rendering& reference, const std::string& picture_name,
                               const std::string& reference_name) {
-  const Comparison comparison = compare(picture, reference, picture_name, reference_name);
+  const reference::Comparison comparison = reference::compare(picture, reference, picture_name, reference_name);
   if (!(comparison.mean_b > 0)) input_error("{}: the picture is black", reference_name);
   const std::size_t count = reference.mean.rgb.size();
   double noise = 0, variance_a = 0, variance_b = 0;
@@ -118,7 +121,8 @@ WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& refer
                      const std::string& reference_name) {
   if (pictures.size() < 2) throw std::invalid_argument("Welch's test needs two pictures at least");
   if (!reference.variance) throw std::invalid_argument("Welch's test needs the reference's variance");
-  for (const Rendering& r : pictures) compare(r, reference, picture_name, reference_name);  // sizes, finite values
+  for (const Rendering& r : pictures)
+    reference::compare(r, reference, picture_name, reference_name);  // sizes, finite values
 
   const int width = reference.mean.width, height = reference.mean.height;
   const double samples = reference.metadata.is_object() ? reference.metadata.value("samples", 1e6) : 1e6;
@@ -179,4 +183,4 @@ WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& refer
   return test;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -9,12 +9,12 @@
 
 #include "reference/image.h"
 
-namespace brdfc {
+namespace brdfc::report {
 
 /// Mean of renderings of the same size that differ in their random numbers alone. With two or more, the variance
 /// is estimated from their spread; one alone keeps what it has. Throws std::invalid_argument when there is none,
 /// or when sizes differ.
-Rendering mean_of(std::span<const Rendering>);
+reference::Rendering mean_of(std::span<const reference::Rendering>);
 
 /// Regularises relMSE where the reference is black; the same number as in Comparison.
 inline constexpr double kRelMseEpsilon = 0.01;
@@ -28,8 +28,8 @@ struct Difference {
 
 /// Compares a picture with its reference; a missing variance layer counts as free of noise. Throws InputError when
 /// sizes differ, a pixel is not finite, or the reference is black; the names are for the message.
-Difference measure_difference(const Rendering& picture, const Rendering& reference, const std::string& picture_name,
-                              const std::string& reference_name);
+Difference measure_difference(const reference::Rendering& picture, const reference::Rendering& reference,
+                              const std::string& picture_name, const std::string& reference_name);
 
 /// Welch's t-test of "both have the same expectation" on luminance, for every pixel and for the mean of every tile of
 /// kTestTile x kTestTile pixels. A family of n tests rejects where p < 1 - (1 - kTestSignificance)^(1/n) (Sidak).
@@ -39,7 +39,7 @@ struct WelchTest {
   double worst_pixel = 1, worst_tile = 1;  ///< smallest p
   std::array<int, 20> histogram{};         ///< of the p of the pixels that have noise
   double uniform = 1;                      ///< p of a chi-square test that the histogram is flat
-  Image p;                                 ///< p of every pixel, in all three channels
+  reference::Image p;                      ///< p of every pixel, in all three channels
 
   double accepted() const { return pixels > 0 ? 1 - double(rejected_pixels) / pixels : 1; }
   /// At least kTestAccepted of the pixels and all tiles accepted.
@@ -53,7 +53,7 @@ inline constexpr double kTestSignificance = 0.01, kTestAccepted = 0.9975;
 /// are taken to vary together, which for luminance is the largest variance they allow). What single precision rounds
 /// counts as noise. Throws std::invalid_argument for too few pictures or no variance, InputError when sizes differ or
 /// a pixel is not finite.
-WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& reference, const std::string& picture_name,
-                     const std::string& reference_name);
+WelchTest welch_test(std::span<const reference::Rendering> pictures, const reference::Rendering& reference,
+                     const std::string& picture_name, const std::string& reference_name);
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -3,9 +3,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "reference/image.h"
 #include "report/report.h"
 
-namespace brdfc {
+namespace brdfc::report {
 namespace {
 
 namespace fs = std::filesystem;
@@ -58,7 +59,7 @@ std::string csv_field(const std::string& text) {
 }
 
 void write_text(const fs::path& file, const std::string& text) {
-  write_beside(file, [&](const fs::path& temporary) {
+  reference::write_beside(file, [&](const fs::path& temporary) {
     std::ofstream out(temporary, std::ios::binary);
     out << text;
     out.close();
@@ -117,4 +118,4 @@ std::vector<SceneReport> write_report(const fs::path& folder) {
   return scenes;
 }
 
-}  // namespace brdfc
+}  // namespace brdfc::report

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the extension does where closures have a pool of limited size: OptiX, which is pretended.
-Sums are by hand, of what tests/pack_test.cpp counts; 1016 bytes is what the pool holds."""
+Sums are by hand, of what tests/pack/pack_test.cpp counts; 1016 bytes is what the pool holds."""
 
 import bpy
 import helpers

@@ -8,7 +8,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   const char* names[] = {"a.exr", "a.hdr", "a.png"};
   const auto path = fuzz::write(names[data[0] % 3], data + 1, size - 1);
-  fuzz::expect_value_or_input_error([&] { read_rendering(path); });
-  fuzz::expect_value_or_input_error([&] { read_image(path, ColorSpace::Auto); });
+  fuzz::expect_value_or_input_error([&] { reference::read_rendering(path); });
+  fuzz::expect_value_or_input_error([&] { reference::read_image(path, reference::ColorSpace::Auto); });
   return 0;
 }

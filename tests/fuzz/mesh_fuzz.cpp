@@ -12,6 +12,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   const auto path = fuzz::write(data[0] % 3 ? "a.obj" : "a.ply", data + 1, size - 1);
-  fuzz::expect_value_or_input_error([&] { read_mesh(path, data[0] & 8); });
+  fuzz::expect_value_or_input_error([&] { reference::read_mesh(path, data[0] & 8); });
   return 0;
 }

@@ -26,6 +26,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (std::count(data, data + size, '[') + std::count(data, data + size, '{') < 1000 &&
       is_large(nlohmann::json::parse(data, data + size, nullptr, false)))
     return 0;
-  fuzz::expect_value_or_input_error([&] { load_scene(fuzz::write("scene.json", data, size)); });
+  fuzz::expect_value_or_input_error([&] { reference::load_scene(fuzz::write("scene.json", data, size)); });
   return 0;
 }

@@ -2,7 +2,7 @@
 // Text of the command line: CSV tables and parameters; the first byte picks one.
 #include <sstream>
 
-#include "app/csv.h"
+#include "core/csv.h"
 #include "fuzz.h"
 #include "model/model.h"
 

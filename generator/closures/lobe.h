@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every closure of Cycles that a form uses or may come to use, with all its settings, as the conformance tests and
+// fits need it. Those that forms use are defined in closure.h, and only there; this adds the others.
+#pragma once
+
+#include <string>
+
+#include "closures/closure.h"
+
+namespace brdfc {
+inline namespace closures {
+
+enum class LobeKind {
+  Diffuse,
+  Burley,
+  DiffuseRamp,
+  PhongRamp,
+  Reflection,
+  // microfacet(distribution, N, T, alpha_x, alpha_y, 1, 0): without Fresnel term.
+  Ggx,               ///< Smith's height-correlated masking
+  Beckmann,          ///< the same with Walter's rational masking, as Cycles has it
+  AshikhminShirley,  ///< eq. 16 of their paper, n = 2 / alpha^2 - 2. Cycles samples it wrongly: no form may use it
+  // In units of 90 degrees: 1 inside the cone `size`, linear in angle to 0 over `smooth`; no cosine.
+  DiffuseToon,  ///< diffuse_toon(N, size, smooth): a cone about N
+  GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction
+};
+
+/// As the command line and the conformance tests call it.
+const char* name_of(LobeKind);
+/// Throws InputError that lists the known names.
+LobeKind lobe_named(const std::string&);
+
+struct Lobe {
+  LobeKind kind = LobeKind::Diffuse;
+  Rgb<double> weight{1, 1, 1};
+  Vec3<double> normal{0, 0, 1};
+  std::array<Rgb<double>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp
+  double exponent = 1;                      ///< PhongRamp
+  Vec3<double> tangent{1, 0, 0};            ///< microfacets; need not be perpendicular to the normal
+  double alpha_x = 0.5, alpha_y = 0.5;      ///< microfacets
+  double size = 0.5, smooth = 0;            ///< toons
+};
+
+/// f cos(theta_i) with its weight; delta closures are 0. Directions above the surface.
+Rgb<double> evaluate(const Lobe&, const Vec3<double>& wi, const Vec3<double>& wo);
+
+}  // namespace closures
+}  // namespace brdfc

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/csv.h"
+
+#include <charconv>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace brdfc {
+inline namespace core {
+namespace {
+
+std::string trim(const std::string& s) {
+  const auto first = s.find_first_not_of(" \t\r"), last = s.find_last_not_of(" \t\r");
+  return first == std::string::npos ? "" : s.substr(first, last - first + 1);
+}
+
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> fields;
+  std::size_t start = 0;
+  for (;;) {
+    const auto comma = line.find(',', start);
+    fields.push_back(trim(line.substr(start, comma == std::string::npos ? comma : comma - start)));
+    if (comma == std::string::npos) return fields;
+    start = comma + 1;
+  }
+}
+
+}  // namespace
+
+CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::string> columns)
+    : in_(in), source_(std::move(source)), columns_(std::move(columns)) {
+  std::vector<std::string> header;
+  if (!read_line(header)) {
+    line_ = 0;
+    return;
+  }
+  fields_ = header.size();
+  for (const std::string& c : columns_) {
+    std::size_t i = 0;
+    while (i < header.size() && header[i] != c) ++i;
+    if (i == header.size())
+      input_error("{}: expected a header with the columns {}; '{}' is missing", where(), fmt::join(columns_, ","), c);
+    where_.push_back(i);
+  }
+}
+
+std::string CsvReader::where() const { return fmt::format("{} line {}", source_, line_); }
+
+bool CsvReader::read_line(std::vector<std::string>& fields) {
+  std::string line;
+  while (std::getline(in_, line)) {
+    ++line_;
+    if (trim(line).empty()) continue;
+    fields = split(line);
+    return true;
+  }
+  return false;
+}
+
+bool CsvReader::next(std::vector<double>& row) {
+  std::vector<std::string> fields;
+  if (!read_line(fields)) return false;
+  if (fields.size() != fields_)
+    input_error("{}: expected {} values as in the header, got {}", where(), fields_, fields.size());
+  row.clear();
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const std::string& text = fields[where_[i]];
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+      input_error("{}: {}: expected a finite number, got '{}'", where(), columns_[i], text);
+    row.push_back(value);
+  }
+  return true;
+}
+
+Vec3<double> CsvReader::unit_vector(const std::vector<double>& row, std::size_t first) const {
+  const Vec3<double> v{row[first], row[first + 1], row[first + 2]};
+  const double len = length(v);
+  if (!(std::abs(len - 1) <= 1e-6))
+    input_error("{}: {}, {}, {}: expected a unit vector, its length is {}", where(), columns_[first],
+                columns_[first + 1], columns_[first + 2], len);
+  return v / len;
+}
+
+void CsvWriter::row(const std::vector<double>& values) {
+  const char* separator = "";
+  for (const double v : values) {
+    fmt::format_to(std::back_inserter(text_), "{}{:.17g}", separator, v);
+    separator = ",";
+  }
+  text_ += '\n';
+  if (text_.size() > (1u << 16)) write();
+}
+
+void CsvWriter::write() {
+  if (std::fwrite(text_.data(), 1, text_.size(), stdout) != text_.size())
+    input_error("stdout: expected to write {} bytes, could not", text_.size());
+  text_.clear();
+}
+
+void CsvWriter::finish() {
+  write();
+  if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
+}
+
+}  // namespace core
+}  // namespace brdfc

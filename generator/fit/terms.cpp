@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/terms.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "measure/probes.h"
+
+namespace brdfc::fit {
+namespace {
+
+using Powers = std::vector<int>;  ///< of each parameter
+
+constexpr double kTolerance = 1e-9;
+/// In place of 0 for what is proportional to a colour there, where f would vanish.
+constexpr double kNearlyNone = 1e-6;
+constexpr double kLeastReflected = 0.02;
+constexpr std::size_t kMaxParameters = 8;
+
+bool may_be_any_share(const ParamInfo& p) {
+  return p.kind == ParamKind::Color || (p.kind == ParamKind::Number && p.min <= 0 && p.max >= 1);
+}
+
+Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.g), std::abs(c.b)}; }
+
+/// Pairs of directions, some of them where the model with these parameters scatters to.
+std::vector<std::array<Vec3<double>, 2>> pairs(const Model& model, const ParamValues& values, int count) {
+  measure::Random random(12);
+  return measure::direction_pairs(*model.make_double(values), count, random, model.two_sided());
+}
+
+/// The degree of f in a parameter, the other ones of `open` being anything: 0, 1 or 2, else 3.
+int degree(const Model& model, const std::vector<ParamValues>& places, const ParamInfo& p,
+           const std::vector<const ParamInfo*>& open) {
+  int degree = 0;
+  measure::Random random(5);
+  for (ParamValues values : places) {
+    for (const ParamInfo* other : open)
+      values[other->name] =
+          as_value(*other, {measure::uniform(random), measure::uniform(random), measure::uniform(random)});
+    const auto with = [&](const Rgb<double>& c) {
+      values[p.name] = as_value(p, c);
+      return model.make_double(values);
+    };
+    std::vector<std::unique_ptr<Brdf<double>>> steps;
+    for (int k = 0; k <= 4; ++k) steps.push_back(with(Rgb<double>(k / 4.0)));
+    const auto coloured = with({0, 0.5, 1});
+    for (const auto& [wi, wo] : pairs(model, values, 128)) {
+      std::vector<Rgb<double>> f;
+      for (const auto& brdf : steps) f.push_back(brdf->eval(wi, wo));
+      double scale = 0;
+      for (const Rgb<double>& v : f) scale = std::max(scale, max_component(magnitude(v)));
+      const auto vanishes = [&](const Rgb<double>& v) { return max_component(magnitude(v)) <= kTolerance * scale; };
+      if (!vanishes(f[4] - f[0])) degree = std::max(degree, 1);
+      for (std::size_t k = 0; k < 3; ++k)
+        if (!vanishes(f[k + 2] - f[k + 1] * 2.0 + f[k])) degree = 2;
+      for (std::size_t k = 0; k < 2; ++k)
+        if (!vanishes(f[k + 3] - f[k + 2] * 3.0 + f[k + 1] * 3.0 - f[k])) return 3;
+      const Rgb<double> each = coloured->eval(wi, wo);
+      if (p.kind == ParamKind::Color && !vanishes(each - Rgb<double>{f[0].r, f[2].g, f[4].b})) return 3;
+    }
+  }
+  return degree;
+}
+
+/// All powers up to those of the degrees, first parameter slowest.
+std::vector<Powers> all_powers(const Powers& degrees) {
+  std::vector<Powers> out = {{}};
+  for (const int d : degrees) {
+    std::vector<Powers> longer;
+    for (const Powers& p : out)
+      for (int e = 0; e <= d; ++e) {
+        longer.push_back(p);
+        longer.back().push_back(e);
+      }
+    out = std::move(longer);
+  }
+  return out;
+}
+
+/// The products of powers that f has.
+std::set<Powers> powers_in(const Model& model, const std::vector<ParamValues>& places,
+                           const std::vector<const ParamInfo*>& open, const Powers& degrees) {
+  const std::vector<Powers> all = all_powers(degrees);
+  std::set<Powers> out;
+  for (const ParamValues& place : places) {
+    // f at the nodes 0, 1 or 0, 1/2, 1 of each parameter.
+    std::vector<std::unique_ptr<Brdf<double>>> nodes;
+    ParamValues values = place;
+    for (const Powers& powers : all) {
+      for (std::size_t i = 0; i < open.size(); ++i)
+        values[open[i]->name] = as_value(*open[i], Rgb<double>(double(powers[i]) / degrees[i]));
+      nodes.push_back(model.make_double(values));
+    }
+    for (const ParamInfo* p : open) values[p->name] = as_value(*p, Rgb<double>(0.5));
+    for (const auto& [wi, wo] : pairs(model, values, 256)) {
+      std::vector<Rgb<double>> c;
+      for (const auto& brdf : nodes) c.push_back(brdf->eval(wi, wo));
+      double scale = 0;
+      for (const Rgb<double>& v : c) scale = std::max(scale, max_component(magnitude(v)));
+      // From values to coefficients, one parameter after the other.
+      std::size_t stride = c.size();
+      for (const int d : degrees) {
+        const std::size_t block = stride;
+        stride /= std::size_t(d + 1);
+        for (std::size_t first = 0; first < c.size(); first += block)
+          for (std::size_t i = first; i < first + stride; ++i) {
+            const Rgb<double> at0 = c[i], at1 = c[i + stride];
+            if (d == 1) {
+              c[i + stride] = at1 - at0;
+            } else {
+              const Rgb<double> at2 = c[i + 2 * stride];
+              c[i + stride] = at1 * 4.0 - at0 * 3.0 - at2;
+              c[i + 2 * stride] = (at0 + at2) * 2.0 - at1 * 4.0;
+            }
+          }
+      }
+      for (std::size_t i = 0; i < all.size(); ++i)
+        if (max_component(magnitude(c[i])) > 100 * kTolerance * scale) out.insert(all[i]);
+    }
+  }
+  return out;
+}
+
+double product(const std::vector<double>& at, const Powers& powers) {
+  double out = 1;
+  for (std::size_t i = 0; i < at.size(); ++i) out *= std::pow(at[i], powers[i]);
+  return out;
+}
+
+/// Whether a product has all of these powers and some of parameter i besides.
+bool has_more(const std::set<Powers>& products, const Powers& powers, std::size_t i) {
+  return std::ranges::any_of(products, [&](const Powers& other) {
+    bool all = other[i] > powers[i];
+    for (std::size_t k = 0; k < powers.size(); ++k) all = all && other[k] >= powers[k];
+    return all;
+  });
+}
+
+/// A term for each product of powers: f where its parameters are 1 and the others 0, and nearly 0 where it has but the
+/// first power of one that others have the second of. Weights by undoing what f has there of the products. Nothing
+/// where nearly 0 is not little enough.
+std::optional<Terms> solved(const std::set<Powers>& products, const std::vector<const ParamInfo*>& open,
+                            const Powers& degrees) {
+  Terms out;
+  out.terms.clear();
+  for (const ParamInfo* p : open) out.parameters.push_back(p->name);
+  const auto n = Eigen::Index(products.size());
+  Eigen::MatrixXd have(n, n);
+  Eigen::Index row = 0;
+  for (const Powers& powers : products) {
+    Terms::Term& term = out.terms.emplace_back();
+    std::vector<double> at;
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      at.push_back(powers[i] == 0 ? 0 : powers[i] == degrees[i] ? 1 : kNearlyNone);
+      if (at.back() == kNearlyNone) term.scale *= kNearlyNone;
+      term.values[open[i]->name] = as_value(*open[i], Rgb<double>(at.back()));
+      const double judged = powers[i] == 0 && has_more(products, powers, i) ? kLeastReflected : at.back();
+      term.judged[open[i]->name] = as_value(*open[i], Rgb<double>(judged));
+    }
+    Eigen::Index column = 0;
+    for (const Powers& other : products) have(row, column++) = product(at, other) / term.scale;
+    ++row;
+  }
+  if (have.maxCoeff() > 1 + kTolerance) return std::nullopt;
+  const Eigen::MatrixXd undo = have.inverse();
+  Eigen::Index of_product = 0;
+  for (const Powers& powers : products) {
+    for (std::size_t t = 0; t < out.terms.size(); ++t)
+      if (const double x = undo(of_product, Eigen::Index(t)); std::abs(x) > 1e-12) out.terms[t].polynomial[powers] = x;
+    ++of_product;
+  }
+  return out;
+}
+
+/// Without those where f is black, as if nothing were left for the matte base of a perfect mirror.
+Terms without_black(const Model& model, const std::vector<ParamValues>& places, Terms terms) {
+  std::erase_if(terms.terms, [&](const Terms::Term& term) {
+    for (ParamValues values : places) {
+      const auto seen = pairs(model, values, 256);
+      for (const auto& [name, value] : term.values) values[name] = value;
+      const auto brdf = model.make_double(values);
+      for (const auto& [wi, wo] : seen)
+        if (max_component(brdf->eval(wi, wo)) > kTolerance * term.scale) return false;
+    }
+    return true;
+  });
+  return terms;
+}
+
+bool positive(const Terms& terms, const Powers& degrees) {
+  for (const Powers& node : all_powers(Powers(degrees.size(), 2))) {
+    std::vector<double> at;
+    for (const int k : node) at.push_back(k / 2.0);
+    for (const Terms::Term& term : terms.terms) {
+      double weight = 0;
+      for (const auto& [powers, x] : term.polynomial) weight += x * product(at, powers);
+      if (weight < -2 * kNearlyNone) return false;
+    }
+  }
+  return true;
+}
+
+/// With the product of any two of them, each parameter to the higher of its powers.
+std::set<Powers> closed(std::set<Powers> products) {
+  for (std::size_t before = 0; before != products.size();) {
+    before = products.size();
+    const std::set<Powers> now = products;
+    for (const Powers& a : now)
+      for (const Powers& b : now) {
+        Powers both(a.size());
+        std::ranges::transform(a, b, both.begin(), [](int x, int y) { return std::max(x, y); });
+        products.insert(std::move(both));
+      }
+  }
+  return products;
+}
+
+}  // namespace
+
+Rgb<double> as_rgb(const ParamValue& value) {
+  const auto* c = std::get_if<std::array<double, 3>>(&value);
+  return c ? Rgb<double>{(*c)[0], (*c)[1], (*c)[2]} : Rgb<double>(std::get<double>(value));
+}
+
+ParamValue as_value(const ParamInfo& p, const Rgb<double>& c) {
+  return p.kind == ParamKind::Number ? ParamValue(c.r) : ParamValue(std::array<double, 3>{c.r, c.g, c.b});
+}
+
+std::vector<ParamValues> places(const Model& model, const ParamValues& known) {
+  std::vector<ParamValues> out = {complete(model.info(), known)};
+  for (const ParamInfo& p : model.info().params)
+    if (!known.count(p.name) && p.kind == ParamKind::Number)
+      for (const double end : {p.soft_min, p.soft_max}) {
+        out.push_back(out.front());
+        out.back()[p.name] = end;
+      }
+  return out;
+}
+
+std::set<std::string> factors(const Model& model, const ParamValues& known) {
+  if (!model.has_scatter()) return {};
+  std::set<std::string> out;
+  for (const ParamInfo& p : model.info().params) {
+    if (!may_be_any_share(p)) continue;
+    const Rgb<double> colour = p.kind == ParamKind::Number ? Rgb<double>(0.3) : Rgb<double>{0.3, 0.6, 0.8};
+    bool proportional = true;
+    for (ParamValues values : places(model, known)) {
+      values[p.name] = as_value(p, colour);
+      const auto of_coloured = model.make_double(values);
+      values[p.name] = as_value(p, Rgb<double>(1.0));
+      const auto of_white = model.make_double(values);
+      for (const auto& [wi, wo] : pairs(model, values, 256))
+        proportional =
+            proportional && measure::relative(of_white->eval(wi, wo) * colour, of_coloured->eval(wi, wo)) < kTolerance;
+    }
+    if (proportional) out.insert(p.name);
+  }
+  return out;
+}
+
+Terms terms_of(const Model& model, const ParamValues& known) {
+  if (!model.has_scatter()) return {};
+  const ModelInfo& info = model.info();
+  const auto is_open = [&](const ParamInfo& p) { return !known.count(p.name) && may_be_any_share(p); };
+  if (std::ranges::none_of(info.params, is_open)) return {};
+  const std::set<std::string> proportional = factors(model, known);
+  std::vector<const ParamInfo*> candidates, open;
+  for (const ParamInfo& p : info.params)
+    if (is_open(p) && !proportional.count(p.name)) candidates.push_back(&p);
+  const std::vector<ParamValues> asked = places(model, known);
+  Powers degrees;
+  for (const ParamInfo* p : candidates) {
+    const int d = degree(model, asked, *p, candidates);
+    if (d == 0 || d > (p->kind == ParamKind::Color ? 2 : 1)) continue;
+    open.push_back(p);
+    degrees.push_back(d);
+  }
+  if (open.empty() || open.size() > kMaxParameters) return {};
+  std::set<Powers> products = powers_in(model, asked, open, degrees);
+  for (int tries = 0; tries < 2; ++tries) {
+    if (products.empty() || products.size() > kMaxTerms) return {};
+    const std::optional<Terms> out = solved(products, open, degrees);
+    if (!out) return {};
+    if (positive(*out, degrees)) return without_black(model, asked, *out);
+    products = closed(std::move(products));
+  }
+  return {};
+}
+
+bool Terms::has(const std::string& parameter) const {
+  return std::ranges::find(parameters, parameter) != parameters.end();
+}
+
+template <class T> std::vector<Rgb<T>> Terms::weights(const std::map<std::string, Rgb<T>>& values) const {
+  std::vector<Rgb<T>> out;
+  for (const Term& term : terms) {
+    Rgb<T> sum(T(0));
+    for (const auto& [powers, coefficient] : term.polynomial) {
+      // What is taken away as often as it is added is shorter taken away than added with a factor.
+      Rgb<T> part{T(std::abs(coefficient))};
+      for (std::size_t i = 0; i < powers.size(); ++i)
+        for (int k = 0; k < powers[i]; ++k) part = part * values.at(parameters[i]);
+      sum = coefficient < 0 ? sum - part : sum + part;
+    }
+    out.push_back(named("weight_of_term", sum));
+  }
+  return out;
+}
+template std::vector<Rgb<double>> Terms::weights(const std::map<std::string, Rgb<double>>&) const;
+template std::vector<Rgb<Expr>> Terms::weights(const std::map<std::string, Rgb<Expr>>&) const;
+
+}  // namespace brdfc::fit

@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The aimed form: base + lamps + rest. Equal to the model in expectation, whatever the base and wherever the lamps.
+//
+//   base   closures that carry most of the model: those that it declares (Brdf::base), a fit (fit/fit.h), or none
+//   lamps  one closure a lamp, aimed at it, whose value there is the model's own f cos less the base, so that light
+//          sampling meets the model itself
+//   rest   a direction that the shader draws, as a lobe as narrow as those of a sampled form, which carries what the
+//          other two leave of f cos, over the density of drawing it
+//
+// Where a drawn direction meets a lamp, lamp and rest share f cos - base by a power heuristic (E. Veach, L. Guibas:
+// Optimally Combining Sampling Techniques for Monte Carlo Rendering, 1995): a lobe wins for lamps that are small beside
+// the model's lobe, the drawn direction for those that are large. Elsewhere the rest takes off what lobes give beside
+// their lamps, for which some directions are drawn from there: the model's own hardly come where it falls steeply. The
+// one approximation: over a lamp f and the lamp's visibility are averaged apart.
+//
+// Directions and lamps are in the local frame of the shader: z is the normal on the viewer's side.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "closures/closure.h"
+#include "model/sampling.h"
+
+namespace brdfc::forms {
+
+/// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample;
+/// empty ones cost nothing.
+inline constexpr int kMaxLamps = 8;
+
+/// A lamp as a flat patch, in units of any length: a disk or ellipse with these half axes, or a rectangle. A sun has
+/// its centre at distance 1.
+template <class T> struct LampPatch {
+  Vec3<T> centre;         ///< from the shading point
+  Vec3<T> across, along;  ///< half axes, perpendicular to each other and longer than 0
+  T disk;                 ///< 1: disk or ellipse, 0: rectangle
+
+  /// A point by two coordinates from -1 to 1, of a disk within the unit circle.
+  Vec3<T> at(const T& x, const T& y) const { return centre + across * x + along * y; }
+};
+
+/// How high above the surface the lamp reaches, at most. Where that is not above 0, a surface that lets no light
+/// through need not look at it.
+template <class T> T highest(const LampPatch<T>& patch) {
+  return patch.centre.z + abs(patch.across.z) + abs(patch.along.z);
+}
+
+/// How much of a ramp's flank, from 1 down, an aimed lobe is level over: colours of 7/k at its entries k >= kLevel make
+/// colour times cos^e equal 1 (to 2 %) where cos^e >= kLevel / 7.
+inline constexpr int kLevel = 3;
+/// Colours of the ramp of an aimed lobe whose height is 1, from cos^e = 0 to cos^e = 1.
+constexpr std::array<double, kRampSize> aimed_ramp() {
+  std::array<double, kRampSize> ramp{};
+  for (int k = kLevel; k < kRampSize; ++k) ramp[std::size_t(k)] = double(kRampSize - 1) / k;
+  return ramp;
+}
+
+/// phong_ramp(half, exponent, height * aimed_ramp()): f cos is 1 over the lamp and falls to 0 beside it.
+template <class T> struct AimedLobe {
+  Vec3<T> towards;  ///< the lamp's centre
+  Vec3<T> half;     ///< the closure's normal
+  T exponent;
+  T sinRadius;  ///< of the lamp
+  T cosEnd;     ///< from its centre on the lobe is 0
+  T extent;     ///< solid angle of where it is not
+};
+
+/// What a shading point makes of a lamp.
+template <class T> struct AimedLamp {
+  AimedLobe<T> lobe;
+  Vec3<T> wi;     ///< to a point of the lamp, unit
+  T emphasis;     ///< what the point stands for over the mean of all points, and over the lobe's height there, which is
+                  ///< 1 to some percent; 0 where the lamp is left to the rest
+  T solid_angle;  ///< of the lamp
+  T height;       ///< of the closure's colours over aimed_ramp() where f cos is 1
+};
+
+/// cos^e -> f cos of an aimed lobe over its height and (half.wi): ramp times cos^e.
+template <class T> T aimed_profile(const T& lobe) {
+  const T position = T(kRampSize - 1) * lobe;
+  // The entry below the position: its colour and the step to the next are 7/k and 7/(k (k + 1)).
+  T k(kLevel);
+  for (int i = kLevel + 1; i < kRampSize - 1; ++i) k = select(position < T(i), k, T(i));
+  const T level = (T(kRampSize - 1) / k) * (T(1) - (position - k) / (k + T(1)));
+  const T flank = (position - T(kLevel - 1)) * T(double(kRampSize - 1) / kLevel);
+  return lobe * select(position < T(kLevel), maximum(flank, T(0)), level);
+}
+
+/// f cos of the lobe of an aimed closure.
+template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
+  const T cosAlpha = dot(lobe.towards, wi), rise = dot(lobe.half, wi);
+  const T profile = aimed_profile(pow(maximum(cosAlpha, lobe.cosEnd), lobe.exponent));
+  return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
+}
+
+/// How far a lobe towards `centre` may reach, as a sine, without covering the lamp of an earlier one: what it gave
+/// there the drawn directions would have to take off again, bright as the lamp is.
+template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earlier) {
+  return length(normalize(centre) - earlier.towards) - earlier.sinRadius;
+}
+
+/// A closure aimed at a lamp whose bounding sphere has the radius of this sine. wo: towards the viewer, unit.
+template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, const T& room, const Vec3<T>& wo) {
+  // Room for the drawn directions' own lobes, 5e-3 wide; and cos^e of a narrower lobe loses digits in single precision.
+  constexpr double kRoom = 1.1, kLeast = 0.03, kTight = 0.005, kMost = 0.95;
+  // The flank ends where cos^e = (kLevel - 1) / 7; sines of small angles are as the roots of the logarithms.
+  const double level = std::log(double(kLevel) / (kRampSize - 1)), end = std::log(double(kLevel - 1) / (kRampSize - 1));
+  const T wide = minimum(T(kRoom) * sinRadius + T(kLeast), T(std::sqrt(level / end)) * room);
+  const T sinWidth = minimum(maximum(wide, sinRadius + T(kTight)), T(kMost));
+  AimedLobe<T> lobe;
+  lobe.towards = towards;
+  lobe.half = normalize(towards + wo);
+  // cos^e = kLevel / 7 at the width
+  lobe.exponent = T(2 * level) / log1p(-sqr(sinWidth));
+  lobe.sinRadius = sinRadius;
+  lobe.cosEnd = exp(T(end) / lobe.exponent);
+  lobe.extent = T(-2) * pi<T>() * expm1(T(end) / lobe.exponent);
+  return lobe;
+}
+
+/// A direction under a lobe, each as likely as the others; and how likely that is.
+template <class T> Vec3<T> sample_under(const AimedLobe<T>& lobe, const T& u, const T& v) {
+  // From 1 - cos, which has all its digits.
+  const T drop = u * lobe.extent / (T(2) * pi<T>()), sine = sqrt(drop * (T(2) - drop)), turn = T(2) * pi<T>() * v;
+  const auto upright = abs(lobe.towards.z) > T(0.9);
+  const Vec3<T> t =
+      normalize(cross(lobe.towards, Vec3<T>{select(upright, T(1), T(0)), T(0), select(upright, T(0), T(1))}));
+  const Vec3<T> b = cross(lobe.towards, t);
+  return lobe.towards * (T(1) - drop) + t * (sine * cos(turn)) + b * (sine * sin(turn));
+}
+template <class T> T pdf_under(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
+  return select(dot(lobe.towards, wi) > lobe.cosEnd, T(1) / lobe.extent, T(0));
+}
+
+/// The direction `ray`, moved out of the seam about a lamp if it lies there. The rest is drawn as a lobe 1e-3 wide,
+/// which in the seam still touches the lamp: light sampling finds that rarely, and where it does, what little is left
+/// beside the lamp would be as bright as the lamp, or as dark. Beside the seam it meets next to the same light without.
+template <class T> Vec3<T> beside(const LampPatch<T>& patch, const Vec3<T>& ray) {
+  constexpr double kReach = 5e-3;
+  const auto disk = patch.disk > T(0.5);
+  const Vec3<T> normal = cross(patch.across, patch.along);
+  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
+  const T facing = dot(normal, ray);
+  const T distance = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const Vec3<T> offset = ray * distance - patch.centre;
+  const T x = dot(offset, patch.across) / a2, y = dot(offset, patch.along) / b2;
+  // The seam's width in the plane of the lamp, in units of its axes.
+  const T width = T(kReach) * distance * length(normal) / maximum(abs(facing), tiny<T>());
+  const T seam_x = T(1) + width / sqrt(a2), seam_y = T(1) + width / sqrt(b2);
+  const T r = sqrt(x * x + y * y), seam = maximum(seam_x, seam_y);
+  const auto past_x = abs(x) > T(1);
+  const auto touches = distance > T(0) && select(disk, r, maximum(abs(x), abs(y))) > T(1) &&
+                       select(disk, r / seam, maximum(abs(x) / seam_x, abs(y) / seam_y)) < T(1);
+  const T round = seam / maximum(r, tiny<T>());
+  const T out_x = select(past_x, select(x > T(0), seam_x, -seam_x), x),
+          out_y = select(past_x, y, select(y > T(0), seam_y, -seam_y));
+  const Vec3<T> moved = normalize(patch.at(select(disk, x * round, out_x), select(disk, y * round, out_y)));
+  return select(touches && moved.z * ray.z > T(0), moved, ray);
+}
+
+/// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp.
+template <class T>
+AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2, const Vec3<T>& wo) {
+  /// Sine of the radius beyond which a lamp is so near that drawn directions meet it well.
+  constexpr double kNearest = 0.85;
+  /// Cosine between the closure's normal and any point of the lamp below which the normal is but rounding; and the same
+  /// in units of that to the lamp's centre, where the closure would be as good as black.
+  constexpr double kLeastRise = 0.005, kLeastShare = 0.2;
+  const auto disk = patch.disk > T(0.5);
+  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
+  const T distance2 = dot(patch.centre, patch.centre);
+  const T radius2 = select(disk, maximum(a2, b2), a2 + b2);
+  AimedLamp<T> lamp;
+  const Vec3<T> towards = patch.centre / sqrt(distance2);
+  lamp.lobe = aim(towards, sqrt(minimum(radius2 / distance2, T(1))), room, wo);
+  const T rise = dot(lamp.lobe.half, towards);
+  lamp.height = T(2) * pi<T>() / (rise * (lamp.lobe.exponent + T(2)));
+
+  const T radius = sqrt(v1), angle = T(2) * pi<T>() * v2;
+  const Vec3<T> point = patch.at(select(disk, radius * cos(angle), T(2) * v1 - T(1)),
+                                 select(disk, radius * sin(angle), T(2) * v2 - T(1)));
+  lamp.wi = normalize(point);
+  // Solid angle over area, up to the length of `normal`, which is the area up to 4 or pi.
+  const Vec3<T> normal = cross(patch.across, patch.along);
+  const auto density = [&](const Vec3<T>& p) {
+    const T d2 = dot(p, p);
+    return abs(dot(normal, p)) / (d2 * sqrt(d2));
+  };
+  // Its mean over the lamp by four points, which is right to third degree (A. Stroud: Approximate Calculation of
+  // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1).
+  const T node = select(disk, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(disk, T(0), node);
+  const T mean = (density(patch.at(node, other)) + density(patch.at(-node, other * T(-1))) +
+                  density(patch.at(other * T(-1), node)) + density(patch.at(other, -node))) /
+                 T(4);
+  lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
+  const T sinRadius = lamp.lobe.sinRadius;
+  const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
+  const auto usable =
+      radius2 < T(kNearest * kNearest) * distance2 && least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
+  lamp.emphasis = select(usable, density(point) / maximum(mean * evaluate(lamp.lobe, lamp.wi), tiny<T>()), T(0));
+  return lamp;
+}
+
+/// 1 where a direction meets the lamp, else 0.
+template <class T> T meets(const LampPatch<T>& patch, const Vec3<T>& wi) {
+  const Vec3<T> normal = cross(patch.across, patch.along);
+  const T facing = dot(normal, wi);
+  const T reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const Vec3<T> offset = wi * reach - patch.centre;
+  const T x2 = sqr(dot(offset, patch.across) / dot(patch.across, patch.across)),
+          y2 = sqr(dot(offset, patch.along) / dot(patch.along, patch.along));
+  const auto inside = reach > T(0) && select(patch.disk > T(0.5), x2 + y2, maximum(x2, y2)) < T(1);
+  return select(inside, T(1), T(0));
+}
+
+/// What the drawn direction carries of a lamp of this solid angle, which it meets with this density: the power
+/// heuristic, to the fourth so that it has next to nothing where the lamp is the smaller one: light sampling finds
+/// that, too, and rarely.
+template <class T> T share_of_drawn(const T& solid_angle, const T& density) {
+  constexpr double kAll = 1e3;  // beyond it the share is 1 in single precision
+  const T power = sqr(sqr(minimum(solid_angle * density, T(kAll))));
+  return power / (T(1) + power);
+}
+
+/// The largest magnitude of a channel.
+template <class T> T largest(const Rgb<T>& c) { return maximum(max_component(c), max_component(c * T(-1))); }
+
+/// What a lamp's lobe carries.
+template <class T> struct Sent {
+  Rgb<T> value;   ///< f cos over the lamp
+  T weight;       ///< of the closure: what Cycles follows it by
+  Rgb<T> colour;  ///< aimed_ramp() times this are the closure's colours
+};
+
+/// `value`: f cos - base towards AimedLamp::wi, less what the lobes of earlier lamps give there; `density` that of
+/// drawing it.
+template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, const T& density) {
+  // Cycles drops closures of small weight.
+  constexpr double kLeastWeight = 1e-3;
+  Sent<T> out;
+  out.value = value * (lamp.emphasis * (T(1) - share_of_drawn(lamp.solid_angle, density)));
+  const T size = largest(out.value);
+  out.weight = select(size > T(0), minimum(maximum(size * lamp.lobe.extent, T(kLeastWeight)), T(1)), T(0));
+  out.colour = out.value * (lamp.height / maximum(out.weight, T(kLeastWeight)));
+  return out;
+}
+
+/// How often, where there are lobes, the drawn direction comes from under one of them.
+inline constexpr double kFromLobes = 0.1;
+
+/// u.x from 0 to 1 chooses where the drawn direction comes from, and serves again, stretched.
+template <class T> struct Toss {
+  T lobe;  ///< number of the lobe, less than 0: none
+  T u;     ///< the number in [0, 1) for draw()
+};
+/// `lobes`: how many there are.
+template <class T> Toss<T> toss(const T& u, const T& lobes) {
+  const T of_lobes = select(lobes > T(0), T(kFromLobes), T(0));
+  const auto from_lobe = u < of_lobes;
+  return {select(from_lobe, minimum(u * lobes / T(kFromLobes), lobes - T(0.5)), T(-1)),
+          minimum(maximum(u - of_lobes, T(0)) / (T(1) - of_lobes), T(1 - 1e-7))};
+}
+
+/// What lamps make of the drawn direction, added up lobe by lobe.
+template <class T> struct Met {
+  Rgb<T> covered = Rgb<T>(T(0));  ///< f cos of the lobes, but for that of the lamp that it meets
+  Rgb<T> before = Rgb<T>(T(0));   ///< the same of the lobes before that one's; none where it meets no lamp
+  T solid_angle{0};               ///< of the lamp that it meets, else 0
+  T density{0};                   ///< sum of pdf_under()
+};
+template <class T> Met<T> meet(Met<T> met, const LampPatch<T>& patch, const AimedLobe<T>& lobe, const T& solid_angle,
+                               const Rgb<T>& value, const Vec3<T>& drawn) {
+  const auto here = meets(patch, drawn) > T(0);
+  met.solid_angle = select(here, solid_angle, met.solid_angle);
+  met.before = select(here, met.covered, met.before);
+  // On the lamp the lobe is not quite level. Its height is in the emphasis: were it in the rest, light sampling would
+  // find it there, as rarely and as bright as in a seam (beside()). Below the surface nothing is taken off.
+  met.covered += value * select(here || drawn.z <= T(0), T(0), evaluate(lobe, drawn));
+  met.density = met.density + pdf_under(lobe, drawn);
+  return met;
+}
+
+/// Of the drawn direction, by that of draw(); `lobes`: how many there are.
+template <class T> T density_of_drawn(const T& density, const T& lobes, const Met<T>& met) {
+  const T of_lobes = select(lobes > T(0), T(kFromLobes), T(0));
+  return (T(1) - of_lobes) * density + of_lobes * met.density / maximum(lobes, T(1));
+}
+
+/// The drawn direction's weight without its sign, and sign and colour.
+template <class T> struct Rest {
+  T weight;
+  Rgb<T> colour;
+};
+
+/// `value`: f cos - base in the drawn direction; `density`, `lobes`: see density_of_drawn().
+template <class T> Rest<T> rest(const Rgb<T>& value, const T& density, const T& lobes, const Met<T>& met) {
+  const T p = density_of_drawn(density, lobes, met);
+  const auto drawn = p > T(0);
+  const Rgb<T> left = value - met.before;
+  const Rgb<T> lacking = select(met.solid_angle > T(0), Rgb<T>(T(0)), left) - (met.covered - met.before);
+  const Rgb<T> all = left * share_of_drawn(met.solid_angle, density) + lacking;
+  Rest<T> out;
+  const T size = largest(all);
+  out.weight = select(drawn, size / select(drawn, p, T(1)), T(0));
+  out.colour = all / maximum(size, tiny<T>());
+  return out;
+}
+
+/// f cos - base, with the density of the direction in draw().
+template <class T> struct Excess {
+  Rgb<T> value;
+  T density;
+};
+
+/// How often the direction of draw() comes from everywhere: a base may give light that the model has none of.
+inline constexpr double kFromEverywhere = 0.2;
+
+/// u: three numbers in [0, 1). `with_base`: whether there is a base.
+template <class T> Vec3<T> draw(const Brdf<T>& brdf, bool with_base, const Vec3<T>& wo, const Vec3<T>& u) {
+  if (!with_base) return brdf.sample(wo, u).wi;
+  const T share = T(1 - kFromEverywhere);
+  // The number that chooses serves again, stretched.
+  const Sample<T> s = brdf.sample(wo, {minimum(u.x / share, T(1 - 1e-7)), u.y, u.z});
+  return select(u.x < share, s.wi, sample_everywhere(u.y, u.z));
+}
+
+template <class T>
+Excess<T> excess(const Brdf<T>& brdf, bool with_base, const Rgb<T>& base, const Vec3<T>& wi, const Vec3<T>& wo) {
+  Excess<T> out;
+  const Rgb<T> f_cos = brdf.eval(wi, wo) * abs(wi.z);
+  out.value = with_base ? f_cos - base : f_cos;
+  out.density = brdf.pdf(wi, wo);
+  if (with_base) out.density = T(1 - kFromEverywhere) * out.density + T(kFromEverywhere) * everywhere_pdf(wi);
+  return out;
+}
+
+/// All that one sample hands to the renderer beside the base.
+struct AimedSum {
+  std::vector<AimedLobe<double>> lobes;
+  std::vector<Rgb<double>> values;  ///< of the lobes: f cos is value times evaluate(lobe, wi)
+  Vec3<double> drawn;               ///< the drawn direction
+  Vec3<double> wi;                  ///< the same, beside lamps' seams: where the rest goes
+  Rgb<double> rest;                 ///< its weight
+  double density;                   ///< of drawing it
+};
+
+/// As the shader goes about it (pack/shader.cpp), with the base for wo. u: three numbers that draw the direction; v:
+/// two a lamp that choose a point of it, independent of one another.
+AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
+                   const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 2>>& v);
+
+}  // namespace brdfc::forms

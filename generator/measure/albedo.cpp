@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measure/albedo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include "core/sequence.h"
+#include "measure/bound_model.h"
+#include "measure/guides.h"
+
+namespace brdfc::measure {
+namespace {
+
+// Replicates of the sequence, for its error: enough that 7 standard errors are all but impossible (t, 15 d.o.f.).
+constexpr int kReplicates = 16;
+
+class AlbedoIntegrator {
+ public:
+  AlbedoIntegrator(const Brdf<double>& guide, const std::vector<const Brdf<double>*>& models, const Vec3<double>& wo,
+                   const std::string& label)
+      : guide_(guide), models_(models), wo_(wo), label_(label), n_(3 * models.size()) {}
+
+  /// f cos of every model.
+  void evaluate(const Vec3<double>& wi, double* out) const {
+    for (const Brdf<double>* m : models_) {
+      const Rgb<double> f = m->eval(wi, wo_);
+      require_value(f, "f", label_, wi, wo_);
+      const double cosTheta = std::abs(wi.z);
+      *out++ = f.r * cosTheta;
+      *out++ = f.g * cosTheta;
+      *out++ = f.b * cosTheta;
+    }
+  }
+
+  CubatureResult over_directions(const CubatureOptions& options, int guides) const {
+    return integrate_hemisphere(
+        guide_, wo_, n_, [&](const Vec3<double>& wi, double* out) { evaluate(wi, out); }, options, guides);
+  }
+
+  /// How much of the guide's density the cells of over_directions() miss, up to the chance of the share of lost
+  /// samples.
+  double missed_density(const CubatureOptions& options, int guides) const {
+    const auto density = [&](const Vec3<double>& wi, double* out) {
+      out[0] = guide_.pdf(wi, wo_);
+      require_value(out[0], "pdf", label_, wi, wo_);
+    };
+    const SampledAlbedo drawn = sampled_albedo(guide_, wo_.z, std::atan2(wo_.y, wo_.x), label_);
+    const double found = integrate_hemisphere(guide_, wo_, 1, density, options, guides).value[0];
+    return std::max(std::abs(1 - drawn.lost - found) - 7 * drawn.lost_error, 0.);
+  }
+
+  /// f cos / pdf at a sample of the guide.
+  void evaluate_sample(const Vec3<double>& u, double* out) const {
+    const Sample<double> s = guide_.sample(wo_, u);
+    require_value(s.pdf, "pdf", label_, s.wi, wo_);
+    if (!(s.pdf > 0)) {
+      std::fill_n(out, n_, 0.);
+      return;
+    }
+    evaluate(s.wi, out);
+    for (std::size_t k = 0; k < n_; ++k) out[k] /= s.pdf;
+  }
+
+  /// Where in the unit square of one lobe the samples of the other lobes lie: there f cos / pdf has a bump or a hole as
+  /// narrow as they are. `u1` chooses the lobe.
+  std::vector<Point2> preimages(double u1, const std::vector<Vec3<double>>& others, int grid) const {
+    const auto at = [&](const Point2& p) { return guide_.sample(wo_, {u1, p.x, p.y}).wi; };
+    std::vector<Point2> places;
+    std::vector<Vec3<double>> directions;
+    for (int i = 0; i < grid; ++i)
+      for (int j = 0; j < grid; ++j) {
+        places.push_back({(i + 0.5) / grid, (j + 0.5) / grid});
+        directions.push_back(at(places.back()));
+      }
+    std::vector<Point2> out;
+    for (const Vec3<double>& target : others) {
+      std::size_t nearest = 0;
+      double best = -2;
+      for (std::size_t i = 0; i < directions.size(); ++i)
+        if (const double c = dot(directions[i], target); c > best) best = c, nearest = i;
+      // Gauss-Newton with difference quotients.
+      Point2 p = places[nearest];
+      Vec3<double> r = target - directions[nearest];
+      for (int step = 0; step < 8; ++step) {
+        constexpr double h = 1e-7;
+        const double hx = p.x < 0.5 ? h : -h, hy = p.y < 0.5 ? h : -h;
+        const Vec3<double> here = at(p);
+        r = target - here;
+        const Vec3<double> dx = (at({p.x + hx, p.y}) - here) / hx, dy = (at({p.x, p.y + hy}) - here) / hy;
+        const double xx = dot(dx, dx), xy = dot(dx, dy), yy = dot(dy, dy), det = xx * yy - xy * xy;
+        if (!(det > 0)) break;
+        const double bx = dot(dx, r), by = dot(dy, r);
+        p.x = std::clamp(p.x + (yy * bx - xy * by) / det, 0., 1 - 1e-12);
+        p.y = std::clamp(p.y + (xx * by - xy * bx) / det, 0., 1 - 1e-12);
+      }
+      if (length(r) < 1e-3) out.push_back(p);
+    }
+    return out;
+  }
+
+  /// Not converged, without value, if the choice of lobe can't be told apart from the direction.
+  CubatureResult over_samples(const CubatureOptions& options, int effort) const {
+    CubatureResult sum;
+    sum.error.assign(n_, std::numeric_limits<double>::infinity());
+    const std::vector<double> borders = lobe_borders(guide_, wo_);
+    if (borders.empty()) return sum;
+    sum.value.assign(n_, 0);
+    sum.error.assign(n_, 0);
+    sum.converged = true;
+    const std::size_t lobes = borders.size() - 1;
+    for (std::size_t lobe = 0; lobe < lobes; ++lobe) {
+      const double width = borders[lobe + 1] - borders[lobe], u1 = borders[lobe] + 0.5 * width;
+      std::vector<Vec3<double>> others;
+      for (std::size_t other = 0; other < lobes; ++other) {
+        if (other == lobe) continue;
+        Sequence2 sequence(2);
+        for (int i = 0; i < 32 << (2 * effort); ++i) {
+          const Point2 p = sequence.next();
+          const Sample<double> s = guide_.sample(wo_, {0.5 * (borders[other] + borders[other + 1]), p.x, p.y});
+          if (s.pdf > 0) others.push_back(s.wi);
+        }
+      }
+      const std::vector<Point2> seeds = preimages(u1, others, 16 << effort);
+      // At least four cells a side: sample() may map each quadrant of the unit square on its own.
+      std::vector<Rect> cells;
+      const int grid = 4 << effort;
+      for (int i = 0; i < grid; ++i)
+        for (int j = 0; j < grid; ++j) {
+          const auto parts =
+              partition({double(i) / grid, double(i + 1) / grid, double(j) / grid, double(j + 1) / grid}, seeds, 4);
+          cells.insert(cells.end(), parts.begin(), parts.end());
+        }
+      const CubatureResult r = integrate(
+          [&](double x, double y, double* out) {
+            evaluate_sample({u1, x, y}, out);
+          },
+          n_, cells, options);
+      for (std::size_t k = 0; k < n_; ++k) {
+        sum.value[k] += width * r.value[k];
+        sum.error[k] += width * r.error[k];
+      }
+      sum.cells += r.cells;
+      sum.converged = sum.converged && r.converged;
+    }
+    return sum;
+  }
+
+  /// Mean and standard error over low-discrepancy samples, `count` a lobe where the lobes can be told apart: what is
+  /// left is a plain average of bounded weights, which no peak or ridge can escape.
+  CubatureResult witness(int count) const {
+    CubatureResult out;
+    std::vector<double> borders = lobe_borders(guide_, wo_);
+    const bool known = !borders.empty();
+    if (!known) borders = {0, 1};
+    const int n = count / kReplicates;
+    std::vector<double> scratch(n_);
+    std::vector<std::vector<double>> means(kReplicates, std::vector<double>(n_, 0.));
+    out.value.assign(n_, 0);
+    out.error.assign(n_, 0);
+    for (int k = 0; k < kReplicates; ++k)
+      for (std::size_t lobe = 0; lobe + 1 < borders.size(); ++lobe) {
+        const double width = borders[lobe + 1] - borders[lobe];
+        Sequence3 sequence(std::uint64_t(5000 + k));
+        Sequence2 plane(std::uint64_t(5000 + k));
+        for (int i = 0; i < n; ++i) {
+          Vec3<double> u;
+          if (known) {
+            const Point2 p = plane.next();
+            u = {borders[lobe] + 0.5 * width, p.x, p.y};
+          } else {
+            u = sequence.next();
+          }
+          evaluate_sample(u, scratch.data());
+          for (std::size_t c = 0; c < n_; ++c) means[std::size_t(k)][c] += scratch[c] * width / n;
+        }
+      }
+    for (std::size_t c = 0; c < n_; ++c) {
+      for (const auto& m : means) out.value[c] += m[c] / kReplicates;
+      for (const auto& m : means) out.error[c] += sqr(m[c] - out.value[c]);
+      out.error[c] = std::sqrt(out.error[c] / (kReplicates * (kReplicates - 1)));
+    }
+    return out;
+  }
+
+ private:
+  const Brdf<double>& guide_;
+  const std::vector<const Brdf<double>*>& models_;
+  const Vec3<double> wo_;
+  const std::string& label_;
+  std::size_t n_;
+};
+
+double largest(const std::vector<double>& v) { return *std::max_element(v.begin(), v.end()); }
+
+double distance(const CubatureResult& a, const CubatureResult& b) {
+  double d = 0;
+  for (std::size_t k = 0; k < a.value.size(); ++k) d = std::max(d, std::abs(a.value[k] - b.value[k]));
+  return d;
+}
+
+struct Estimate {
+  std::vector<double> value;
+  double error = 0;
+};
+
+Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& options) {
+  const CubatureOptions cubature{options.absolute, 0, options.max_cells};
+  // The rule's estimates are far above its true error, unless it missed something. At a kink they may be passed by
+  // some hundred times the aim; what differs by more was missed.
+  const double slack = 200 * options.absolute;
+  CubatureResult directions, samples;
+  double directions_moved = 0, samples_moved = 0;  // between the last two meshes
+  bool ridge = false;
+  for (int effort = 0; effort < 3; ++effort) {
+    CubatureResult before = std::move(samples);
+    samples = integrator.over_samples(cubature, effort);
+    if (samples.value.empty()) samples.value.assign(samples.error.size(), 0);
+    if (effort > 0) samples_moved = distance(before, samples);
+    if (!ridge) {
+      before = std::move(directions);
+      directions = integrator.over_directions(cubature, 512 << effort);
+      if (effort > 0) directions_moved = distance(before, directions);
+    }
+    const double apart = distance(directions, samples);
+    const double d = largest(directions.error), s = largest(samples.error);
+    if (apart <= d + s + slack && std::min(d, s) <= slack) {
+      // Kinks of the model are met by the cut cells of the first, and not by the squares of the second.
+      if (d <= slack) return {directions.value, std::max(d, apart)};
+      return {samples.value, std::max(s, apart)};
+    }
+    // Two meshes that agree are right; the samples, which all trust the density, may then not be.
+    // Except for edges across the cells, which both may take for smooth, and for peaks that both missed: the density is
+    // then seen to miss them too.
+    constexpr double kEdges = 3e-5;
+    if (effort > 0 && d <= slack && directions_moved <= slack) {
+      const bool missed = apart > kEdges && integrator.missed_density(cubature, 512 << effort) > kEdges;
+      return {directions.value, std::max({d, directions_moved, missed ? apart : std::min(apart, kEdges)})};
+    }
+    // One that is thin and curved never converges over directions, however many guides there are.
+    ridge = effort > 0 && d > slack;
+  }
+  const CubatureResult witness = integrator.witness(options.witnesses);
+  const double chance = largest(witness.error), noise = 7 * chance + 1e-12;
+  const double d = distance(directions, witness), s = distance(samples, witness);
+  if (s <= noise && samples.converged && samples_moved <= slack)
+    return {samples.value, std::max(largest(samples.error), samples_moved)};
+  if (d <= noise && d <= s) return {directions.value, std::max({largest(directions.error), chance, d})};
+  if (s <= noise) return {samples.value, std::max({largest(samples.error), chance, s})};
+  return {witness.value, std::max(3 * chance, std::min(d, s))};
+}
+
+}  // namespace
+
+Albedo albedo(const Brdf<double>& brdf, double cos_theta_o, double phi_o, const std::string& label,
+              const AlbedoOptions& options) {
+  const Vec3<double> wo = direction(cos_theta_o, phi_o);
+  const std::vector<const Brdf<double>*> models{&brdf};
+  const Estimate e = estimate(AlbedoIntegrator(brdf, models, wo, label), options);
+  Albedo out;
+  out.scattered = {e.value[0], e.value[1], e.value[2]};
+  out.mirror = brdf.mirror(wo);
+  out.transmit = brdf.transmit(wo);
+  out.error = e.error;
+  require_value(out.mirror, "mirror", label, {-wo.x, -wo.y, wo.z}, wo);
+  require_value(out.transmit, "transmit", label, {-wo.x, -wo.y, -wo.z}, wo);
+  return out;
+}
+
+MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<double>*>& models, double cos_theta_o,
+                        std::optional<double> phi_o, const std::string& label, int count, std::uint64_t seed) {
+  constexpr int kCopies = 4;
+  const std::size_t n = 6 * models.size();  // scattered, then mirror
+  std::vector<std::vector<double>> means(kCopies, std::vector<double>(n, 0.));
+  std::vector<double> borders = lobe_borders(guide, direction(cos_theta_o, phi_o.value_or(0.3)));
+  const bool known = !borders.empty();
+  if (!known) borders = {0, 1};
+  const int each = std::max(1, count / kCopies);
+  // A tent makes the integrand periodic, which the sequence rewards.
+  const auto tent = [](double u) { return std::min(1 - std::abs(2 * u - 1), 1 - 1e-16); };
+  std::vector<double> scratch(n);
+  const auto mirrors = [&](const Vec3<double>& wo) {
+    double* out = &scratch[3 * models.size()];
+    for (const Brdf<double>* model : models) {
+      const Rgb<double> mirror = model->mirror(wo) + model->transmit(wo);
+      require_value(mirror, "mirror", label, {-wo.x, -wo.y, wo.z}, wo);
+      *out++ = mirror.r;
+      *out++ = mirror.g;
+      *out++ = mirror.b;
+    }
+  };
+  Vec3<double> wo;
+  if (phi_o) {
+    wo = direction(cos_theta_o, *phi_o);
+    mirrors(wo);
+  }
+  for (int k = 0; k < kCopies; ++k)
+    for (std::size_t lobe = 0; lobe + 1 < borders.size(); ++lobe) {
+      const double width = borders[lobe + 1] - borders[lobe];
+      Sequence3 sequence(9000 + 16 * seed + std::uint64_t(k));
+      std::mt19937_64 random(seed + std::uint64_t(k));
+      for (int i = 0; i < each; ++i) {
+        const Vec3<double> p = sequence.next();
+        const double choice = known ? 0.5 : double(random() >> 11) * 0x1p-53;
+        if (!phi_o) {
+          wo = direction(cos_theta_o, 2 * kPi * p.z);
+          mirrors(wo);
+        }
+        const AlbedoIntegrator integrator(guide, models, wo, label);
+        integrator.evaluate_sample({borders[lobe] + choice * width, tent(p.x), tent(p.y)}, scratch.data());
+        for (std::size_t c = 0; c < n; ++c) means[std::size_t(k)][c] += scratch[c] * width / each;
+      }
+    }
+  MeanAlbedo out;
+  for (std::size_t m = 0; m < 2 * models.size(); ++m) {
+    std::array<double, 3> mean{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (const auto& copy : means) mean[c] += copy[3 * m + c] / kCopies;
+      double variance = 0;
+      for (const auto& copy : means) variance += sqr(copy[3 * m + c] - mean[c]) / (kCopies * (kCopies - 1));
+      out.error = std::max(out.error, std::sqrt(variance));
+    }
+    (m < models.size() ? out.scattered : out.mirror).push_back({mean[0], mean[1], mean[2]});
+  }
+  return out;
+}
+
+SampledAlbedo sampled_albedo(const Brdf<double>& brdf, double cos_theta_o, double phi_o, const std::string& label,
+                             int count) {
+  const Vec3<double> wo = direction(cos_theta_o, phi_o);
+  const int n = std::max(1, count / kReplicates);
+  std::array<Rgb<double>, kReplicates> mean;
+  std::array<double, kReplicates> lost{};
+  for (int k = 0; k < kReplicates; ++k) {
+    Sequence3 sequence(std::uint64_t(1000 + k));
+    Rgb<double> sum(0);
+    int below = 0;
+    for (int i = 0; i < n; ++i) {
+      const Sample<double> s = brdf.sample(wo, sequence.next());
+      require_value(s.pdf, "pdf", label, s.wi, wo);
+      require_value(s.weight, "weight", label, s.wi, wo);
+      if (s.pdf > 0)
+        sum += s.weight;
+      else
+        ++below;
+    }
+    mean[k] = sum / double(n);
+    lost[k] = double(below) / n;
+  }
+  SampledAlbedo out;
+  out.scattered = Rgb<double>(0);
+  for (int k = 0; k < kReplicates; ++k) {
+    out.scattered += mean[k] / double(kReplicates);
+    out.lost += lost[k] / kReplicates;
+  }
+  Rgb<double> variance(0);
+  double lost_variance = 0;
+  for (int k = 0; k < kReplicates; ++k) {
+    const Rgb<double> d = mean[k] - out.scattered;
+    variance += d * d;
+    lost_variance += sqr(lost[k] - out.lost);
+  }
+  const double scale = 1. / (kReplicates * (kReplicates - 1));
+  out.standard_error = std::sqrt(max_component(variance) * scale);
+  // At least a sample's worth: losses so rare that none came up would seem certain not to happen.
+  out.lost_error = std::max(std::sqrt(lost_variance * scale), 1. / count);
+  return out;
+}
+
+}  // namespace brdfc::measure

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Directional albedo of a model as tables over the view cosine and the parameters it depends on.
+//
+// Per channel the albedo is a polynomial in the colour parameters, of degree one or two in each, whose coefficients
+// are tabulated. With C the channel of the colours:
+//
+//   albedo_C = sum over terms of  grid(cos_theta_o, numbers)_C * product of the term's colours_C
+//
+// That the albedo has this form is verified while tabulating, never assumed. A coefficient depends on few of
+// the numbers as a rule, and is often the same for several choices: a grid has only the axes that matter and
+// is shared between the combinations of choices that agree on it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "model/model.h"
+
+namespace brdfc::measure {
+
+/// How a value is mapped before a grid is interpolated linearly between two neighbouring knots.
+enum class AxisScale {
+  Linear,  ///< x
+  Log,     ///< log(x), all knots > 0
+  Log1p,   ///< log(1 + x), all knots >= 0
+};
+template <class T> T to_scale(AxisScale scale, const T& x) {
+  return scale == AxisScale::Log ? log(x) : scale == AxisScale::Log1p ? log(T(1) + x) : x;
+}
+double from_scale(AxisScale, double);
+/// "linear", "log" or "log1p".
+const char* name_of(AxisScale);
+
+struct TableAxis {
+  std::string name;  ///< "cos_theta_o" or the name of a Number parameter
+  AxisScale scale = AxisScale::Linear;
+  std::vector<double> values;  ///< knots in units of the parameter, increasing, at least 2; ends clamp
+};
+
+/// A tabulated coefficient.
+struct AlbedoGrid {
+  std::vector<TableAxis> axes;  ///< none for a constant; cos_theta_o comes first if present
+  int channels = 1;             ///< 1: equal in r, g and b; or 3
+  std::vector<float> values;    ///< row-major, first axis slowest, channel innermost; may be negative
+  double error = 0;             ///< largest |interpolated - quadrature| at random points off the grid, of the value
+                                ///< itself where that is more than 1
+};
+
+/// A coefficient of the polynomial in the colours.
+struct AlbedoTerm {
+  bool mirror = false;              ///< weight of ideal reflection; otherwise scattered light
+  std::vector<std::string> colors;  ///< Color parameters multiplied with it, twice for a square; empty for a constant
+  int grid = 0;                     ///< index into AlbedoTable::grids
+};
+
+struct AlbedoTable {
+  std::string model;
+  std::vector<AlbedoGrid> grids;
+  std::vector<std::string> choices;  ///< the Choice parameters in schema order
+  std::vector<int> choice_sizes;     ///< how many identifiers each has
+  /// The terms of every combination of choices, at index ((c0 * size1) + c1) * size2 + c2 ... with c the index
+  /// of each choice; one entry for a model without choices. A black combination has no terms.
+  std::vector<std::vector<AlbedoTerm>> terms;
+  double error = 0;       ///< the same of the whole albedo at random points, colours included
+  double quadrature = 0;  ///< largest error estimate of the quadrature met
+  double anisotropy = 0;  ///< largest |albedo at one azimuth - azimuthal average| met; 0 if it does not depend on it
+  std::string doc;        ///< what the table holds, for people
+
+  /// The terms for complete or partial values; what is missing takes its default.
+  const std::vector<AlbedoTerm>& terms_for(const Model&, const ParamValues&) const;
+  /// All floats of all grids.
+  std::size_t size() const;
+};
+
+/// Tabulates the whole admissible range of every parameter. Throws ValueError (naming model, parameters,
+/// directions and value) for a value that is NaN, infinite or negative, or when the albedo is not of the form above.
+AlbedoTable tabulate_albedo(const Model&);
+
+/// Does a pack have the table? Delta terms alone need none: the shader adds up their weights. With few parameters they
+/// still get one, for the panel, which can't run the formula.
+bool has_albedo_table(const Model&);
+/// Where the table of a model is kept: data/albedos/MODEL_HASH.exr, by hash of what the model computes, its
+/// parameters and the settings of tables.
+std::filesystem::path stored_albedo(const Model&);
+/// tabulate_albedo(), or what is kept of it. Throws InputError naming the file if that is damaged.
+AlbedoTable albedo_table_of(const Model&);
+
+/// Albedo, mirror included, by interpolation. Throws InputError for inadmissible parameters.
+Rgb<double> lookup(const AlbedoTable&, const Model&, const ParamValues&, double cos_theta_o);
+/// A grid interpolated at one coordinate per axis; r = g = b if it has one channel.
+Rgb<double> lookup(const AlbedoGrid&, const std::vector<double>& coordinates);
+
+/// Writes a float EXR: one row of pixels per grid, padded with zeros to the longest, and as JSON in the
+/// attribute "brdfc:table" the axes, scales, sizes, terms, errors and layout. Written beside and renamed.
+/// Throws InputError naming the path if it can't be written.
+void write_albedo_exr(const AlbedoTable&, const std::filesystem::path&);
+/// What write_albedo_exr() wrote, number for number. Throws InputError naming the path if it can't be read.
+AlbedoTable read_albedo_exr(const std::filesystem::path&);
+
+}  // namespace brdfc::measure

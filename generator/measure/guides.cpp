@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measure/guides.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace brdfc::measure {
+namespace {
+
+/// Directions on both sides of a jump of sample() as its third number goes round, of one lobe. Where a model folds rays
+/// back, its density jumps along the image of the fold: a curve that a cubature must be led to.
+std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo, double u1) {
+  constexpr int kTrial = 8, kLines = 192, kSteps = 16;
+  constexpr std::size_t kMost = 768;
+  std::vector<Vec3<double>> out;
+  Sequence2 sequence(3);
+  for (int line = 0; line < kLines; ++line) {
+    if ((line == kTrial && out.empty()) || out.size() >= kMost) break;
+    const Point2 p = sequence.next();
+    const auto at = [&](double z) { return brdf.sample(wo, {u1, p.x, wrap(z)}); };
+    std::array<double, kSteps> steps;
+    for (int i = 0; i < kSteps; ++i)
+      steps[std::size_t(i)] = length(at(p.y + double(i + 1) / kSteps).wi - at(p.y + double(i) / kSteps).wi);
+    std::array<double, kSteps> sorted = steps;
+    std::sort(sorted.begin(), sorted.end());
+    for (int i = 0; i < kSteps; ++i) {
+      // A smooth map goes round in steps of about equal length.
+      if (!(steps[std::size_t(i)] > 4 * sorted[kSteps / 4])) continue;
+      double lo = p.y + double(i) / kSteps, hi = p.y + double(i + 1) / kSteps, halfway = 0;
+      for (int k = 0; k < 40; ++k) {
+        const double mid = 0.5 * (lo + hi), left = length(at(mid).wi - at(lo).wi),
+                     right = length(at(hi).wi - at(mid).wi);
+        (left > right ? hi : lo) = mid;
+        if (k == 20) halfway = std::max(left, right);
+      }
+      const Sample<double> a = at(lo), b = at(hi);
+      // A jump stays as large as it is, however near its two sides are looked at.
+      if (!(length(a.wi - b.wi) > 0.9 * halfway)) continue;
+      for (const Sample<double>& s : {a, b})
+        if (s.pdf > 0) out.push_back(s.wi);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& wo) {
+  constexpr int kProbes = 16;
+  const auto at = [&](double u) { return brdf.sample(wo, {u, 0.37, 0.71}).wi; };
+  const auto same = [](const Vec3<double>& a, const Vec3<double>& b) { return length(a - b) < 1e-12; };
+  std::vector<double> borders{0};
+  double from = 0;
+  Vec3<double> before = at(from);
+  for (int i = 0; i <= kProbes; ++i) {
+    const double to = i < kProbes ? (i + 0.5) / kProbes : 1 - 0x1p-53;
+    const Vec3<double> after = at(to);
+    // A lobe that is drawn rarely may lie between two probes: every border up to here, one by one.
+    while (!same(before, after)) {
+      double lo = from, hi = to;
+      while (hi - lo > 1e-15) {
+        const double mid = 0.5 * (lo + hi);
+        (same(at(mid), before) ? lo : hi) = mid;
+      }
+      borders.push_back(hi);
+      if (borders.size() > kProbes / 2) return {};
+      from = hi;
+      before = at(from);
+    }
+    from = to;
+  }
+  borders.push_back(1);
+  return borders;
+}
+
+Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brdf_(brdf), wo_(wo) {
+  sin_o_ = std::hypot(wo.x, wo.y);
+  theta_o_ = std::atan2(sin_o_, wo.z);
+  // Beyond the critical angle nothing comes through: f jumps there.
+  if (brdf.scatters_through()) edge_ = kPi - std::asin(std::min(1 / brdf.ior(), 1.));
+  cos_phi_ = sin_o_ > 0 ? wo.x / sin_o_ : 1;
+  sin_phi_ = sin_o_ > 0 ? wo.y / sin_o_ : 0;
+  std::vector<double> borders = lobe_borders(brdf, wo);
+  if (borders.empty()) borders = {0, 1};
+  lobes_.resize(borders.size() - 1);
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> octaves(1, 30);
+  for (std::size_t lobe = 0; lobe < lobes_.size(); ++lobe) {
+    std::vector<Point2>& points = lobes_[lobe];
+    Sequence3 sequence(1);
+    // Half of them crowd towards the ends of the random numbers at all scales, which lead to the tails.
+    const auto crowd = [&](double v) {
+      const double near = 0.5 * std::exp2(-octaves(random));
+      return v < 0.5 ? near : 1 - near;
+    };
+    for (int i = 0; i < each; ++i) {
+      Vec3<double> u = sequence.next();
+      u.x = borders[lobe] + (borders[lobe + 1] - borders[lobe]) * u.x;
+      if (i % 8 == 1 || i % 8 == 3) u.y = crowd(u.y);
+      if (i % 8 == 2 || i % 8 == 3) u.z = crowd(u.z);
+      const Sample<double> s = brdf.sample(wo, u);
+      if (s.pdf > 0) points.push_back(angles(s.wi));
+    }
+    // Around every cluster, points at distances of all scales: a narrow lobe's flank, where few samples fall but
+    // which still holds light, then lies in cells that grow with the distance from it.
+    for (std::size_t i = 0, n = points.size(); i + 1 < n; ++i) {
+      const double t = std::exp2(octaves(random));
+      points.push_back(
+          {points[i].x + t * (points[i].x - points[i + 1].x), points[i].y + t * (points[i].y - points[i + 1].y)});
+    }
+  }
+  std::vector<Point2> edges;
+  for (std::size_t lobe = 0; lobe + 1 < borders.size(); ++lobe)
+    for (const Vec3<double>& w : folds(brdf, wo, 0.5 * (borders[lobe] + borders[lobe + 1]))) edges.push_back(angles(w));
+  if (!edges.empty()) lobes_.push_back(std::move(edges));
+}
+
+Point2 Guides::angles(const Vec3<double>& wi) const {
+  const double x = cos_phi_ * wi.x + sin_phi_ * wi.y, y = cos_phi_ * wi.y - sin_phi_ * wi.x;
+  const double phi = std::atan2(y, x);
+  return {std::atan2(std::hypot(x, y), wi.z), phi < 0 ? phi + 2 * kPi : phi};
+}
+
+Vec3<double> Guides::direction_at(double theta, double phi) const {
+  const double s = std::sin(theta), x = s * std::cos(phi), y = s * std::sin(phi);
+  return {cos_phi_ * x - sin_phi_ * y, sin_phi_ * x + cos_phi_ * y, std::cos(theta)};
+}
+
+std::vector<Rect> Guides::cells(std::size_t most) const {
+  // Cut at the mirror direction, where a lobe's peak or a kink of max(cos_i, cos_o) lies.
+  std::vector<Rect> out;
+  std::vector<double> cuts{0, std::min(theta_o_, kPi / 2), std::max(theta_o_, kPi / 2)};
+  if (edge_ > 0) cuts.push_back(kPi);
+  for (const double phi : {0., kPi})
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i)
+      if (const Rect r{cuts[i], cuts[i + 1], phi, phi + kPi}; r.x1 > r.x0) {
+        const std::vector<Rect> parts = cells(r, most);
+        out.insert(out.end(), parts.begin(), parts.end());
+      }
+  // Where a peak on that cone holds a hundredth of the light, too few samples fall to lead to it: cells there are
+  // halved towards it as long as that changes what is seen.
+  const auto value = [&](double theta, double phi) {
+    const Vec3<double> wi = direction_at(theta, phi);
+    return max_component(brdf_.eval(wi, wo_)) + brdf_.pdf(wi, wo_);
+  };
+  for (std::size_t i = 0, n = out.size(); i < n; ++i) {
+    const auto at_cone = [&] { return out[i].x0 == theta_o_ || out[i].x1 == theta_o_; };
+    const double phi = 0.5 * (out[i].y0 + out[i].y1), peak = at_cone() ? value(theta_o_, phi) : 0;
+    while (at_cone() && out[i].x1 - out[i].x0 > 1e-8) {
+      const double middle = 0.5 * (out[i].x0 + out[i].x1), beside = value(middle, phi);
+      if (std::abs(peak - beside) <= 0.1 * std::max(peak, beside)) break;
+      Rect far = out[i];
+      (out[i].x0 == theta_o_ ? out[i].x1 : out[i].x0) = middle;
+      (far.x0 == theta_o_ ? far.x0 : far.x1) = middle;
+      out.push_back(far);
+    }
+  }
+  return out;
+}
+
+std::vector<Rect> Guides::cells(const Rect& whole, std::size_t most) const {
+  std::vector<Rect> parts{whole};
+  if (edge_ > whole.x0 && edge_ < whole.x1)
+    parts = {{whole.x0, edge_, whole.y0, whole.y1}, {edge_, whole.x1, whole.y0, whole.y1}};
+  // Each lobe for itself: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
+  for (const std::vector<Point2>& all : lobes_) {
+    // What lies elsewhere would be passed over for every part anew.
+    std::vector<Point2> points;
+    for (const Point2& p : all)
+      if (p.x >= whole.x0 && p.x < whole.x1 && p.y >= whole.y0 && p.y < whole.y1) points.push_back(p);
+    std::vector<Rect> finer;
+    for (const Rect& part : parts) {
+      const std::vector<Rect> more = partition(part, points, most);
+      finer.insert(finer.end(), more.begin(), more.end());
+    }
+    parts = std::move(finer);
+  }
+  return parts;
+}
+
+CubatureResult integrate_hemisphere(const Brdf<double>& guide, const Vec3<double>& wo, std::size_t components,
+                                    const std::function<void(const Vec3<double>& wi, double*)>& integrand,
+                                    const CubatureOptions& options, int guides) {
+  const Guides g(guide, wo, guides);
+  const Integrand2 in_angles = [&](double theta, double phi, double* out) {
+    integrand(g.direction_at(theta, phi), out);
+    for (std::size_t k = 0; k < components; ++k) out[k] *= std::sin(theta);
+  };
+  return integrate(in_angles, components, g.cells(8), options);
+}
+
+}  // namespace brdfc::measure

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Parameters as the inputs of a recorded model.
+#pragma once
+
+#include "model/model.h"
+#include "trace/program.h"
+
+namespace brdfc {
+inline namespace model {
+
+/// Numbers and colours by their names.
+template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values) {
+  for (const auto& [name, value] : values) {
+    if (const double* v = std::get_if<double>(&value)) set_input(inputs, name, *v);
+    if (const auto* c = std::get_if<std::array<double, 3>>(&value)) inputs[name] = {T((*c)[0]), T((*c)[1]), T((*c)[2])};
+  }
+}
+
+}  // namespace model
+}  // namespace brdfc

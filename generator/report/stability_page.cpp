@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "report/stability_page.h"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <optional>
+
+#include "core/parallel.h"
+#include "measure/probes.h"
+#include "model/model.h"
+
+namespace brdfc::report {
+namespace {
+
+constexpr int kWidth = 240, kHeight = 160, kScale = 2;
+
+/// Relative error at (x, y) in [0, 1]^2, y upwards; NaN where a form breaks, negative where there is no light.
+using Map = std::function<double(double x, double y)>;
+
+std::array<double, 3> color_of(double error) {
+  if (!std::isfinite(error)) return {0.85, 0.1, 0.1};
+  if (error < 0) return {0.75, 0.75, 0.75};
+  const double t = std::clamp((std::log10(std::max(error, 1e-17)) + 16) / 16, 0., 1.);
+  // From dark blue by green to yellow: light is bad.
+  return {std::clamp(1.6 * t - 0.45, 0.05, 1.), std::clamp(0.1 + 0.9 * t, 0., 0.95),
+          std::clamp(0.45 - 0.35 * t, 0.1, 1.)};
+}
+
+void write_map(const std::string& path, const Map& map) {
+  std::vector<unsigned char> pixels(std::size_t(3 * kWidth * kHeight * kScale * kScale));
+  for_all(kHeight, [&](std::size_t index) {
+    const int row = int(index);
+    for (int column = 0; column < kWidth; ++column) {
+      const auto c = color_of(map((column + 0.5) / kWidth, 1 - (row + 0.5) / kHeight));
+      for (int i = 0; i < kScale * kScale; ++i) {
+        const int x = column * kScale + i % kScale, y = row * kScale + i / kScale;
+        for (std::size_t k = 0; k < 3; ++k)
+          pixels[std::size_t(3 * (y * kWidth * kScale + x)) + k] = static_cast<unsigned char>(255 * c[k] + 0.5);
+      }
+    }
+  });
+  const auto out = OIIO::ImageOutput::create(path);
+  const OIIO::ImageSpec spec(kWidth * kScale, kHeight * kScale, 3, OIIO::TypeDesc::UINT8);
+  if (!out || !out->open(path, spec) || !out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) || !out->close())
+    throw InputError(fmt::format("{}: expected a place that can be written", path));
+}
+
+/// A direction stands for the unit vector nearest to it.
+Vec3<Wide> exact(const Vec3<double>& w) { return normalize(Vec3<Wide>::from(w)); }
+
+double relative_error(double got, const Wide& truth) {
+  if (!(truth > Wide(1e-290))) return -1;
+  if (!std::isfinite(got)) return std::numeric_limits<double>::quiet_NaN();
+  return double(Wide(abs(Wide((Wide(got) - truth) / truth))));
+}
+
+// ---- the formulas as printed: they exist here alone, to be compared ------------------------------------------
+
+/// Radziszewski and Alda, eq. 17, with the factor 2 that it lacks.
+double printed_f_theta(double n, double x, double y) {
+  const double m = 2 * std::log(std::cosh(n)), t2 = std::pow(std::tanh(n), 2);
+  const double d = t2 - (1 - std::exp(-m * x)) * (1 - std::exp(-m * y));
+  return 2 * m * t2 * std::exp(-m * (x + y)) / (d * d);
+}
+
+/// Ashikhmin and Shirley, eq. 16 with eq. 11, R_s = 1.
+double printed_specular(double nu, double nv, const Vec3<double>& wi, const Vec3<double>& wo) {
+  const Vec3<double> h = normalize(wi + wo);
+  const double hn = h.z, exponent = (nu * h.x * h.x + nv * h.y * h.y) / (1 - hn * hn);
+  return std::sqrt((nu + 1) * (nv + 1)) / (8 * kPi) * std::pow(hn, exponent) / (dot(h, wi) * std::max(wi.z, wo.z));
+}
+
+/// Phong's highlight: a power of the cosine.
+double printed_highlight(double e, const Vec3<double>& wi, const Vec3<double>& wo) {
+  return std::pow(std::max(wo.z * wi.z - wo.x * wi.x - wo.y * wi.y, 0.), e) / wi.z;
+}
+
+/// Oren and Nayar's full formula of section 4.3, from angles; rho = 1.
+double printed_rough(double sigma, const Vec3<double>& wi, const Vec3<double>& wo) {
+  const double ti = std::acos(wi.z), to = std::acos(wo.z), s = sigma * sigma;
+  const double a = std::max(ti, to), b = std::min(ti, to);
+  const double c = std::cos(std::atan2(wi.y, wi.x) - std::atan2(wo.y, wo.x));
+  const double bent = c < 0 ? std::pow(2 * b / kPi, 3) : 0;
+  const double C1 = 1 - 0.5 * s / (s + 0.33), C2 = 0.45 * s / (s + 0.09) * (std::sin(a) - bent),
+               C3 = 0.125 * s / (s + 0.09) * std::pow(4 * a * b / (kPi * kPi), 2);
+  const double direct = C1 + c * C2 * std::tan(b) + (1 - std::abs(c)) * C3 * std::tan((a + b) / 2);
+  const double again = 0.17 * s / (s + 0.13) * (1 - c * std::pow(2 * b / kPi, 2));
+  return (direct + again) / kPi;
+}
+
+double by_factors(double low, double high, double t) { return low * std::pow(high / low, t); }
+
+struct Figure {
+  std::string file, title, x, y;
+  Map map;
+};
+
+/// The printed value's error, or that of our formula without one.
+double error_of(const Model& model, const ParamValues& v, const Vec3<double>& wi, const Vec3<double>& wo,
+                std::optional<double> printed) {
+  return relative_error(printed ? *printed : model.make_double(v)->eval(wi, wo).r,
+                        model.make_wide(v)->eval(exact(wi), exact(wo)).r);
+}
+
+/// In the plane of incidence of kOblique, away from ideal reflection towards the normal.
+const Vec3<double> kOblique = direction(std::sqrt(0.75), 0.4);
+Vec3<double> beside_reflection(double angle) {
+  const double c = std::cos(kPi / 6 - angle), s = std::sin(kPi / 6 - angle);
+  return {-s * std::cos(0.4), -s * std::sin(0.4), c};
+}
+
+std::vector<Figure> printed_forms() {
+  constexpr double kCosR = 0.6, kN0 = 1e-3, kN1 = 1e8;
+  const auto only = [](bool printed, double value) { return printed ? std::optional(value) : std::nullopt; };
+  const auto latitudinal = [=](bool printed) -> Map {
+    return [=](double x, double y) {
+      const double n = by_factors(kN0, kN1, y);
+      const Vec3<double> wi = direction(x, 1), wo = direction(kCosR, 2);
+      return error_of(find_model("radziszewski_alda"), {{"n", n}, {"part", std::string("latitudinal")}}, wi, wo,
+                      only(printed, printed_f_theta(n, wi.z * wi.z, kCosR * kCosR) / (2 * kPi)));
+    };
+  };
+  const auto specular = [=](bool printed) -> Map {
+    return [=](double x, double y) {
+      const double n = by_factors(1, 1e8, y);
+      const Vec3<double> wi = beside_reflection(by_factors(1e-12, 1, x) / 2);
+      return error_of(find_model("ashikhmin_shirley"),
+                      {{"nu", n}, {"nv", n}, {"rs", 1.}, {"part", std::string("specular")}}, wi, kOblique,
+                      only(printed, printed_specular(n, n, wi, kOblique)));
+    };
+  };
+  const auto highlight = [=](bool printed) -> Map {
+    return [=](double x, double y) {
+      const double e = by_factors(1, 1e8, y);
+      const Vec3<double> wi = beside_reflection(by_factors(1e-12, 1, x));
+      return error_of(find_model("phong"), {{"ks", 1.}, {"e", e}}, wi, kOblique,
+                      only(printed, printed_highlight(e, wi, kOblique)));
+    };
+  };
+  // Opposite directions, where the printed difference sin alpha - (2 beta / pi)^3 meets tan beta.
+  const auto rough = [=](bool printed) -> Map {
+    return [=](double x, double y) {
+      const double sigma = 0.66 * y, c = by_factors(1e-12, 1, x);
+      const Vec3<double> wo = direction(c, 0.3), wi = direction(0.5 * c, 0.3 + 0.9 * kPi);
+      return error_of(find_model("oren_nayar"), {{"rho", 1.}, {"sigma", sigma}}, wi, wo,
+                      only(printed, printed_rough(sigma, wi, wo)));
+    };
+  };
+  const char* cosine = "cos theta_i from 0 to 1, cos theta_r = 0.6";
+  const char* gloss = "n from 1e-3 to 1e8, by factors";
+  const char* offset = "angle from ideal reflection, 1e-12 to 1 rad, by factors; view at 30 degrees";
+  const char* exponent = "e from 1 to 1e8, by factors";
+  const char* grazing = "cos theta_o = 2 cos theta_i from 1e-12 to 1, by factors; azimuths 162 degrees apart";
+  const char* exponents = "n_u = n_v from 1 to 1e8, by factors";
+  return {{"radziszewski_alda_printed", "Radziszewski-Alda, eq. 17 as printed", cosine, gloss, latitudinal(true)},
+          {"radziszewski_alda_ours", "Radziszewski-Alda, ours", cosine, gloss, latitudinal(false)},
+          {"ashikhmin_shirley_printed", "Ashikhmin-Shirley, eq. 16 as printed", offset, exponents, specular(true)},
+          {"ashikhmin_shirley_ours", "Ashikhmin-Shirley, ours", offset, exponents, specular(false)},
+          {"phong_printed", "Phong, as printed", offset, exponent, highlight(true)},
+          {"phong_ours", "Phong, ours", offset, exponent, highlight(false)},
+          {"oren_nayar_printed", "Oren-Nayar, section 4.3 as printed", grazing, "sigma from 0 to 0.66", rough(true)},
+          {"oren_nayar_ours", "Oren-Nayar, ours", grazing, "sigma from 0 to 0.66", rough(false)}};
+}
+
+/// Largest error over some directions of light, for every view and value of the model's first number.
+Figure figure_of(const Model& model) {
+  const ModelInfo& info = model.info();
+  const ParamInfo* number = nullptr;
+  for (const ParamInfo& p : info.params)
+    if (!number && p.kind == ParamKind::Number) number = &p;
+  const double low = number ? std::max(number->min, std::min(1e-3, number->max)) : 0;
+  const bool factors = number && low > 0 && number->max / low > 100;
+  const auto value = [=](double y) {
+    return factors ? by_factors(low, number->max, y) : number->min + y * (number->max - number->min);
+  };
+  const Map map = [&model, number, value](double x, double y) {
+    ParamValues v;
+    if (number) v[number->name] = value(y);
+    const auto wide = model.make_wide(v);
+    const auto ours = model.make_double(v);
+    const Vec3<double> wo = direction(by_factors(1e-6, 1, x), 0.7);
+    measure::Random random(std::uint64_t(1000 * x) * 1000 + std::uint64_t(1000 * y));
+    double worst = -1;
+    for (int i = 0; i < 5; ++i) {
+      Vec3<double> wi = i == 0 ? Vec3<double>{-wo.x, -wo.y, wo.z} : measure::uniform_direction(random);
+      if (const Sample<double> s = ours->sample(wo, measure::uniform_cube(random)); i > 2 && s.pdf > 0) wi = s.wi;
+      if (!(wi.z > 0)) continue;
+      const Rgb<double> f = ours->eval(wi, wo);
+      const Rgb<Wide> t = wide->eval(exact(wi), exact(wo));
+      for (const double e : {relative_error(f.r, t.r), relative_error(f.g, t.g), relative_error(f.b, t.b)}) {
+        if (std::isnan(e)) return e;
+        worst = std::max(worst, e);
+      }
+    }
+    return worst;
+  };
+  const std::string range =
+      number ? fmt::format("{} from {:g} to {:g}{}", number->name, value(0), value(1), factors ? ", by factors" : "")
+             : "no number";
+  return {info.name, info.label, "cos theta_o from 1e-6 to 1, by factors", range, map};
+}
+
+}  // namespace
+
+void write_stability_page(const std::string& dir) {
+  std::error_code error;
+  std::filesystem::create_directories(dir, error);
+  if (error) throw InputError(fmt::format("{}: expected a folder that can be written: {}", dir, error.message()));
+  std::string body;
+  const auto add = [&](const Figure& f) {
+    write_map(dir + "/" + f.file + ".png", f.map);
+    body += fmt::format(
+        "<figure><img src=\"{}.png\" alt=\"{}\"><figcaption><b>{}</b><br>&rarr; {}<br>&uarr; "
+        "{}</figcaption></figure>\n",
+        f.file, f.title, f.title, f.x, f.y);
+  };
+  body += "<h2>As printed and as computed here</h2>\n";
+  for (const Figure& f : printed_forms()) add(f);
+  body +=
+      "<h2>Every model</h2>\n<p>The largest error over ideal reflection, directions anywhere and the model's own "
+      "samples. High gloss turns the rounding of the directions themselves into light green.</p>\n";
+  for (const auto& [name, model] : models())
+    if (model->has_scatter()) add(figure_of(*model));
+  std::string legend;
+  for (int e = -16; e <= 0; e += 2) {
+    const auto c = color_of(std::pow(10., e));
+    legend += fmt::format("<span style=\"background:rgb({:.0f},{:.0f},{:.0f})\">1e{}</span>", 255 * c[0], 255 * c[1],
+                          255 * c[2], e);
+  }
+  const std::string path = dir + "/index.html";
+  std::ofstream out(path);
+  out << "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Stability</title><style>"
+         "body{font:15px sans-serif;margin:2em;max-width:1100px}figure{display:inline-block;margin:0 1em 1em 0}"
+         "figcaption{max-width:480px}span{display:inline-block;padding:.3em .6em;color:#fff;text-shadow:0 0 3px #000}"
+         "</style><h1>Rounding errors</h1><p>Relative error of f in double precision against 113 bits, on the same "
+         "inputs. Red: not a number or infinite. Grey: no light (below 1e-290).</p><p>"
+      << legend << "</p>\n"
+      << body << "</html>\n";
+  out.close();
+  if (!out) throw InputError(fmt::format("{}: expected a place that can be written", path));
+}
+
+}  // namespace brdfc::report

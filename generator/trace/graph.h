@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The graph that a formula becomes when it is recorded.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "tables/table.h"
+
+namespace brdfc {
+inline namespace trace {
+
+/// A formula that a recording cannot express.
+struct ExprError : std::logic_error {
+  using std::logic_error::logic_error;
+};
+
+enum class Op : std::uint8_t {
+  Const,
+  Input,
+  Add,
+  Sub,
+  Mul,
+  Div,
+  Neg,
+  Sqrt,
+  Cbrt,
+  Exp,
+  Log,
+  Log1p,
+  Expm1,
+  Sin,
+  Cos,
+  Atan,
+  Pow,
+  Abs,
+  Min,
+  Max,
+  Less,
+  LessEqual,
+  And,
+  Or,
+  Not,
+  Select,
+  MaxComponent,
+  MakeColor,
+  Loop,
+  LoopVar,
+  LoopOut,
+  Lookup
+};
+
+/// As messages call it.
+const char* name_of(Op);
+
+enum class ExprType : std::uint8_t { Real, Color, Bool };
+
+struct ExprNode {
+  Op op;
+  ExprType type;
+  std::vector<int> args;                 ///< Loop: N initial values, then N values of the next state
+  std::array<double, 3> value{};         ///< Const; a Real uses element 0
+  std::string name;                      ///< Input
+  int index = 0;                         ///< Loop: count. LoopVar, LoopOut: which state element
+  int scope = -1;                        ///< LoopVar: its loop's serial; else that of the loop it depends on, or -1
+  std::string hint;                      ///< name given by named()
+  std::shared_ptr<const Table> table{};  ///< Lookup
+};
+
+/// Owns the nodes of one recording; the innermost one alive on this thread is the current one.
+class Recorder {
+ public:
+  Recorder();
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  static Recorder& current();
+  int add(ExprNode node);
+  /// The node equal to this one, or -1.
+  int find(const ExprNode& node) const;
+  const ExprNode& node(int id) const { return nodes_[std::size_t(id)]; }
+  int size() const { return int(nodes_.size()); }
+  void hint(int id, const char* name);
+  int open_loop();
+  void close_loop();
+
+ private:
+  using Key = std::tuple<Op, ExprType, std::vector<int>, std::array<double, 3>, std::string, int, int>;
+  static Key key_of(const ExprNode& node);
+  int scope_of(const ExprNode& node) const;
+
+  std::vector<ExprNode> nodes_;
+  std::map<Key, int> interned_;
+  int loops_ = 0;
+  bool in_loop_ = false;
+  Recorder* outer_;
+};
+
+}  // namespace trace
+}  // namespace brdfc

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The checks against models that are wrong on purpose.
+#include "check/check.h"
+
+#include <gmock/gmock.h>
+
+#include <map>
+#include <set>
+
+#include "faulty.h"
+#include "measure/albedo.h"
+#include "measure/albedo_table.h"
+#include "measure/bound_model.h"
+#include "support.h"
+
+namespace brdfc::check {
+namespace {
+
+using namespace faulty;
+
+using testing::HasSubstr;
+
+/// Of the checks that apply.
+template <Defect D> std::map<std::string, bool> outcome() {
+  const detail::ModelOf<Faulty<D>::template Type> model;
+  std::map<std::string, bool> passed;
+  for (const Row& r : check_model(model))
+    if (r.result != Result::Skipped) passed[r.check] = r.result == Result::Passed;
+  return passed;
+}
+Row row_of(const Model& model, const std::string& check) {
+  for (const Row& r : check_model(model, {.effort = 0.1}))
+    if (r.check == check) return r;
+  throw InputError(check + ": no such check");
+}
+
+TEST(Checks, PassARightModel) {
+  for (const auto& [check, passed] : outcome<kNone>()) EXPECT_TRUE(passed) << check;
+}
+TEST(Checks, SeeAPdfThatIsNotTheSamplers) {
+  const auto r = outcome<kPdf>();
+  EXPECT_FALSE(r.at("chi-square"));
+  EXPECT_FALSE(r.at("sampled albedo"));
+  EXPECT_TRUE(r.at("pdf integral"));
+}
+TEST(Checks, SeeASamplerThatLeavesTwoPercentOut) {
+  // All its weights are the reflectance, so that no furnace can tell.
+  const auto r = outcome<kSampler>();
+  EXPECT_FALSE(r.at("chi-square"));
+  EXPECT_TRUE(r.at("sampled albedo"));
+}
+TEST(Checks, SeeMissingReciprocity) { EXPECT_FALSE(outcome<kReciprocity>().at("reciprocal")); }
+TEST(Checks, SeeMissingIsotropy) { EXPECT_FALSE(outcome<kTurn>().at("isotropic")); }
+TEST(Checks, SeeEnergyFromNowhere) {
+  const auto r = outcome<kGain>();
+  EXPECT_FALSE(r.at("conserving"));
+  EXPECT_FALSE(r.at("lossless"));
+}
+TEST(Checks, SeeCancellation) {
+  const auto r = outcome<kUnstable>();
+  EXPECT_FALSE(r.at("float rounding"));
+  EXPECT_FALSE(r.at("double rounding"));
+}
+TEST(Checks, SeeClosuresThatAreNotTheModel) { EXPECT_FALSE(outcome<kClosure>().at("exact closures")); }
+TEST(Checks, SeePropertiesDeclaredAbsentThatHold) {
+  const auto passed = outcome<kModest>();
+  EXPECT_FALSE(passed.at("not reciprocal"));
+  EXPECT_FALSE(passed.at("not conserving"));
+  EXPECT_FALSE(passed.at("not lossless"));
+  EXPECT_FALSE(passed.at("not isotropic"));
+  EXPECT_FALSE(passed.at("not positive"));
+  EXPECT_FALSE(passed.at("not smooth"));
+  EXPECT_FALSE(passed.at("not exact sampling"));
+}
+
+TEST(Checks, SeeDarkPlacesAndTellThemFromUnderflow) {
+  EXPECT_FALSE(outcome<kDark>().at("positive"));
+  const auto r = outcome<kShadow>();
+  EXPECT_TRUE(r.at("positive"));
+  EXPECT_TRUE(r.at("smooth"));
+}
+TEST(Checks, SeeEdgesOfAFewPercent) {
+  const auto r = outcome<kEdge>();
+  EXPECT_FALSE(r.at("smooth"));
+  EXPECT_TRUE(r.at("positive"));
+}
+TEST(Checks, SeeLimitsThatAreNone) {
+  EXPECT_FALSE(outcome<kShadow>().at("diffuse limit"));
+  const auto r = outcome<kModest>();
+  EXPECT_FALSE(r.at("specular limit"));
+  EXPECT_FALSE(r.at("no diffuse limit"));
+}
+TEST(Checks, SeeWeightsThatVary) { EXPECT_FALSE(outcome<kPdf>().at("exact sampling")); }
+TEST(Checks, SeeALobeThatItsSamplerDoesNotKnow) {
+  EXPECT_FALSE(outcome<kShadow>().at("sampling variance"));
+  EXPECT_TRUE(outcome<kDark>().at("sampling variance"));
+}
+TEST(Checks, SayWhyOneDoesNotApply) {
+  const Row skipped = row_of(find_model("fresnel_dielectric"), "chi-square");
+  EXPECT_EQ(skipped.result, Result::Skipped);
+  EXPECT_EQ(skipped.cases, 0);
+  EXPECT_EQ(skipped.reason, "the model has delta terms alone");
+  EXPECT_EQ(row_of(find_model("phong"), "exact closures").reason, "no closures equal the model");
+  EXPECT_EQ(row_of(find_model("lambert"), "exact closures").reason, "");
+}
+TEST(Checks, AreTheSameNumberForEveryModelAndHaveALimit) {
+  std::set<std::size_t> numbers;
+  for (const auto& [name, model] : models()) {
+    const std::vector<Row> rows = check_model(*model, {.effort = 0.01});
+    numbers.insert(rows.size());
+    for (const Row& r : rows) EXPECT_LT(std::abs(r.limit), 100) << name << ": " << r.check;
+  }
+  EXPECT_EQ(numbers.size(), 1u);
+}
+
+TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
+  const detail::ModelOf<Faulty<kNegative>::Type> negative;
+  const detail::ModelOf<Faulty<kNan>::Type> nan;
+  for (const std::string& text : {row_of(negative, "values").where, row_of(negative, "conserving").where,
+                                  message([&] { measure::tabulate_albedo(negative); }), message([&] {
+                                    measure::albedo(*measure::bind_model(negative, {}).brdf, 0.5, 0,
+                                                    measure::bind_model(negative, {}).label);
+                                  })}) {
+    EXPECT_THAT(text, HasSubstr("faulty rho="));
+    EXPECT_THAT(text, HasSubstr("level="));
+    EXPECT_THAT(text, testing::ContainsRegex("(f|weight)\\(wi=\\("));
+    EXPECT_THAT(text, HasSubstr("wo=("));
+    EXPECT_THAT(text, HasSubstr("= -0.00"));
+    EXPECT_THAT(text, HasSubstr("expected finite and >= 0"));
+  }
+  // Only at some parameters, which the table has to come across.
+  EXPECT_THAT(message([&] { measure::tabulate_albedo(nan); }), HasSubstr("nan"));
+  // One bad value fails the checks that meet it, and no other.
+  for (const char* check : {"values", "conserving"}) EXPECT_EQ(row_of(negative, check).result, Result::Failed) << check;
+  EXPECT_EQ(row_of(negative, "sample weight").result, Result::Passed);
+}
+
+}  // namespace
+}  // namespace brdfc::check

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the tests of the built tool share."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Absolute: some tests run it elsewhere.
+TOOL = str(Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve())
+MODELS = [
+    m["name"]
+    for m in json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
+]
+
+
+def scene(**changes):
+    """A scene of one sphere; a change of None removes the key."""
+    content = {
+        "name": "s",
+        "description": "a sphere",
+        "settings": {"width": 8, "height": 8, "spp": 4, "seed": 1, "max_bounces": 1},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -4, 0],
+            "look_at": [0, 0, 0],
+            "up": [0, 0, 1],
+            "fov_y_degrees": 25,
+        },
+        "materials": {"m": {"model": "lambert", "parameters": {"rho": [0.5, 0.5, 0.5]}}},
+        "objects": [{"name": "o", "shape": {"type": "sphere"}, "material": "m"}],
+        "environment": {"color": [1, 1, 1]},
+    } | changes
+    return {k: v for k, v in content.items() if v is not None}

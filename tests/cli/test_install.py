@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The installed tool, moved elsewhere, finds its data beside itself, and says what it misses."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from support import TOOL
+
+ENVIRONMENT = {k: v for k, v in os.environ.items() if k != "BRDFC_DATA"}
+
+
+def run(program, *arguments, **environment):
+    return subprocess.run(
+        [program, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd="/",
+        env=ENVIRONMENT | environment,
+    )
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """The folder of an installation that was moved after it was made."""
+    folder = tmp_path_factory.mktemp("install")
+    command = ["cmake", "--install", Path(TOOL).parent, "--prefix", folder / "first"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return (folder / "first").rename(folder / "moved")
+
+
+@pytest.fixture
+def own(installed, tmp_path):
+    """A copy of the data, to be damaged."""
+    return Path(shutil.copytree(installed / "share" / "brdfc", tmp_path / "data"))
+
+
+def test_it_takes_its_data_from_beside_itself(installed):
+    done = run(installed / "bin" / "brdfc", "where")
+    assert (done.returncode, done.stdout.strip()) == (0, str(installed / "share" / "brdfc"))
+    # Through a link in a folder of programs, too.
+    link = installed.parent / "brdfc"
+    link.symlink_to(installed / "bin" / "brdfc")
+    assert run(link, "where").stdout == done.stdout
+
+
+def test_it_lists_and_builds_what_the_built_one_does(installed, tmp_path):
+    program = installed / "bin" / "brdfc"
+    assert "lambert" in run(program, "list").stdout
+    hashes = set()
+    for tool, out in ((program, tmp_path / "installed"), (TOOL, tmp_path / "built")):
+        # Coupled has a stored albedo that takes long to make.
+        done = run(tool, "build", "--model", "lambert", "--model", "coupled", "--out", out)
+        assert done.returncode == 0, done.stderr
+        assert "no stored" not in done.stderr
+        (zip_file,) = out.glob("brdfc_shaders-*.zip")
+        hashes.add(hashlib.sha256(zip_file.read_bytes()).hexdigest())
+    assert len(hashes) == 1
+
+
+def test_data_elsewhere_are_named_by_the_environment(installed, own, tmp_path):
+    program = installed / "bin" / "brdfc"
+    assert run(program, "where", BRDFC_DATA=str(own)).stdout.strip() == str(own)
+    done = run(program, "build", "--model", "lambert", "--out", tmp_path, BRDFC_DATA="/nowhere")
+    assert done.returncode == 2
+    for word in ("BRDFC_DATA=/nowhere", "blender_addon/blender_manifest.toml", "share/brdfc"):
+        assert word in done.stderr
+
+
+def test_a_table_that_is_not_stored_is_made_and_said(installed, own, tmp_path):
+    (table,) = (own / "data" / "albedos").glob("lambert_*.exr")
+    table.unlink()
+    program = installed / "bin" / "brdfc"
+    done = run(program, "build", "--model", "lambert", "--out", tmp_path, BRDFC_DATA=str(own))
+    assert done.returncode == 0, done.stderr
+    assert f"no stored albedo of lambert in {own / 'data' / 'albedos'}: making it" in done.stderr
+
+
+def test_a_fit_that_is_not_stored_is_announced_before_it_is_made(installed, own):
+    shutil.rmtree(own / "data" / "fits")
+    command = [installed / "bin" / "brdfc", "fit", "phong", "--over", "e"]
+    environment = ENVIRONMENT | {"BRDFC_DATA": str(own)}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            line = process.stderr.readline()
+        finally:
+            process.kill()
+    assert line.startswith("brdfc: no stored fit of phong")
+    assert f"in {own / 'data' / 'fits'}: making it, which takes about a minute" in line

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Base, lamps and rest add up to the model.
+#include "forms/aimed.h"
+
+#include <gtest/gtest.h>
+
+#include "core/parallel.h"
+#include "core/sequence.h"
+#include "fit/fit.h"
+#include "forms/representation.h"
+#include "measure/probes.h"
+#include "support.h"
+
+namespace brdfc::forms {
+namespace {
+
+/// Axes across a direction, of any length.
+LampPatch<double> disk(const Vec3<double>& centre, double radius, double ratio = 1) {
+  const Vec3<double> away = std::abs(centre.z) < 0.9 * length(centre) ? Vec3<double>{0, 0, 1} : Vec3<double>{1, 0, 0};
+  const Vec3<double> across = normalize(cross(centre, away));
+  return {centre, across * radius, normalize(cross(centre, across)) * (radius * ratio), 1};
+}
+
+bool meets(const LampPatch<double>& p, const Vec3<double>& w) {
+  const Vec3<double> n = cross(p.across, p.along);
+  if (dot(n, w) == 0) return false;
+  const double t = dot(n, p.centre) / dot(n, w);
+  const Vec3<double> at = w * t - p.centre;
+  const double x = dot(at, p.across) / dot(p.across, p.across), y = dot(at, p.along) / dot(p.along, p.along);
+  return t > 0 && (p.disk > 0.5 ? x * x + y * y < 1 : std::max(std::abs(x), std::abs(y)) < 1);
+}
+
+/// Light from everywhere, without an edge.
+double sky(const Vec3<double>& w) { return 0.6 + 0.3 * w.x - 0.2 * w.y * w.z; }
+
+/// Integral of g over the directions of a patch that is lit evenly, times `light`.
+template <class G> double over_patch(const LampPatch<double>& p, double light, const G& g) {
+  constexpr int kSteps = 96;
+  const double area = length(cross(p.across, p.along));
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i)
+    for (int j = 0; j < kSteps; ++j) {
+      double x = 2 * (i + 0.5) / kSteps - 1, y = 2 * (j + 0.5) / kSteps - 1, weight = 4 * area;
+      if (p.disk > 0.5) {
+        const double r = std::sqrt((i + 0.5) / kSteps), a = 2 * kPi * (j + 0.5) / kSteps;
+        x = r * std::cos(a), y = r * std::sin(a), weight = kPi * area;
+      }
+      const Vec3<double> at = p.at(x, y), w = normalize(at);
+      const double d2 = dot(at, at);
+      sum += g(w) * weight * std::abs(dot(normalize(cross(p.across, p.along)), w)) / d2 / (kSteps * kSteps);
+    }
+  return sum * light;
+}
+
+/// Integral over the sky above the surface, of something that is not 0 within an angle of an axis.
+template <class G> double over_sky(const Vec3<double>& axis, double cosEnd, const G& g) {
+  constexpr int kHeights = 256, kTurns = 256;
+  const Vec3<double> t = normalize(cross(axis, std::abs(axis.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0})),
+                     b = cross(axis, t);
+  double sum = 0;
+  for (int i = 0; i < kHeights; ++i)
+    for (int j = 0; j < kTurns; ++j) {
+      const double c = 1 - (1 - cosEnd) * (i + 0.5) / kHeights, s = std::sqrt(1 - c * c),
+                   a = 2 * kPi * (j + 0.5) / kTurns;
+      const Vec3<double> w = axis * c + t * (s * std::cos(a)) + b * (s * std::sin(a));
+      if (w.z > 0) sum += g(w) * sky(w);
+    }
+  return sum * 2 * kPi * (1 - cosEnd) / (kHeights * kTurns);
+}
+
+/// What reaches the viewer from a sky and lamps of even radiance, of one sample: closures by quadrature, the drawn
+/// direction by its weight.
+struct Scene {
+  std::vector<LampPatch<double>> patches;
+  std::vector<double> light;
+
+  double radiance(const Vec3<double>& w) const {
+    double sum = w.z > 0 ? sky(w) : 0;
+    for (std::size_t k = 0; k < patches.size(); ++k) sum += meets(patches[k], w) ? light[k] : 0;
+    return sum;
+  }
+  template <class G> double of_lamps(const G& g) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < patches.size(); ++k) sum += over_patch(patches[k], light[k], g);
+    return sum;
+  }
+};
+
+/// Lamps by the mirror direction and off it, large, small, and covering one another's lobes, but not nearer each other
+/// than their seams (beside()).
+Scene scene_for(const Vec3<double>& wo) {
+  const Vec3<double> mirror = reflect(wo), beside = normalize(mirror + Vec3<double>{0.05, 0.12, 0.1});
+  Scene scene;
+  scene.patches = {disk(normalize(Vec3<double>{0.4, -0.6, 0.8}) * 3.0, 0.6),
+                   disk(beside * 5.0, 0.1),
+                   {Vec3<double>{-0.5, 1.2, 1.4}, {0.5, 0, 0}, {0, 0.3, -0.25}, 0},
+                   disk(normalize(beside + Vec3<double>{0.06, 0, 0}), 0.005),
+                   disk(normalize(Vec3<double>{-0.6, 0.2, 0.5}) * 2.0, 0.3, 0.4)};
+  scene.light = {3, 400, 5, 1e5, 10};
+  return scene;
+}
+
+struct Case {
+  const char* model;
+  std::vector<std::string> values;
+};
+
+/// Sum of base, lamps and rest against the model, each lit by a sky and five lamps. The mean of so many draws is
+/// compared at 4.5 of its standard errors, or to 0.2 %, which quadrature may be off by. The base is that which the
+/// model declares, or a fit.
+void expect_model(const Model& m, const ParamValues& values, AimedBase from = AimedBase::Declared) {
+  constexpr int kDraws = 20000;
+  const auto brdf = m.make_double(values);
+  if (brdf->scatters_through()) return;
+  for (const double cosTheta_o : {0.15, 0.5, 0.95}) {
+    const Vec3<double> wo = direction(cosTheta_o, 0.3);
+    const Scene scene = scene_for(wo);
+    const auto f_cos = [&](const Vec3<double>& w) { return brdf->eval(w, wo).g * std::max(w.z, 0.0); };
+    const ClosureSum<double> base = from == AimedBase::Fitted
+                                        ? fit::fit_of(m, values).closures(wo, fit::fit_of(m, values).varied(values))
+                                        : brdf->base(wo);
+    // The sky's part is drawn both ways: what differs is how lamps are met.
+    const double base_lamps = base.empty() ? 0 : scene.of_lamps([&](const auto& w) { return evaluate(base, w, wo).g; });
+    const double lamps = scene.of_lamps(f_cos);
+    measure::Random random(7);
+    std::vector<AimedLobe<double>> lobes;
+    std::vector<double> of_lobe;
+    std::vector<std::array<double, 2>> v(scene.patches.size());
+    double sum = 0, squares = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      const Vec3<double> u = measure::uniform_cube(random);
+      for (auto& pair : v) {
+        const Vec3<double> number = measure::uniform_cube(random);
+        pair = {number.x, number.y};
+      }
+      const AimedSum s = aimed_sum(*brdf, base, scene.patches, wo, u, v);
+      if (lobes.empty()) {  // they do not depend on what was drawn
+        lobes = s.lobes;
+        for (const AimedLobe<double>& lobe : lobes) {
+          const auto value = [&](const Vec3<double>& w) { return evaluate(lobe, w); };
+          of_lobe.push_back(over_sky(lobe.towards, lobe.cosEnd, value) + scene.of_lamps(value));
+        }
+      }
+      double given = s.rest.g * scene.radiance(s.wi) + base_lamps;
+      for (std::size_t k = 0; k < s.lobes.size(); ++k) given += s.values[k].g * of_lobe[k];
+      // The base under the sky, by the same density, so that its noise is small: drawn directions see f cos - base.
+      if (!base.empty() && s.density > 0 && s.drawn.z > 0)
+        given += evaluate(base, s.drawn, wo).g / s.density * sky(s.drawn);
+      sum += given / kDraws;
+      squares += given * given / kDraws;
+    }
+    double truth = lamps;
+    Sequence3 points(11);
+    constexpr int kPoints = 1 << 17;
+    for (int i = 0; i < kPoints; ++i) {
+      const Sample<double> s = brdf->sample(wo, points.next());
+      if (s.pdf > 0 && s.wi.z > 0) truth += s.weight.g * sky(s.wi) / kPoints;
+    }
+    const double error = std::sqrt(std::max(squares - sum * sum, 0.0) / kDraws);
+    EXPECT_NEAR(sum, truth, std::max(4.5 * error, 2e-3 * truth))
+        << m.info().name << " " << format_values(m.info(), values) << " at " << cosTheta_o << ", standard error "
+        << error;
+    EXPECT_LT(error, 0.05 * truth) << m.info().name << ": too noisy to compare";
+  }
+}
+
+TEST(Aimed, AddsUpToTheModel) {
+  for (const auto& [name, model] : models())
+    if (model->has_scatter()) expect_model(*model, complete(model->info(), {}));
+}
+
+TEST(Aimed, AddsUpToTheModelWhereItIsStiff) {
+  const Case cases[] = {{"ashikhmin_shirley", {"nu=100", "nv=10000", "rd=0", "rs=0.9"}},
+                        {"phong", {"e=5000"}},
+                        {"ward", {"ax=0.02", "ay=0.3"}},
+                        {"cook_torrance", {"m=0.05"}},
+                        {"schlick", {"rough=0.01", "p=0.5"}},
+                        {"blinn", {"e=2000"}}};
+  for (const Case& c : cases) {
+    const Model& m = find_model(c.model);
+    expect_model(m, values_of(m, c.values));
+  }
+}
+
+TEST(Aimed, AddsUpToTheModelWhereTheBaseIsAFit) {
+  const Case cases[] = {{"phong", {"e=20"}}, {"oren_nayar", {}}, {"radziszewski_alda", {"n=4"}}, {"ward", {}}};
+  for (const Case& c : cases) {
+    const Model& m = find_model(c.model);
+    expect_model(m, values_of(m, c.values), AimedBase::Fitted);
+  }
+}
+
+TEST(Aimed, NoPointOfALampStandsForTheWholeOfIt) {
+  // Seen from beside the horizon over which the lamp stands opposite, where the closure's normal is nearly across to
+  // both: a point below its horizon once made a pixel of 1e24.
+  measure::Random random(3);
+  int aimed = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3<double> wo = direction(0.1 * measure::uniform(random), 0.2);
+    const double turn = 0.2 + kPi + 0.3 * (measure::uniform(random) - 0.5);
+    const LampPatch<double> lamp =
+        disk(direction(0.1 * measure::uniform(random), turn) * 2.0, 0.2 * measure::uniform(random));
+    const AimedLamp<double> aim = aim_at(lamp, 1.0, measure::uniform(random), measure::uniform(random), wo);
+    aimed += aim.emphasis > 0;
+    ASSERT_LE(aim.emphasis, 12) << i;
+  }
+  EXPECT_GT(aimed, 5000);
+}
+
+TEST(Aimed, DirectionsUnderALobeHaveTheirDensity) {
+  for (const double radius : {0.01, 0.5}) {
+    const Vec3<double> wo = direction(0.6, 1);
+    const AimedLobe<double> lobe = aim_at(disk({0.3, -0.5, 0.9}, radius), 1.0, 0.5, 0.5, wo).lobe;
+    double mean = 0;
+    constexpr int kSteps = 100;
+    for (int i = 0; i < kSteps; ++i) {
+      const Vec3<double> w = sample_under(lobe, (i + 0.5) / kSteps, std::fmod(i * 0.618, 1.0));
+      EXPECT_NEAR(length(w), 1, 1e-12);
+      EXPECT_NEAR(pdf_under(lobe, w) * lobe.extent, 1, 1e-12);
+      mean += dot(w, lobe.towards) / kSteps;
+    }
+    // Over a cap the cosine is even.
+    EXPECT_NEAR(mean, (1 + lobe.cosEnd) / 2, 1e-9);
+    EXPECT_NEAR(lobe.extent, 2 * kPi * (1 - lobe.cosEnd), 1e-9);
+    EXPECT_EQ(pdf_under(lobe, lobe.towards * -1.0), 0);
+  }
+}
+
+TEST(Aimed, DirectionsFromEverywhereHaveTheirDensity) {
+  double all = 0, mean = 0;
+  constexpr int kSteps = 400;
+  for (int i = 0; i < kSteps; ++i) {
+    const double z = (i + 0.5) / kSteps;
+    all += 2 * kPi * everywhere_pdf(Vec3<double>{std::sqrt(1 - z * z), 0, z}) / kSteps;
+    // The share of directions below is what u gives.
+    const Vec3<double> w = sample_everywhere(z, 0.3);
+    EXPECT_NEAR((w.z * w.z + w.z) / 2, z, 1e-12);
+    EXPECT_NEAR(length(w), 1, 1e-12);
+    mean += w.z / kSteps;
+  }
+  EXPECT_NEAR(all, 1, 1e-6);
+  EXPECT_NEAR(mean, 7.0 / 12, 1e-5);
+  EXPECT_EQ(everywhere_pdf(Vec3<double>{0.6, 0, -0.8}), 0);
+}
+
+TEST(Aimed, ProfileIsLevelAndFalls) {
+  for (int i = 0; i <= 1000; ++i) {
+    const double x = i / 1000.0, y = aimed_profile(x);
+    // The ramp as Cycles reads it.
+    const double position = 7 * x;
+    const int k = std::min(int(position), 6);
+    const auto ramp = aimed_ramp();
+    EXPECT_NEAR(y, x * (ramp[k] + (position - k) * (ramp[k + 1] - ramp[k])), 1e-12) << x;
+    if (x >= 3.0 / 7) {
+      EXPECT_NEAR(y, 1, 0.021) << x;
+    }
+    if (x <= 2.0 / 7) {
+      EXPECT_EQ(y, 0) << x;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace brdfc::forms

@@ -1,0 +1,1393 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes golden.csv: values by an implementation that shares nothing with the generator.
+
+The formulas are typed in from the papers as printed (with their errata, see the models'
+headers) and evaluated with mpmath in as many digits as they need; albedos are integrated by
+mpmath. Run it after adding a model:  python3 tests/models/make_golden.py [MODEL...]
+With models named, the rows of the others stay as they are.
+
+A row's tolerance is what the rounding of its inputs to double precision can cause (measured
+here, by moving each input by half a unit in the last place), times a small factor, plus a floor.
+"""
+
+import csv
+import functools
+import math
+import random
+import sys
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+
+OUT = Path(__file__).with_name("golden.csv")
+FLOOR = 1e-14
+ROUNDINGS = 16  # how many such roundings a formula may add up
+
+
+normalise = True
+
+
+def vec(w):
+    v = [mp.mpf(c) for c in w]
+    n = mp.sqrt(sum(c * c for c in v)) if normalise else 1
+    return [c / n for c in v]
+
+
+def unit(v):
+    n = mp.sqrt(sum(c * c for c in v))
+    return [c / n for c in v]
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+# ---- Lambert -----------------------------------------------------------------------------------
+
+
+def lambert_f(p, wi, wo):
+    return [c / mp.pi for c in p["rho"]]
+
+
+def lambert_pdf(p, wi, wo):
+    return vec(wi)[2] / mp.pi
+
+
+# ---- Ashikhmin and Shirley, eqs. 5, 10, 11, 12, 14, 15; eq. 18 inverted ------------------------
+
+
+def as_half(wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    return k1, k2, unit([a + b for a, b in zip(k1, k2, strict=True)])
+
+
+def as_ph(p, h):
+    hn = h[2]
+    u = [mp.cos(p["rotation"]), mp.sin(p["rotation"])]
+    hu = h[0] * u[0] + h[1] * u[1]
+    hv = -h[0] * u[1] + h[1] * u[0]
+    sin2 = 1 - hn**2
+    exponent = 0 if sin2 < mp.mpf(10) ** -30 else (p["nu"] * hu**2 + p["nv"] * hv**2) / sin2
+    return mp.sqrt((p["nu"] + 1) * (p["nv"] + 1)) / (2 * mp.pi) * hn**exponent
+
+
+def as_f(p, wi, wo):
+    k1, k2, h = as_half(wi, wo)
+    hk = dot(h, k1)
+    out = []
+    for rs, rd in zip(p["rs"], p["rd"], strict=True):
+        f = mp.mpf(0)
+        if p["part"] != "diffuse":
+            fresnel = rs + (1 - rs) * (1 - hk) ** 5
+            f += as_ph(p, h) / (4 * hk * max(k1[2], k2[2])) * fresnel
+        if p["part"] != "specular" and p.get("diffuse") == "tabulated":
+            exponents = float(p["nu"]), float(p["nv"])
+            rest = [as_rest(float(k[2]), as_azimuth(p, k), *exponents, rs) for k in (k1, k2)]
+            f += rd * rest[0] * rest[1] / (mp.pi * as_rest_mean(*exponents, rs))
+        elif p["part"] != "specular":
+            fade = [1 - (1 - k[2] / 2) ** 5 for k in (k1, k2)]
+            f += 28 * rd / (23 * mp.pi) * (1 - rs) * fade[0] * fade[1]
+        out.append(f)
+    return out
+
+
+def as_azimuth(p, k):
+    return math.atan2(k[1], k[0]) - float(p["rotation"])
+
+
+def gauss(n, a, b):
+    x, w = np.polynomial.legendre.leggauss(n)
+    return (b - a) / 2 * x + (a + b) / 2, (b - a) / 2 * w
+
+
+@functools.cache
+def as_rest(cos_o, phi_o, nu, nv, rs):
+    """1 - R(k) of eq. 12 over half vectors, for exponents that are not large."""
+    theta, weight = gauss(300, 0, math.pi / 2)
+    theta, weight = theta[:, None], weight[:, None]
+    phi = 2 * math.pi * (np.arange(360) + 0.5) / 360
+    s, hn = np.sin(theta), np.cos(theta)
+    kh = math.sqrt(1 - cos_o**2) * s * np.cos(phi - phi_o) + cos_o * hn
+    cos_i = 2 * kh * hn - cos_o
+    p_h = np.sqrt((nu + 1) * (nv + 1)) / (2 * np.pi)
+    p_h = p_h * hn ** (nu * np.cos(phi) ** 2 + nv * np.sin(phi) ** 2)
+    fresnel = rs + (1 - rs) * (1 - np.clip(kh, 0, 1)) ** 5
+    kept = np.where((kh > 0) & (cos_i > 0), cos_i / np.maximum(cos_i, cos_o), 0)
+    return 1 - float(np.sum(weight * s * p_h * fresnel * kept)) * 2 * math.pi / 360
+
+
+@functools.cache
+def as_rest_mean(nu, nv, rs):
+    x, w = gauss(12, 0, 1)
+    azimuths = [math.pi / 2 * (i + 0.5) / 6 for i in range(6)]
+    rest = [sum(as_rest(c, a, nu, nv, rs) for a in azimuths) / 6 for c in x]
+    return float(np.sum(2 * w * x * rest))
+
+
+def as_pdf(p, wi, wo):
+    """Of one part alone: how often "both" takes each is the sampler's choice, not the paper's."""
+    k1, k2, h = as_half(wi, wo)
+    if p["part"] == "specular":
+        return as_ph(p, h) / (4 * dot(h, k2))
+    if p["part"] == "diffuse":
+        return k1[2] / mp.pi
+    return None
+
+
+def as_albedo(p, cos_o):
+    """Specular part, rotation 0, view in the x-z plane, over half vectors: p_h is smooth there."""
+    fp, rs, nu, nv = mp.fp, p["rs"][0], p["nu"], p["nv"]
+    sin_o = math.sqrt(1 - cos_o**2)
+
+    def integrand(t, phi):
+        # d omega_i = 4 (k.h) d omega_h, so
+        # f cos_i d omega_i = p_h F cos_i / max(cos_i, cos_o) d omega_h.
+        hn, s, c = math.cos(t), math.sin(t), math.cos(phi)
+        kh = sin_o * s * c + cos_o * hn
+        cos_i = 2 * kh * hn - cos_o
+        if kh <= 0 or cos_i <= 0:
+            return 0.0
+        p_h = math.sqrt((nu + 1) * (nv + 1)) / (2 * math.pi) * hn ** (nu * c**2 + nv * (1 - c**2))
+        return p_h * (rs + (1 - rs) * (1 - kh) ** 5) * cos_i / max(cos_i, cos_o) * s
+
+    def ring(phi):
+        # cos_i / cos_o = cos 2t + a sin 2t = r cos(2t - s): the edge of the support is where it
+        # is 0, the kink of max() where it is 1. Between these theta_h = t is smooth; the lobe's
+        # own width needs cuts as well.
+        a = sin_o * math.cos(phi) / cos_o
+        r, s = math.hypot(1, a), math.atan(a)
+        width = 6 / math.sqrt(max(nu, nv) + 1)
+        cuts = {0.0, math.pi / 2, width / 4, width / 2, width}
+        for level in (0, 1):
+            for sign in (-1, 1):
+                cuts.add((s + sign * math.acos(level / r)) / 2 % math.pi)
+        inside = sorted(c for c in cuts if 0 <= c <= math.pi / 2)
+        ends = [c for c, d in zip(inside, [-1.0, *inside], strict=False) if c - d > 1e-9]
+        return fp.quad(lambda t: integrand(t, phi), ends, maxdegree=4)
+
+    a = 2 * fp.quad(ring, [math.pi * k / 8 for k in range(9)], maxdegree=4)
+    return [a, a, a]
+
+
+# ---- Shirley, Smits, Hu and Lafortune, eqs. 1 and 5 with k mended ------------------------------
+
+
+def coupled_f(p, wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    k = 21 * (1 - p["r0"]) / (20 * mp.pi)
+    return [k * rm * (1 - (1 - k1[2]) ** 5) * (1 - (1 - k2[2]) ** 5) for rm in p["rm"]]
+
+
+def coupled_pdf(p, wi, wo):
+    """Eq. 6 differentiated: proportional to (1 - (1 - c)^5) c."""
+    c = vec(wi)[2]
+    return 21 / (20 * mp.pi) * (1 - (1 - c) ** 5) * c
+
+
+def coupled_albedo(p, cos_o):
+    rf = p["r0"] + (1 - p["r0"]) * (1 - mp.mpf(cos_o)) ** 5
+    return [rf + rm * (1 - rf) for rm in p["rm"]]
+
+
+def full_fresnel(r0, c):
+    """Unpolarised reflectance by Snell's law and Fresnel's equations; the index is that of R_0."""
+    s = mp.sqrt(mp.mpf(r0))
+    eta = (1 + s) / (1 - s)
+    cos_t = mp.sqrt(1 - (1 - c * c) / eta**2)
+    rs = (c - eta * cos_t) / (c + eta * cos_t)
+    rp = (eta * c - cos_t) / (eta * c + cos_t)
+    return (rs**2 + rp**2) / 2
+
+
+@functools.cache
+def mean_transmission(r0):
+    """2 integral of (1 - R_f) c dc."""
+    with mp.workdps(30):
+        ends = [0, mp.mpf("1e-4"), mp.mpf("1e-2"), mp.mpf("0.1"), mp.mpf("0.5"), 1]
+        return mp.quad(lambda c: 2 * (1 - full_fresnel(r0, c)) * c, ends)
+
+
+def coupled_full_f(p, wi, wo):
+    if isinstance(p["r0"], mp.mpf):
+        mean = mean_transmission(float(p["r0"]))  # as smooth as R_0 itself: not what rounding moves
+    else:
+        mean = mean_transmission(p["r0"])
+    through = [1 - full_fresnel(p["r0"], vec(w)[2]) for w in (wi, wo)]
+    return [rm * through[0] * through[1] / (mp.pi * mean) for rm in p["rm"]]
+
+
+def coupled_full_albedo(p, cos_o):
+    rf = full_fresnel(p["r0"], mp.mpf(cos_o))
+    return [rf + rm * (1 - rf) for rm in p["rm"]]
+
+
+def by_fresnel(schlick_, full):
+    return lambda p, *w: (full if p.get("fresnel") == "dielectric" else schlick_)(p, *w)
+
+
+# ---- Suffern, eqs. 25.1, 25.2 and 25.7 ---------------------------------------------------------
+
+
+def cos_alpha(wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    return k1, k2, dot(k1, [-k2[0], -k2[1], k2[2]])
+
+
+def gr_pdf(p, wi, wo):
+    k1, k2, c = cos_alpha(wi, wo)
+    if c <= 0:
+        return mp.mpf(0)
+    density = (p["e"] + 1) / (2 * mp.pi) * c ** p["e"]
+    # The ray that is turned to k1 starts out at 2 (r.k1) r - k1.
+    folded = p["below"] == "mirror" and 2 * c * k2[2] - k1[2] < 0
+    return density * (2 if folded else 1)
+
+
+def gr_f(p, wi, wo):
+    return [p["kr"] * c * gr_pdf(p, wi, wo) / vec(wi)[2] for c in p["cr"]]
+
+
+def lobe_above(e, cos_o, cosine):
+    """Integral of cos^e alpha, times the cosine if wanted, over the lobe's part above the surface.
+
+    About r the cosine is a + b cos(phi), positive on an arc that is known for each alpha.
+    """
+    cos_o, e = mp.mpf(cos_o), mp.mpf(e)
+    sin_o = mp.sqrt(1 - cos_o**2)
+
+    def ring(alpha):
+        a, b = mp.cos(alpha) * cos_o, mp.sin(alpha) * sin_o
+        half = mp.pi if a >= b else mp.acos(-a / b)
+        arc = 2 * (a * half + b * mp.sin(half)) if cosine else 2 * half
+        return mp.cos(alpha) ** e * mp.sin(alpha) * arc
+
+    whole = mp.acos(sin_o) if sin_o < 1 else mp.mpf(0)  # rings up to here are whole
+    width = min(mp.pi / 2, 8 / mp.sqrt(e))
+    cuts = sorted({mp.mpf(0), width / 3, width, whole, mp.pi / 2})
+    return mp.quad(ring, cuts)
+
+
+def gr_albedo(p, cos_o):
+    kept = mp.mpf(1)
+    if p["below"] == "lose":
+        kept = (p["e"] + 1) / (2 * mp.pi) * lobe_above(p["e"], cos_o, cosine=False)
+    return [p["kr"] * c * kept for c in p["cr"]]
+
+
+def gs_c(p):
+    e = mp.mpf(p["e"])
+    scales = {"book": 1, "estimator": (e + 1) / (2 * mp.pi), "conserving": (e + 2) / (2 * mp.pi)}
+    return scales[p["normalisation"]] * p["ks"]
+
+
+def gs_f(p, wi, wo):
+    _, _, c = cos_alpha(wi, wo)
+    return [gs_c(p) * cs * (c ** p["e"] if c > 0 else 0) for cs in p["cs"]]
+
+
+def gs_pdf(p, wi, wo):
+    return gr_pdf({"e": p["e"], "below": "lose"}, wi, wo)
+
+
+def gs_albedo(p, cos_o):
+    return [gs_c(p) * cs * lobe_above(p["e"], cos_o, cosine=True) for cs in p["cs"]]
+
+
+def pm_parts(p):
+    """The material's highlight and reflection as the models of those names have them."""
+    specular = {"ks": p["ks"], "cs": p["cs"], "e": p["es"], "normalisation": "book"}
+    return specular, {"kr": p["kr"], "cr": p["cr"], "e": p["e"], "below": "mirror"}
+
+
+def pm_f(p, wi, wo):
+    specular, reflection = pm_parts(p)
+    matte = [p["kd"] * c / mp.pi for c in p["cd"]]
+    parts = matte, gs_f(specular, wi, wo), gr_f(reflection, wi, wo)
+    return [sum(c) for c in zip(*parts, strict=True)]
+
+
+def pm_pdf(p, wi, wo):
+    """Where one term is alone: how often each is drawn is the sampler's choice."""
+    specular, reflection = pm_parts(p)
+    of_terms = {"kd": lambert_pdf, "ks": gs_pdf, "kr": gr_pdf}
+    terms = [k for k in of_terms if p[k] > 0]
+    if len(terms) > 1:
+        return None
+    return of_terms[terms[0]]({"kd": p, "ks": specular, "kr": reflection}[terms[0]], wi, wo)
+
+
+def pm_albedo(p, cos_o):
+    specular, reflection = pm_parts(p)
+    matte = [p["kd"] * c for c in p["cd"]]
+    parts = matte, gs_albedo(specular, cos_o), gr_albedo(reflection, cos_o)
+    return [sum(c) for c in zip(*parts, strict=True)]
+
+
+# ---- The three models that Shirley, Smits, Hu and Lafortune compare with, their section 5 ------
+
+
+def schlick(p, c):
+    return p["r0"] + (1 - mp.mpf(p["r0"])) * (1 - c) ** 5
+
+
+def s91_f(p, wi, wo):
+    return [rd * (1 - schlick(p, vec(wo)[2])) / mp.pi for rd in p["rd"]]
+
+
+def s91_albedo(p, cos_o):
+    r = schlick(p, mp.mpf(cos_o))
+    return [r + rd * (1 - r) for rd in p["rd"]]
+
+
+def sd_f(p, wi, wo):
+    half = mp.acos(dot(vec(wi), vec(wo))) / 2
+    return [rd * (1 - schlick(p, mp.cos(half))) / mp.pi for rd in p["rd"]]
+
+
+def sd_albedo(p, cos_o):
+    fp, sin_o = mp.fp, math.sqrt(1 - cos_o**2)
+
+    def integrand(t, phi):
+        cos_angle = math.sin(t) * math.cos(phi) * sin_o + math.cos(t) * cos_o
+        cos_half = math.sqrt(max(0.0, (1 + cos_angle) / 2))
+        r = p["r0"] + (1 - p["r0"]) * (1 - cos_half) ** 5
+        return (1 - r) * math.cos(t) * math.sin(t) / math.pi
+
+    ends = [math.pi * k / 4 for k in range(5)]
+    matte = 2 * fp.quad(
+        lambda phi: fp.quad(
+            lambda t: integrand(t, phi), [0, math.pi / 4, math.pi / 2], maxdegree=4
+        ),
+        ends,
+        maxdegree=4,
+    )
+    mirror = p["r0"] + (1 - p["r0"]) * (1 - cos_o) ** 5
+    return [mirror + rd * matte for rd in p["rd"]]
+
+
+# ---- Radziszewski and Alda, eqs. 17 to 19, factor 2 and nbar mended -----------------------------
+
+
+def ra_digits(n):
+    return 50 if n == 0 or n >= 1 else 60 + int(-6 * math.log10(n))
+
+
+def ra_f(p, wi, wo):
+    n = p["n"]
+    mp.mp.dps = ra_digits(n)
+    n = mp.mpf(n)
+    ki, ko = vec(wi), vec(wo)
+    factor = mp.mpf(1)
+    if p["around"] == "refraction":
+        # Snell's law carries what is inside (z < 0) to the thin side.
+        if ki[2] * ko[2] >= 0:
+            return [mp.mpf(0)] * 3  # pairs beyond the critical angle are not among these tests
+        if ki[2] < 0:
+            factor = mp.mpf(p["ior"]) ** 2
+        carried = []
+        for k in (ki, ko):
+            scale = mp.mpf(p["ior"]) if k[2] < 0 else mp.mpf(1)
+            x, y = scale * k[0], scale * k[1]
+            if x * x + y * y >= 1:
+                return [mp.mpf(0)] * 3
+            carried.append([x, y, mp.sqrt(1 - x * x - y * y)])
+        ki, ko = carried
+    kr = ko if p["around"] == "retro" else [-ko[0], -ko[1], ko[2]]
+    si, sr = mp.sqrt(ki[0] ** 2 + ki[1] ** 2), mp.sqrt(kr[0] ** 2 + kr[1] ** 2)
+    x, y = ki[2] ** 2, kr[2] ** 2
+    n_theta = p["n_theta"] if p["proportion"] == "custom" else n
+    n_theta = mp.mpf(n_theta)
+    if p["proportion"] == "paper":
+        n_phi = mp.mpf("0.75") * n * mp.sqrt(n * si * sr)
+    else:
+        n_phi = n if p["proportion"] == "equal" else mp.mpf(p["n_phi"])
+    if n_theta == 0:
+        f_theta = mp.mpf(2)
+    else:
+        m = 2 * mp.log(mp.cosh(n_theta))
+        # tanh^2 n = 1 - e^-m, so that the printed denominator is this difference of exponentials.
+        d = mp.exp(-m * x) + mp.exp(-m * y) - mp.exp(-m * (x + y)) - mp.exp(-m)
+        f_theta = 2 * m * mp.tanh(n_theta) ** 2 * mp.exp(-m * (x + y)) / d**2
+    nbar = n_phi * si * sr
+    if si == 0 or sr == 0:
+        cos_dphi = mp.mpf(1)
+    else:
+        cos_dphi = (ki[0] * kr[0] + ki[1] * kr[1]) / (si * sr)
+    p5 = sum(mp.mpf(c) * nbar**k for k, c in enumerate((1, 5, 15, 25, "21.875", "7.875")))
+    f_phi = (2 * nbar + 1) ** mp.mpf("5.5") / (2 * mp.pi * p5)
+    f_phi /= (nbar * (1 - cos_dphi) + 1) ** 6
+    if p["part"] == "latitudinal":
+        f = f_theta / (2 * mp.pi)
+    elif p["part"] == "longitudinal":
+        f = 2 * f_phi
+    else:
+        f = f_theta * f_phi
+    return [factor * f * c for c in p["tint"]]
+
+
+def ra_pdf(p, wi, wo):
+    """The cosine-weighted lobe."""
+    white = dict(p, tint=(1, 1, 1))
+    return ra_f(white, wi, wo)[0] * abs(vec(wi)[2])
+
+
+# ---- The same paper's construction, eqs. 9 to 13, from a kernel, by numerical integrals ----------
+
+
+HEIGHTS = ["h0", "h1", "h2", "h3"]
+
+
+def kernel(name, heights, u):
+    u = abs(u)
+    if name == "table":
+        i = min(int(u), 3)
+        return heights[3] if i == 3 else heights[i] + (heights[i + 1] - heights[i]) * (u - i)
+    return mp.exp(-u) if name == "exponential" else mp.sech(u) ** 2
+
+
+@functools.cache
+def lossless_place(name, heights, n, x):
+    """x' with marginal x, the marginal's density there, the kernel's integral over the square."""
+    # Cut at the peak, at a curve's knots and where it has faded.
+    peak = [s * w / n for s in (-1, 1) for w in (1, 2, 3, 4, 5, 12, 30, 60)] + [0]
+
+    def integral(of, low, high, *cuts):
+        ends = {low, high, *peak, *cuts}
+        return mp.quad(of, sorted(e for e in ends if low <= e <= high))
+
+    def density(t):
+        return integral(lambda d: kernel(name, heights, n * d), -t, 1 - t)
+
+    def mass(t):
+        """Of the strip below t: by the difference d, and the length of the line where it is d."""
+        return integral(
+            lambda d: kernel(name, heights, n * d) * (min(t, 1 - d) - max(0, -d)),
+            -t,
+            mp.mpf(1),
+            1 - t,
+        )
+
+    whole = mass(mp.mpf(1))
+    # Newton's steps from a bracket: the density is known.
+    low, high, at = mp.mpf(0), mp.mpf(1), x
+    for _ in range(60):
+        error = mass(at) / whole - x
+        low, high = (at, high) if error < 0 else (low, at)
+        step = error * whole / density(at)
+        at = at - step if low < at - step < high else (low + high) / 2
+        if abs(step) < mp.mpf(10) ** -20:
+            break
+    return at, density(at), whole
+
+
+def lossless_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    if p["n"] == 0:
+        return [c / mp.pi for c in p["tint"]]
+    mp.mp.dps, n = 24, mp.mpf(p["n"])
+    heights = tuple(mp.mpf(p[k]) for k in HEIGHTS) if p["kernel"] == "table" else ()
+    shape = p["kernel"], heights
+    a, ma, whole = lossless_place(*shape, n, ki[2] ** 2)
+    b, mb, _ = lossless_place(*shape, n, ko[2] ** 2)
+    f_theta = 2 * kernel(*shape, n * (a - b)) * whole / (ma * mb)
+    return [f_theta / (2 * mp.pi) * c for c in p["tint"]]
+
+
+def lossless_pdf(p, wi, wo):
+    return lossless_f({**p, "tint": (1, 1, 1)}, wi, wo)[0] * vec(wi)[2]
+
+
+# ---- Fresnel's equations by complex numbers ------------------------------------------------------
+
+
+def fresnel(c, eta):
+    """Both polarisations' mean reflectance for a complex relative index."""
+    c = mp.mpf(c)
+    root = mp.sqrt(eta**2 - 1 + c**2)
+    rs, rp = (c - root) / (c + root), (eta**2 * c - root) / (eta**2 * c + root)
+    return (abs(rs) ** 2 + abs(rp) ** 2) / 2
+
+
+def dielectric_albedo(p, cos_o):
+    """A boundary keeps nothing: what is not reflected goes through."""
+    return [mp.mpf(1)] * 3
+
+
+def conductor_albedo(p, cos_o):
+    return [fresnel(cos_o, mp.mpc(p[f"n_{c}"], p[f"k_{c}"])) for c in "rgb"]
+
+
+# ---- Lobes around the mirror direction: Phong, modified Phong, max-Phong ------------------------
+
+
+def mirror_cosine(wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    return max(ki[2] * ko[2] - ki[0] * ko[0] - ki[1] * ko[1], mp.mpf(0))
+
+
+def phong_lobe(p, wi, wo):
+    c = mirror_cosine(wi, wo)
+    return c ** p["e"] if c > 0 else mp.mpf(0)
+
+
+def phong_f(p, wi, wo):
+    return [k * phong_lobe(p, wi, wo) / vec(wi)[2] for k in p["ks"]]
+
+
+def modified_phong_f(p, wi, wo):
+    return [k * (mp.mpf(p["e"]) + 2) / (2 * mp.pi) * phong_lobe(p, wi, wo) for k in p["ks"]]
+
+
+def max_phong_f(p, wi, wo):
+    larger = max(vec(wi)[2], vec(wo)[2])
+    return [k * phong_pdf(p, wi, wo) / larger for k in p["ks"]]
+
+
+def phong_pdf(p, wi, wo):
+    return (mp.mpf(p["e"]) + 1) / (2 * mp.pi) * phong_lobe(p, wi, wo)
+
+
+def lobe_albedo(e, axis_cos, ring, breaks=()):
+    """Integral over directions above the horizon of cos^e alpha times a function of cos theta_i.
+
+    ring(up, side, a) is that function's integral over the circle at alpha, where
+    cos theta_i = up + side cos b, for |b| < a."""
+    c, s = mp.mpf(axis_cos), mp.sqrt(1 - mp.mpf(axis_cos) ** 2)
+
+    def circle(t):
+        up, side = mp.cos(t) * c, mp.sin(t) * s
+        if up >= side:
+            a = mp.pi
+        else:
+            a = mp.acos(-up / side)
+        return mp.sin(t) * mp.cos(t) ** e * ring(up, side, a)
+
+    width = 4 / mp.sqrt(e + 1)
+    cuts = {mp.mpf(0), mp.pi / 2, mp.asin(c), *breaks}
+    cuts |= {k * width for k in (0.25, 0.5, 1, 2)}
+    return mp.quad(circle, sorted(t for t in cuts if 0 <= t <= mp.pi / 2))
+
+
+def phong_albedo(p, cos_o):
+    a = lobe_albedo(p["e"], cos_o, lambda up, side, a: 2 * a)
+    return [k * a for k in p["ks"]]
+
+
+def modified_phong_albedo(p, cos_o):
+    def ring(up, side, a):
+        return 2 * (up * a + side * mp.sin(a))
+
+    e = p["e"]
+    a = (e + 2) / (2 * mp.pi) * lobe_albedo(e, cos_o, ring)
+    return [k * a for k in p["ks"]]
+
+
+def max_phong_albedo(p, cos_o):
+    """The integral of min(1, cos theta_i / cos theta_o)."""
+    o = mp.mpf(cos_o)
+
+    def ring(up, side, a):
+        if side == 0:
+            return 2 * a * min(mp.mpf(1), up / o)
+        b = mp.acos(min(max((o - up) / side, mp.mpf(-1)), mp.mpf(1)))
+        b = min(b, a)
+        return 2 * (b + (up * (a - b) + side * (mp.sin(a) - mp.sin(b))) / o)
+
+    e = p["e"]
+    double = 2 * mp.acos(o)
+    kink = [double] if double < mp.pi / 2 else []
+    a = (e + 1) / (2 * mp.pi) * lobe_albedo(e, cos_o, ring, kink)
+    return [k * a for k in p["ks"]]
+
+
+# ---- Blinn; Cook and Torrance ------------------------------------------------------------------
+
+
+def half(wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    h = unit([a + b for a, b in zip(ki, ko, strict=True)])
+    return ki, ko, h, dot(h, ko)
+
+
+def cavity(hn, oh, ni, no):
+    return min(1, 2 * hn * ni / oh, 2 * hn * no / oh)
+
+
+def blinn_d(p, hn):
+    e = mp.mpf(p["e"])
+    return (e + 2) / (2 * mp.pi) * hn**e
+
+
+# Mitsuba 3.9's Beckmann distribution agrees with beckmann_d, and stretched with ward_gaussian, to
+# single precision (1.5e-6).
+def beckmann_d(p, hn):
+    m2 = mp.mpf(p["m"]) ** 2
+    return mp.exp(-(1 - hn**2) / hn**2 / m2) / (mp.pi * m2 * hn**4)
+
+
+def facet_f(d, fresnel):
+    def f(p, wi, wo):
+        ki, ko, h, oh = half(wi, wo)
+        g = cavity(h[2], oh, ki[2], ko[2])
+        shape = d(p, h[2]) * g / (4 * ki[2] * ko[2])
+        return [c * shape for c in fresnel(p, oh)]
+
+    return f
+
+
+def facet_pdf(d):
+    """Facets drawn from D (n.h), reflected."""
+
+    def pdf(p, wi, wo):
+        _, _, h, oh = half(wi, wo)
+        return d(p, h[2]) * h[2] / (4 * oh)
+
+    return pdf
+
+
+def blinn_fresnel(p, oh):
+    return p["ks"]
+
+
+def schlick_fresnel(name):
+    return lambda p, oh: [r + (1 - r) * (1 - oh) ** 5 for r in p[name]]
+
+
+def half_albedo(density, width):
+    """Albedo over half vectors, by Gauss-Legendre panels that close in on the lobe and on kinks:
+    density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h."""
+
+    def albedo(p, cos_o):
+        sin_o = math.sqrt(1 - cos_o**2)
+        wide = width(p)
+
+        def ring(phi):
+            c = math.cos(phi)
+
+            def at(t):
+                hn, s = math.cos(t), math.sin(t)
+                oh = sin_o * s * c + cos_o * hn
+                return hn, oh, 2 * oh * hn - cos_o, s
+
+            def levels(t):
+                hn, oh, ni, _ = at(t)
+                return ni, ni - cos_o, 2 * hn * ni - oh, 2 * hn * cos_o - oh
+
+            # Roots of the conditions at which the integrand has a kink or ends.
+            grid = [k * math.pi / 2 / 256 for k in range(257)]
+            values = [levels(t) for t in grid]
+            cuts = {0.0, math.pi / 2, *(k * wide for k in (0.5, 1, 2, 4, 8))}
+            for j in range(4):
+                for a, b, va, vb in zip(grid, grid[1:], values, values[1:], strict=False):
+                    if va[j] * vb[j] < 0:
+                        for _ in range(48):
+                            m = (a + b) / 2
+                            if levels(m)[j] * va[j] > 0:
+                                a = m
+                            else:
+                                b = m
+                        cuts.add(a)
+                        # Towards the horizon there may be a root, of which all derivatives grow.
+                        cuts |= {a + d * 10.0**-k for k in (1, 2, 3, 4) for d in (-1, 1) if j == 0}
+            ends = sorted(t for t in cuts if 0 <= t <= math.pi / 2)
+            total = 0.0
+            for a, b in zip(ends, ends[1:], strict=False):
+                for x, w in GAUSS:
+                    t = a + (b - a) * x
+                    hn, oh, ni, s = at(t)
+                    if oh > 0 and ni > 0:
+                        total += w * (b - a) * s * density(p, hn, oh, ni, cos_o, phi)
+            return total
+
+        panels = 96
+        total = 0.0
+        for i in range(panels):
+            for x, w in GAUSS:
+                total += w * math.pi / panels * ring((i + x) * math.pi / panels)
+        return 2 * total
+
+    return albedo
+
+
+def gauss_legendre(n):
+    """Nodes and weights on [0, 1]."""
+    out = []
+    for k in range(n):
+        x = mp.cos(mp.pi * (k + 0.75) / (n + 0.5))
+        for _ in range(8):  # Newton
+            d = n * (x * mp.legendre(n, x) - mp.legendre(n - 1, x)) / (x * x - 1)
+            x -= mp.legendre(n, x) / d
+        out.append((float((1 + x) / 2), float(1 / ((1 - x * x) * d * d))))
+    return out
+
+
+GAUSS = gauss_legendre(12)
+
+
+def facet_albedo(d, fresnel, width):
+    def one(p, hn, oh, ni, no, phi):
+        return d(p, hn) * cavity(hn, oh, ni, no) * oh / no * fresnel(p, oh)[0]
+
+    return lambda p, c: [half_albedo(one, width)(p, c)] * 3
+
+
+def blinn_d_fp(p, hn):
+    return (p["e"] + 2) / (2 * math.pi) * hn ** p["e"]
+
+
+def beckmann_d_fp(p, hn):
+    m2 = p["m"] ** 2
+    return math.exp(-(1 - hn**2) / hn**2 / m2) / (math.pi * m2 * hn**4)
+
+
+# ---- Ward, in three normalisations -------------------------------------------------------------
+
+
+def ward_gaussian(p, h):
+    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    exponent = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
+    return mp.exp(-exponent) / (4 * mp.pi * ax * ay)
+
+
+def ward_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    norm = {
+        "bounded": oh**2 * h[2] ** 4,
+        "duer": ki[2] * ko[2],
+        "ward": mp.sqrt(ki[2] * ko[2]),
+    }[p["normalisation"]]
+    return [k * ward_gaussian(p, h) / norm for k in p["ks"]]
+
+
+def ward_pdf(p, wi, wo):
+    _, _, h, oh = half(wi, wo)
+    return ward_gaussian(p, h) / (oh * h[2] ** 3)
+
+
+def ward_albedo(p, cos_o):
+    """View in the x-z plane, over half vectors."""
+
+    def one(p, hn, oh, ni, no, phi):
+        s2 = (1 - hn**2) / hn**2
+        q = (math.cos(phi) / p["ax"]) ** 2 + (math.sin(phi) / p["ay"]) ** 2
+        g = math.exp(-s2 * q) / (math.pi * p["ax"] * p["ay"])
+        norm = {"bounded": oh**2 * hn**4, "duer": ni * no, "ward": math.sqrt(ni * no)}
+        return g / norm[p["normalisation"]] * ni * oh
+
+    a = half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)
+    return [k * a for k in p["ks"]]
+
+
+# ---- Schlick -----------------------------------------------------------------------------------
+
+
+def schlick_shares(p):
+    s = mp.mpf(p["rough"])
+    b = 4 * s * (1 - s)
+    return (0, b, 1 - b) if s < 0.5 else (1 - b, b, 0)
+
+
+def schlick_parts(p, h):
+    """Z(t) and A(w)."""
+    s, iso, t = mp.mpf(p["rough"]), mp.mpf(p["p"]), h[2]
+    z = s / (1 + s * t**2 - t**2) ** 2
+    w2 = h[0] ** 2 / (h[0] ** 2 + h[1] ** 2)
+    return z, mp.sqrt(iso / (iso**2 - iso**2 * w2 + w2))
+
+
+def schlick_g(p, v):
+    s = mp.mpf(p["rough"])
+    return v / (s - s * v + v)
+
+
+def schlick_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    a, b, _ = schlick_shares(p)
+    z, aw = schlick_parts(p, h)
+    g = schlick_g(p, ki[2]) * schlick_g(p, ko[2])
+    shape = a / mp.pi + b * g * z * aw / (4 * mp.pi * ki[2] * ko[2])
+    return [c * shape for c in schlick_fresnel("r")(p, oh)]
+
+
+def schlick_pdf(p, wi, wo):
+    """Of the glossy lobe, where it is alone: half vectors by Z, azimuths by the mean of a circle's
+    and of a squeezed circle's."""
+    a, _, _ = schlick_shares(p)
+    if a:
+        return None
+    _, _, h, oh = half(wi, wo)
+    z, _ = schlick_parts(p, h)
+    iso = mp.mpf(p["p"])
+    w2 = h[0] ** 2 / (h[0] ** 2 + h[1] ** 2)
+    squeezed = iso / (iso**2 * (1 - w2) + w2)
+    return z * h[2] / mp.pi * (1 + squeezed) / 2 / (4 * oh)
+
+
+def schlick_albedo(p, cos_o):
+    """View in the x-z plane."""
+    s, iso, r = p["rough"], p["p"], p["r"][0]
+    a, b, c = (float(x) for x in schlick_shares(p))
+
+    def one(p, hn, oh, ni, no, phi):
+        z = s / (1 + s * hn**2 - hn**2) ** 2
+        w2 = math.cos(phi) ** 2
+        aw = math.sqrt(iso / (iso**2 * (1 - w2) + w2))
+        g = 1 / (s - s * ni + ni) / (s - s * no + no)
+        fresnel = r + (1 - r) * (1 - oh) ** 5
+        return fresnel * (a / math.pi + b / (4 * math.pi) * g * z * aw) * ni * 4 * oh
+
+    mirror = c * (r + (1 - r) * (1 - cos_o) ** 5)
+    return [half_albedo(one, lambda p: math.sqrt(s))(p, cos_o) + mirror] * 3
+
+
+# ---- Oren and Nayar ----------------------------------------------------------------------------
+
+
+def oren_nayar_terms(p, ti, to, c, lib):
+    """What rho / pi and rho^2 / pi are multiplied with, as printed: a formula of angles."""
+    s2 = p["sigma"] * p["sigma"]
+    al, be = max(ti, to), min(ti, to)
+    c1 = 1 - 0.5 * s2 / (s2 + 0.33)
+    k = s2 / (s2 + 0.09)
+    if p["form"] == "qualitative":
+        return c1 + 0.45 * k * max(c, 0) * lib.sin(al) * lib.tan(be), 0 * c
+    c2 = 0.45 * k * (lib.sin(al) - (0 if c >= 0 else (2 * be / lib.pi) ** 3))
+    c3 = 0.125 * k * (4 * al * be / lib.pi**2) ** 2
+    l1 = c1 + c * c2 * lib.tan(be) + (1 - abs(c)) * c3 * lib.tan((al + be) / 2)
+    return l1, 0.17 * s2 / (s2 + 0.13) * (1 - c * (2 * be / lib.pi) ** 2)
+
+
+def oren_nayar_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    si, so = mp.hypot(ki[0], ki[1]), mp.hypot(ko[0], ko[1])
+    c = (ki[0] * ko[0] + ki[1] * ko[1]) / (si * so) if si * so > 0 else mp.mpf(1)
+    p = dict(p, sigma=mp.mpf(p["sigma"]))
+    l1, l2 = oren_nayar_terms(p, mp.atan2(si, ki[2]), mp.atan2(so, ko[2]), c, mp)
+    return [r * l1 / mp.pi + mp.mpf(r) ** 2 * l2 / mp.pi for r in p["rho"]]
+
+
+def oren_nayar_albedo(p, cos_o):
+    to = math.acos(cos_o)
+    direct = again = 0.0
+    cuts = [0.0, to / 2, to, (to + math.pi / 2) / 2, math.pi / 2]
+    for a, b in zip(cuts, cuts[1:], strict=False):
+        for x, w in GAUSS if b > a else ():
+            ti = a + (b - a) * x
+            for half_pi in (0, 1):  # the kink of |c| at a right angle
+                for y, v in GAUSS:
+                    phi = (half_pi + y) * math.pi / 2
+                    weight = w * (b - a) * v * math.pi * math.sin(ti) * math.cos(ti) / math.pi
+                    l1, l2 = oren_nayar_terms(p, ti, to, math.cos(phi), math)
+                    direct += weight * l1
+                    again += weight * l2
+    return [r * direct + r * r * again for r in p["rho"]]
+
+
+# ---- Lafortune ---------------------------------------------------------------------------------
+
+
+def lafortune_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    bracket = p["cxy"] * (ki[0] * ko[0] + ki[1] * ko[1]) + p["cz"] * ki[2] * ko[2]
+    e = mp.mpf(p["e"])
+    lobe = bracket**e if bracket > 0 else mp.mpf(0)
+    return [k * (e + 2) / (2 * mp.pi) * lobe for k in p["ks"]]
+
+
+def lafortune_axis(p, ko):
+    return [p["cxy"] * ko[0], p["cxy"] * ko[1], p["cz"] * ko[2]]
+
+
+def lafortune_pdf(p, wi, wo):
+    ki, axis = vec(wi), unit(lafortune_axis(p, vec(wo)))
+    e = mp.mpf(p["e"])
+    c = dot(ki, axis)
+    return (e + 1) / (2 * mp.pi) * (c**e if c > 0 else mp.mpf(0))
+
+
+def lafortune_albedo(p, cos_o):
+    """A modified Phong lobe about another axis, times |w|^e."""
+    w = lafortune_axis(p, [mp.sqrt(1 - mp.mpf(cos_o) ** 2), mp.mpf(0), mp.mpf(cos_o)])
+    size = mp.sqrt(dot(w, w))
+    a = modified_phong_albedo({"e": p["e"], "ks": (1, 1, 1)}, w[2] / size)[0]
+    return [k * a * size ** p["e"] for k in p["ks"]]
+
+
+PHONG_CASES = [
+    {"e": 0},
+    {"e": 1.5, "ks": (1, 1, 1)},
+    {"e": 20, "ks": (0.1, 0.5, 1)},
+    {"e": 300},
+    {"e": 10000},
+    {"e": 1e6},
+    {"e": 1e8},
+]
+MODELS = {
+    "lambert": dict(
+        f=lambert_f,
+        pdf=lambert_pdf,
+        albedo=lambda p, c: p["rho"],
+        defaults={"rho": (0.8, 0.8, 0.8)},
+        cases=[{"rho": (1, 1, 1)}, {"rho": (0.2, 0.5, 0.9)}],
+        cosines=[1, 0.3],
+    ),
+    "ashikhmin_shirley": dict(
+        f=as_f,
+        pdf=as_pdf,
+        albedo=as_albedo,
+        defaults={
+            "rs": (0.05, 0.05, 0.05),
+            "rd": (0.5, 0.5, 0.5),
+            "nu": 100,
+            "nv": 100,
+            "rotation": 0,
+            "part": "both",
+        },
+        cases=[
+            {},
+            {"rs": (0.05, 0.2, 0.9), "rd": (1, 0.5, 0.1), "nu": 10, "nv": 1000, "rotation": 0.7},
+            {"part": "diffuse", "rd": (1, 0.3, 0), "rs": (0, 0.05, 1)},
+            {"part": "specular", "rs": (1, 1, 1), "nu": 0, "nv": 0},
+            {"part": "specular", "rs": (1, 0.5, 0.04), "nu": 3, "nv": 40, "rotation": -2},
+            {"part": "specular", "rs": (1, 1, 1), "nu": 10000, "nv": 10000},
+            {"part": "specular", "rs": (0.5, 0.5, 0.5), "nu": 1e6, "nv": 1e6},
+            {"part": "specular", "rs": (0.5, 0.5, 0.5), "nu": 1e8, "nv": 1e4, "rotation": 1},
+            {"diffuse": "tabulated", "rs": (0.05, 0.5, 1), "rd": (1, 1, 1), "nu": 10, "nv": 10},
+            {"diffuse": "tabulated", "part": "diffuse", "nu": 4, "nv": 90, "rotation": 0.7},
+        ],
+        # Interpolation in the model's tables: of 1 - R at either direction.
+        floor=lambda p: 0.04 if p.get("diffuse") == "tabulated" else 0,
+        albedo_cases=[
+            {"part": "specular", "rs": (1, 1, 1), "nu": 10, "nv": 10},
+            {"part": "specular", "rs": (0.05, 0.05, 0.05), "nu": 10, "nv": 10},
+            {"part": "specular", "rs": (1, 1, 1), "nu": 4, "nv": 30},
+            {"part": "specular", "rs": (0.3, 0.3, 0.3), "nu": 400, "nv": 400},
+        ],
+        cosines=[1, 0.5, math.cos(math.radians(80)), 0.09],
+    ),
+    "coupled": dict(
+        f=by_fresnel(coupled_f, coupled_full_f),
+        pdf=coupled_pdf,
+        albedo=by_fresnel(coupled_albedo, coupled_full_albedo),
+        defaults={"r0": 0.05, "rm": (0.8, 0.8, 0.8)},
+        cases=[
+            {},
+            {"r0": 0.5, "rm": (1, 0.5, 0.1)},
+            {"r0": 0, "rm": (1, 1, 1)},
+            {"fresnel": "dielectric"},
+            {"fresnel": "dielectric", "r0": 0.3, "rm": (1, 0.5, 0.1)},
+            {"fresnel": "dielectric", "r0": 0.99},
+        ],
+        # Interpolation in the model's table of the constant.
+        floor=lambda p: 4e-7 if p.get("fresnel") == "dielectric" else 0,
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "glossy_reflector": dict(
+        f=gr_f,
+        pdf=gr_pdf,
+        albedo=gr_albedo,
+        defaults={"kr": 0.9, "cr": (1, 1, 1), "e": 100, "below": "mirror"},
+        cases=[
+            {},
+            {"e": 1, "kr": 1},
+            {"e": 1, "kr": 1, "below": "lose"},
+            {"e": 5, "cr": (0.9, 0.5, 0.1)},
+            {"e": 25, "below": "lose"},
+            {"e": 1e5},
+            {"e": 1e7, "kr": 1},
+        ],
+        albedo_cases=[
+            {"e": 1, "kr": 1},
+            {"e": 25, "kr": 1},
+            *({"e": e, "kr": 1, "below": "lose"} for e in (1, 5, 100, 1e4)),
+        ],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "glossy_specular": dict(
+        f=gs_f,
+        pdf=gs_pdf,
+        albedo=gs_albedo,
+        defaults={"ks": 0.65, "cs": (1, 1, 1), "e": 25, "normalisation": "book"},
+        cases=[
+            {},
+            {"e": 1, "ks": 1},
+            {"e": 7, "normalisation": "estimator", "cs": (0.9, 0.5, 0.1)},
+            {"e": 1000, "normalisation": "conserving", "ks": 1},
+            {"e": 1e5},
+            {"e": 1e7, "normalisation": "conserving"},
+        ],
+        albedo_cases=[
+            {"e": 1, "ks": 1},
+            {},
+            {"e": 7, "normalisation": "estimator", "ks": 1},
+            {"e": 1000, "normalisation": "conserving", "ks": 1},
+        ],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "phong_material": dict(
+        f=pm_f,
+        pdf=pm_pdf,
+        albedo=pm_albedo,
+        defaults={
+            "kd": 0.4,
+            "cd": (1, 1, 0.3),
+            "ks": 0.2,
+            "cs": (1, 1, 1),
+            "es": 25,
+            "kr": 0.4,
+            "cr": (1, 1, 0.3),
+            "e": 100,
+        },
+        cases=[
+            {},
+            {"kd": 1, "ks": 0, "kr": 0},
+            {"kd": 0, "kr": 0, "es": 1000},
+            {"kd": 0, "ks": 0, "e": 1, "kr": 1},
+            {"ks": 1, "es": 3, "e": 1e5, "cs": (0.1, 0.5, 1)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "lambertian_specular": dict(
+        f=lambda p, wi, wo: [c / mp.pi for c in p["rd"]],
+        pdf=lambert_pdf,
+        albedo=lambda p, c: [rd + mp.mpf(p["rs"]) for rd in p["rd"]],
+        defaults={"rs": 0.05, "rd": (0.8, 0.8, 0.8)},
+        cases=[{}, {"rs": 0.5, "rd": (0.2, 0.5, 0.9)}],
+        cosines=[1, 0.3],
+    ),
+    "shirley_1991": dict(
+        f=s91_f,
+        pdf=lambert_pdf,
+        albedo=s91_albedo,
+        defaults={"r0": 0.05, "rd": (0.8, 0.8, 0.8)},
+        cases=[{}, {"r0": 0.5, "rd": (1, 0.5, 0.1)}, {"r0": 0, "rd": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "schlick_double": dict(
+        f=sd_f,
+        pdf=lambert_pdf,
+        albedo=sd_albedo,
+        defaults={"r0": 0.05, "rd": (0.8, 0.8, 0.8)},
+        cases=[{}, {"r0": 0.5, "rd": (1, 0.5, 0.1)}, {"r0": 0, "rd": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1, 0.01],
+    ),
+    "radziszewski_alda": dict(
+        f=ra_f,
+        pdf=ra_pdf,
+        albedo=lambda p, c: p["tint"],
+        defaults={
+            "n": 4,
+            "n_theta": 4,
+            "n_phi": 4,
+            "proportion": "paper",
+            "part": "product",
+            "around": "reflection",
+            "ior": 1.5,
+            "tint": (1, 1, 1),
+        },
+        cases=[
+            *({"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)),
+            {"n": 2, "proportion": "equal", "tint": (0.9, 0.5, 0.1)},
+            {"n_theta": 7, "n_phi": 0.3, "proportion": "custom"},
+            {"n_theta": 0, "n_phi": 100, "proportion": "custom"},
+            {"n": 3, "part": "latitudinal"},
+            {"n": 30, "part": "longitudinal"},
+            {"n": 4, "around": "retro"},
+            {"n": 1e4, "around": "retro"},
+            {"n": 4, "around": "refraction"},
+            {"n": 40, "around": "refraction", "ior": 1.1},
+            {"n": 2, "around": "refraction", "ior": 2.4, "proportion": "equal"},
+        ],
+        albedo_cases=[{"n": n} for n in (0, 1e-300, 1e-3, 0.5, 1, 4, 25, 50, 1e3, 1e6, 1e8)]
+        + [{"n": 4, "around": a} for a in ("retro", "refraction")],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "lossless": dict(
+        f=lossless_f,
+        pdf=lossless_pdf,
+        albedo=lambda p, c: p["tint"],
+        defaults={"kernel": "sech2", "n": 4, "tint": (1, 1, 1)}
+        | dict(zip(HEIGHTS, (1, 0.6, 0.2, 0.1), strict=True)),
+        cases=[
+            {},
+            {"n": 0.3, "tint": (0.9, 0.5, 0.1)},
+            {"n": 25},
+            {"kernel": "exponential", "n": 0.3},
+            {"kernel": "exponential", "n": 8},
+            {"kernel": "table", "n": 7, "h1": 0.9, "h3": 0.3},
+        ],
+        cosines=[1, 0.5, 0.05],
+        # Numerical integrals.
+        floor=lambda p: 1e-12,
+    ),
+    "fresnel_dielectric": dict(
+        albedo=dielectric_albedo,
+        defaults={"ior": 1.5},
+        cases=[{}, {"ior": 2.4}, {"ior": 0.75}],
+        cosines=[1, 0.5, 0.1, 0.001],
+    ),
+    "glass": dict(
+        albedo=dielectric_albedo,
+        defaults={"ior": 1.5, "attenuation": (0.5, 0.9, 0.7), "density": 1},
+        cases=[{}, {"attenuation": (0, 0, 1), "density": 100}],
+        cosines=[1, 0.1],
+    ),
+    "fresnel_conductor": dict(
+        albedo=conductor_albedo,
+        defaults={"metal": "custom"}
+        | {f"n_{c}": n for c, n in zip("rgb", (0.2, 0.9, 1.1), strict=True)}
+        | {f"k_{c}": k for c, k in zip("rgb", (3.9, 2.4, 2.2), strict=True)},
+        cases=[
+            {"metal": "custom"},
+            {
+                "metal": "custom",
+                "n_r": 1.5,
+                "k_r": 0,
+                "n_g": 0.001,
+                "k_g": 100,
+                "n_b": 100,
+                "k_b": 0,
+            },
+            {"metal": "custom", "n_r": 0.5, "k_r": 1e-9, "n_g": 1.0001, "k_g": 0, "k_b": 1e-4},
+        ],
+        cosines=[1, 0.5, 0.1, 0.001],
+    ),
+    "phong": dict(
+        f=phong_f,
+        pdf=phong_pdf,
+        albedo=phong_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 20},
+        cases=PHONG_CASES,
+        albedo_cases=PHONG_CASES[1:5],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "modified_phong": dict(
+        f=modified_phong_f,
+        pdf=phong_pdf,
+        albedo=modified_phong_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 20},
+        cases=PHONG_CASES,
+        albedo_cases=PHONG_CASES[1:5],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "max_phong": dict(
+        f=max_phong_f,
+        pdf=phong_pdf,
+        albedo=max_phong_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 20},
+        cases=PHONG_CASES,
+        albedo_cases=PHONG_CASES[1:5],
+        cosines=[1, 0.5, 0.05],
+    ),
+    "blinn": dict(
+        f=facet_f(blinn_d, blinn_fresnel),
+        pdf=facet_pdf(blinn_d),
+        albedo=facet_albedo(blinn_d_fp, lambda p, oh: p["ks"], lambda p: 1 / math.sqrt(p["e"] + 2)),
+        defaults={"ks": (0.5, 0.5, 0.5), "e": 50},
+        cases=PHONG_CASES,
+        albedo_cases=[{"e": 0}, {"e": 30, "ks": (1, 1, 1)}, {"e": 3000, "ks": (1, 1, 1)}],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "cook_torrance": dict(
+        f=facet_f(beckmann_d, schlick_fresnel("f0")),
+        pdf=facet_pdf(beckmann_d),
+        albedo=facet_albedo(beckmann_d_fp, schlick_fresnel("f0"), lambda p: p["m"]),
+        defaults={"f0": (0.9, 0.6, 0.3), "m": 0.3},
+        cases=[{}, {"m": 1}, {"m": 0.05, "f0": (0, 0.04, 1)}, {"m": 1e-3}, {"m": 1e-4}],
+        albedo_cases=[
+            {"m": 1, "f0": (1, 1, 1)},
+            {"m": 0.3, "f0": (0.04, 0.04, 0.04)},
+            {"m": 0.05, "f0": (1, 1, 1)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "ward": dict(
+        f=ward_f,
+        pdf=ward_pdf,
+        albedo=ward_albedo,
+        defaults={"ks": (0.5, 0.5, 0.5), "ax": 0.15, "ay": 0.15, "normalisation": "bounded"},
+        cases=[
+            {},
+            {"ax": 0.02, "ay": 0.5, "ks": (1, 0.5, 0.1)},
+            {"ax": 1, "ay": 1, "normalisation": "duer"},
+            {"ax": 0.3, "ay": 0.1, "normalisation": "ward"},
+            {"ax": 1e-4, "ay": 1e-4},
+            {"ax": 1e-4, "ay": 1, "normalisation": "duer"},
+        ],
+        albedo_cases=[
+            {"ks": (1, 1, 1)},
+            {"ax": 0.5, "ay": 0.5, "ks": (1, 1, 1), "normalisation": "ward"},
+            {"ax": 0.2, "ay": 0.4, "ks": (1, 1, 1), "normalisation": "duer"},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "schlick": dict(
+        f=schlick_f,
+        pdf=schlick_pdf,
+        albedo=schlick_albedo,
+        defaults={"r": (0.8, 0.8, 0.8), "p": 1, "rough": 0.2},
+        cases=[
+            {},
+            {"rough": 0.7, "p": 0.3, "r": (0, 0.5, 1)},
+            {"rough": 1},
+            {"rough": 0.01, "p": 0.1},
+            {"rough": 1e-8},
+        ],
+        albedo_cases=[
+            {"rough": 0.3, "r": (1, 1, 1)},
+            {"rough": 0.8, "p": 0.4, "r": (0.5, 0.5, 0.5)},
+            {"rough": 0.05, "r": (0, 0, 0)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "oren_nayar": dict(
+        f=oren_nayar_f,
+        pdf=lambda p, wi, wo: vec(wi)[2] / mp.pi,
+        albedo=oren_nayar_albedo,
+        defaults={"rho": (0.8, 0.8, 0.8), "sigma": 0.3, "form": "full"},
+        cases=[
+            {},
+            {"sigma": 0.66, "rho": (1, 0.5, 0.1)},
+            {"sigma": 1e-4},
+            {"form": "qualitative"},
+            {"form": "qualitative", "sigma": 0.6},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "lafortune": dict(
+        f=lafortune_f,
+        pdf=lafortune_pdf,
+        albedo=lafortune_albedo,
+        defaults={"cxy": -1, "cz": 0.8, "e": 10, "ks": (0.5, 0.5, 0.5)},
+        cases=[
+            {},
+            {"cxy": 1, "cz": 1, "e": 100, "ks": (1, 0.5, 0.1)},
+            {"cxy": -1, "cz": 1, "e": 300},
+            {"cxy": -0.7, "cz": 0.9, "e": 3},
+            {"cxy": 0, "cz": 1, "e": 1.5},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+}
+
+
+def direction(theta, phi):
+    return (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
+
+
+def pairs(rng):
+    """Anywhere, near the mirror direction at several distances, near the normal, near grazing."""
+    out = []
+    for _ in range(3):
+        out.append([direction(rng.uniform(0, 1.5), rng.uniform(0, 6.28)) for _ in range(2)])
+    for distance in (1e-1, 1e-3, 1e-5):
+        theta, phi = rng.uniform(0.3, 1.2), rng.uniform(0, 6.28)
+        wi = direction(
+            theta + rng.uniform(-1, 1) * distance, phi + math.pi + rng.uniform(-1, 1) * distance
+        )
+        out.append([wi, direction(theta, phi)])
+    out.append([(0.0, 0.0, 1.0), direction(1e-3, 1.0)])
+    out.append([direction(1.57, 2.0), direction(1.2, 5.0)])
+    return out
+
+
+def values(function, p, wi, wo):
+    mp.mp.dps = 60
+    r = function(p, wi, wo)
+    return r if r is None or isinstance(r, (list, tuple)) else [r, r, r]
+
+
+def tolerance(function, p, wi, wo, base):
+    """What half a unit in the last place of every input changes, relatively, added up.
+
+    Rounded components make a vector whose length is 1 only nearly: formulas that are equal on the
+    sphere may differ then, which counts as well.
+    """
+    global normalise
+    ulp = mp.mpf(2) ** -53
+    total = mp.mpf(0)
+    moves = [("wi", i) for i in range(3)] + [("wo", i) for i in range(3)]
+    unused = {"ior"} if p.get("around") in ("reflection", "retro") else set()
+    if p.get("kernel") in ("sech2", "exponential"):
+        unused = set(HEIGHTS)
+    moves += [(k, None) for k, v in p.items() if isinstance(v, (int, float)) and k not in unused]
+    for what, i in moves:
+        q, a, b = dict(p), [mp.mpf(c) for c in wi], [mp.mpf(c) for c in wo]
+        if what == "wi":
+            a[i] *= 1 + ulp
+        elif what == "wo":
+            b[i] *= 1 + ulp
+        else:
+            q[what] = mp.mpf(q[what]) * (1 + ulp)
+        for normalise in (False, True):  # noqa: B007, a switch of this module
+            moved = values(function, q, a, b)
+            total += max(
+                abs(m - v) / v if v > 0 else abs(m) for m, v in zip(moved, base, strict=True)
+            )
+    return float(FLOOR + ROUNDINGS * total)
+
+
+def text(p):
+    def one(v):
+        return ":".join(repr(c) for c in v) if isinstance(v, tuple) else str(v)
+
+    return " ".join(f"{k}={one(v)}" for k, v in p.items())
+
+
+def main():
+    chosen = sys.argv[1:] or list(MODELS)
+    rows = []
+    if OUT.exists():
+        with OUT.open(newline="") as f:
+            rows = [row for row in list(csv.reader(f))[1:] if row[0] not in chosen]
+    for name in chosen:
+        m = MODELS[name]
+        rng = random.Random(name)
+        for case in m["cases"]:
+            p = {**m["defaults"], **case}
+            # A model without f has delta terms alone.
+            for wi, wo in pairs(rng) if "f" in m else []:
+                if p.get("around") == "refraction":
+                    wi = (wi[0] / p["ior"], wi[1] / p["ior"])
+                    wi = (*wi, -math.sqrt(1 - wi[0] ** 2 - wi[1] ** 2))
+                    if rng.random() < 0.5:
+                        wi, wo = wo, wi
+                elif p.get("around") == "retro":
+                    wo = (-wo[0], -wo[1], wo[2])
+                for kind in ("f", "pdf"):
+                    v = values(m[kind], p, wi, wo)
+                    # Below the normal numbers of double precision there is nothing to compare.
+                    if v is None or max(v) < mp.mpf("1e-290"):
+                        continue
+                    t = tolerance(m[kind], p, wi, wo, v)
+                    if t > 1e-3:
+                        continue  # says nothing: the inputs' own rounding decides the value
+                    if kind == "f" and "floor" in m:
+                        t += m["floor"](p)
+                    rows.append(
+                        [name, text(case), kind, *map(repr, wi), *map(repr, wo)]
+                        + [mp.nstr(c, 17) for c in v]
+                        + [f"{t:.2e}"]
+                    )
+        for case in m.get("albedo_cases", m["cases"]):
+            p = {**m["defaults"], **case}
+            for c in m["cosines"]:
+                mp.mp.dps = 30
+                a = m["albedo"](p, c)
+                wo = (math.sqrt(1 - c * c), 0.0, c)
+                rows.append(
+                    [name, text(case), "albedo", "", "", "", *map(repr, wo)]
+                    + [mp.nstr(mp.mpf(v), 12) for v in a]
+                    + ["1e-06"]
+                )
+        print(name, len(rows))
+    rows.sort(key=lambda row: row[0])  # stable: the order within a model stays
+    with OUT.open("w", newline="") as f:
+        w = csv.writer(f, lineterminator="\n")
+        w.writerow("model parameters kind wi_x wi_y wi_z wo_x wo_y wo_z r g b tolerance".split())
+        w.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the generator writes: shaders, closure counts, refusals and the extension's files.
+#include "pack/pack.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "closures/closure_pool.h"
+#include "forms/aimed.h"
+#include "forms/representation.h"
+#include "measure/albedo_table.h"
+#include "measure/fold.h"
+#include "model/sampling.h"
+#include "pack/shader.h"
+#include "plan/costs.h"
+#include "plan/plan.h"
+#include "print/osl_library.h"
+#include "print/osl_text.h"
+#include "support.h"
+
+namespace brdfc::pack {
+namespace {
+
+using forms::RepresentationKind;
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Depth of the left spine of a printed sum: what Cycles' stack of 16 has to hold.
+int nesting(const std::string& sum) {
+  int depth = 0, most = 0;
+  for (char c : sum) {
+    depth += c == '(' ? 1 : c == ')' ? -1 : 0;
+    most = std::max(most, depth);
+  }
+  return most;
+}
+
+measure::AlbedoTable empty_table(const Model& model) {
+  measure::AlbedoTable t;
+  t.terms.resize(choice_combinations(model.info()).size());
+  return t;
+}
+
+std::string read(const fs::path& p) {
+  std::ifstream in(p, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+// Not anonymous: templates of other files are instantiated with these.
+namespace pack_test {
+
+/// Lambert with faults that a build must not hide.
+template <class T> struct Broken {
+  Rgb<T> rho;
+  static ModelInfo info() {
+    return {.name = "broken", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
+  }
+  // NaN for light more than 60 degrees from the normal.
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>&) const { return rho * sqrt(wi.z - T(0.5)); }
+  T pdf(const Vec3<T>& wi, const Vec3<T>&) const { return cosine_pdf(wi); }
+  Sample<T> sample(const Vec3<T>&, const Vec3<T>& u) const {
+    const Vec3<T> wi = sample_cosine(u.y, u.z);
+    return {wi, rho * sqrt(wi.z - T(0.5)), cosine_pdf(wi)};
+  }
+};
+
+/// An exact form that needs more slots than Cycles keeps.
+template <class T> struct Greedy : Broken<T> {
+  ClosureSum<T> exact(const Vec3<T>&) const {
+    return ClosureSum<T>(22, Closure<T>(ClosureKind::DiffuseRamp, this->rho));
+  }
+};
+
+/// Delta terms alone.
+template <class T> struct MirrorOnly {
+  Rgb<T> ks;
+  static ModelInfo info() {
+    return {
+        .name = "mirror_only", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(ks, ColorSpec{"ks", "Reflectance", {0.5, 0.5, 0.5}, ""});
+  }
+  Rgb<T> mirror(const Vec3<T>& wo) const { return ks * (T(1) - wo.z / T(2)); }
+};
+
+}  // namespace pack_test
+
+namespace {
+
+TEST(Shader, SumIsABalancedTree) {
+  std::vector<std::string> terms;
+  for (int i = 0; i < 64; ++i) terms.push_back(fmt::format("t{}", i));
+  const std::string sum = print::balanced_sum(terms);
+  EXPECT_EQ(std::count(sum.begin(), sum.end(), '+'), 63);
+  EXPECT_LE(nesting(sum), 6);
+  EXPECT_EQ(print::balanced_sum({"a", "b", "c"}), "(a + b) + c");
+  EXPECT_EQ(print::balanced_sum({}), "0");
+}
+
+TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
+  const detail::ModelOf<pack_test::Greedy> greedy;
+  try {
+    write_shader(greedy, RepresentationKind::Exact, empty_table(greedy));
+    FAIL() << "not refused";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("66 closure slots"));
+    EXPECT_THAT(e.what(), HasSubstr("64"));
+  }
+}
+
+TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
+  for (const auto& [name, model] : models())
+    for (RepresentationKind kind : forms::representations(*model)) {
+      const Shader s = write_shader(*model, kind, empty_table(*model));
+      EXPECT_LE(s.slots, kMaxClosures) << s.name;
+      // Aimed forms hold what is done with lamps, a base and the model's value beside its sampling; lossless' value is
+      // a long sum.
+      const bool aimed = kind == RepresentationKind::Aimed;
+      EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2200 : 1200) << s.name;
+      EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
+    }
+}
+
+/// Sizes by hand from Cycles' structs: see pool_bytes().
+TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
+  const auto bytes = [](const char* name, RepresentationKind kind, int lamps = forms::kMaxLamps) {
+    const Model& m = find_model(name);
+    const Shader s = write_shader(m, kind, empty_table(m), {}, {}, lamps);
+    return std::pair(s.closure_bytes, s.lamp_bytes);
+  };
+  constexpr int kLobe = 16 + 120, kFacets = 16 + 56, kMirror = 16 + 24, kDiffuse = 16 + 24, kNode = 24;
+  // burley_diffuse_bsdf, diffuse_ramp and a mirror
+  EXPECT_EQ(bytes("coupled", RepresentationKind::Exact), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
+  EXPECT_EQ(bytes("lambert", RepresentationKind::Exact), std::pair(kDiffuse, 0));
+  EXPECT_EQ(bytes("glass", RepresentationKind::Exact), std::pair(kMirror + 16 + 24 + kNode, 0));
+  // A lamp's lobe is one of the sum. A direction through the surface is one of three closures, times a weight.
+  EXPECT_EQ(bytes("lambert", RepresentationKind::Sampled), std::pair(kLobe, 0));
+  EXPECT_EQ(bytes("phong", RepresentationKind::Aimed), std::pair(kLobe, kLobe + kNode));
+  EXPECT_EQ(bytes("phong", RepresentationKind::Aimed, 0), std::pair(kLobe, 0));
+  EXPECT_EQ(bytes("ward", RepresentationKind::Aimed), std::pair(kFacets + kLobe + kNode, kLobe + kNode));
+  EXPECT_EQ(bytes("schlick_double", RepresentationKind::Aimed),
+            std::pair(kDiffuse + kMirror + kLobe + 2 * kNode, kLobe + kNode));
+  EXPECT_EQ(bytes("radziszewski_alda", RepresentationKind::Aimed), std::pair(kLobe + kNode, kLobe + kNode));
+}
+
+TEST(Shader, AnAimedFormHasAtLeastALampInAGpusPool) {
+  for (const auto& [name, model] : models())
+    for (const RepresentationKind kind : forms::representations(*model)) {
+      if (forms::is_fit(kind)) continue;  // eight closures, most of them ramps
+      const Shader s = write_shader(*model, kind, empty_table(*model));
+      EXPECT_LE(s.closure_bytes + s.lamp_bytes, kPoolBytes) << s.name;
+    }
+}
+
+TEST(Shader, AnAimedFormWithoutABaseHasNoEmptyBlock) {
+  const Model& m = find_model("phong");
+  const std::string source = write_shader(m, RepresentationKind::Aimed, empty_table(m)).source;
+  EXPECT_THAT(source, Not(testing::ContainsRegex("[{][ \n]*[}]")));
+}
+
+TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
+  const detail::ModelOf<pack_test::MirrorOnly> model;
+  EXPECT_FALSE(model.has_scatter());
+  EXPECT_EQ(forms::representations(model), std::vector{RepresentationKind::Exact});
+  const Shader s = write_shader(model, RepresentationKind::Exact, empty_table(model));
+  EXPECT_THAT(s.source, HasSubstr("BSDF = weight_0 * reflection(frame_n);"));
+  const std::string body = s.source.substr(s.source.find("\n{\n", s.source.find("\nshader ")));
+  EXPECT_EQ(s.statements, std::count(body.begin(), body.end(), ';')) << "there is no loop";
+  EXPECT_LT(forms::measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
+  const measure::AlbedoTable table = measure::tabulate_albedo(model);
+  EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
+}
+
+TEST(Shader, AFixedParameterLeavesTheText) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const Shader all = write_shader(m, RepresentationKind::Sampled, empty_table(m));
+  const Shader specular = write_shader(m, RepresentationKind::Sampled, empty_table(m),
+                                       {{"part", std::string("specular")}, {"rotation", 0.0}});
+  EXPECT_THAT(all.source, HasSubstr("color rd ="));
+  EXPECT_THAT(all.source, HasSubstr("int part ="));
+  EXPECT_THAT(specular.source, Not(HasSubstr("int part")));
+  EXPECT_THAT(specular.source, Not(HasSubstr("rotation")));
+  EXPECT_LT(specular.operations, all.operations);
+  EXPECT_LT(specular.statements, all.statements);
+  EXPECT_LT(specular.source.size(), all.source.size());
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+TEST(Shader, TablesThatChoicesShareStandThereOnce) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const Shader s = write_shader(m, RepresentationKind::Sampled, empty_table(m));
+  for (const char* table : {"specular_loss", "specular_softness", "mean_loss", "mean_matte"})
+    EXPECT_EQ(count(s.source, fmt::format("float {}[", table)), 1u) << table;
+  EXPECT_GT(count(s.source, "specular_loss, "), 1u) << "more than one look-up reads it";
+}
+
+/// A file holds the text and what it is compiled to, whether or not something is linked to the output.
+TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
+  const Model& m = find_model("ward");
+  const measure::AlbedoTable table = measure::albedo_table_of(m);
+  const Shader apart = write_shader(m, RepresentationKind::Sampled, table);
+  EXPECT_THAT(apart.source, Not(HasSubstr("Albedo")));
+  EXPECT_THAT(apart.source, Not(HasSubstr("knots_")));
+  EXPECT_LT(apart.source.size(), 10000u);
+  EXPECT_THAT(apart.albedo, HasSubstr("shader brdfc_ward_sampled_albedo("));
+  EXPECT_THAT(apart.albedo, HasSubstr("output color Albedo = 0)"));
+  EXPECT_THAT(apart.albedo, HasSubstr("float ax = "));
+  EXPECT_THAT(apart.albedo, Not(HasSubstr("BSDF")));
+  const ParamValues known = {{"ax", 0.2}, {"ay", 0.2}, {"normalisation", std::string("bounded")}};
+  const Shader small = write_shader(m, RepresentationKind::Sampled, measure::fold(table, m, known), known);
+  EXPECT_EQ(small.albedo, "");
+  EXPECT_THAT(small.source, HasSubstr("output color Albedo = 0)"));
+  for (const auto& [name, model] : models())
+    for (const RepresentationKind kind : forms::representations(*model)) {
+      if (forms::is_fit(kind)) continue;  // holds tables of its own
+      const std::string text = write_shader(*model, kind, measure::albedo_table_of(*model)).source;
+      // What two aimed forms hold for each of their many choices is more than it should be.
+      const bool longer =
+          kind == RepresentationKind::Aimed && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
+      EXPECT_LE(text.size(), longer ? 190000u : 100000u) << name << " " << name_of(kind);
+    }
+}
+
+TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
+  const Model& m = find_model("ashikhmin_shirley");
+  const ParamValues both = {{"part", std::string("both")}};
+  ParamValues black = both;
+  black["rd"] = 0.0;
+  const forms::Recording with = forms::record(m, RepresentationKind::Sampled, both, 0);
+  const forms::Recording without = forms::record(m, RepresentationKind::Sampled, black, 0);
+  EXPECT_LT(without.operations, with.operations);
+  EXPECT_EQ(std::count(without.inputs.begin(), without.inputs.end(), "rd"), 0);
+}
+
+TEST(Shader, TextOnlyHoldsTheLibraryItCalls) {
+  const std::string library = print::library_for("x = brdfc_log1p(y);");
+  EXPECT_THAT(library, HasSubstr("float brdfc_log1p("));
+  EXPECT_THAT(library, Not(HasSubstr("brdfc_expm1(")));
+  EXPECT_THROW(print::library_for("brdfc_missing(1)"), std::logic_error);
+}
+
+TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
+  const detail::ModelOf<pack_test::Broken> broken;
+  try {
+    measure::tabulate_albedo(broken);
+    FAIL() << "NaN reached a table";
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("broken"));
+    EXPECT_THAT(e.what(), HasSubstr("rho="));
+    EXPECT_THAT(e.what(), HasSubstr("wi"));
+    EXPECT_THAT(e.what(), HasSubstr("nan"));
+  }
+  EXPECT_THROW(forms::measure_error(broken, RepresentationKind::Sampled), ValueError);
+}
+
+TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
+  const Model& m = find_model("coupled");
+  const ParamValues only = forms::form_values(m, RepresentationKind::Exact);
+  ASSERT_EQ(only.size(), 1u);
+  EXPECT_EQ(std::get<std::string>(only.at("fresnel")), "schlick");
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Sampled).empty());
+  const measure::AlbedoTable t = empty_table(m);
+  EXPECT_THAT(write_shader(m, RepresentationKind::Exact, t).source, Not(HasSubstr("int fresnel")));
+  EXPECT_THAT(write_shader(m, RepresentationKind::Sampled, t).source, HasSubstr("int fresnel"));
+  try {
+    write_shader(m, RepresentationKind::Exact, t, {{"fresnel", std::string("dielectric")}});
+    FAIL() << "expected a refusal";
+  } catch (const InputError& e) {
+    EXPECT_STREQ(e.what(), "coupled: the exact form exists only for fresnel=schlick");
+  }
+}
+
+TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
+  const Model& m = find_model("lafortune");
+  const ParamValues only = forms::form_values(m, RepresentationKind::Fitted);
+  EXPECT_EQ(only, (ParamValues{{"cxy", -1.0}, {"cz", 0.8}}));
+  ParamValues others = complete(m.info(), {});
+  others.erase("e");
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Fitted, others).empty()) << "one number is open, any may be";
+  others["e"] = 4.0;
+  others.erase("cz");
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Fitted, others).empty());
+  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Sampled).empty());
+  const std::string source =
+      write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, only), {}).source;
+  for (const char* socket : {"    float e = ", "    color ks = "}) EXPECT_THAT(source, HasSubstr(socket));
+  for (const char* gone : {"float cxy", "float cz"}) EXPECT_THAT(source, Not(HasSubstr(gone)));
+}
+
+class PackFiles : public ::testing::Test {
+ protected:
+  Options options(const fs::path& out) const {
+    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan::plan_models({"lambert"}), {}, {}};
+  }
+  TempFolder temp;
+};
+
+TEST_F(PackFiles, TheSameModelsGiveTheSameBytes) {
+  const Result a = build_pack(options(temp.path() / "a")), b = build_pack(options(temp.path() / "b"));
+  EXPECT_EQ(read(a.zip), read(b.zip));
+  EXPECT_FALSE(read(a.zip).empty());
+}
+
+TEST_F(PackFiles, ManifestAndFilesAgree) {
+  const Result pack = build_pack(options(temp.path()));
+  const auto manifest = nlohmann::json::parse(read(pack.folder / "manifest.json"));
+  EXPECT_EQ(manifest.at("format"), 1);
+  const auto& lambert = manifest.at("models").at("lambert");
+  EXPECT_EQ(lambert.at("auto"), "exact");
+  EXPECT_EQ(manifest.at("closure_pool"), (nlohmann::json{{"bytes", 1016}, {"mix", 72}, {"add", 24}}));
+  EXPECT_EQ(lambert.at("representations").at("exact").at("closure_bytes"), 40);
+  EXPECT_EQ(lambert.at("representations").at("exact").at("lamp_bytes"), 0);
+  for (const auto& [form, r] : lambert.at("representations").items())
+    EXPECT_TRUE(fs::exists(pack.folder / r.at("shader").get<std::string>())) << form;
+  EXPECT_TRUE(fs::exists(pack.folder / lambert.at("albedo").at("table").get<std::string>()));
+  EXPECT_TRUE(fs::exists(pack.folder / "blender_manifest.toml"));
+  for (const auto& entry : fs::recursive_directory_iterator(pack.folder)) EXPECT_NE(entry.path().extension(), ".oso");
+}
+
+TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {
+  const fs::path table = temp.path() / "costs.csv";
+  std::ofstream(table) << "model,form,cost,cost_min\nlambert,glossy,1,1\nlambert,exact,0.75,0.7\n";
+  Options o = options(temp.path() / "out");
+  o.costs = plan::Costs(table);
+  const auto manifest = nlohmann::json::parse(read(build_pack(o).folder / "manifest.json"));
+  const auto& forms = manifest.at("models").at("lambert").at("representations");
+  EXPECT_EQ(forms.at("exact").at("cost"), 0.75);
+  EXPECT_TRUE(forms.at("sampled").at("cost").is_null());
+}
+
+TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
+  const fs::path table = temp.path() / "costs.csv";
+  EXPECT_EQ(plan::Costs(table).of(find_model("lambert"), RepresentationKind::Exact), std::nullopt)
+      << "there is no file";
+  const auto refusal = [&](const std::string& text) -> std::string {
+    std::ofstream(table) << text;
+    try {
+      const plan::Costs costs(table);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "not refused";
+  };
+  const std::string head = "model,form,cost\n";
+  EXPECT_THAT(refusal(""), HasSubstr("costs.csv: line 1: expected the columns model,form,cost"));
+  EXPECT_THAT(refusal("lambert,exact,1\n"), HasSubstr("line 1: expected the columns model,form,cost"));
+  EXPECT_THAT(refusal(head + "lambert,exact,1\nlambert,sampled,fast\n"),
+              HasSubstr("line 3: cost: expected a positive number, got 'fast'"));
+  for (const char* cost : {"", "0", "-1", "nan", "inf", "1x"})
+    EXPECT_THAT(refusal(head + "lambert,exact," + cost), HasSubstr("line 2: cost: expected")) << cost;
+  EXPECT_THAT(refusal(head + "lambert,excat,1\n"), HasSubstr("line 2: form: unknown representation 'excat'"));
+  EXPECT_THAT(refusal(head + ",exact,1\n"), HasSubstr("line 2: model: expected a name"));
+  EXPECT_THAT(refusal(head + "lambert,exact,1\nlambert,exact,2\n"), HasSubstr("line 3: form: expected one row"));
+}
+
+TEST(Costs, ThoseOfTheExtensionAreMeasured) {
+  const plan::Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
+  for (const auto& [model, kind] :
+       {std::pair("coupled", RepresentationKind::Exact), std::pair("ward", RepresentationKind::Sampled),
+        std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Aimed),
+        std::pair("phong", RepresentationKind::Twin)}) {
+    const std::optional<double> cost = costs.of(find_model(model), kind);
+    ASSERT_TRUE(cost) << model << " " << name_of(kind);
+    EXPECT_GT(*cost, 0.2);
+    EXPECT_LT(*cost, 10);
+  }
+}
+TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
+  const Result pack = build_pack(options(temp.path()));
+  const std::string before = read(pack.zip);
+  Options bad = options(temp.path());
+  bad.models[0].fixed["rho"] =
+      std::array<double, 3>{7, 7, 7};  // refused when the shader is written, after the build has begun
+  EXPECT_THROW(build_pack(bad), InputError);
+  bad = options(temp.path());
+  bad.addon = temp.path() / "nowhere";
+  EXPECT_THROW(build_pack(bad), InputError);
+  EXPECT_EQ(read(pack.zip), before);
+  int files = 0;
+  for (const auto& entry : fs::directory_iterator(temp.path())) files += entry.exists();
+  EXPECT_EQ(files, 2);  // the zip and the folder: nothing half-written
+}
+
+TEST_F(PackFiles, AnOutputThatIsAFileIsAnErrorThatNamesIt) {
+  const fs::path file = temp.path() / "file";
+  std::ofstream(file) << "x";
+  try {
+    build_pack(options(file));
+    FAIL() << "not refused";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr(file.string()));
+  }
+}
+
+}  // namespace
+}  // namespace brdfc::pack

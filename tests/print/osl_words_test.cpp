@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The list of names that a shader's text uses itself: complete, and kept from models.
+#include "print/osl_words.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <regex>
+
+#include "fit/terms.h"
+#include "forms/representation.h"
+#include "measure/albedo_table.h"
+#include "measure/fold.h"
+#include "model/choices.h"
+#include "model/sampling.h"
+#include "pack/probe.h"
+#include "pack/shader.h"
+#include "plan/plan.h"
+
+namespace brdfc {
+
+using forms::RepresentationKind;
+
+// Not in the anonymous namespace: the model adapter has members of these types.
+namespace osl_words_test {
+
+/// All names that a shader has for something else, also those that it numbers.
+std::vector<std::string> all_words() {
+  std::vector<std::string> words(print::osl_words().begin(), print::osl_words().end());
+  for (const std::string& stem : print::numbered_osl_words())
+    for (const char* end : {"", "_0", "_12", "_0_1", "_1_x"}) words.push_back(stem + end);
+  words.insert(words.end(), {"brdfc_random", "M_PI"});
+  return words;
+}
+
+/// Every statement has such a name, and two others that follow the rule which names are made unique by.
+template <class T> struct Hinted {
+  Rgb<T> rho;
+  T unread;
+  static ModelInfo info() {
+    return {.name = "hinted", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
+    v(unread, NumberSpec{"unread", "Unread", 1, 0, 1, 0, 1, ""});
+  }
+  /// 1, the long way.
+  T one(const T& x) const {
+    T y = x;
+    for (const std::string& word : all_words()) y = named(word.c_str(), sin(y));
+    for (const char* name : {"count_1", "model_weight", "unread", "rho"}) y = named(name, sin(y));
+    return T(1) + y * y / T(1e30);
+  }
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return rho * select(above(wi, wo), one(wi.z) / pi<T>(), T(0));
+  }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), cosine_pdf(wi), T(0)); }
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> wi = sample_cosine(u.y, u.z);
+    return sample_if(above(wi, wo), wi, rho * one(wi.z), pdf(wi, wo));
+  }
+  ClosureSum<T> exact(const Vec3<T>& wo) const {
+    ClosureSum<T> sum;
+    sum.emplace_back(ClosureKind::Diffuse, rho * one(wo.z));
+    return sum;
+  }
+  Rgb<T> mirror(const Vec3<T>& wo) const { return rho * (one(wo.z) - T(1)); }
+};
+
+/// A model with one parameter, of any name.
+std::string name_of_parameter;
+template <class T> struct OfName : Hinted<T> {
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(this->rho, ColorSpec{name_of_parameter.c_str(), "Reflectance", {0.5, 0.5, 0.5}, ""});
+    this->unread = T(1);
+  }
+};
+
+}  // namespace osl_words_test
+
+namespace {
+
+using namespace osl_words_test;
+using ::testing::HasSubstr;
+
+measure::AlbedoTable table_of(const Model& model) {
+  measure::AlbedoTable t;
+  t.model = model.info().name;
+  t.grids.push_back({{{"cos_theta_o", measure::AxisScale::Linear, {0, 1}}}, 3, {0, 0, 0, 1, 1, 1}, 0});
+  t.terms.assign(choice_combinations(model.info()).size(), {measure::AlbedoTerm{}});
+  return t;
+}
+
+std::string without_comments_and_strings(const std::string& text) {
+  return std::regex_replace(std::regex_replace(text, std::regex("//[^\n]*"), ""), std::regex("\"[^\"]*\""), "");
+}
+
+std::vector<std::string> matches(const std::string& text, const char* pattern) {
+  const std::regex name(pattern);
+  std::vector<std::string> found;
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), name); it != std::sregex_iterator(); ++it)
+    found.push_back((*it)[1]);
+  return found;
+}
+
+std::vector<std::string> declared_in(const std::string& statements) {
+  return matches(statements, R"((?:float|color|int) (\w+)(?:\[\d+\])? = )");
+}
+
+/// What a model's statements declare, for all choices.
+std::set<std::string> declared_by(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
+  std::set<std::string> names;
+  const auto add = [&](const forms::Recording& r) {
+    for (const std::string& name : declared_in(r.statements)) names.insert(name);
+    for (const std::string& array : r.arrays) names.insert(declared_in(array).at(0));
+  };
+  for (const Choices& c : choice_combinations(model.info())) {
+    if (!admits(model.info(), c, fixed)) continue;
+    const ParamValues values = with_choices(model.info(), c, fixed);
+    if (kind == RepresentationKind::Aimed) {
+      const forms::AimedRecording r = forms::record_aimed(model, values, 4);
+      for (const forms::Recording* part : {&r.base, &r.draw, &r.value}) add(*part);
+      const forms::AimedSteps& s = forms::aimed_steps(4);
+      for (const forms::Recording* part : {&s.room, &s.aim, &s.less, &s.send, &s.rest}) add(*part);
+    } else {
+      add(forms::record(model, kind, values, 4));
+    }
+    if (model.has_mirror()) add(forms::record_mirror(model, values, 4));
+  }
+  return names;
+}
+
+TEST(OslWords, AreAllThatShadersUseBesideTheirModelsNames) {
+  for (const auto& [name, model] : models())
+    for (const RepresentationKind kind : forms::representations(*model)) {
+      const ParamValues fixed = forms::form_values(*model, kind);
+      const pack::Shader shader =
+          pack::write_shader(*model, kind, measure::fold(table_of(*model), *model, fixed), fixed);
+      std::set<std::string> own = declared_by(*model, kind, fixed);
+      for (const ParamInfo& p : model->info().params) own.insert(p.name);
+      const std::string text = without_comments_and_strings(shader.source);
+      std::set<std::string> unknown;
+      // A number's exponent, or a vector's component, is no name.
+      for (const std::string& word :
+           matches(text.substr(text.find("\n{\n", text.find("\nshader "))), R"((\b[A-Za-z_]\w*))"))
+        if (!own.count(word) && !print::is_osl_word(word)) unknown.insert(word);
+      EXPECT_THAT(unknown, testing::IsEmpty()) << shader.name << ": add to print/osl_words.cpp";
+    }
+}
+
+TEST(OslWords, AStatementOfAModelMayHaveAnyForAName) {
+  const detail::ModelOf<Hinted> model;
+  for (const RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled}) {
+    const forms::Recording r = forms::record(model, kind, {}, 4);
+    const std::vector<std::string> names = declared_in(r.statements);
+    EXPECT_GE(names.size(), all_words().size() + 4) << "each has its own";
+    EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size()) << "twice the same";
+    for (const std::string& name : names) {
+      EXPECT_FALSE(print::is_osl_word(name)) << name;
+      EXPECT_EQ(model.info().param(name), nullptr) << name << ": a parameter, also where statements do not read it";
+    }
+    EXPECT_THAT(r.statements, HasSubstr("float count_1 = sin("));
+    EXPECT_NO_THROW(pack::write_shader(model, kind, table_of(model)));
+  }
+  EXPECT_THAT(pack::probe_source(model, {}), HasSubstr("float shown_f_1 = sin("));
+}
+
+TEST(OslWords, AParameterMayHaveNoneForAName) {
+  for (const std::string& word : all_words()) {
+    name_of_parameter = word;
+    const detail::ModelOf<OfName> model;
+    if (print::numbered_osl_words().count(word) && !print::osl_words().count(word)) {
+      EXPECT_NO_THROW(pack::write_shader(model, RepresentationKind::Sampled, table_of(model))) << word;
+      continue;
+    }
+    try {
+      pack::write_shader(model, RepresentationKind::Sampled, table_of(model));
+      ADD_FAILURE() << word << " was not refused";
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.what(),
+                "hinted: a parameter may not be called '" + word + "', which is a word of OSL or of the generator");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace brdfc

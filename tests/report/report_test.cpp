@@ -1,0 +1,411 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The report measures what it says, against pictures whose error and noise are known by construction.
+#include "report/report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <regex>
+
+#include "core/error.h"
+#include "reference/image.h"
+
+namespace brdfc::report {
+namespace {
+
+using reference::Image;
+using reference::Rendering;
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr int kSize = 64;
+constexpr float kNoise = 0.05f;
+
+/// A gradient in [0.2, 0.8], `factor` times as bright, with Gaussian noise.
+Rendering picture(double factor, float noise, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal(0, noise > 0 ? noise : 1);
+  Rendering out;
+  out.mean = Image(kSize, kSize);
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c)
+        out.mean.pixel(x, y)[c] = float(factor * (0.2 + 0.6 * x / (kSize - 1))) + (noise > 0 ? normal(random) : 0.0f);
+  return out;
+}
+
+Rendering reference() {
+  Rendering out = picture(1, 0, 0);
+  out.variance = Image(kSize, kSize);
+  return out;
+}
+
+class ReportTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(testing::TempDir()) / (std::string("brdfc-report-") + info->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "ball");
+    reference::write_rendering(folder_ / "ball/reference.exr", reference());
+    for (unsigned i = 0; i < 4; ++i) {
+      reference::write_rendering(folder_ / fmt::format("ball/glossy-{}.exr", i), picture(1.1, kNoise, 10 + i));
+      reference::write_rendering(folder_ / fmt::format("ball/exact-{}.exr", i), picture(1, kNoise, 20 + i));
+    }
+    runs_ = json::parse(R"({
+      "format": 1, "scene": "ball", "description": "a <ball> & more",
+      "settings": {"width": 64, "height": 64, "max_bounces": 4},
+      "reference": {"image": "reference.exr", "spp": 1024, "wall_seconds": 2.5},
+      "runs": [
+        {"form": "glossy", "spp": 16, "images": ["glossy-0.exr", "glossy-1.exr", "glossy-2.exr", "glossy-3.exr"],
+         "cpu_seconds": [1.0, 2.0, 1.0, 1.0], "wall_seconds": [1, 1, 1, 1], "materials": []},
+        {"form": "exact", "spp": 16, "images": ["exact-0.exr", "exact-1.exr", "exact-2.exr", "exact-3.exr"],
+         "cpu_seconds": [1.5, 3.0, 1.5, 9.0], "wall_seconds": [1, 1, 1, 1],
+         "materials": [
+           {"id": "a", "model": "coupled", "representation": "exact", "closures": 3,
+            "error": {"relative_l1": 1e-5, "albedo": 1e-6}},
+           {"id": "b", "model": "lambert", "representation": "exact", "closures": 1, "error": null}]}],
+      "provenance": {"Blender": "4.5.15"}, "commands": ["brdfc render ball.json"]})");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::vector<SceneReport> load() {
+    std::ofstream(folder_ / "ball/runs.json") << runs_;
+    return load_report(folder_);
+  }
+  std::string load_error() {
+    try {
+      load();
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  }
+
+  fs::path folder_;
+  json runs_;
+};
+
+TEST_F(ReportTest, SeparatesErrorFromNoise) {
+  const auto scenes = load();
+  ASSERT_EQ(scenes.size(), 1u);
+  const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
+  EXPECT_NEAR(glossy.difference.bias, 0.1, 5 * glossy.difference.bias_error);
+  EXPECT_GT(glossy.difference.rel_mse, 2 * glossy.difference.noise);
+  EXPECT_NEAR(exact.difference.bias, 0, 5 * exact.difference.bias_error);
+  EXPECT_NEAR(exact.difference.rel_mse / exact.difference.noise, 1, 0.05);
+  // Four pictures, so the standard deviation of a pixel is half that of one; then the mean over all pixels, whose
+  // channels are taken to err together: of the products of two channels' deviations there are twice as many as squares,
+  // and the deviation of four normal numbers is sqrt(8 / (3 pi)) of the true one on average.
+  EXPECT_NEAR(exact.difference.bias_error, kNoise / 2 / kSize / 0.5 * std::sqrt((1 + 2 * 8 / (3 * kPi)) / 3), 2e-5);
+  EXPECT_EQ(exact.spp, 64);
+}
+
+TEST_F(ReportTest, RelMseOfKnownPictures) {
+  runs_["runs"].erase(1);
+  runs_["runs"][0]["images"] = {"brighter.exr"};
+  runs_["runs"][0]["cpu_seconds"] = {1};
+  runs_["runs"][0]["wall_seconds"] = {1};
+  reference::write_rendering(folder_ / "ball/brighter.exr", picture(1.5, 0, 0));
+  double expected = 0;
+  for (int x = 0; x < kSize; ++x) {
+    const double b = 0.2 + 0.6 * x / (kSize - 1);
+    expected += 0.25 * b * b / (b * b + kRelMseEpsilon) / kSize;
+  }
+  const Difference d = load()[0].forms[0].difference;
+  EXPECT_NEAR(d.rel_mse, expected, 1e-6);
+  EXPECT_NEAR(d.bias, 0.5, 1e-6);
+  EXPECT_EQ(d.noise, 0);
+}
+
+TEST_F(ReportTest, CostIsTheMedianOfPairs) {
+  const auto scenes = load();
+  EXPECT_DOUBLE_EQ(scenes[0].forms[0].cost.value(), 1);
+  EXPECT_DOUBLE_EQ(scenes[0].forms[1].cost.value(), 1.5);  // 1.5, 1.5, 1.5, 9: one disturbed run changes nothing
+  for (json& run : runs_["runs"])
+    for (json& time : run["cpu_seconds"]) time = 0.1 * time.get<double>();
+  EXPECT_FALSE(load()[0].forms[1].cost.has_value()) << "chance";
+  runs_["runs"].erase(0);
+  EXPECT_FALSE(load()[0].forms[0].cost.has_value());
+}
+
+TEST_F(ReportTest, TakesTheWorstMaterial) {
+  const FormReport exact = load()[0].forms[1];
+  EXPECT_EQ(exact.closures(), 3);
+  EXPECT_EQ(exact.relative_l1(), 1e-5);
+  EXPECT_EQ(load()[0].forms[0].closures(), std::nullopt);
+}
+
+TEST_F(ReportTest, WritesPageJsonAndCsv) {
+  load();
+  write_report(folder_);
+  std::ifstream json_file(folder_ / "report.json");
+  const json report = json::parse(json_file);
+  EXPECT_EQ(report["scenes"][0]["forms"][1]["cost"], 1.5);
+  EXPECT_EQ(report["scenes"][0]["forms"][0]["closures"], json());
+  const auto text = [&](const char* name) {
+    std::ifstream in(folder_ / name);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  EXPECT_THAT(text("report.csv"), HasSubstr("\nball,exact,"));
+  const std::string page = text("index.html");
+  EXPECT_THAT(page, HasSubstr("a &lt;ball&gt; &amp; more"));
+  for (const char* name : {"ball/reference.png", "ball/exact.png", "ball/exact-difference.png", "ball/glossy.png"}) {
+    EXPECT_THAT(page, HasSubstr(fmt::format("src=\"{}\"", name)));
+    const Image preview = reference::read_image(folder_ / name);
+    EXPECT_EQ(preview.width, kSize);
+  }
+  EXPECT_THAT(page, testing::Not(HasSubstr("http")));  // self-contained
+  for (const auto& entry : fs::recursive_directory_iterator(folder_))
+    EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << ": a temporary file was left";
+}
+
+TEST_F(ReportTest, NamesInTheChartLieBesideEachOther) {
+  for (const char* form : {"sampled", "planned", "aimed", "twin"}) {
+    runs_["runs"].push_back(runs_["runs"][1]);
+    runs_["runs"].back()["form"] = form;
+  }
+  load();
+  write_report(folder_);
+  std::ifstream in(folder_ / "index.html");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  struct Name {
+    double x, y;
+    std::string text;
+  };
+  std::vector<Name> names;
+  const std::regex pattern("class=\"name\" x=\"([0-9.]+)\" y=\"([0-9.]+)\">([^<]+)<");
+  for (auto it = std::sregex_iterator(page.begin(), page.end(), pattern); it != std::sregex_iterator(); ++it)
+    names.push_back({std::stod((*it)[1]), std::stod((*it)[2]), (*it)[3]});
+  ASSERT_EQ(names.size(), 6u);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_GT(names[i].y, 12) << names[i].text << " lies above the picture";
+    for (std::size_t j = 0; j < i; ++j)
+      // Letters of 12 pixels, which are about half as wide.
+      EXPECT_TRUE(std::abs(names[i].y - names[j].y) >= 12 ||
+                  names[i].x + 6.0 * double(names[i].text.size()) < names[j].x ||
+                  names[j].x + 6.0 * double(names[j].text.size()) < names[i].x)
+          << names[i].text << " lies on " << names[j].text;
+  }
+}
+
+TEST_F(ReportTest, ShowsWhatTheClosuresOfEachVersionDo) {
+  const fs::path folder = folder_ / "conformance";
+  EXPECT_TRUE(load_conformance(folder).empty());
+  fs::create_directories(folder);
+  const json agrees = {{"closure", "diffuse"},
+                       {"evaluation_l1", 1e-7},
+                       {"sampling_share", 0.0},
+                       {"verdict", "ok"},
+                       {"sampling_resolution", 4e-3}};
+  const json wrong = {{"closure", "wrong"},
+                      {"sampling_share", 0.43},
+                      {"verdict", "fault"},
+                      {"sampling_resolution", 0.01},
+                      {"fault", "differs <much>"}};
+  std::ofstream(folder / "4.5.json") << json{{"blender", "4.5.15"}, {"closures", {agrees, wrong}}};
+  std::string page;
+  put_conformance(page, load_conformance(folder));
+  EXPECT_THAT(page, HasSubstr("4.5.15"));
+  EXPECT_THAT(page, HasSubstr("agrees (0.4 %)"));
+  EXPECT_THAT(page, HasSubstr("class=\"bad\" title=\"differs &lt;much&gt;\">+43.0 % (1.0 %)"));
+
+  json unknown = agrees;
+  unknown["verdict"] = "fine";
+  std::ofstream(folder / "5.0.json") << json{{"blender", "5.0.1"}, {"closures", json::array({unknown})}};
+  try {
+    load_conformance(folder);
+    FAIL() << "an unknown verdict was accepted";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("5.0.json: closures[0].verdict"));
+  }
+}
+
+TEST_F(ReportTest, PreviewsShowThePicturesAndTheSignOfTheDifference) {
+  load();
+  write_report(folder_);
+  const Image shown = reference::read_image(folder_ / "ball/reference.png");
+  EXPECT_NEAR(shown.pixel(kSize / 2, 3)[0], reference().mean.pixel(kSize / 2, 3)[0], 0.01);
+  const Image difference = reference::read_image(folder_ / "ball/glossy-difference.png");
+  double red = 0, blue = 0;
+  for (int y = 0; y < kSize; ++y) {
+    red += difference.pixel(kSize - 1, y)[0];
+    blue += difference.pixel(kSize - 1, y)[2];
+  }
+  EXPECT_GT(red, blue + 0.1 * kSize);  // 10 % too bright at the bright end
+}
+
+TEST_F(ReportTest, ErrorsNameFileAndKey) {
+  EXPECT_EQ(load_error(), "no error");
+  const json good = runs_;
+  const auto with = [&](const char* pointer, json value) {
+    runs_ = good;
+    runs_[json::json_pointer(pointer)] = std::move(value);
+    return load_error();
+  };
+  EXPECT_THAT(with("/format", 2), HasSubstr("ball/runs.json: format"));
+  EXPECT_THAT(with("/scene", "other"), HasSubstr("runs.json: scene"));
+  EXPECT_THAT(with("/reference/spp", "many"), HasSubstr("reference.spp"));
+  EXPECT_THAT(with("/runs/0/images/1", "absent.exr"), HasSubstr("runs[0].images[1]"));
+  EXPECT_THAT(with("/runs/0/form", "exact"), HasSubstr("runs[1].form"));
+  EXPECT_THAT(with("/runs/0/form", "../up"), HasSubstr("runs[0].form"));
+  EXPECT_THAT(with("/runs/1/cpu_seconds", {1, 2}), HasSubstr("runs[1].cpu_seconds: expected 4 numbers"));
+  EXPECT_THAT(with("/runs/1/materials/0/closures", -1), HasSubstr("runs[1].materials[0].closures"));
+  EXPECT_THAT(with("/settings/width", 32), HasSubstr("reference.image"));
+  EXPECT_THAT(with("/runs", json::array()), HasSubstr("runs: expected at least one form"));
+  runs_ = good;
+  runs_["runs"][1].erase("wall_seconds");
+  EXPECT_THAT(load_error(), HasSubstr("wall_seconds"));
+
+  runs_ = good;
+  Rendering broken = picture(1, 0, 0);
+  broken.mean.pixel(5, 7)[1] = std::nanf("");
+  reference::write_rendering(folder_ / "ball/exact-0.exr", broken);
+  EXPECT_THAT(load_error(), HasSubstr("(5, 7)"));
+}
+
+TEST_F(ReportTest, ASceneThatWasNotRenderedIsAnError) {
+  load();
+  fs::create_directories(folder_ / "unfinished");
+  std::ofstream(folder_ / "unfinished/scene.json") << "{}";
+  EXPECT_THAT(load_error(), HasSubstr("unfinished/runs.json"));
+  fs::remove_all(folder_ / "unfinished");
+  fs::remove_all(folder_ / "ball");
+  EXPECT_THROW(load_report(folder_), InputError);
+  EXPECT_THROW(load_report(folder_ / "nowhere"), InputError);
+}
+
+TEST(Statistics, RefusesWhatDoesNotFit) {
+  const std::vector<Rendering> none;
+  EXPECT_THROW(mean_of(none), std::invalid_argument);
+  const std::vector<Rendering> different{picture(1, 0, 0), Rendering{Image(2, 2), {}, {}}};
+  EXPECT_THROW(mean_of(different), std::invalid_argument);
+  Rendering black = reference();
+  black.mean = Image(kSize, kSize);
+  EXPECT_THROW(measure_difference(picture(1, 0, 0), black, "a", "b"), InputError);
+}
+
+std::vector<Rendering> noisy(double factor, int count, unsigned seed) {
+  std::vector<Rendering> out;
+  for (int i = 0; i < count; ++i) out.push_back(picture(factor, kNoise, seed + unsigned(i)));
+  return out;
+}
+
+/// A picture with grey noise of its own, which its variance layer tells.
+Rendering noisy_reference() {
+  Rendering out = reference();
+  std::mt19937 random(99);
+  std::normal_distribution<float> normal(0, kNoise / 4);
+  for (std::size_t i = 0; i < out.mean.rgb.size(); i += 3) {
+    const float noise = normal(random);
+    for (std::size_t c = 0; c < 3; ++c) out.mean.rgb[i + c] += noise;
+  }
+  std::fill(out.variance->rgb.begin(), out.variance->rgb.end(), float(sqr(kNoise / 4)));
+  out.metadata = {{"samples", 1024}};
+  return out;
+}
+
+TEST(Welch, AcceptsPicturesThatDifferInNoiseAlone) {
+  const WelchTest t = welch_test(noisy(1, 8, 1), noisy_reference(), "a", "b");
+  EXPECT_TRUE(t.passed());
+  EXPECT_EQ(t.pixels, kSize * kSize);
+  EXPECT_EQ(t.tiles, sqr(kSize / kTestTile));
+  EXPECT_GT(t.uniform, 0.01);
+  EXPECT_GE(t.accepted(), kTestAccepted);
+}
+
+TEST(Welch, PValuesAreUniformWhereTheReferenceHasNoNoise) {
+  EXPECT_GT(welch_test(noisy(1, 8, 1), reference(), "a", "b").uniform, 0.01);
+}
+
+TEST(Welch, RejectsABiasThatNoiseHides) {
+  // Seven times less than the noise of a pixel's mean: no pixel shows it, every tile does.
+  const std::vector<Rendering> pictures = noisy(1.01, 8, 1);
+  const WelchTest t = welch_test(pictures, reference(), "a", "b");
+  EXPECT_FALSE(t.passed());
+  EXPECT_GT(t.rejected_tiles, 0);
+  EXPECT_LT(t.uniform, 0.01);
+}
+
+TEST(Welch, RejectsAFewWrongPixels) {
+  std::vector<Rendering> pictures = noisy(1, 8, 1);
+  for (Rendering& r : pictures)
+    for (int x = 0; x < kSize / 4; ++x)
+      for (int c = 0; c < 3; ++c) r.mean.pixel(x, 5)[c] += 1;
+  const WelchTest t = welch_test(pictures, reference(), "a", "b");
+  EXPECT_FALSE(t.passed());
+  EXPECT_GE(t.rejected_pixels, kSize / 4);
+  EXPECT_LT(t.p.pixel(3, 5)[0], 1e-6);
+}
+
+TEST(Welch, WithoutNoiseOnlyRoundingIsForgiven) {
+  std::vector<Rendering> pictures(2, picture(1, 0, 0));
+  EXPECT_EQ(welch_test(pictures, reference(), "a", "b").worst_pixel, 1);
+  pictures.assign(2, picture(1 + 1e-6, 0, 0));
+  EXPECT_TRUE(welch_test(pictures, reference(), "a", "b").passed());
+  pictures.assign(2, picture(1 + 1e-3, 0, 0));
+  EXPECT_EQ(welch_test(pictures, reference(), "a", "b").rejected_pixels, kSize * kSize);
+}
+
+TEST(Welch, RefusesWhatItCannotJudge) {
+  EXPECT_THROW(welch_test(noisy(1, 1, 1), reference(), "a", "b"), std::invalid_argument);
+  EXPECT_THROW(welch_test(noisy(1, 2, 1), picture(1, 0, 0), "a", "b"), std::invalid_argument);
+}
+
+TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
+  // Noise falls as 1/n for both forms; "exact" starts at twice the noise and costs as much a sample.
+  runs_["convergence"] = json::array();
+  for (const int spp : {16, 256, 1024})
+    for (const char* form : {"glossy", "exact"}) {
+      const bool native = std::string(form) == "glossy";
+      json images = json::array();
+      for (unsigned i = 0; i < 4; ++i) {
+        const std::string name = fmt::format("{}-{}-{}.exr", form, spp, i);
+        const float noise = kNoise * float(std::sqrt((native ? 1. : 2.) * 16 / spp));
+        reference::write_rendering(folder_ / "ball" / name,
+                                   picture(1, noise, 1000 + unsigned(spp) * 10 + i + (native ? 0 : 5)));
+        images.push_back(name);
+      }
+      runs_["convergence"].push_back(
+          {{"form", form}, {"spp", spp}, {"images", images}, {"cpu_seconds", json::array({spp, spp, spp, spp})}});
+    }
+  const auto scenes = load();
+  const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
+  ASSERT_EQ(exact.equal_error.size(), 3u);
+  for (const auto& cost : glossy.equal_error) EXPECT_NEAR(cost.value(), 1, 1e-9);
+  for (const auto& cost : exact.equal_error) EXPECT_NEAR(cost.value(), 2, 0.1);
+  EXPECT_EQ(exact.cost, 1) << "of the longest renders, not the short ones";
+  // A rare bright path can keep noise from falling where it was measured: that is not carried on for ever.
+  for (json& point : runs_["convergence"])
+    if (point["form"] == "exact" && point["spp"] == 1024)
+      for (json& image : point["images"]) image = "exact-256-" + image.get<std::string>().substr(11);
+  EXPECT_NEAR(load()[0].forms[1].equal_error[2].value(), 8, 0.4);
+  runs_["convergence"][0]["form"] = "fitted";
+  EXPECT_THAT(load_error(), HasSubstr("convergence[0].form"));
+}
+
+TEST_F(ReportTest, EqualTimeTakesTheImagesThatFit) {
+  // The exact form costs 1.5 times as much: 4 / 1.5 = 2.7 images, of whose mean the noise is 4 / 3 that of all four.
+  const auto scenes = load();
+  const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
+  EXPECT_EQ(glossy.equal_time_images, 4);
+  EXPECT_EQ(exact.equal_time_images, 3);
+  EXPECT_NEAR(exact.equal_time.rel_mse / exact.difference.rel_mse, 4. / 3, 0.1);
+}
+
+TEST_F(ReportTest, ReadsFlipBesideTheRuns) {
+  std::ofstream(folder_ / "ball/flip.json") << R"({"exact": 0.25})";
+  const auto scenes = load();
+  EXPECT_EQ(scenes[0].forms[1].flip, 0.25);
+  EXPECT_EQ(scenes[0].forms[0].flip, std::nullopt);
+  std::ofstream(folder_ / "ball/flip.json") << R"({"exact": 2})";
+  EXPECT_THAT(load_error(), HasSubstr("flip.json: exact: expected"));
+}
+
+}  // namespace
+}  // namespace brdfc::report

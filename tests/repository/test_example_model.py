@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Following docs/add-a-model.md adds a model: its example, dropped into a copy of the sources,
+builds, equals its formula, and renders in Blender as it does in the reference renderer."""
+
+import csv
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BLENDER_PYTHON = Path(
+    os.environ.get("BRDFC_BLENDER_PYTHON", ROOT / ".env" / "blender-4.5" / "bin" / "python")
+)
+K, RHO = 2.5, (0.8, 0.6, 0.4)
+
+pytestmark = pytest.mark.full
+
+
+def run(*command, text=None):
+    done = subprocess.run([str(c) for c in command], input=text, capture_output=True, text=True)
+    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def tool(tmp_path_factory):
+    """The tool, built from a copy of the sources with the example of the docs as a new model."""
+    page = (ROOT / "docs" / "add-a-model.md").read_text(encoding="utf-8")
+    found = re.findall(
+        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", page, re.S
+    )
+    assert len(found) == 1
+    path, text = found[0]
+    source = tmp_path_factory.mktemp("example") / "source"
+    skip = shutil.ignore_patterns("build", ".env", ".git", "__pycache__", ".*_cache")
+    shutil.copytree(ROOT, source, ignore=skip)
+    assert not (source / path).exists()
+    (source / path).write_text(text, encoding="utf-8")
+    build = source / "build"
+    run("cmake", "-S", source, "-B", build, "-G", "Ninja", "-DBUILD_TESTING=OFF")
+    run("cmake", "--build", build, "--target", "brdfc")
+    return build / "brdfc"
+
+
+@pytest.fixture(scope="module")
+def extension(tool, tmp_path_factory):
+    out = tmp_path_factory.mktemp("extension")
+    run(tool, "build", "--model", "minnaert", "--out", out)
+    (zip_file,) = out.glob("brdfc_shaders-*.zip")
+    return zip_file
+
+
+def scene(environment, camera, shape):
+    return {
+        "name": "example",
+        "description": "The model of docs/add-a-model.md",
+        "settings": {"width": 48, "height": 48, "spp": 256, "seed": 1, "max_bounces": 1},
+        "camera": camera,
+        "materials": {"m": {"model": "minnaert", "parameters": {"k": K, "rho": list(RHO)}}},
+        "objects": [{"name": "thing", "shape": shape, "material": "m"}],
+        "lights": [],
+        "environment": environment,
+    }
+
+
+@pytest.fixture
+def renderers(tool, extension, tmp_path):
+    """(reference, blender, compare) for the scene that reference() was given."""
+
+    def reference(content, spp):
+        source = tmp_path / "example.json"
+        source.write_text(json.dumps(content), encoding="utf-8")
+        run(tool, "scene", source, "--out", tmp_path)
+        out = tmp_path / "reference.exr"
+        run(tool, "render", tmp_path / "scene.json", "--out", out, "--spp", spp)
+        return out
+
+    def blender(seed):
+        out = tmp_path / f"blender-{seed}.exr"
+        script = ROOT / "script" / "render_scene.py"
+        command = [BLENDER_PYTHON, script, "--extension", extension, "--seed", seed]
+        (record,) = json.loads(run(*command, "--scene", tmp_path / "scene.json", "--out", out))
+        assert record["materials"]["m"][0]["model"] == "minnaert"
+        return out
+
+    def compare(a, b):
+        return json.loads(run(tool, "compare", a, b, "--json"))
+
+    return reference, blender, compare
+
+
+def test_parameters_are_listed(tool):
+    models = {m["name"]: m for m in json.loads(run(tool, "list", "--json"))}
+    parameters = {p["name"]: p for p in models["minnaert"]["parameters"]}
+    assert parameters["k"]["default"] == 1.5
+    assert parameters["rho"]["default"] == [0.8, 0.8, 0.8]
+
+
+def test_values_equal_the_formula(tool):
+    lines = ["wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"]
+    pairs = [(0.1, 0.9), (0.7, 0.7), (1.2, 0.3), (1.5, 1.4)]
+    for theta_i, theta_o in pairs:
+        wi = (math.sin(theta_i), 0.0, math.cos(theta_i))
+        wo = (0.0, math.sin(theta_o), math.cos(theta_o))
+        lines.append(",".join(repr(v) for v in (*wi, *wo)))
+    rho = ",".join(map(str, RHO))
+    out = run(tool, "eval", "minnaert", f"k={K}", f"rho={rho}", text="\n".join(lines) + "\n")
+    rows = list(csv.DictReader(out.splitlines()))
+    assert len(rows) == len(pairs)
+    for (theta_i, theta_o), row in zip(pairs, rows, strict=True):
+        f = (K + 1) / (2 * math.pi) * (math.cos(theta_i) * math.cos(theta_o)) ** (K - 1)
+        assert [float(row[c]) for c in ("f_r", "f_g", "f_b")] == pytest.approx(
+            [r * f for r in RHO], rel=1e-12
+        )
+        pdf = (K + 1) / (2 * math.pi) * math.cos(theta_i) ** K
+        assert float(row["pdf"]) == pytest.approx(pdf, rel=1e-12)
+
+
+def test_checks_find_no_fault(tool):
+    run(tool, "check", "minnaert")
+
+
+def test_uniform_light_gives_the_albedo(renderers):
+    """A plane seen at 60 degrees under light of radiance 1 reflects rho cos^(k - 1), exactly."""
+    reference, blender, compare = renderers
+    camera = {
+        "type": "orthographic",
+        "position": [0, -10 * math.sin(math.pi / 3), 5],
+        "look_at": [0, 0, 0],
+        "up": [0, 0, 1],
+        "height": 0.5,
+    }
+    shape = {"type": "quad", "size": [4, 4]}
+    truth = reference(scene({"color": [1, 1, 1]}, camera, shape), spp=64)
+    result = compare(blender(seed=1), truth)
+    expected = sum(RHO) / 3 * 0.5 ** (K - 1)
+    assert result["mean_b"] == pytest.approx(expected, rel=1e-3)
+    assert result["mean_a"] == pytest.approx(expected, rel=1e-3)
+
+
+def test_structured_light_agrees_with_the_reference(renderers):
+    """Under light with structure a wrong distribution of directions would show."""
+    reference, blender, compare = renderers
+    camera = {
+        "type": "perspective",
+        "position": [0, -4, 1],
+        "look_at": [0, 0, 0],
+        "up": [0, 0, 1],
+        "fov_y_degrees": 25,
+    }
+    shape = {"type": "sphere", "radius": 1}
+    truth = reference(scene({"procedural": "checker"}, camera, shape), spp=2048)
+    one, two = blender(seed=1), blender(seed=2)
+    against_truth = compare(one, truth)
+    assert against_truth["bias"] / against_truth["mean_b"] == pytest.approx(0, abs=0.01)
+    # Two pictures with independent noise are twice as far apart as one is from the truth.
+    assert against_truth["relmse"] < 0.75 * compare(one, two)["relmse"]
