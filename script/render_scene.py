@@ -78,9 +78,10 @@ def cpu_seconds():
 
 
 def take_even_block(cycles, samples):
-    """Sets how many samples are taken, and which: a block of Cycles' sequence that is as even as its
-    first ones, without the very first. Cycles sends that through the centre of each pixel whatever
-    the seed, where a form that draws from where the path is would draw the same in every picture.
+    """Sets how many samples are taken, and which: a block of Cycles' sequence that is as even as
+    its first ones, without the very first. Cycles sends that through the centre of each pixel
+    whatever the seed, where a form that draws from where the path is would draw the same in every
+    picture.
     """
     first = 1 << (samples - 1).bit_length()  # blocks of powers of two are even
     cycles.samples, cycles.sample_offset = first + samples, first
