@@ -338,7 +338,9 @@ class AimedText {
            "            } else {\n                int chosen = int(tossed);\n" + indented(steps.under.statements, 4) +
            "            }\n"
            "            ray_x = drawn_x;\n            ray_y = drawn_y;\n            ray_z = drawn_z;\n";
-    out += earlier_lobes("", steps.meet.statements);
+    // Neither lamp nor seam reaches out from under its lobe.
+    out += earlier_lobes("if (dot(lobe_towards[earlier], vector(drawn_x, drawn_y, drawn_z)) > lobe_end[earlier]) ",
+                         steps.meet.statements);
     out +=
         "            wi_x = drawn_x;\n            wi_y = drawn_y;\n            wi_z = drawn_z;\n"
         "        }\n"
