@@ -176,6 +176,19 @@ template <class T> struct Coupled {
     return ClosureSum<T>{burley, ramp, Closure<T>(ClosureKind::Reflection, mirror(wo))};
   }
 
+  /// The matte term is one function of wi times one of wo: a ramp through it. Its weight is the matte term's albedo.
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const FullCoat<T> coat(r0);
+    const bool full = fresnel == Dielectric;
+    const T matte = named("matte", full ? coat.nu * coat.That(wo.z) : (T(1) - r0) * f(wo.z));
+    Closure<T> ramp(ClosureKind::DiffuseRamp, rm * matte);
+    for (int i = 0; i < kRampSize; ++i) {
+      const T c(double(i) / (kRampSize - 1));
+      ramp.ramp[std::size_t(i)] = Rgb<T>(full ? coat.That(c) * c / coat.S() : T(1.05) * f(c) * c);
+    }
+    return {ramp};
+  }
+
   /// Large enough that Cycles does not drop the closure (it does at 1e-5), small beside any albedo that matters.
   static constexpr double kRampWeight = 1e-3;
 };
