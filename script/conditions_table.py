@@ -7,6 +7,8 @@ import csv
 import json
 from pathlib import Path
 
+from markdown_table import heading, line
+
 INTRODUCTION = """\
 # What settings and scenes do to the forms
 
@@ -70,12 +72,8 @@ def markdown(versions, page=""):
         if form not in measured:
             lines += [f"## {form}", "", kept[form], ""]
             continue
-        lines += [
-            f"## {form}",
-            "",
-            "| condition | " + " | ".join(f"Blender {v}" for v in versions) + " |",
-            "|---" * (len(versions) + 1) + "|",
-        ]
+        lines += [f"## {form}", ""]
+        lines += heading("condition", *(f"Blender {v}" for v in versions))
         for condition in conditions_of(versions):
             found = [
                 next((r for r in rows if r["form"] == form and r["condition"] == condition), None)
@@ -83,7 +81,7 @@ def markdown(versions, page=""):
             ]
             if any(found):
                 cells = [cell(r) if r else "" for r in found]
-                lines.append(f"| {condition} | " + " | ".join(cells) + " |")
+                lines.append(line(condition, *cells))
         lines.append("")
     return "\n".join(lines)
 

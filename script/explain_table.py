@@ -9,6 +9,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from markdown_table import heading, line
+
 # Options that show most: many materials of one model, a form that is too dear, forms that change.
 SCENES = {
     "as-fig2": [],
@@ -55,14 +57,6 @@ def arguments(scene, options):
     return ["build", "--scene", f"scenes/{scene}.json", *options, "--explain"]
 
 
-def row(*cells):
-    return f"| {' | '.join(str(c).replace('|', chr(92) + '|') for c in cells)} |"
-
-
-def header(*cells):
-    return [row(*cells), "|---" * len(cells) + "|"]
-
-
 def change(before, after):
     return before if before == after else f"{before} → {after}"
 
@@ -94,20 +88,20 @@ def material_rows(model):
         )
 
     for alike, materials in itertools.groupby(model["material_forms"], cells):
-        yield row(", ".join(m["material"] for m in materials), *alike)
+        yield line(", ".join(m["material"] for m in materials), *alike)
 
 
 def size_rows(model):
     for form in model["forms"]:
         sizes = (change(f"{form['before'][key]:,}", f"{form['after'][key]:,}") for key in SIZES)
-        yield row(f"`{model['model']}`", form["form"], *sizes)
+        yield line(f"`{model['model']}`", form["form"], *sizes)
 
 
 def reasons(model):
-    lines = [f"### {model['model']}", "", *header("Form", "Cost", "Error", "Taken", "Why")]
+    lines = [f"### {model['model']}", "", *heading("Form", "Cost", "Error", "Taken", "Why")]
     for c in model["choices"]:
         taken = "**yes**" if c["taken"] else "no"
-        lines.append(row(c["form"], cost(c["cost"]), error(c["error"]), taken, c["why"]))
+        lines.append(line(c["form"], cost(c["cost"]), error(c["error"]), taken, c["why"]))
     lines.append("")
     if model["left_out"]:
         lines += ["Left out:", "", *(f"- {reason}" for reason in model["left_out"]), ""]
@@ -125,9 +119,9 @@ def section(tool, scene, options):
         f"    build/brdfc {' '.join(arguments(scene, options))} --out DIR",
         "",
     ]
-    lines += header("Material", "Model", "Form", "Error", "Cost")
+    lines += heading("Material", "Model", "Form", "Error", "Cost")
     lines += itertools.chain.from_iterable(map(material_rows, models))
-    lines += ["", *header("Model", "Form", *SIZES.values())]
+    lines += ["", *heading("Model", "Form", *SIZES.values())]
     lines += itertools.chain.from_iterable(map(size_rows, models))
     lines.append("")
     for model in models:

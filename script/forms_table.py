@@ -12,6 +12,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from markdown_table import heading, line, percent
+
 FORMS = ("exact", "aimed", "sampled", "fitted", "twin")
 
 #: What f is a polynomial of, for models that have such parameters.
@@ -70,9 +72,9 @@ def cell(entry, name):
 def forms(tool):
     with tempfile.TemporaryDirectory(prefix="brdfc-forms-") as folder:
         models = built(tool, Path(folder))
-    lines = [f"| Model | {' | '.join(FORMS)} |", "|---" * (len(FORMS) + 1) + "|"]
+    lines = heading("Model", *FORMS)
     for name, entry in models.items():
-        lines.append(f"| `{name}` | {' | '.join(cell(entry, form) for form in FORMS)} |")
+        lines.append(line(f"`{name}`", *(cell(entry, form) for form in FORMS)))
     return "\n".join(lines)
 
 
@@ -87,10 +89,6 @@ def by_view(tool, *arguments):
     return [float(row["relative_l1"]) for row in csv.DictReader(io.StringIO(done.stdout))]
 
 
-def line(*cells):
-    return f"| {' | '.join(cells)} |"
-
-
 def spread(off):
     """Half of the views do not exceed the first, 95 % the second, none the third."""
     off = sorted(off)
@@ -98,15 +96,9 @@ def spread(off):
     return [percent(part) for part in parts]
 
 
-def percent(part):
-    """Of two digits; 0 where only rounding is left."""
-    return "0" if part < 1e-5 else f"{float(f'{100 * part:.2g}'):g} %"
-
-
 def errors(columns, found):
     """`found`: the first cells of a row, and what each view is off by."""
-    lines = [line(*columns, "half of the views below", "95 % of the views below", "worst view")]
-    lines.append("|---" * (len(columns) + 3) + "|")
+    lines = heading(*columns, "half of the views below", "95 % of the views below", "worst view")
     for first, off in sorted(found, key=lambda row: sorted(row[1])[len(row[1]) // 2]):
         lines.append(line(*first, *spread(off)))
     return lines

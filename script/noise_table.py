@@ -3,7 +3,8 @@
 """Noise and CPU time of every form of every model under many kinds of light, in units of Blender's
 own Glossy node in the same scene.
 
-Runs in a Python that has `bpy`. The scenes are those of script/noise_scenes.py. Noise is the
+Runs in a Python that has `bpy`. The scenes are those of script/noise_scenes.py, the page is
+that of script/noise_page.py. Noise is the
 variance between pictures of several seeds, so it needs no truth; only what it is divided by does,
 for which the steadiest form of the model serves. What is measured is kept beside the pictures, by
 the contents of the extension, so that a run that was stopped goes on.
@@ -28,6 +29,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from noise_page import BLOCK, NODE, RIGHT, STEADY, UNIT, Page
 
 FIELDS = (
     *("model", "values", "form", "condition", "samples", "seeds", "pixels"),
@@ -41,7 +43,6 @@ NATIVE = {
     "Glossy": ("ShaderNodeBsdfAnisotropic", {"Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.4}),
     "Diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.8, 0.8, 1)}),
 }
-UNIT, NODE = "Glossy", "node"
 
 #: Beside the default values of every model: rough, stiff and stretched ones of some.
 BESIDE = {
@@ -69,12 +70,6 @@ PICKED = (
     "ward",
 )
 
-#: Which form's picture noise is divided by, where a model has several: the one with least noise.
-STEADY = ("exact", "aimed", "fitted", "twin")
-#: Which form is right on average without an assumption about lamps.
-RIGHT = ("exact", "sampled")
-#: Side of the squares of pixels whose means are compared.
-BLOCK = 6
 #: Mean of (f - f0)^2 / (f0^2 + this), as in docs/conventions.md.
 FLOOR = 0.01
 
@@ -503,273 +498,6 @@ def cost_jobs(jobs, table, options):
         if all((model, "", f, job["condition"]) in table.rows for f in forms):
             continue
         yield job | {"forms": forms, "repeat": options.repeat, "samples": 64}
-
-
-# ---- the page ------------------------------------------------------------------------------------
-
-INTRODUCTION = """\
-# Noise and CPU time by model and lamp
-
-Made by `script/noise` in Blender 4.5; the figures, with their errors, are in [noise.csv](noise.csv)
-and [noise-cost.csv](noise-cost.csv). A ball with the model lies on a grey floor under one kind of
-light and, where that is a lamp, the dim grey world of a new file. Settings are those of a new file
-(indirect light clamped at 10, Filter Glossy 1, light tree, caustics) with adaptive sampling and
-denoising off, so that samples are equal, OSL on, and one thread. Parameters have their defaults but
-for those named.
-
-**Noise** is the mean over the ball's pixels of the variance over the squared radiance + 0.01:
-relMSE, 64 samples a pixel unless said otherwise. The variance is that between pictures of {seeds}
-seeds (2 where there are 1,024 samples). The radiance is that of the form of the model with least
-noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. *unmet*: the form
-shows less than 80 % of the light of that form, because what comes as rare, bright dots came in none
-of the pictures; medians take that for more than any number. Where noise is thousands a few dots
-make it: take it as rough. The unit is the noise of Blender's own Glossy node (GGX, colour 0.8,
-roughness 0.4) in the same scene. Grain, as the eye sees it, is the square root.
-
-**Cost** is CPU time a sample in units of that node, forms and node taking turns in one process;
-compiling is left out. **Noise x cost** is how much longer than with the Glossy node a picture of
-the same noise takes.
-"""
-
-
-#: The noise of a form whose pictures lack light that comes as rare dots, of which there was none.
-UNMET = math.inf
-#: A form that shows less than this share of the light has not met the lamps.
-MET = 0.8
-
-
-def number(x):
-    if x == UNMET:
-        return "unmet"
-    if x >= 100:
-        return f"{float(f'{x:.2g}'):.0f}" if x < 1e5 else f"{x:.0e}".replace("e+0", "e")
-    return f"{x:.2g}" if x >= 0.01 else f"{x:.1g}"
-
-
-def line(*cells):
-    return f"| {' | '.join(str(c) for c in cells)} |"
-
-
-def heading(*cells):
-    return [line(*cells), "|---" * len(cells) + "|"]
-
-
-def percentile_rows(columns):
-    """Median and worst of each column of numbers."""
-    some = [[x for x in column if x is not None] for column in columns]
-    yield line("**median**", *(number(statistics.median(c)) if c else "" for c in some))
-    yield line("**worst**", *(number(max(c)) if c else "" for c in some))
-
-
-class Page:
-    def __init__(self, rows, costs, conditions):
-        self.rows, self.conditions = rows, conditions
-        self.noise = {}
-        for row in rows:
-            place = row["condition"], int(row["samples"])
-            self.noise.setdefault(row["form"], {}).setdefault(case_key(row), {})[place] = row
-        self.costs = {
-            (r["model"], r["values"], r["form"], r["condition"]): float(r["cost"]) for r in costs
-        }
-        order = list(conditions)
-        places = {(r["condition"], int(r["samples"])) for r in rows if r["condition"] in order}
-        self.places = sorted(places, key=lambda p: (order.index(p[0]), p[1]))
-        self.by_default = {
-            (name, n) for name, entry in conditions.items() for n in entry["samples"]
-        }
-        self.forms = [f for f in dict.fromkeys((*STEADY, "sampled")) if f in self.noise]
-        self.forms += [f for f in self.noise if f not in (*self.forms, NODE)]
-
-    def title(self, place):
-        name, samples = place
-        many = "" if samples == 64 else f", {samples:,} samples"
-        return self.conditions[name]["title"] + many
-
-    def unit(self, place):
-        row = self.noise.get(NODE, {}).get((UNIT, ""), {}).get(place)
-        return float(row["noise"]) if row else None
-
-    def met(self, row):
-        """Whether the form shows the light that the steadiest form of the model shows."""
-        place = row["condition"], int(row["samples"])
-        steady = self.noise.get(row["divided_by"], {}).get(case_key(row), {}).get(place, row)
-        mean, of = float(row["mean"]), float(steady["mean"])
-        error = math.hypot(float(row["mean_error"]), float(steady["mean_error"]))
-        return mean >= MET * of or mean + 5 * error >= of
-
-    def relative(self, form, case, place):
-        row, unit = self.noise[form].get(case, {}).get(place), self.unit(place)
-        if not row or not unit:
-            return None
-        return float(row["noise"]) / unit if self.met(row) else UNMET
-
-    def cost(self, form, case, place):
-        """That of the model's defaults, where lamps are as many."""
-        timed = self.conditions[place[0]]["timed_as"]
-        return self.costs.get((case[0], "", form, timed))
-
-    def common(self):
-        """Places that tables of all models have: what few models are measured in is apart."""
-        return [
-            p for p in self.places if p in self.by_default and not self.conditions[p[0]]["picked"]
-        ]
-
-    def table(self, form, value):
-        places = self.common()
-        lines = heading("Model", *(self.title(p) for p in places))
-        columns = [[] for _ in places]
-        for case in self.noise[form]:
-            cells = [value(form, case, p) for p in places]
-            if not any(c is not None for c in cells):
-                continue
-            for column, cell in zip(columns, cells, strict=True):
-                column.append(cell)
-            lines.append(line(name_of(case), *("" if c is None else number(c) for c in cells)))
-        return [*lines, *percentile_rows(columns), ""]
-
-    def dear(self, form, case, place):
-        noise, cost = self.relative(form, case, place), self.cost(form, case, place)
-        return None if noise is None or cost is None else noise * cost
-
-    def summary(self):
-        places = self.common()
-        lines = ["## Median and worst by form", ""]
-        lines += heading("Form", "", *(self.title(p) for p in places))
-        for form in self.forms:
-            found = [
-                [x for c in self.noise[form] if (x := self.relative(form, c, p)) is not None]
-                for p in places
-            ]
-            for what, of in (("median", statistics.median), ("worst", max)):
-                cells = (number(of(f)) if f else "" for f in found)
-                lines.append(line(f"{form}" if what == "median" else "", what, *cells))
-        return [*lines, ""]
-
-    def nodes(self):
-        lines = [
-            "## Blender's own nodes",
-            "",
-            "Noise as it is, of which the first row is the unit.",
-        ]
-        lines += ["", *heading("Node", *(self.title(p) for p in self.common()))]
-        for case, found in self.noise.get(NODE, {}).items():
-            cells = (number(float(found[p]["noise"])) if p in found else "" for p in self.common())
-            lines.append(line(case[0], *cells))
-        return [*lines, ""]
-
-    def cost_table(self):
-        timed = [c for c in self.conditions if any(k[3] == c for k in self.costs)]
-        if not timed:
-            return []
-        lines = ["## Cost", "", "CPU time a sample in units of the Glossy node."]
-        titles = [self.conditions[c]["title"] for c in timed]
-        lines += ["", *heading("Model", "form", *titles)]
-        for model, form in dict.fromkeys((k[0], k[2]) for k in self.costs):
-            cells = (self.costs.get((model, "", form, c)) for c in timed)
-            lines.append(
-                line(f"`{model}`", form, *("" if c is None else f"{c:.2f}" for c in cells))
-            )
-        return [*lines, ""]
-
-    def right(self, case, place):
-        """(form, row) of what is right on average there, of the most samples."""
-        for form in RIGHT:
-            found = self.noise.get(form, {}).get(case, {})
-            of = [p for p in found if p[0] == place[0]]
-            if of:
-                most = max(of, key=lambda p: p[1])
-                return form, found[most]
-        return None, None
-
-    def off(self, form, case, place):
-        """Relative difference of the means and its standard error."""
-        row = self.noise[form].get(case, {}).get(place)
-        name, right = self.right(case, place)
-        if row is None or right is None or name == form or not self.met(right):
-            return None
-        mean, of = float(row["mean"]), float(right["mean"])
-        error = math.hypot(float(row["mean_error"]), float(right["mean_error"]))
-        return ((mean - of) / of, error / of) if of > 0 else None
-
-    def means(self):
-        lines = ["## Means", ""]
-        lines += [
-            "Mean radiance of the ball against that of the exact form, or of the sampled form",
-            "where there is no exact one: difference and its standard error in percent. Of the",
-            "other form the most samples count that were measured. Bold is what exceeds 1 % and 5",
-            "standard errors. The error comes from the spread of a few pictures: where light is",
-            "met as rare dots alone, it is larger than it says; nothing stands where the form to",
-            "compare with has not met the lamp.",
-            "",
-        ]
-        for form in self.forms:
-            places = self.common()
-            rows = []
-            for case in self.noise[form]:
-                found = [self.off(form, case, p) for p in places]
-                if any(found):
-                    rows.append(line(name_of(case), *(percent(f) for f in found)))
-            if rows:
-                lines += [f"### {form}", "", *heading("Model", *(self.title(p) for p in places))]
-                lines += [*rows, ""]
-        return lines if len(lines) > 7 else []
-
-    def penumbras(self):
-        places = [p for p in self.places if self.conditions[p[0]]["picked"]]
-        rows = []
-        for place in places:
-            for form in self.forms:
-                for case in self.noise[form]:
-                    if not (off := self.off(form, case, place)):
-                        continue
-                    row = self.noise[form][case][place]
-                    apart = [f"{100 * float(row[k]):.2f}" if row[k] else "" for k in APART]
-                    rows.append(line(name_of(case), form, f"{place[1]:,}", percent(off), *apart))
-        if not rows:
-            return []
-        return [
-            "## In a penumbra",
-            "",
-            "A floor that has the model where the edge of a ball's shadow crosses it, under a 1 m",
-            "area lamp, seen from the mirror direction; only pixels that see part of the lamp",
-            "count. Difference of the mean from that of the exact or sampled form, and relative L1",
-            f"of squares of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in",
-            "percent.",
-            "",
-            *heading("Model", "form", "samples", "mean", "squares", "by noise"),
-            *rows,
-            "",
-        ]
-
-    def text(self, seeds):
-        lines = [INTRODUCTION.format(seeds=seeds)]
-        lines += self.summary() + self.nodes()
-        for form in self.forms:
-            lines += [f"## {form}", "", "Noise in units of the Glossy node.", ""]
-            lines += self.table(form, self.relative)
-            if any(k[2] == form for k in self.costs):
-                lines += ["Noise x cost.", "", *self.table(form, self.dear)]
-        lines += self.cost_table() + self.means() + self.penumbras()
-        return "\n".join(lines)
-
-
-APART = ("apart", "apart_error")
-
-
-def case_key(row):
-    return row["model"], row["values"]
-
-
-def name_of(case):
-    return f"`{' '.join(case).strip()}`"
-
-
-def percent(off):
-    if off is None:
-        return ""
-    value, error = (100 * x for x in off)
-    text = f"{value:+.1f} ± {error:.1f}" if error >= 0.05 else f"{value:+.2f} ± {error:.2f}"
-    return f"**{text}**" if abs(value) > 1 and abs(value) > 5 * error else text
 
 
 def main():

@@ -7,6 +7,8 @@ import itertools
 import re
 from pathlib import Path
 
+from markdown_table import heading, line
+
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, DRAWING = ROOT / "docs/tables/rooms.md", ROOT / "docs/tables/rooms.svg"
 
@@ -115,12 +117,12 @@ def page(rooms, below):
         "",
         "![Rooms and arrows](rooms.svg)",
         "",
-        "| Room of `generator/` | What it is for | Includes | Lines, about |",
-        "|---|---|---|---|",
+        *heading("Room of `generator/`", "What it is for", "Includes", "Lines, about"),
     ]
     for room, (doc, _) in rooms.items():
         count = sum(len(text.splitlines()) for text in sources(room))
-        lines.append(f"| `{room}` | {doc} | {', '.join(below[room]) or '-'} | {round(count, -2)} |")
+        uses = ", ".join(below[room]) or "-"
+        lines.append(line(f"`{room}`", doc, uses, round(count, -2)))
     return "\n".join([*lines, ""])
 
 

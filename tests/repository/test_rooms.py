@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rooms include what they link, which is above them; the page that draws them is that of now."""
 
-import importlib.util
 import re
 from pathlib import Path
 
 import pytest
+import rooms_page
 
 ROOT = Path(__file__).resolve().parents[2]
-SCRIPT = importlib.util.spec_from_file_location("rooms_page", ROOT / "script" / "rooms_page.py")
-rooms_page = importlib.util.module_from_spec(SCRIPT)
-SCRIPT.loader.exec_module(rooms_page)
 ROOMS = rooms_page.listed()
 BELOW = rooms_page.included(ROOMS)
 

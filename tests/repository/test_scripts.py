@@ -1,20 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the scripts of the report and of the conditions' page decide without Blender."""
 
-import importlib.util
-from pathlib import Path
+from importlib import import_module as script
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def script(name):
-    spec = importlib.util.spec_from_file_location(name, ROOT / "script" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
 
 MODELS = {
     "plain": {"auto": "exact", "representations": {"exact": {}, "sampled": {}}},
