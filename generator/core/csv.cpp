@@ -6,8 +6,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 namespace {
 
 std::string trim(const std::string& s) {
@@ -105,5 +104,4 @@ void CsvWriter::finish() {
   if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

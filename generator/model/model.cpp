@@ -4,20 +4,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <ranges>
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 namespace {
 
 std::map<std::string, std::unique_ptr<Model>>& registry() {
   static std::map<std::string, std::unique_ptr<Model>> all;
   return all;
-}
-
-template <class Names> std::string join(const Names& names) {
-  std::string text;
-  for (const auto& n : names) text += (text.empty() ? "" : ", ") + std::string(n);
-  return text;
 }
 
 double parse_number(const std::string& model, const std::string& name, const std::string& text) {
@@ -55,9 +49,7 @@ const std::map<std::string, std::unique_ptr<Model>>& models() { return registry(
 const Model& find_model(const std::string& name) {
   const auto it = registry().find(name);
   if (it != registry().end()) return *it->second;
-  std::vector<std::string> names;
-  for (const auto& [n, m] : registry()) names.push_back(n);
-  input_error("unknown model '{}': expected one of {}", name, join(names));
+  input_error("unknown model '{}': expected one of {}", name, fmt::join(std::views::keys(registry()), ", "));
 }
 
 bool register_model(std::unique_ptr<Model> model) {
@@ -80,7 +72,7 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
     if (info.param(name)) continue;
     std::vector<std::string> names;
     for (const ParamInfo& p : info.params) names.push_back(p.name);
-    input_error("{}: unknown parameter '{}': expected one of {}", info.name, name, join(names));
+    input_error("{}: unknown parameter '{}': expected one of {}", info.name, name, fmt::join(names, ", "));
   }
   for (const ParamInfo& p : info.params) {
     const auto it = given.find(p.name);
@@ -115,7 +107,7 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
         if (it != given.end()) {
           const auto* s = std::get_if<std::string>(&it->second);
           if (!s || std::find(p.choices.begin(), p.choices.end(), *s) == p.choices.end())
-            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, join(p.choices),
+            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, fmt::join(p.choices, ", "),
                         s ? *s : "a number");
           text = *s;
         }
@@ -180,5 +172,4 @@ std::string format_values(const ModelInfo& info, const ParamValues& values) {
   return text;
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

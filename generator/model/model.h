@@ -33,8 +33,7 @@
 #include "core/vec.h"
 #include "trace/expr.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 enum class ParamKind { Number, Color, Choice };
 
@@ -418,5 +417,4 @@ template <template <class> class M> class ModelOf final : public Model {
   const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>()); \
   }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model
