@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/csv.h"
 
-#include <charconv>
 #include <cmath>
 
 #include "core/error.h"
+#include "core/parse.h"
 
 namespace brdfc::inline core {
 namespace {
@@ -65,11 +65,10 @@ bool CsvReader::next(std::vector<double>& row) {
   row.clear();
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const std::string& text = fields[where_[i]];
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    const auto value = parse(text);
+    if (!value || !std::isfinite(*value))
       input_error("{}: {}: expected a finite number, got '{}'", where(), columns_[i], text);
-    row.push_back(value);
+    row.push_back(*value);
   }
   return true;
 }

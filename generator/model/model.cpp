@@ -2,9 +2,10 @@
 #include "model/model.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <ranges>
+
+#include "core/parse.h"
 
 namespace brdfc::inline model {
 namespace {
@@ -15,11 +16,8 @@ std::map<std::string, std::unique_ptr<Model>>& registry() {
 }
 
 double parse_number(const std::string& model, const std::string& name, const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    input_error("{}: {}: expected a number, got '{}'", model, name, text);
-  return value;
+  if (const auto value = parse(text)) return *value;
+  input_error("{}: {}: expected a number, got '{}'", model, name, text);
 }
 
 void check_range(const ModelInfo& m, const ParamInfo& p, double value) {
@@ -50,6 +48,13 @@ const Model& find_model(const std::string& name) {
   const auto it = registry().find(name);
   if (it != registry().end()) return *it->second;
   input_error("unknown model '{}': expected one of {}", name, fmt::join(std::views::keys(registry()), ", "));
+}
+
+std::vector<const Model*> models_named(const std::string& name) {
+  if (!name.empty()) return {&find_model(name)};
+  std::vector<const Model*> all;
+  for (const auto& [n, model] : registry()) all.push_back(model.get());
+  return all;
 }
 
 bool register_model(std::unique_ptr<Model> model) {

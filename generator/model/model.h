@@ -167,6 +167,8 @@ std::string format_values(const ModelInfo&, const ParamValues&);
 const std::map<std::string, std::unique_ptr<Model>>& models();
 /// Throws InputError that lists the known names.
 const Model& find_model(const std::string& name);
+/// That one, or without a name all of them.
+std::vector<const Model*> models_named(const std::string& name);
 
 /// Called by BRDFC_MODEL; a name taken twice throws std::logic_error.
 bool register_model(std::unique_ptr<Model>);
