@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 
 #include "core/parse.h"
 
@@ -47,7 +46,9 @@ const std::map<std::string, std::unique_ptr<Model>>& models() { return registry(
 const Model& find_model(const std::string& name) {
   const auto it = registry().find(name);
   if (it != registry().end()) return *it->second;
-  input_error("unknown model '{}': expected one of {}", name, fmt::join(std::views::keys(registry()), ", "));
+  std::vector<std::string> names;
+  for (const auto& [n, model] : registry()) names.push_back(n);
+  input_error("unknown model '{}': expected one of {}", name, fmt::join(names, ", "));
 }
 
 std::vector<const Model*> models_named(const std::string& name) {
