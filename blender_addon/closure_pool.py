@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Counts what materials take of the memory that OptiX has for the closures of a shading point.
 
-Cycles does not check whether they fit; sizes are the generator's (represent/closure_pool.h).
+Cycles does not check whether they fit; sizes are the generator's (closures/closure_pool.h).
 """
 
 from dataclasses import dataclass

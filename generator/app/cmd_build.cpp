@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -13,6 +12,7 @@
 
 #include "app/commands.h"
 #include "core/data_dir.h"
+#include "core/parse.h"
 #include "forms/aimed.h"
 #include "forms/representation.h"
 #include "pack/pack.h"
@@ -162,13 +162,9 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
 }
 
 /// A finite number, which may end in `unit`.
-std::optional<double> parse_number(const std::string& text, char unit) {
-  const char *first = text.data(), *last = first + text.size();
-  double value = 0;
-  const auto [end, error] = std::from_chars(first, last, value);
-  const bool ends = end == last || (end + 1 == last && *end == unit);
-  if (error != std::errc() || !ends || !std::isfinite(value)) return std::nullopt;
-  return value;
+std::optional<double> parse_number(std::string_view text, char unit) {
+  const auto value = parse(text.substr(0, text.size() - text.ends_with(unit)));
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 /// A budget of time in units of Blender's Glossy node.

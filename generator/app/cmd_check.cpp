@@ -39,11 +39,7 @@ void add_check_command(CLI::App& app) {
       fmt::print("{}", measure::property_table(true));
       return;
     }
-    std::vector<const Model*> chosen;
-    if (o->model.empty())
-      for (const auto& [name, m] : models()) chosen.push_back(m.get());
-    else
-      chosen.push_back(&find_model(o->model));
+    const std::vector<const Model*> chosen = models_named(o->model);
 
     nlohmann::ordered_json all = nlohmann::ordered_json::array();
     int failed = 0;

@@ -30,11 +30,7 @@ void add_stability_command(CLI::App& app) {
   cmd->add_option("--page", o->page, "Folder for a page of maps of the errors");
   cmd->add_option("--seed", o->hunt.seed, "Seed of parameters and directions");
   cmd->callback([o] {
-    std::vector<const Model*> chosen;
-    if (o->model.empty())
-      for (const auto& [name, m] : models()) chosen.push_back(m.get());
-    else
-      chosen.push_back(&find_model(o->model));
+    const std::vector<const Model*> chosen = models_named(o->model);
     int failed = 0;
     for (const Model* m : chosen) {
       fmt::print(stderr, "{} ...\n", m->info().name);

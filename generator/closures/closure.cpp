@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "closures/closure.h"
 
-namespace brdfc {
-inline namespace closures {
+namespace brdfc::inline closures {
 namespace {
 
 /// Linear look-up of a ramp at a position in [0, 1]; positions outside take the end entries.
@@ -38,5 +37,4 @@ int slots(ClosureKind kind) {
   }
 }
 
-}  // namespace closures
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

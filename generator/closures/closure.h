@@ -10,8 +10,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace closures {
+namespace brdfc::inline closures {
 
 enum class ClosureKind {
   Diffuse,      ///< diffuse(N):             cos / pi
@@ -179,5 +178,4 @@ inline constexpr int kMaxClosures = 64;
 /// What a closure costs of those slots: a ramp needs extra storage for its colours. Measured.
 int slots(ClosureKind);
 
-}  // namespace closures
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "closures/closure_pool.h"
 
-namespace brdfc {
-inline namespace closures {
+namespace brdfc::inline closures {
 
 int pool_bytes(ClosureKind kind) {
   // OSLClosureComponent, which is an identifier and a weight; then a pointer to a label and the parameters, filled up
@@ -28,5 +27,4 @@ int pool_bytes(ClosureKind kind) {
   throw std::logic_error("closure of unknown kind");
 }
 
-}  // namespace closures
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

@@ -4,8 +4,7 @@
 
 #include "closures/closure.h"
 
-namespace brdfc {
-inline namespace closures {
+namespace brdfc::inline closures {
 
 /// On OptiX the closures of a shading point lie in a pool of 1,024 bytes, and Cycles does not check whether they fit:
 /// what is too much overwrites other data. (osl_eval_nodes() in Cycles' kernel/osl/osl.h, osl_allocate_*() and
@@ -18,5 +17,4 @@ inline constexpr int kPoolNode = 24;
 /// What a closure with its weight takes of it, in bytes.
 int pool_bytes(ClosureKind);
 
-}  // namespace closures
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

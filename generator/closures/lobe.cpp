@@ -6,8 +6,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
-inline namespace closures {
+namespace brdfc::inline closures {
 namespace {
 
 constexpr std::pair<LobeKind, const char*> kNames[] = {
@@ -98,5 +97,4 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
   throw InputError("closure of unknown kind");
 }
 
-}  // namespace closures
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

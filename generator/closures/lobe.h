@@ -7,8 +7,7 @@
 
 #include "closures/closure.h"
 
-namespace brdfc {
-inline namespace closures {
+namespace brdfc::inline closures {
 
 enum class LobeKind {
   Diffuse,
@@ -44,5 +43,4 @@ struct Lobe {
 /// f cos(theta_i) with its weight; delta closures are 0. Directions above the surface.
 Rgb<double> evaluate(const Lobe&, const Vec3<double>& wi, const Vec3<double>& wo);
 
-}  // namespace closures
-}  // namespace brdfc
+}  // namespace brdfc::inline closures

@@ -4,8 +4,7 @@
 
 #include <algorithm>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// Cosines of the angles between shading normal and viewer; of all views unless told otherwise.
 struct Cosines {
@@ -19,5 +18,4 @@ struct Cosines {
   }
 };
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

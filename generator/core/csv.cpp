@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/csv.h"
 
-#include <charconv>
 #include <cmath>
 
 #include "core/error.h"
+#include "core/parse.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 namespace {
 
 std::string trim(const std::string& s) {
@@ -66,11 +65,10 @@ bool CsvReader::next(std::vector<double>& row) {
   row.clear();
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const std::string& text = fields[where_[i]];
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    const auto value = parse(text);
+    if (!value || !std::isfinite(*value))
       input_error("{}: {}: expected a finite number, got '{}'", where(), columns_[i], text);
-    row.push_back(value);
+    row.push_back(*value);
   }
   return true;
 }
@@ -105,5 +103,4 @@ void CsvWriter::finish() {
   if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -11,8 +11,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// Numbers in named columns. Columns may come in any order; others than those asked for are ignored, so that the
 /// output of one command can be the input of the next. Every error is an InputError naming line, column and what
@@ -55,5 +54,4 @@ class CsvWriter {
   std::string text_;
 };
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

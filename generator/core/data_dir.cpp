@@ -9,8 +9,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -55,5 +54,4 @@ void note_missing(const std::string& what, const fs::path& store, const std::str
   fmt::print(stderr, "brdfc: no {} in {}: making it, which takes {}\n", what, store.string(), how_long);
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

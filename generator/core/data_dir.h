@@ -5,8 +5,7 @@
 #include <filesystem>
 #include <string>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// The first of these that holds the extension's Python: the folder that the environment variable BRDFC_DATA names,
 /// and if it is set no other; share/brdfc beside the folder of the program, as `cmake --install` lays it out; the
@@ -17,5 +16,4 @@ std::filesystem::path data_dir();
 /// Tells on stderr that something is not in its store and is made, which takes that long.
 void note_missing(const std::string& what, const std::filesystem::path& store, const std::string& how_long);
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -6,8 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// Bad usage or input: the message names the file, the key and what was expected. Exit status 2.
 struct InputError : std::runtime_error {
@@ -23,5 +22,4 @@ template <class... Args> [[noreturn]] void input_error(fmt::format_string<Args..
   throw InputError(fmt::format(format, std::forward<Args>(args)...));
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -6,8 +6,7 @@
 
 #include <array>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 std::string sha256(const std::string& bytes) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest;
@@ -17,5 +16,4 @@ std::string sha256(const std::string& bytes) {
   return hex;
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -3,11 +3,9 @@
 
 #include <string>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// SHA-256 of the bytes, as 64 hexadecimal digits.
 std::string sha256(const std::string& bytes);
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

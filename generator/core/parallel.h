@@ -6,8 +6,7 @@
 
 #include <cstddef>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// f(i) for i from 0 to n - 1, side by side. What one of them throws is thrown here, once those that had begun are
 /// done; loops within these come to their end. TBB's own would stop where a loop around them was cancelled, without a
@@ -17,5 +16,4 @@ template <class F> void for_all(std::size_t n, const F& f) {
   tbb::parallel_for(std::size_t(0), n, f, alone);
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

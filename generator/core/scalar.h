@@ -16,8 +16,7 @@
 
 #include "core/wide.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// float, double, Wide: types whose comparisons are decided at once.
 template <class T>
@@ -76,5 +75,4 @@ template <class T> constexpr int newton_steps() { return std::same_as<T, double>
 /// Gives a subexpression the name it has in the paper; only the recorded form keeps it.
 template <Numeric T> const T& named(const char*, const T& x) { return x; }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -3,8 +3,7 @@
 
 #include <random>
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 Sequence3::Sequence3(std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -35,5 +34,4 @@ Point2 Sequence2::next() {
   return u;
 }
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -7,8 +7,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 struct Point2 {
   double x = 0, y = 0;
@@ -38,5 +37,4 @@ class Sequence2 {
   Point2 state_;
 };
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

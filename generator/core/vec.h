@@ -6,8 +6,7 @@
 
 #include "core/scalar.h"
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 /// A direction or vector. Local shading frame: z is the normal, x the tangent.
 template <class T> struct Vec3 {
@@ -67,6 +66,8 @@ template <Numeric T> Rgb<T>& operator+=(Rgb<T>& a, const Rgb<T>& b) { return a =
 template <Numeric T> Rgb<T> select(bool condition, const Rgb<T>& a, const Rgb<T>& b) { return condition ? a : b; }
 template <Numeric T> T max_component(const Rgb<T>& c) { return maximum(c.r, maximum(c.g, c.b)); }
 
+template <Numeric T> Rgb<T> magnitude(const Rgb<T>& c) { return {abs(c.r), abs(c.g), abs(c.b)}; }
+
 /// Luminance of linear Rec.709 primaries (ITU-R BT.709), used only to choose between lobes.
 template <Numeric T> T luminance(const Rgb<T>& c) { return T(0.2126) * c.r + T(0.7152) * c.g + T(0.0722) * c.b; }
 template <Numeric T> const Rgb<T>& named(const char*, const Rgb<T>& c) { return c; }
@@ -81,11 +82,5 @@ template <class T> Vec3<T> about_axis(const Vec3<T>& w, const Vec3<T>& s) {
   const auto [u, v] = across_axis(w);
   return u * s.x + v * s.y + w * s.z;
 }
-/// The components of s in that frame: the inverse of about_axis().
-template <class T> Vec3<T> seen_along_axis(const Vec3<T>& w, const Vec3<T>& s) {
-  const auto [u, v] = across_axis(w);
-  return {dot(u, s), dot(v, s), dot(w, s)};
-}
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core

@@ -24,8 +24,7 @@ __float128 ldexpf128(__float128, int) noexcept;
 __float128 powf128(__float128, __float128) noexcept;
 }
 
-namespace brdfc {
-inline namespace core {
+namespace brdfc::inline core {
 
 class Wide {
  public:
@@ -78,8 +77,7 @@ inline bool isfinite(const Wide& x) { return x.value() - x.value() == 0; }
 /// Smallest positive normal number.
 inline constexpr int kWideMinExponent = -16382;
 
-}  // namespace core
-}  // namespace brdfc
+}  // namespace brdfc::inline core
 
 template <> class std::numeric_limits<brdfc::Wide> {
  public:

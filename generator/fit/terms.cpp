@@ -23,8 +23,6 @@ bool may_be_any_share(const ParamInfo& p) {
   return p.kind == ParamKind::Color || (p.kind == ParamKind::Number && p.min <= 0 && p.max >= 1);
 }
 
-Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.g), std::abs(c.b)}; }
-
 /// Pairs of directions, some of them where the model with these parameters scatters to.
 std::vector<std::array<Vec3<double>, 2>> pairs(const Model& model, const ParamValues& values, int count) {
   measure::Random random(12);

@@ -12,8 +12,6 @@ namespace brdfc::forms {
 namespace {
 
 double mean(const Rgb<double>& c) { return (c.r + c.g + c.b) / 3; }
-Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.g), std::abs(c.b)}; }
-
 /// A smooth sky without symmetry, 1 on average over all directions.
 double sky(const Vec3<double>& w) {
   const Vec3<double> brightest = {0.48, 0.6, 0.64};

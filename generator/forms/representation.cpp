@@ -98,16 +98,8 @@ void output_closures(const ClosureSum<Expr>& sum, Program& program, std::vector<
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
     if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
     if (sum[c].stretched != Tangent::None) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
-    if (sum[c].stretched == Tangent::Surface) {
-      program.output(fmt::format("tangent_{}_x", c), sum[c].tangent.x);
-      program.output(fmt::format("tangent_{}_y", c), sum[c].tangent.y);
-      program.output(fmt::format("tangent_{}_z", c), sum[c].tangent.z);
-    }
-    if (sum[c].turned) {
-      program.output(fmt::format("normal_{}_x", c), sum[c].normal.x);
-      program.output(fmt::format("normal_{}_y", c), sum[c].normal.y);
-      program.output(fmt::format("normal_{}_z", c), sum[c].normal.z);
-    }
+    if (sum[c].stretched == Tangent::Surface) program.output(fmt::format("tangent_{}", c), sum[c].tangent);
+    if (sum[c].turned) program.output(fmt::format("normal_{}", c), sum[c].normal);
     if (sum[c].kind == ClosureKind::Refraction) program.output(fmt::format("ior_{}", c), sum[c].ior);
   }
 }
@@ -116,10 +108,9 @@ Vec3<Expr> recorded_u() { return {Expr::input("u_0"), Expr::input("u_1"), Expr::
 
 void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program) {
   const Vec3<Expr> wo = recorded_wo(model, brdf);
-  const Sample<Expr> s = brdf.sample(wo, recorded_u());
-  program.output("wi_x", s.wi.x);
-  program.output("wi_y", s.wi.y);
-  program.output("wi_z", brdf.scatters_through() ? s.wi.z * Expr::input("side") : s.wi.z);
+  Sample<Expr> s = brdf.sample(wo, recorded_u());
+  if (brdf.scatters_through()) s.wi.z = s.wi.z * Expr::input("side");
+  program.output("wi", s.wi);
   program.output("weight", s.weight);
 }
 
@@ -137,11 +128,6 @@ Recording finish(const Model& model, const Program& program, int indent, std::ve
 /// An OSL vector.
 Vec3<Expr> input_vector(const std::string& name) {
   return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
-}
-void output3(Program& program, const std::string& name, const Vec3<Expr>& v) {
-  program.output(name + "_x", v.x);
-  program.output(name + "_y", v.y);
-  program.output(name + "_z", v.z);
 }
 
 /// Closures whose numbers are the variables that output_closures() assigned.
@@ -346,7 +332,7 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
   }
   {
     Program program;
-    output3(program, "drawn", turned(draw(*brdf, !base.empty(), wo, recorded_u())));
+    program.output("drawn", turned(draw(*brdf, !base.empty(), wo, recorded_u())));
     out.draw = finish(model, program, indent);
   }
   {
@@ -401,9 +387,9 @@ const AimedSteps& aimed_steps(int indent) {
   steps.aim = record_step([&](Program& p) {
     const AimedLamp<Expr> lamp =
         aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
-    output3(p, "wi", lamp.wi);
-    output3(p, "to_lamp", lamp.lobe.towards);
-    output3(p, "to_half", lamp.lobe.half);
+    p.output("wi", lamp.wi);
+    p.output("to_lamp", lamp.lobe.towards);
+    p.output("to_half", lamp.lobe.half);
     p.output("lobe_exponent[lobes]", lamp.lobe.exponent);
     p.output("lobe_radius[lobes]", lamp.lobe.sinRadius);
     p.output("lobe_end[lobes]", lamp.lobe.cosEnd);
@@ -434,7 +420,7 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("u_0", tossed.u);
   });
   steps.under = record_step([&](Program& p) {
-    output3(p, "drawn", sample_under(kept_lobe("chosen"), Expr::input("u_1"), Expr::input("u_2")));
+    p.output("drawn", sample_under(kept_lobe("chosen"), Expr::input("u_1"), Expr::input("u_2")));
   });
   const Met<Expr> before{Rgb<Expr>::input("covered"), Rgb<Expr>::input("covered_before"), Expr::input("lamp_met"),
                          Expr::input("density_under")};
@@ -446,7 +432,7 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("covered", met.covered);
     p.output("lamp_met", met.solid_angle);
     p.output("density_under", met.density);
-    output3(p, "ray", beside(of_earlier, input3("ray")));
+    p.output("ray", beside(of_earlier, input3("ray")));
   });
   const auto record_rest = [&](const Expr& count, const Met<Expr>& met) {
     return record_step([&](Program& p) {

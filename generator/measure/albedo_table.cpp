@@ -52,9 +52,7 @@ std::string formula(const Model& model, const ParamValues& fixed) {
   Program program;
   program.output("f", brdf->eval(wi, wo));
   program.output("pdf", brdf->pdf(wi, wo));
-  program.output("sample_x", sample.wi.x);
-  program.output("sample_y", sample.wi.y);
-  program.output("sample_z", sample.wi.z);
+  program.output("sample", sample.wi);
   program.output("sample_weight", sample.weight);
   program.output("sample_pdf", sample.pdf);
   program.output("mirror", brdf->mirror(wo));
@@ -96,7 +94,7 @@ struct Coefficients {
   double error = 0;  // of each coefficient, one standard error
 };
 
-double max_abs(const Rgb<double>& c) { return std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
+double max_abs(const Rgb<double>& c) { return max_component(magnitude(c)); }
 
 /// In units of what counts: of 1, or of the value itself where a model without bounds gives off more than it gets.
 double unit_of(const Rgb<double>& albedo) { return std::max(1.0, max_abs(albedo)); }

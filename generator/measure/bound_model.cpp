@@ -10,12 +10,10 @@
 namespace brdfc::measure {
 namespace {
 
-std::string text(const Vec3<double>& w) { return fmt::format("({:.17g}, {:.17g}, {:.17g})", w.x, w.y, w.z); }
-
 [[noreturn]] void bad_value(const std::string& value, const char* what, const std::string& label,
                             const Vec3<double>& wi, const Vec3<double>& wo) {
   throw ValueError(fmt::format("{}: {}(wi={}, wo={}) = {}, expected finite and >= 0", label.empty() ? "model" : label,
-                               what, text(wi), text(wo), value));
+                               what, text(wi, 17), text(wo, 17), value));
 }
 
 bool good(double v) { return v >= 0 && std::isfinite(v); }
@@ -29,6 +27,10 @@ BoundModel bind_model(const Model& model, const ParamValues& values) {
   bound.brdf = model.make_double(bound.values);
   bound.label = fmt::format("{} {}", model.info().name, format_values(model.info(), bound.values));
   return bound;
+}
+
+std::string text(const Vec3<double>& w, int digits) {
+  return fmt::format("({:.{}g}, {:.{}g}, {:.{}g})", w.x, digits, w.y, digits, w.z, digits);
 }
 
 void require_value(double value, const char* what, const std::string& label, const Vec3<double>& wi,

@@ -19,6 +19,9 @@ struct BoundModel {
 /// Throws InputError for inadmissible values.
 BoundModel bind_model(const Model&, const ParamValues&);
 
+/// "(x, y, z)" for messages.
+std::string text(const Vec3<double>&, int digits = 9);
+
 /// Throws ValueError unless every component is finite and >= 0. `what` is "f", "pdf", ...
 void require_value(const Rgb<double>& value, const char* what, const std::string& label, const Vec3<double>& wi,
                    const Vec3<double>& wo);

@@ -40,8 +40,6 @@ Vec3<double> uniform_cube(Random& random) {
   return {a, b, c};
 }
 
-std::string text(const Vec3<double>& w) { return fmt::format("({:.9g}, {:.9g}, {:.9g})", w.x, w.y, w.z); }
-
 std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brdf, int count, Random& random,
                                                          bool two_sided) {
   std::vector<std::array<Vec3<double>, 2>> out;

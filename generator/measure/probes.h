@@ -43,9 +43,6 @@ template <class T> Rgb<T> value_of(const Model& model, const Brdf<T>& brdf, cons
   return (wi.z > T(0)) == (wo.z > T(0)) ? brdf.mirror(wo) : brdf.transmit(wo);
 }
 
-/// "(x, y, z)" for messages.
-std::string text(const Vec3<double>&);
-
 /// Pairs of directions (wi, wo): anywhere, where the model scatters to, and where formulas break: the normal, grazing,
 /// mirror and backscattering directions.
 std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>&, int count, Random&,

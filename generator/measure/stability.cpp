@@ -51,7 +51,7 @@ template <class Narrow, class Better> class Pair {
     const Rgb<double> got = to_double(value_of(model_, *narrow_, wi, wo));
     const auto where = [&] {
       return fmt::format("{} {} wi={} wo={}", model_.info().name, format_values(model_.info(), values_),
-                         full(to_double(wi)), full(to_double(wo)));
+                         text(to_double(wi), 17), text(to_double(wo), 17));
     };
     if (!(got.r >= 0 && got.g >= 0 && got.b >= 0 && std::isfinite(got.r + got.g + got.b)))
       require_value(got, std::same_as<Narrow, float> ? "f in float" : "f",
@@ -76,8 +76,6 @@ template <class Narrow, class Better> class Pair {
   }
 
  private:
-  static std::string full(const Vec3<double>& w) { return fmt::format("({:.17g}, {:.17g}, {:.17g})", w.x, w.y, w.z); }
-
   Rgb<Better> kept(const Rgb<Better>& c) const {
     return {c.r * Better(keep_.r), c.g * Better(keep_.g), c.b * Better(keep_.b)};
   }

@@ -6,8 +6,7 @@
 
 #include "closures/closure.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// The least roughness that Cycles takes; below it facets are this rough.
 inline constexpr double kLeastRoughness = 1e-4;
@@ -44,5 +43,4 @@ template <class T> Closure<T> power_closure(const Rgb<T>& weight, const T& expon
 /// weight that is divided by a height, or a Fresnel term of one, takes this.
 template <class T> T lobe_height(const T& z, const T& variance) { return sqrt(z * z + variance); }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 std::vector<Choices> choice_combinations(const ModelInfo& info) {
   std::vector<Choices> all = {{}};
@@ -36,5 +35,4 @@ bool admits(const ModelInfo& info, const Choices& choices, const ParamValues& fi
   });
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -6,8 +6,7 @@
 
 #include "model/model.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// One combination of the model's choices.
 using Choices = std::vector<int>;
@@ -18,5 +17,4 @@ ParamValues with_choices(const ModelInfo&, const Choices&, ParamValues values = 
 /// Whether the combination has the choices that are among the fixed values.
 bool admits(const ModelInfo&, const Choices&, const ParamValues& fixed);
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -6,8 +6,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// Reflectance of a conductor n + i k. With u + i v = sqrt((n + i k)^2 - sin^2),
 ///   R_s = ((u - c)^2 + v^2) / ((u + c)^2 + v^2),  R_p = R_s ((u c - s^2)^2 + v^2 c^2) / ((u c + s^2)^2 + v^2 c^2):
@@ -53,5 +52,4 @@ template <class T> Dielectric<T> fresnel_dielectric(const Vec3<T>& wo, const T& 
                             named("eta", select(wo.z > T(0), ior, T(1) / ior)));
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -4,8 +4,7 @@
 
 #include "model/sampling.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// Unit half vector, its cosine o.h = i.h = |wi + wo| / 2 to both directions, and 1 - o.h from
 /// |wi - wo|^2 = 4 (1 - (o.h)^2).
@@ -46,5 +45,4 @@ template <class T> Vec3<T> sample_gaussian_slopes(const T& ax, const T& ay, cons
   return {x * cosTheta, y * cosTheta, cosTheta};
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

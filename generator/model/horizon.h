@@ -4,8 +4,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// Interpolated or bent normals can turn away from a viewer who still sees the surface. Such a view is moved to
 /// just above the horizon, in the same azimuth, so that silhouettes get the grazing colour and not black.
@@ -20,5 +19,4 @@ template <class T> Vec3<T> raise_to_horizon(const Vec3<T>& wo) {
           named("cosTheta_o", select(below, low, wo.z))};
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -5,8 +5,7 @@
 #include "model/model.h"
 #include "trace/program.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// Numbers and colours by their names.
 template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values) {
@@ -16,5 +15,4 @@ template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values)
   }
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -21,8 +21,7 @@
 
 #include "model/sampling.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// iterate(), ended early where numbers can tell that nothing changes any more.
 template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
@@ -40,7 +39,6 @@ std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step ste
 
 /// Knots 0, 1, 2, ... of a curve: what a shader has sockets for.
 template <class T, int Count> struct EvenKnots {
-  static constexpr int kCount = Count;
   static constexpr int kNewtonSteps = 20;
   std::array<T, std::size_t(Count)> heights;
 
@@ -295,5 +293,4 @@ template <class T, class Knots> struct KernelLobe {
   }
 };
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -8,8 +8,7 @@
 #include "model/fresnel.h"
 #include "model/spectrum.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 namespace {
 
 constexpr const char* kNoble =
@@ -167,5 +166,4 @@ const std::vector<ChannelIndices>& channel_indices() {
   return all;
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

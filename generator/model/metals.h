@@ -7,8 +7,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 struct Metal {
   std::string name;              ///< "cu"
@@ -38,5 +37,4 @@ struct ChannelIndices {
 /// In the order of metals(); computed once.
 const std::vector<ChannelIndices>& channel_indices();
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

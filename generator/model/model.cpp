@@ -2,11 +2,11 @@
 #include "model/model.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
-namespace brdfc {
-inline namespace model {
+#include "core/parse.h"
+
+namespace brdfc::inline model {
 namespace {
 
 std::map<std::string, std::unique_ptr<Model>>& registry() {
@@ -14,18 +14,9 @@ std::map<std::string, std::unique_ptr<Model>>& registry() {
   return all;
 }
 
-template <class Names> std::string join(const Names& names) {
-  std::string text;
-  for (const auto& n : names) text += (text.empty() ? "" : ", ") + std::string(n);
-  return text;
-}
-
 double parse_number(const std::string& model, const std::string& name, const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    input_error("{}: {}: expected a number, got '{}'", model, name, text);
-  return value;
+  if (const auto value = parse(text)) return *value;
+  input_error("{}: {}: expected a number, got '{}'", model, name, text);
 }
 
 void check_range(const ModelInfo& m, const ParamInfo& p, double value) {
@@ -56,8 +47,15 @@ const Model& find_model(const std::string& name) {
   const auto it = registry().find(name);
   if (it != registry().end()) return *it->second;
   std::vector<std::string> names;
-  for (const auto& [n, m] : registry()) names.push_back(n);
-  input_error("unknown model '{}': expected one of {}", name, join(names));
+  for (const auto& [n, model] : registry()) names.push_back(n);
+  input_error("unknown model '{}': expected one of {}", name, fmt::join(names, ", "));
+}
+
+std::vector<const Model*> models_named(const std::string& name) {
+  if (!name.empty()) return {&find_model(name)};
+  std::vector<const Model*> all;
+  for (const auto& [n, model] : registry()) all.push_back(model.get());
+  return all;
 }
 
 bool register_model(std::unique_ptr<Model> model) {
@@ -80,7 +78,7 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
     if (info.param(name)) continue;
     std::vector<std::string> names;
     for (const ParamInfo& p : info.params) names.push_back(p.name);
-    input_error("{}: unknown parameter '{}': expected one of {}", info.name, name, join(names));
+    input_error("{}: unknown parameter '{}': expected one of {}", info.name, name, fmt::join(names, ", "));
   }
   for (const ParamInfo& p : info.params) {
     const auto it = given.find(p.name);
@@ -115,7 +113,7 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
         if (it != given.end()) {
           const auto* s = std::get_if<std::string>(&it->second);
           if (!s || std::find(p.choices.begin(), p.choices.end(), *s) == p.choices.end())
-            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, join(p.choices),
+            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, fmt::join(p.choices, ", "),
                         s ? *s : "a number");
           text = *s;
         }
@@ -180,5 +178,4 @@ std::string format_values(const ModelInfo& info, const ParamValues& values) {
   return text;
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

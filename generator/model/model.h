@@ -33,8 +33,7 @@
 #include "core/vec.h"
 #include "trace/expr.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 enum class ParamKind { Number, Color, Choice };
 
@@ -168,6 +167,8 @@ std::string format_values(const ModelInfo&, const ParamValues&);
 const std::map<std::string, std::unique_ptr<Model>>& models();
 /// Throws InputError that lists the known names.
 const Model& find_model(const std::string& name);
+/// That one, or without a name all of them.
+std::vector<const Model*> models_named(const std::string& name);
 
 /// Called by BRDFC_MODEL; a name taken twice throws std::logic_error.
 bool register_model(std::unique_ptr<Model>);
@@ -418,5 +419,4 @@ template <template <class> class M> class ModelOf final : public Model {
   const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>()); \
   }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -9,8 +9,7 @@
 
 #include "model/model.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// cos^e alpha of the angle between unit vectors; 0 beyond a right angle.
 template <class T> T power_lobe(const T& e, const Vec3<T>& a, const Vec3<T>& b) {
@@ -35,5 +34,4 @@ template <class T> Vec3<T> sample_power_lobe(const T& e, const T& u1, const T& u
   return {sinAlpha * cos(phi), sinAlpha * sin(phi), T(1) - one_minus_cos};
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

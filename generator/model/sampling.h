@@ -4,8 +4,7 @@
 
 #include "model/model.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// True where both directions are above the surface; the BRDF is 0 elsewhere.
 template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
@@ -78,5 +77,4 @@ template <class T> T one_minus_schlick_weight(const T& c) {
   return select(c < T(0.25), polynomial, T(1) - pow5(T(1) - c));
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

@@ -3,8 +3,7 @@
 
 #include <cmath>
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 namespace {
 
 /// Relative power of D65 from 380 to 780 nm in steps of 10 nm; linear in between, as CIE 15 asks.
@@ -57,5 +56,4 @@ Rgb<double> rec709_of(const std::function<double(double nm)>& reflectance) {
   return out;
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

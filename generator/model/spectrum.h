@@ -12,8 +12,7 @@
 
 #include "core/vec.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// Wavelengths in nm at which spectra are summed up.
 inline constexpr int kWavelengthMin = 380, kWavelengthMax = 780, kWavelengthStep = 5;
@@ -26,5 +25,4 @@ const std::array<Rgb<double>, kWavelengths>& rec709_weights();
 /// outside of Rec.709.
 Rgb<double> rec709_of(const std::function<double(double nm)>& reflectance);
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

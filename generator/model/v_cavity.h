@@ -11,8 +11,7 @@
 
 #include "model/half_vector.h"
 
-namespace brdfc {
-inline namespace model {
+namespace brdfc::inline model {
 
 /// G / ((n.i)(n.o)), written so that grazing directions neither overflow nor divide 0 by 0.
 template <class T> T v_cavity_shape(const HalfVector<T>& k, const Vec3<T>& wi, const Vec3<T>& wo) {
@@ -29,5 +28,4 @@ template <class T> T v_cavity_weight(const Vec3<T>& h, const T& oh, const Vec3<T
   return minimum(oh / maximum(zo * h.z, tiny<T>()), T(2) * minimum(wi.z / zo, T(1)));
 }
 
-}  // namespace model
-}  // namespace brdfc
+}  // namespace brdfc::inline model

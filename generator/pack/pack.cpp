@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -18,6 +17,7 @@
 
 #include "closures/closure_pool.h"
 #include "core/hash.h"
+#include "core/parse.h"
 #include "fit/fit.h"
 #include "fit/terms.h"
 #include "fit/twin.h"
@@ -82,11 +82,8 @@ class Staging {
     for (const fs::directory_entry& entry : fs::directory_iterator(out, ignored)) {
       const std::string name = entry.path().filename().string();
       if (!name.starts_with(kPrefix)) continue;
-      pid_t process = 0;
-      const char* first = name.data() + std::string_view(kPrefix).size();
-      const auto [end, bad] = std::from_chars(first, name.data() + name.size(), process);
-      if (bad != std::errc() || end != name.data() + name.size() || process <= 0) continue;
-      if (kill(process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), ignored);
+      const auto process = parse<pid_t>(std::string_view(name).substr(std::string_view(kPrefix).size()));
+      if (process && *process > 0 && kill(*process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), ignored);
     }
   }
 

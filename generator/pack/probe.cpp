@@ -22,9 +22,7 @@ Recorded record_both(const Model& model, const ParamValues& choices) {
   r.eval.output("shown_f", brdf->eval(wi, wo));
   r.eval.output("shown_pdf", brdf->pdf(wi, wo));
   const Sample<Expr> s = brdf->sample(wo, {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
-  r.sample.output("shown_x", s.wi.x);
-  r.sample.output("shown_y", s.wi.y);
-  r.sample.output("shown_z", s.wi.z);
+  r.sample.output("shown", s.wi);
   r.sample.output("shown_pdf", s.pdf);
   r.sample.output("shown_weight", s.weight);
   return r;

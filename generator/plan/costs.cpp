@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "plan/costs.h"
 
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 
 #include "core/error.h"
+#include "core/parse.h"
 
 namespace brdfc::plan {
 namespace {
@@ -38,11 +38,10 @@ Costs::Costs(const std::filesystem::path& path) {
     } catch (const InputError& e) {
       input_error("{}: form: {}", where, e.what());
     }
-    double value = 0;
-    const auto [end, error] = std::from_chars(cost.data(), cost.data() + cost.size(), value);
-    if (error != std::errc() || end != cost.data() + cost.size() || !std::isfinite(value) || value <= 0)
+    const auto value = parse(cost);
+    if (!value || !std::isfinite(*value) || *value <= 0)
       input_error("{}: cost: expected a positive number, got '{}'", where, cost);
-    if (!costs_.emplace(std::pair(model, form), value).second)
+    if (!costs_.emplace(std::pair(model, form), *value).second)
       input_error("{}: form: expected one row for {} of {}, got a second", where, form, model);
   }
   if (!in.eof()) input_error("{}: cannot be read", path.string());

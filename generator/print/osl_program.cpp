@@ -127,8 +127,8 @@ class OslPrinter {
     loop_vars_[id] = std::move(vars);
   }
 
-  Text call(const char* function, const ExprNode& n) const {
-    std::string s = std::string(function) + "(";
+  Text call(const std::string& function, const ExprNode& n) const {
+    std::string s = function + "(";
     for (std::size_t i = 0; i < n.args.size(); ++i) s += (i ? ", " : "") + use(n.args[i], 0);
     return {s + ")", 6};
   }
@@ -148,45 +148,33 @@ class OslPrinter {
       case Op::Input:
         return {n.name, 6};
       case Op::Add:
-        return infix("+", n, 3);
       case Op::Sub:
-        return infix("-", n, 3);
+        return infix(name_of(n.op), n, 3);
       case Op::Mul:
-        return infix("*", n, 4);
       case Op::Div:
-        return infix("/", n, 4);
+        return infix(name_of(n.op), n, 4);
       case Op::Neg:
         return {fmt::format("-{}", use(n.args[0], 6)), 5};
       case Op::Sqrt:
-        return call("sqrt", n);
       case Op::Cbrt:
-        return call("cbrt", n);
       case Op::Exp:
-        return call("exp", n);
       case Op::Log:
-        return call("log", n);
-      case Op::Log1p:
-        return call("brdfc_log1p", n);
-      case Op::Expm1:
-        return call("brdfc_expm1", n);
       case Op::Sin:
-        return call("sin", n);
       case Op::Cos:
-        return call("cos", n);
       case Op::Atan:
-        return call("atan", n);
       case Op::Pow:
-        return call("pow", n);
       case Op::Abs:
-        return call("abs", n);
       case Op::Min:
-        return call("min", n);
       case Op::Max:
-        return call("max", n);
+      case Op::MakeColor:
+        return call(name_of(n.op), n);
+      case Op::Log1p:
+      case Op::Expm1:
+      case Op::MaxComponent:
+        return call(std::string("brdfc_") + name_of(n.op), n);
       case Op::Less:
-        return infix("<", n, 2);
       case Op::LessEqual:
-        return infix("<=", n, 2);
+        return infix(name_of(n.op), n, 2);
       case Op::And:
         return {use(n.args[0], 2) + " && " + use(n.args[1], 2), 1};
       case Op::Or:
@@ -201,10 +189,6 @@ class OslPrinter {
         };
         return {use(n.args[0], 1) + " ? " + arm(1) + " : " + arm(2), 0};
       }
-      case Op::MaxComponent:
-        return call("brdfc_max_component", n);
-      case Op::MakeColor:
-        return call("color", n);
       case Op::Lookup: {
         std::string text = fmt::format("brdfc_table{}({}", n.args.size(), array_names_.at(n.name));
         for (int size : n.table->sizes) text += fmt::format(", {}", size);

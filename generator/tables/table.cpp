@@ -6,8 +6,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
-inline namespace tables {
+namespace brdfc::inline tables {
 
 std::shared_ptr<const Table> make_table(std::string name, std::vector<int> sizes, std::vector<double> values) {
   std::size_t count = 1;
@@ -34,5 +33,4 @@ std::shared_ptr<const Table> part(const Table& table, std::size_t axis, int firs
   return make_table(table.name, std::move(sizes), std::move(values));
 }
 
-}  // namespace tables
-}  // namespace brdfc
+}  // namespace brdfc::inline tables

@@ -11,8 +11,7 @@
 
 #include "core/scalar.h"
 
-namespace brdfc {
-inline namespace tables {
+namespace brdfc::inline tables {
 
 /// Values on a regular grid over [0, 1]^d, d = 1 to 4, row-major with the first axis slowest.
 struct Table {
@@ -70,5 +69,4 @@ template <Numeric T> T lookup(const std::shared_ptr<const Table>& table, const s
   }
 }
 
-}  // namespace tables
-}  // namespace brdfc
+}  // namespace brdfc::inline tables

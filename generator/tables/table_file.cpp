@@ -5,8 +5,7 @@
 
 #include "core/error.h"
 
-namespace brdfc {
-inline namespace tables {
+namespace brdfc::inline tables {
 namespace {
 
 constexpr const char* kMeta = "brdfc:table";
@@ -61,5 +60,4 @@ void replace_stored(const std::filesystem::path& path, const std::string& model,
   }
 }
 
-}  // namespace tables
-}  // namespace brdfc
+}  // namespace brdfc::inline tables

@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace brdfc {
-inline namespace tables {
+namespace brdfc::inline tables {
 
 /// Rows of numbers, padded with zeros, and what they mean.
 struct TableImage {
@@ -28,5 +27,4 @@ TableImage read_table_image(const std::filesystem::path&);
 void replace_stored(const std::filesystem::path&, const std::string& model,
                     const std::function<void(const std::filesystem::path&)>& write);
 
-}  // namespace tables
-}  // namespace brdfc
+}  // namespace brdfc::inline tables

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 
-namespace brdfc {
-inline namespace trace {
+namespace brdfc::inline trace {
 namespace {
 
 thread_local Recorder* current_recorder = nullptr;
@@ -65,5 +64,4 @@ int Recorder::open_loop() {
 }
 void Recorder::close_loop() { in_loop_ = false; }
 
-}  // namespace trace
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

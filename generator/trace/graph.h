@@ -13,8 +13,7 @@
 
 #include "tables/table.h"
 
-namespace brdfc {
-inline namespace trace {
+namespace brdfc::inline trace {
 
 /// A formula that a recording cannot express.
 struct ExprError : std::logic_error {
@@ -56,7 +55,7 @@ enum class Op : std::uint8_t {
   Lookup
 };
 
-/// As messages call it.
+/// As messages call it, and OSL those that it has.
 const char* name_of(Op);
 
 enum class ExprType : std::uint8_t { Real, Color, Bool };
@@ -103,5 +102,4 @@ class Recorder {
   Recorder* outer_;
 };
 
-}  // namespace trace
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

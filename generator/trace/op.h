@@ -7,8 +7,7 @@
 #include "core/scalar.h"
 #include "trace/graph.h"
 
-namespace brdfc {
-inline namespace trace {
+namespace brdfc::inline trace {
 
 template <class T> T apply(Op op, const T* a) {
   switch (op) {
@@ -65,5 +64,4 @@ template <class T> T apply(Op op, const T* a) {
   }
 }
 
-}  // namespace trace
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

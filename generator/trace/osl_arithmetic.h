@@ -2,11 +2,11 @@
 // The arithmetic that OSL uses in Blender, to tell what it costs from what a recording gets wrong.
 #pragma once
 
-namespace brdfc {
-inline namespace trace {
+#include "trace/graph.h"
 
-/// While one is alive on this thread, Program::run<float> uses the functions that OSL calls (OpenImageIO's fast ones,
-/// quotients and roots that are 0 where they are not defined, and the shaders' own expm1 and log1p).
+namespace brdfc::inline trace {
+
+/// While one is alive on this thread, Program::run<float> computes as OSL does.
 class OslArithmetic {
  public:
   OslArithmetic();
@@ -16,19 +16,8 @@ class OslArithmetic {
   static bool active();
 };
 
-namespace osl {
-float divide(float a, float b);
-float sqrt(float);
-float cbrt(float);
-float exp(float);
-float log(float);
-float log1p(float);
-float expm1(float);
-float sin(float);
-float cos(float);
-float atan(float);
-float pow(float base, float exponent);
-}  // namespace osl
+/// One operation, with the functions that OSL calls: OpenImageIO's fast ones, quotients and roots that are 0 where they
+/// are not defined, and the shaders' own expm1 and log1p.
+float apply_as_osl(Op, const float* arguments);
 
-}  // namespace trace
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

@@ -6,43 +6,12 @@
 #include "trace/op.h"
 #include "trace/osl_arithmetic.h"
 
-namespace brdfc {
-inline namespace trace {
+namespace brdfc::inline trace {
 namespace {
-
-/// The same as OSL computes it.
-float apply_osl(Op op, const float* a) {
-  switch (op) {
-    case Op::Div:
-      return osl::divide(a[0], a[1]);
-    case Op::Sqrt:
-      return osl::sqrt(a[0]);
-    case Op::Cbrt:
-      return osl::cbrt(a[0]);
-    case Op::Exp:
-      return osl::exp(a[0]);
-    case Op::Log:
-      return osl::log(a[0]);
-    case Op::Log1p:
-      return osl::log1p(a[0]);
-    case Op::Expm1:
-      return osl::expm1(a[0]);
-    case Op::Sin:
-      return osl::sin(a[0]);
-    case Op::Cos:
-      return osl::cos(a[0]);
-    case Op::Atan:
-      return osl::atan(a[0]);
-    case Op::Pow:
-      return osl::pow(a[0], a[1]);
-    default:
-      return apply(op, a);
-  }
-}
 
 template <class T> T execute(Op op, const T* a) {
   if constexpr (std::is_same_v<T, float>)
-    if (OslArithmetic::active()) return apply_osl(op, a);
+    if (OslArithmetic::active()) return apply_as_osl(op, a);
   return apply(op, a);
 }
 
@@ -110,21 +79,12 @@ template <class T> std::map<std::string, std::array<T, 3>> Program::run(const In
       case Op::MakeColor:
         out = {arg(0)[0], arg(1)[0], arg(2)[0]};
         break;
-      case Op::Lookup:
-        switch (n.args.size()) {
-          case 1:
-            out.fill(lookup<T, 1>(n.table, {arg(0)[0]}));
-            break;
-          case 2:
-            out.fill(lookup<T, 2>(n.table, {arg(0)[0], arg(1)[0]}));
-            break;
-          case 3:
-            out.fill(lookup<T, 3>(n.table, {arg(0)[0], arg(1)[0], arg(2)[0]}));
-            break;
-          default:
-            out.fill(lookup<T, 4>(n.table, {arg(0)[0], arg(1)[0], arg(2)[0], arg(3)[0]}));
-        }
+      case Op::Lookup: {
+        std::vector<T> at;
+        for (std::size_t i = 0; i < n.args.size(); ++i) at.push_back(arg(i)[0]);
+        out.fill(lookup(n.table, at));
         break;
+      }
       case Op::LoopVar:
         break;  // set by the loop
       case Op::LoopOut:
@@ -179,5 +139,4 @@ template <class T> std::map<std::string, std::array<T, 3>> Program::run(const In
 template std::map<std::string, std::array<float, 3>> Program::run(const Inputs<float>&) const;
 template std::map<std::string, std::array<double, 3>> Program::run(const Inputs<double>&) const;
 
-}  // namespace trace
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

@@ -10,8 +10,7 @@
 
 #include "trace/expr.h"
 
-namespace brdfc {
-inline namespace trace {
+namespace brdfc::inline trace {
 
 /// Values by the names of inputs; a real is grey.
 template <class T> using Inputs = std::map<std::string, std::array<T, 3>>;
@@ -31,6 +30,13 @@ class Program {
   void output(const std::string& name, const Expr& value) { outputs_.push_back({name, value.id()}); }
   void output(const std::string& name, const Rgb<Expr>& value) { outputs_.push_back({name, value.id()}); }
 
+  /// name_x, name_y and name_z.
+  void output(const std::string& name, const Vec3<Expr>& value) {
+    output(name + "_x", value.x);
+    output(name + "_y", value.y);
+    output(name + "_z", value.z);
+  }
+
   /// In the order in which they were named.
   const std::vector<std::pair<std::string, int>>& outputs() const { return outputs_; }
   /// By node of the current recorder, which must be the one the outputs were recorded with.
@@ -48,5 +54,4 @@ class Program {
   mutable std::size_t outputs_seen_ = 0;
 };
 
-}  // namespace trace
-}  // namespace brdfc
+}  // namespace brdfc::inline trace

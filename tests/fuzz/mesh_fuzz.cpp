@@ -8,7 +8,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   if (data[0] % 3 == 2) {
     const auto path = fuzz::write("a.npy", data + 1, size - 1);
-    fuzz::expect_value_or_input_error([&] { read_npy<float>(path, 3); });
+    fuzz::expect_value_or_input_error([&] { reference::read_npy<float>(path, 3); });
     return 0;
   }
   const auto path = fuzz::write(data[0] % 3 ? "a.obj" : "a.ply", data + 1, size - 1);
