@@ -16,12 +16,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, lamps, lean, nodes, pack
+from . import checks, lamps, lean, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
 from .lamps import Lamp
 from .lean import PlanError
-from .nodes import CompileError
+from .nodes import CompileError, has_twin
 from .pack import PackError
+from .update import Update
 
 __all__ = [
     "CompileError",
@@ -29,12 +30,14 @@ __all__ = [
     "PlanError",
     "Finding",
     "Lamp",
+    "Update",
     "add_albedo",
     "add_twin",
     "albedo",
     "bake",
     "enable_osl",
     "get_parameters",
+    "has_twin",
     "models",
     "new_material",
     "plan",
@@ -43,6 +46,7 @@ __all__ = [
     "set_kernel",
     "set_parameters",
     "switch_representation",
+    "update_materials",
     "used_materials",
     "warnings",
     "write_materials",
@@ -192,6 +196,20 @@ def switch_representation(material, representation):
     prepare_material(material)
 
 
+def update_materials():
+    """Gives the models of the open file that another version of the extension made the shaders of
+    this one; values, links and forms stay.
+
+    Returns an Update: `count` of nodes, `refusals` and `notes`, sentences. A node that would lose
+    something stays as it is and is named there.
+    """
+    result = update.update()
+    for material in bpy.data.materials:
+        if material.library is None:
+            prepare_material(material)
+    return result
+
+
 def add_albedo(material):
     """Gives the node of a material with one model its Albedo output: what the surface reflects of a
     white world. Where that takes large tables nodes are made without, so that files stay small.
@@ -203,14 +221,6 @@ def add_albedo(material):
 
 #: The form that is made of Blender's own nodes.
 TWIN = "twin"
-
-
-def has_twin(material):
-    """Whether a material shows a twin in EEVEE."""
-    return any(
-        n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE"
-        for n in material.node_tree.nodes
-    )
 
 
 def add_twin(material):

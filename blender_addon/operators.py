@@ -208,6 +208,26 @@ class BRDFC_OT_find_lamps(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_update(Operator):
+    """Give the models that another version of the extension made the shaders of this one, where all
+    that they are set to can stay"""
+
+    bl_idname = "brdfc.update"
+    bl_label = "Update Materials"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            result = api.update_materials()
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for sentence in (*result.refusals, *result.notes):
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"Models updated: {result.count}")
+        return {"FINISHED"}
+
+
 class BRDFC_OT_add_albedo(Operator):
     """Give the model's node an output for its albedo, whose tables make the file larger"""
 
@@ -401,6 +421,7 @@ _CLASSES = (
     BRDFC_OT_bake,
     BRDFC_OT_add_albedo,
     BRDFC_OT_add_twin,
+    BRDFC_OT_update,
     BRDFC_OT_find_lamps,
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,
