@@ -21,9 +21,10 @@
 #include "fit/terms.h"
 #include "fit/twin.h"
 #include "forms/representation.h"
-#include "measure/albedo_table.h"
+#include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/nodes.h"
@@ -157,7 +158,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
     const ParamValues fixed = fixed_in(plan, kind);
     const fit::Fit* fit = fit_in(kind, plan, fixed);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
-                      of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
+                      of_fit = fit && !plan.views.all() ? fit->cut_to(plan.views).size() : of_whole_fit;
     const measure::AlbedoTable of_form =
         fixed == plan.fixed ? table : measure::fold(whole_table, model, fixed, plan.views);
     const Shader shader = twin ? write_nodes(model, fixed)
