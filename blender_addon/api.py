@@ -313,15 +313,14 @@ def write_materials(path):
     return len(materials)
 
 
-def plan(error=None, time=None, fit=False):
-    """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
-    lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
+def start_plan(error=None, time=None, fit=False):
+    """Starts the program brdfc on a plan for the open file; a lean.Job, whose result is the Plan.
 
     `error` in percent and `time` in units of Blender's Glossy node let it choose the forms. With
     `fit` aimed forms get closures fitted to these materials for a base, which takes seconds to
     minutes a material and leaves less noise under skies and images.
     Nothing is changed. Raises ValueError where no material has a model, PlanError without the
-    program or where it refuses.
+    program.
     """
     used = [
         (name, node, entry)
@@ -330,7 +329,20 @@ def plan(error=None, time=None, fit=False):
     ]
     if not used:
         raise ValueError(_NO_MATERIAL)
-    return lean.Plan(used, error, time, fit)
+    return lean.Planning(used, error, time, fit)
+
+
+def plan(error=None, time=None, fit=False):
+    """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
+    lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
+
+    As start_plan(), and waits for the program. Raises PlanError where it refuses.
+    """
+    job = start_plan(error, time, fit)
+    try:
+        return job.wait()
+    finally:
+        job.cancel()
 
 
 def bake(made):
@@ -340,11 +352,18 @@ def bake(made):
     Raises CompileError, and PlanError where brdfc is of another version than the extension; the
     file is then as it was.
     """
-    count = made.bake()
-    for material in bpy.data.materials:
-        if material.library is None:
-            prepare_material(material)
-    return count
+    return start_bake(made).wait()
+
+
+def start_bake(made):
+    """The same as a lean.Job, a model a step. Until the last one the file is as it was."""
+
+    def prepare_all():
+        for material in bpy.data.materials:
+            if material.library is None:
+                prepare_material(material)
+
+    return lean.Baking(made, prepare_all)
 
 
 def see_lamps(scene):

@@ -59,12 +59,30 @@ def error_text(entry):
     error = entry["error"]
     parts = []
     if error.get("relative_l1") is not None:
-        parts.append(f"L1 {error['relative_l1']:.2g}")
-    if error.get("albedo") is not None:
-        parts.append(f"albedo {error['albedo']:.2g}")
+        parts.append(f"{100 * error['relative_l1']:.2g} % of the light")
     if error.get("note"):
         parts.append(error["note"])
     return ", ".join(parts) or "not measured"
+
+
+def details(node, form):
+    """What the panel leaves out of a node's form, a sentence a line."""
+    error = form["error"]
+    out = [
+        f"{what}: {100 * error[key]:.2g} %"
+        for key, what in (
+            ("relative_l1", "Light that leaves in other directions than the model's"),
+            ("relative_l2", "The same by squares, to which bright spots count more"),
+            ("albedo", "Largest error of how much is reflected, of a white surface"),
+        )
+        if error.get(key) is not None
+    ]
+    if error.get("note"):
+        out.append(error["note"].capitalize())
+    out.append(f"Run time at equal samples: {cost_text(node, form)}")
+    if form.get("closures"):
+        out.append(f"Closures of Cycles: {form['closures']}")
+    return out
 
 
 def cost_text(node, form):
@@ -126,6 +144,7 @@ def _draw_form(layout, node, form, scene, editable):
     for refusal in refusals:
         _wrapped(column, refusal[0].upper() + refusal[1:])
     _wrapped(column, f"Error: {error_text(form)}")
+    column.operator("brdfc.details", icon="QUESTION", emboss=False).node = node.name
     _wrapped(column, f"Cost: {cost_text(node, form)}")
     if form.get("closures"):
         _wrapped(column, f"Closures: {form['closures']}")

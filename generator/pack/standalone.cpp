@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "forms/representation.h"
-#include "measure/albedo_table.h"
+#include "measure/stored_albedo.h"
 #include "model/choices.h"
 #include "pack/choice_switch.h"
 #include "pack/shader.h"
