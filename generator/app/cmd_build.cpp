@@ -250,6 +250,8 @@ void run(const Options& options) {
     plan = plan::plan_models(options.models);
   }
   pack::Options pack{options.out, addon, plan, budget.costs, {}};
+  const std::string& cut_to = options.scene.empty() ? options.materials : options.scene;
+  pack.cut = std::filesystem::path(cut_to).stem().string();
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -2,6 +2,10 @@
 """What keeps a person from a wrong picture: one line and one button for each thing that is wrong,
 and files that other versions of the extension made."""
 
+import contextlib
+from importlib import import_module
+from pathlib import Path
+
 import bpy
 import helpers
 import pytest
@@ -188,3 +192,39 @@ def test_linked_materials_are_left_to_their_file(extension, empty, phong, tmp_pa
     result = extension.api.update_materials()
     assert result.count == 0
     assert "is linked from" in result.refusals[0] and "library.blend" in result.refusals[0]
+
+
+# ---- beside an extension that is cut to a scene --------------------------------------------------
+
+
+def test_what_is_cut_to_a_file_never_replaces_the_whole(extension, empty, phong, lean_pack):
+    folder = lean_pack({"m": {"model": "phong", "parameters": {"e": 20}}})
+    (cut,) = folder.parent.glob("*.zip")
+    assert cut.name.startswith("brdfc_shaders_materials-")
+    repository = bpy.context.preferences.extensions.repos["User Default"].directory
+    whole = extension.pack.manifest()["hash"]
+    bpy.ops.extensions.package_install_files(
+        filepath=str(cut), repo="user_default", enable_on_install=False
+    )
+    module = f"{extension.package}_materials"
+    try:
+        found = {p.name for p in Path(repository).iterdir() if not p.name.startswith(".")}
+        assert found == {"brdfc_shaders", "brdfc_shaders_materials"}
+        with pytest.raises(RuntimeError, match=f"{extension.package} is enabled"):
+            import_module(module).register()
+        with contextlib.suppress(RuntimeError):
+            bpy.ops.preferences.addon_enable(module=module)
+        assert module not in bpy.context.preferences.addons
+        extension.pack.manifest.cache_clear()
+        assert extension.pack.manifest()["hash"] == whole
+        assert shown(extension, phong, empty) == []
+        assert bpy.ops.brdfc.switch(
+            node=extension.nodes.group_nodes(phong)[0].name, representation="sampled"
+        ) == {"FINISHED"}
+    finally:
+        bpy.ops.extensions.package_uninstall(
+            repo_directory=repository, pkg_id="brdfc_shaders_materials"
+        )
+    assert [p.name for p in Path(repository).iterdir() if p.name.startswith("b")] == [
+        "brdfc_shaders"
+    ]
