@@ -9,6 +9,7 @@
 #include "closures/closure_pool.h"
 #include "fit/fit.h"
 #include "fit/terms.h"
+#include "pack/choice_switch.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
@@ -34,71 +35,6 @@ std::string parameter(const ParamInfo& p) {
       return fmt::format("    int {} = {}", p.name, int(p.value[0])) + meta;
   }
 }
-
-/// Statements that differ by combination of choices: equal ones are written once.
-class ChoiceSwitch {
- public:
-  ChoiceSwitch(const ModelInfo& info, const ParamValues& fixed) : info_(info), fixed_(fixed) {}
-
-  void add(const Choices& choices, const std::string& statements) {
-    for (auto& [text, combinations] : cases_)
-      if (text == statements) {
-        combinations.push_back(choices);
-        return;
-      }
-    cases_.push_back({statements, {choices}});
-  }
-
-  std::string print(int indent) const {
-    if (cases_.size() == 1) return cases_[0].first;
-    std::string out;
-    for (std::size_t i = 0; i < cases_.size(); ++i) {
-      const bool last = i + 1 == cases_.size();
-      out += fmt::format("{:{}}{}{{\n", "", indent,
-                         i == 0 ? "if (" + condition(cases_[i].second) + ") "
-                         : last ? std::string("else ")
-                                : "else if (" + condition(cases_[i].second) + ") ");
-      out += indented(cases_[i].first);
-      out += fmt::format("{:{}}}}\n", "", indent);
-    }
-    return out;
-  }
-
- private:
-  std::string condition(const std::vector<Choices>& combinations) const {
-    // Only the choices that tell these combinations from the others need a test.
-    std::set<std::string> alternatives;
-    for (const Choices& c : combinations) {
-      std::string all;
-      std::size_t k = 0;
-      for (const ParamInfo& p : info_.params) {
-        if (p.kind != ParamKind::Choice) continue;
-        const int index = c[k];
-        if (p.choices.size() > 1 && !fixed_.count(p.name) && !covers(combinations, c, k, int(p.choices.size())))
-          all += (all.empty() ? "" : " && ") + fmt::format("{} == {}", p.name, index);
-        ++k;
-      }
-      alternatives.insert(all.empty() ? "1" : all);
-    }
-    std::string text;
-    for (const std::string& a : alternatives)
-      text += (text.empty() ? "" : " || ") + (alternatives.size() > 1 ? "(" + a + ")" : a);
-    return text;
-  }
-
-  /// Whether every value of choice k stands in the combinations with the others as in c.
-  static bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size) {
-    for (int i = 0; i < size; ++i) {
-      c[k] = i;
-      if (std::find(combinations.begin(), combinations.end(), c) == combinations.end()) return false;
-    }
-    return true;
-  }
-
-  const ModelInfo& info_;
-  const ParamValues& fixed_;
-  std::vector<std::pair<std::string, std::vector<Choices>>> cases_;
-};
 
 /// The arrays of all statements of a shader, each once: combinations of choices share their tables.
 class SharedArrays {
