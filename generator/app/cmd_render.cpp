@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <csignal>
 
 #include "app/commands.h"
+#include "reference/color.h"
 #include "reference/image.h"
 #include "reference/render.h"
 #include "reference/scene.h"
@@ -73,7 +75,7 @@ class ProgressLine {
 
 void add_render_command(CLI::App& app) {
   struct Options {
-    std::string scene, out, preview, strategy = "mis";
+    std::string scene, out, preview, view = "Standard", strategy = "mis";
     int spp = 0, seed = -1, threads = 0, width = 0, height = 0;
     double max_seconds = 0, scale = 1, exposure = 0;
   };
@@ -97,13 +99,25 @@ void add_render_command(CLI::App& app) {
   command->add_option("--strategy", options->strategy, "Sample both ways (mis), or the BRDF or the lights alone")
       ->check(CLI::IsMember({"mis", "brdf", "light"}))
       ->capture_default_str();
-  command->add_option("--preview", options->preview, "Write an sRGB PNG as well");
+  command->add_option("--preview", options->preview, "Write a PNG as well, as a display shows it");
+  command
+      ->add_option(
+          "--view", options->view,
+          "View transform of the preview, of the OpenColorIO configuration that the environment variable OCIO\n"
+          "names, such as AgX of Blender's own")
+      ->capture_default_str();
   command->add_option("--exposure", options->exposure, "Stops, for the preview")->check(CLI::Range(-64.0, 64.0));
   command->callback([options] {
     const std::filesystem::path out(options->out);
     if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());
     if (!options->preview.empty() && std::filesystem::path(options->preview).extension() != ".png")
       input_error("--preview {}: expected a file name that ends in .png", options->preview);
+    if (!options->preview.empty()) {
+      const std::vector<std::string> views = reference::ColorConfig::current().views();
+      if (std::find(views.begin(), views.end(), options->view) == views.end())
+        input_error("--view {}: expected one of {}, the views of {}", options->view, fmt::join(views, ", "),
+                    reference::ColorConfig::current().file().string());
+    }
     const reference::Scene scene = reference::load_scene(options->scene);
     reference::RenderOptions r;
     r.settings = scene.settings;
@@ -128,7 +142,8 @@ void add_render_command(CLI::App& app) {
     line.close();
     result.rendering.metadata["strategy"] = options->strategy;
     reference::write_rendering(out, result.rendering);
-    if (!options->preview.empty()) reference::write_preview(options->preview, result.rendering.mean, options->exposure);
+    if (!options->preview.empty())
+      reference::write_preview(options->preview, result.rendering.mean, options->exposure, options->view);
     const std::string summary =
         fmt::format("{} has {} of {} samples a pixel", out.string(), result.samples, r.settings.spp);
     if (result.cancelled) throw CheckFailed("interrupted: " + summary);

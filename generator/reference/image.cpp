@@ -14,6 +14,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "reference/color.h"
 
 namespace brdfc::reference {
 
@@ -233,7 +234,7 @@ void write_rendering(const fs::path& path, const Rendering& rendering) {
   write_file(path, spec, data);
 }
 
-Image read_image(const fs::path& path, ColorSpace space) {
+Image read_image(const fs::path& path, const std::string& space) {
   const File file = read_file(path);
   const Channels channels = find_channels(file.spec);
   if (channels.r < 0)
@@ -241,9 +242,8 @@ Image read_image(const fs::path& path, ColorSpace space) {
                 fmt::join(file.spec.channelnames, ", "));
   Image image = file.extract(channels);
   check_finite(image, path.string());
-  const bool decode = space == ColorSpace::Srgb || (space == ColorSpace::Auto && !file.spec.format.is_floating_point());
-  if (decode)
-    for (float& value : image.rgb) value = float(srgb_decode(value));
+  const bool encoded = space == "auto" ? !file.spec.format.is_floating_point() : space != "linear";
+  if (encoded) ColorConfig::current().to_scene_linear(image, space == "auto" || space == "srgb" ? "sRGB" : space);
   return image;
 }
 
@@ -320,15 +320,13 @@ void write_display(const fs::path& path, const Image& display) {
   write_file(path, spec, display.rgb);
 }
 
-void write_preview(const fs::path& path, const Image& linear, double exposure) {
+void write_preview(const fs::path& path, const Image& linear, double exposure, const std::string& view) {
   Image display = linear;
   const double gain = std::exp2(exposure);
-  for (float& v : display.rgb) v = float(srgb_encode(std::clamp(gain * v, 0.0, 1.0)));
+  for (float& v : display.rgb) v = float(gain * v);
+  ColorConfig::current().to_display(display, view);
   write_display(path, display);
 }
-
-double srgb_encode(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055; }
-double srgb_decode(double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); }
 
 Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical) {
   const auto index = [](long i, int size, Wrap wrap) {

@@ -35,12 +35,6 @@ struct Rendering {
   nlohmann::json metadata = nlohmann::json::object();
 };
 
-enum class ColorSpace {
-  Auto,    ///< sRGB for integer pixels, linear for floating point
-  Linear,  ///< as stored
-  Srgb     ///< decoded from the sRGB transfer curve
-};
-
 /// The file's extension in small letters, with its dot.
 std::string ending(const std::filesystem::path& path);
 
@@ -54,9 +48,10 @@ Rendering read_rendering(const std::filesystem::path& path);
 /// Writes float EXR with the variance as layer "variance" and the metadata as attributes.
 void write_rendering(const std::filesystem::path& path, const Rendering& rendering);
 
-/// Reads an image for use as texture or environment; grey is repeated. Throws InputError naming the file,
-/// also for values that are not finite.
-Image read_image(const std::filesystem::path& path, ColorSpace space = ColorSpace::Auto);
+/// Reads an image for use as texture or environment, as scene-linear colours; grey is repeated. `space`: "linear", as
+/// stored; a colour space of ColorConfig::current(), where "srgb" is "sRGB"; "auto", sRGB for integer pixels and linear
+/// for floating point. Throws InputError naming the file, also for values that are not finite.
+Image read_image(const std::filesystem::path& path, const std::string& space = "auto");
 /// Writes float EXR without metadata: equal pixels give equal files.
 void write_image(const std::filesystem::path& path, const Image& image);
 
@@ -80,14 +75,11 @@ nlohmann::json to_json(const Comparison& c);
 /// darker, full colour at a difference of `scale` times the mean of b.
 Image difference_image(const Image& a, const Image& b, double scale = 0.25);
 
-/// Writes 8 bits: colours are multiplied by 2^exposure, clipped, and encoded with the sRGB curve.
-void write_preview(const std::filesystem::path& path, const Image& linear, double exposure = 0);
+/// Writes 8 bits: colours are multiplied by 2^exposure and shown through a view transform of ColorConfig::current().
+void write_preview(const std::filesystem::path& path, const Image& linear, double exposure = 0,
+                   const std::string& view = "Standard");
 /// Writes 8 bits from values that are already display-referred, in [0, 1].
 void write_display(const std::filesystem::path& path, const Image& display);
-
-/// sRGB transfer curve (IEC 61966-2-1), [0, 1] to [0, 1].
-double srgb_encode(double linear);
-double srgb_decode(double encoded);
 
 enum class Wrap { Repeat, Clamp };
 

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <set>
 
+#include "reference/color.h"
 #include "reference/json_view.h"
 #include "reference/procedural.h"
 #include "reference/shapes.h"
@@ -174,10 +175,13 @@ class Loader {
       image = checker_texture({a[0], a[1], a[2]}, {b[0], b[1], b[2]}, j.at("cells").integer(1, 256));
     } else {
       j.only({"image", "colorspace"});
-      ColorSpace space = ColorSpace::Auto;
+      std::string space = "auto";
       if (const auto v = j.find("colorspace")) {
-        const std::string name = v->choice({"auto", "linear", "srgb"});
-        space = name == "linear" ? ColorSpace::Linear : name == "srgb" ? ColorSpace::Srgb : ColorSpace::Auto;
+        space = v->text();
+        std::vector<std::string> known{"auto", "linear", "srgb"};
+        for (const std::string& name : ColorConfig::current().spaces()) known.push_back(name);
+        if (std::find(known.begin(), known.end(), space) == known.end())
+          v->fail(fmt::format("one of {}", fmt::join(known, ", ")));
       }
       image = read_file(j.at("image"), [space](const fs::path& f) { return read_image(f, space); });
     }

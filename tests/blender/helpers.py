@@ -86,17 +86,23 @@ def render(scene):
         return read_picture(path)
 
 
-def render_passes(scene):
-    """Renders the scene; every pass by name, (height, width, channels), row 0 at the bottom.
-
-    Blender does not hand out the pixels of a multilayer file; the OpenImageIO that it brings does.
-    """
+def open_image_io():
+    """The module that Blender brings."""
     import sys
 
     root = Path(bpy.utils.resource_path("LOCAL"))
     sys.path += [str(p) for p in root.glob("python/lib/python3.*/site-packages")]
     import OpenImageIO
 
+    return OpenImageIO
+
+
+def render_passes(scene):
+    """Renders the scene; every pass by name, (height, width, channels), row 0 at the bottom.
+
+    Blender does not hand out the pixels of a multilayer file; the OpenImageIO that it brings does.
+    """
+    oiio = open_image_io()
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # from 5.0
         settings.media_type = "MULTI_LAYER_IMAGE"
@@ -106,11 +112,11 @@ def render_passes(scene):
         path = Path(folder) / "picture.exr"
         scene.render.filepath = str(path)
         bpy.ops.render.render(write_still=True, scene=scene.name)
-        image = OpenImageIO.ImageBuf(str(path))
+        image = oiio.ImageBuf(str(path))
         passes = {}
         for part in range(image.nsubimages):
-            image = OpenImageIO.ImageBuf(str(path), part, 0)
-            pixels = image.get_pixels(OpenImageIO.FLOAT)[::-1].astype(np.float64)
+            image = oiio.ImageBuf(str(path), part, 0)
+            pixels = image.get_pixels(oiio.FLOAT)[::-1].astype(np.float64)
             for index, channel in enumerate(image.spec().channelnames):
                 *_, name, letter = channel.split(".")
                 passes.setdefault(name, {})[letter] = pixels[..., index]

@@ -9,6 +9,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const char* names[] = {"a.exr", "a.hdr", "a.png"};
   const auto path = fuzz::write(names[data[0] % 3], data + 1, size - 1);
   fuzz::expect_value_or_input_error([&] { reference::read_rendering(path); });
-  fuzz::expect_value_or_input_error([&] { reference::read_image(path, reference::ColorSpace::Auto); });
+  fuzz::expect_value_or_input_error([&] { reference::read_image(path, "auto"); });
   return 0;
 }

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/color.h"
+
+#include <OpenColorIO/OpenColorIO.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <regex>
+
+#include "core/data_dir.h"
+#include "core/error.h"
+
+namespace brdfc::reference {
+
+namespace ocio = OCIO_NAMESPACE;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// What the file says of its version; nothing where it says none.
+std::string stated_version(const fs::path& file) {
+  std::ifstream in(file);
+  static const std::regex line_of_version(R"(^\s*ocio_profile_version:\s*([0-9.]+))");
+  std::smatch found;
+  for (std::string line; std::getline(in, line);)
+    if (std::regex_search(line, found, line_of_version)) return found[1];
+  return {};
+}
+
+/// The processor's exact formulas: the default ones approximate powers to 1e-4.
+void convert(const ocio::ConstProcessorRcPtr& processor, Image& image) {
+  const auto cpu =
+      processor->getOptimizedCPUProcessor(ocio::BIT_DEPTH_F32, ocio::BIT_DEPTH_F32, ocio::OPTIMIZATION_LOSSLESS);
+  ocio::PackedImageDesc pixels(image.rgb.data(), image.width, image.height, 3);
+  cpu->apply(pixels);
+}
+
+}  // namespace
+
+struct ColorConfig::Impl {
+  ocio::ConstConfigRcPtr config;
+};
+
+ColorConfig::ColorConfig(const fs::path& file) : file_(file), impl_(std::make_unique<Impl>()) {
+  ocio::SetLoggingLevel(ocio::LOGGING_LEVEL_NONE);  // what matters comes as an exception
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) input_error("{}: expected an OpenColorIO configuration", file.string());
+  try {
+    impl_->config = ocio::Config::CreateFromFile(file.c_str());
+    impl_->config->validate();
+  } catch (const ocio::Exception& e) {
+    const std::string version = stated_version(file);
+    input_error(
+        "{}: an OpenColorIO configuration{} that OpenColorIO {} can't read; without the environment variable "
+        "OCIO brdfc takes its own. {}",
+        file.string(), version.empty() ? "" : " of version " + version, ocio::GetVersion(), e.what());
+  }
+}
+
+ColorConfig::~ColorConfig() = default;
+
+const ColorConfig& ColorConfig::current() {
+  static const ColorConfig config = [] {
+    const char* given = std::getenv("OCIO");
+    return ColorConfig(given && *given ? fs::path(given) : data_dir() / "data" / "color" / "config.ocio");
+  }();
+  return config;
+}
+
+std::vector<std::string> ColorConfig::spaces() const {
+  std::vector<std::string> out;
+  for (int i = 0; i < impl_->config->getNumColorSpaces(); ++i)
+    out.emplace_back(impl_->config->getColorSpaceNameByIndex(i));
+  return out;
+}
+
+std::vector<std::string> ColorConfig::views() const {
+  const ocio::ConstConfigRcPtr& c = impl_->config;
+  std::vector<std::string> out;
+  for (int i = 0; i < c->getNumViews(c->getDefaultDisplay()); ++i)
+    out.emplace_back(c->getView(c->getDefaultDisplay(), i));
+  return out;
+}
+
+void ColorConfig::to_scene_linear(Image& image, const std::string& space) const {
+  const ocio::ConstColorSpaceRcPtr found = impl_->config->getColorSpace(space.c_str());
+  if (!found)
+    input_error("{} has no colour space '{}', expected one of {}", file_.string(), space, fmt::join(spaces(), ", "));
+  if (found->isData()) return;
+  convert(impl_->config->getProcessor(found->getName(), ocio::ROLE_SCENE_LINEAR), image);
+}
+
+void ColorConfig::to_display(Image& image, const std::string& view) const {
+  const std::vector<std::string> known = views();
+  if (std::find(known.begin(), known.end(), view) == known.end())
+    input_error("{} has no view '{}', expected one of {}", file_.string(), view, fmt::join(known, ", "));
+  const auto transform = ocio::DisplayViewTransform::Create();
+  transform->setSrc(ocio::ROLE_SCENE_LINEAR);
+  transform->setDisplay(impl_->config->getDefaultDisplay());
+  transform->setView(view.c_str());
+  convert(impl_->config->getProcessor(transform), image);
+  for (float& v : image.rgb) v = std::clamp(v, 0.0f, 1.0f);
+}
+
+}  // namespace brdfc::reference

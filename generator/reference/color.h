@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Colour spaces and view transforms, by OpenColorIO.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "reference/image.h"
+
+namespace brdfc::reference {
+
+/// An OpenColorIO configuration. Renderers compute in its role "scene_linear".
+class ColorConfig {
+ public:
+  /// Throws InputError that names the file, and its version where that is later than this OpenColorIO reads.
+  explicit ColorConfig(const std::filesystem::path& file);
+  ~ColorConfig();
+
+  /// The one that the environment variable OCIO names, as for every program that uses OpenColorIO, Blender's own among
+  /// them; without it data/color/config.ocio. Loaded once. Throws as the constructor.
+  static const ColorConfig& current();
+
+  const std::filesystem::path& file() const { return file_; }
+  /// Names of colour spaces, and of the default display's view transforms.
+  std::vector<std::string> spaces() const;
+  std::vector<std::string> views() const;
+
+  /// Pixels of that colour space, by name, alias or role, become scene-linear. Spaces that hold data stay as they are.
+  /// Throws InputError that lists the spaces if there is none of that name.
+  void to_scene_linear(Image& image, const std::string& space) const;
+  /// Scene-linear pixels as the default display shows them, in [0, 1]. Throws InputError that lists the views.
+  void to_display(Image& image, const std::string& view) const;
+
+ private:
+  struct Impl;
+  std::filesystem::path file_;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace brdfc::reference
