@@ -15,6 +15,7 @@
 #include "model/horizon.h"
 #include "pack/shader.h"
 #include "plan/plan.h"
+#include "reference/shapes.h"
 
 namespace brdfc::reference {
 namespace {
