@@ -28,6 +28,7 @@
 #include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/nodes.h"
+#include "pack/python_package.h"
 #include "pack/shader.h"
 #include "pack/zip.h"
 #include "plan/costs.h"
@@ -246,6 +247,10 @@ Result build_pack(const Options& options) {
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
   }
+  std::vector<const Model*> formulas;
+  for (const plan::PlannedModel& plan : chosen) formulas.push_back(plan.model);
+  for (const auto& [name, data] : python_package(formulas, options.python))
+    if (name.ends_with(".py")) members["brdfc/" + name] = data;
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;
   manifest["hash"] = sha256(everything);
