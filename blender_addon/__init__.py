@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import lamps, operators, ui
+from . import lamps, operators, plot_panel, ui, update
 
 
 def _refuse_beside_another():
@@ -22,10 +22,14 @@ def register():
     _refuse_beside_another()
     operators.register()
     ui.register()
+    plot_panel.register()
     lamps.register()
+    update.register()
 
 
 def unregister():
+    update.unregister()
     lamps.unregister()
+    plot_panel.unregister()
     ui.unregister()
     operators.unregister()

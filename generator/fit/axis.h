@@ -4,16 +4,16 @@
 
 #include <string>
 
-#include "measure/albedo_table.h"
+#include "core/axis_scale.h"
 #include "model/model.h"
 
 namespace brdfc::fit {
 
 /// A Number parameter from one end of its slider to the other.
 struct FitAxis {
-  std::string parameter;     ///< its name
-  double low, high;          ///< ends of the slider, in units of the parameter
-  measure::AxisScale scale;  ///< on which places are even
+  std::string parameter;  ///< its name
+  double low, high;       ///< ends of the slider, in units of the parameter
+  AxisScale scale;        ///< on which places are even
 
   /// The parameter's value at `place`, from 0 at the low end to 1 at the high one; beyond them that of the end.
   double at(double place) const;
