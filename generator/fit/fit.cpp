@@ -364,25 +364,15 @@ std::vector<View> views_of(const measure::BoundModel& some, const std::vector<Sc
 }  // namespace
 
 FitAxis fit_axis(const ParamInfo& p) {
-  FitAxis axis{p.name, p.soft_min, p.soft_max, measure::AxisScale::Linear};
-  // What a factor of ten changes is looked at by factors.
-  if (axis.low > 0 && axis.high > 10 * axis.low)
-    axis.scale = measure::AxisScale::Log;
-  else if (axis.low >= 0 && axis.high > 10)
-    axis.scale = measure::AxisScale::Log1p;
-  return axis;
+  const ScaledRange slider = p.slider();
+  return {p.name, slider.low, slider.high, slider.scale};
 }
 
-double FitAxis::at(double x) const {
-  if (x <= 0) return low;
-  if (x >= 1) return high;
-  return measure::from_scale(
-      scale, measure::to_scale(scale, low) + x * (measure::to_scale(scale, high) - measure::to_scale(scale, low)));
-}
+double FitAxis::at(double x) const { return ScaledRange{scale, low, high}.at(x); }
 
 template <class T> T FitAxis::place(const T& value) const {
-  const double first = measure::to_scale(scale, low), span = measure::to_scale(scale, high) - first;
-  return (measure::to_scale(scale, minimum(maximum(value, T(low)), T(high))) - T(first)) * T(1 / span);
+  const double first = to_scale(scale, low), span = to_scale(scale, high) - first;
+  return (to_scale(scale, minimum(maximum(value, T(low)), T(high))) - T(first)) * T(1 / span);
 }
 template double FitAxis::place(const double&) const;
 template Expr FitAxis::place(const Expr&) const;

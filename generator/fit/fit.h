@@ -37,7 +37,7 @@ namespace brdfc::fit {
 struct FitAxis {
   std::string parameter;
   double low, high;
-  measure::AxisScale scale;
+  AxisScale scale;
 
   /// Its value at x in [0, 1], and the other way round; values beyond the ends take places beyond [0, 1].
   double at(double x) const;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
-#include <random>
 #include <set>
 
 #include "core/sequence.h"
@@ -187,22 +186,6 @@ RepresentationError fitted_error(const std::vector<fit::ViewError>& errors, cons
                          worst.relative_l1, worst.cos_theta_o,
                          axis ? fmt::format(", with {} = {:.3g}", axis->parameter, worst.number) : "");
   return out;
-}
-
-/// Parameters a slider reaches, drawn uniformly; a wide range logarithmically, as its effect is.
-ParamValues random_values(const ModelInfo& info, const Choices& choices, std::mt19937_64& rng) {
-  std::uniform_real_distribution<double> uniform(0, 1);
-  ParamValues values = with_choices(info, choices);
-  for (const ParamInfo& p : info.params) {
-    if (p.kind == ParamKind::Number) {
-      const double span = p.soft_max - p.soft_min;
-      values[p.name] =
-          span > 50 ? p.soft_min + std::expm1(uniform(rng) * std::log1p(span)) : p.soft_min + span * uniform(rng);
-    } else if (p.kind == ParamKind::Color) {
-      values[p.name] = std::array<double, 3>{uniform(rng), uniform(rng), uniform(rng)};
-    }
-  }
-  return values;
 }
 
 /// Where more than the declared number is open, that one alone stays so.
@@ -463,8 +446,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
   if (kind == RepresentationKind::Twin)
     return fitted_error(fit::twin_of(model, fit::without_factors(model, fixed)).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
-  std::mt19937_64 rng(20260101);
-  std::uniform_real_distribution<double> uniform(0, 1);
+  measure::Random random(20260101);
   double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;
   const ParamValues confined = form_values(model, kind);
   for (const Choices& choices : choice_combinations(model.info())) {
@@ -480,12 +462,13 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
       output_sampled(model, *recorded, program);
 
     for (int view = 0; view < kParameterSets * kViews; ++view) {
-      const ParamValues values = random_values(model.info(), choices, rng);
+      const ParamValues values = measure::random_values(model.info(), with_choices(model.info(), choices), random);
       const measure::BoundModel truth = measure::bind_model(model, values);
-      Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + uniform(rng)) / kViews, 2 * kPi * uniform(rng));
+      Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + measure::uniform(random)) / kViews,
+                                  2 * kPi * measure::uniform(random));
       if (measure::two_sided(model, *truth.brdf) && view % 2 == 1) wo.z = -wo.z;
       Inputs<float> inputs = float_inputs(values, wo);
-      const double distance = model.has_medium() ? 3 * uniform(rng) : 0;
+      const double distance = model.has_medium() ? 3 * measure::uniform(random) : 0;
       set_input(inputs, "path_length", distance);
       const auto executed = [&](const std::map<std::string, std::array<float, 3>>& out, const std::string& name,
                                 bool may_be_negative) {

@@ -64,28 +64,15 @@ std::string formula(const Model& model, const ParamValues& fixed) {
 /// A coordinate of the albedo: the view cosine or a Number parameter.
 struct Coordinate {
   std::string name;
-  AxisScale scale = AxisScale::Linear;
-  double min = 0, max = 1;
+  ScaledRange range;
 
   /// t in [0, 1] to a value, uniform on the scale; the cosine crowds towards grazing, where albedos bend most.
   double at(double t) const {
-    if (name == "cos_theta_o") return min + (max - min) * t * t;
-    if (t <= 0) return min;
-    if (t >= 1) return max;
-    return std::clamp(from_scale(scale, to_scale(scale, min) + t * (to_scale(scale, max) - to_scale(scale, min))), min,
-                      max);
+    return name == "cos_theta_o" ? range.low + (range.high - range.low) * t * t : range.at(t);
   }
 };
 
-Coordinate coordinate(const ParamInfo& p) {
-  Coordinate c{p.name, AxisScale::Linear, p.min, p.max};
-  // A range over more than two decades is looked at by factors, not by differences.
-  if (p.min > 0 && p.max / p.min > 100)
-    c.scale = AxisScale::Log;
-  else if (p.min >= 0 && p.max > 100)
-    c.scale = AxisScale::Log1p;
-  return c;
-}
+Coordinate coordinate(const ParamInfo& p) { return {p.name, p.accepted()}; }
 
 /// Coefficients of the polynomial in the colours, by monomial: index = powers of the colours as digits, the first
 /// colour's the lowest, each running to the colour's degree.
@@ -102,7 +89,7 @@ double unit_of(const Rgb<double>& albedo) { return std::max(1.0, max_abs(albedo)
 class Tabulator {
  public:
   explicit Tabulator(const Model& model) : model_(model) {
-    coordinates_.push_back({"cos_theta_o", AxisScale::Linear, kMinCos, 1});
+    coordinates_.push_back({"cos_theta_o", {AxisScale::Linear, kMinCos, 1}});
     for (const ParamInfo& p : model.info().params) {
       if (p.kind == ParamKind::Number) coordinates_.push_back(coordinate(p));
       if (p.kind == ParamKind::Color) colors_.push_back(p.name);
@@ -310,11 +297,11 @@ class Tabulator {
     }
     turns_.assign(coordinates_.size(), false);
     for (std::size_t p = 1; p < coordinates_.size(); ++p) {
-      if (coordinates_[p].max - coordinates_[p].min < 1) continue;
+      if (coordinates_[p].range.high - coordinates_[p].range.low < 1) continue;
       // The same samples in the turned frame: equal up to rounding, if it is a turn.
       turns_[p] = all_equal([&](const Case& c) {
         Position x = c.x;
-        const double sign = x[p] + c.turn <= coordinates_[p].max ? 1 : -1;
+        const double sign = x[p] + c.turn <= coordinates_[p].range.high ? 1 : -1;
         x[p] += sign * c.turn;
         return coefficients(c.combination, x, c.phi + sign * c.turn);
       });
@@ -504,7 +491,8 @@ class Tabulator {
     std::vector<double> bend(axes.size(), 0.);  // error = bend / knots^2
     for (std::size_t a = 0; a < axes.size(); ++a) {
       const Coordinate& c = coordinates_[axes[a]];
-      for (int j = 0; j < kProfile; ++j) s[a][std::size_t(j)] = to_scale(c.scale, c.at(double(j) / (kProfile - 1)));
+      for (int j = 0; j < kProfile; ++j)
+        s[a][std::size_t(j)] = to_scale(c.range.scale, c.at(double(j) / (kProfile - 1)));
       std::vector<Coefficients> profile(lines * kProfile);
       for_all(profile.size(), [&](std::size_t i) {
         Position x = probes_[i / kProfile];
@@ -561,25 +549,26 @@ class Tabulator {
     std::vector<TableAxis> out;
     for (std::size_t a = 0; a < axes.size(); ++a) {
       const Coordinate& c = coordinates_[axes[a]];
-      TableAxis axis{c.name, c.scale, {}};
+      TableAxis axis{c.name, c.range.scale, {}};
       std::vector<double> sum{0};
       for (int j = 0; j + 1 < kProfile; ++j)
         sum.push_back(sum.back() + 0.5 * (density[a][std::size_t(j)] + density[a][std::size_t(j) + 1]) *
                                        (s[a][std::size_t(j) + 1] - s[a][std::size_t(j)]));
       for (int i = 0; i < count[a]; ++i) {
         if (i == 0) {
-          axis.values.push_back(c.min);
+          axis.values.push_back(c.range.low);
           continue;
         }
         if (i + 1 == count[a]) {
-          axis.values.push_back(c.max);
+          axis.values.push_back(c.range.high);
           continue;
         }
         const double target = sum.back() * i / (count[a] - 1);
         const std::size_t j = std::min<std::size_t>(
             std::size_t(std::upper_bound(sum.begin(), sum.end(), target) - sum.begin()) - 1, kProfile - 2);
         const double t = (target - sum[j]) / (sum[j + 1] - sum[j]);
-        axis.values.push_back(std::clamp(from_scale(c.scale, s[a][j] + t * (s[a][j + 1] - s[a][j])), c.min, c.max));
+        axis.values.push_back(
+            std::clamp(from_scale(c.range.scale, s[a][j] + t * (s[a][j + 1] - s[a][j])), c.range.low, c.range.high));
       }
       out.push_back(std::move(axis));
     }
@@ -767,12 +756,6 @@ std::optional<AxisScale> scale_named(const std::string& name) {
 }
 
 }  // namespace
-
-double from_scale(AxisScale s, double x) {
-  return s == AxisScale::Log ? std::exp(x) : s == AxisScale::Log1p ? std::expm1(x) : x;
-}
-
-const char* name_of(AxisScale s) { return s == AxisScale::Linear ? "linear" : s == AxisScale::Log ? "log" : "log1p"; }
 
 std::size_t AlbedoTable::size() const {
   std::size_t n = 0;

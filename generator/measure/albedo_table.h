@@ -15,22 +15,10 @@
 #include <string>
 #include <vector>
 
+#include "core/axis_scale.h"
 #include "model/model.h"
 
 namespace brdfc::measure {
-
-/// How a value is mapped before a grid is interpolated linearly between two neighbouring knots.
-enum class AxisScale {
-  Linear,  ///< x
-  Log,     ///< log(x), all knots > 0
-  Log1p,   ///< log(1 + x), all knots >= 0
-};
-template <class T> T to_scale(AxisScale scale, const T& x) {
-  return scale == AxisScale::Log ? log(x) : scale == AxisScale::Log1p ? log(T(1) + x) : x;
-}
-double from_scale(AxisScale, double);
-/// "linear", "log" or "log1p".
-const char* name_of(AxisScale);
 
 struct TableAxis {
   std::string name;  ///< "cos_theta_o" or the name of a Number parameter

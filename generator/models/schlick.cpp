@@ -47,7 +47,8 @@ template <class T> struct Schlick {
     v(p, NumberSpec{"p", "Isotropy", 1, 0.01, 1, 0.05, 1,
                     "1 is isotropic; smaller stretches the highlight across the tangent"});
     v(rough,
-      NumberSpec{"rough", "Roughness", 0.2, 0, 1, 0.01, 1, "0 is a mirror, 1 Lambertian but for the Fresnel term"});
+      NumberSpec{"rough", "Roughness", 0.2, 0, 1, 0.01, 1, "0 is a mirror, 1 Lambertian but for the Fresnel term"}
+          .by_factors());
   }
 
   Rgb<T> S(const T& one_minus_u) const { return named("S", r + (Rgb<T>(T(1)) - r) * pow5(one_minus_u)); }

@@ -162,9 +162,9 @@ class AlbedoText {
   std::string scaled(const measure::TableAxis& axis) const {
     const std::string x = operand(axis.name);
     switch (axis.scale) {
-      case measure::AxisScale::Log:
+      case AxisScale::Log:
         return fmt::format("log(max({}, {}))", x, number(axis.values.front()));
-      case measure::AxisScale::Log1p:
+      case AxisScale::Log1p:
         return fmt::format("log(1.0 + {})", x);
       default:
         return x;
@@ -203,9 +203,7 @@ class AlbedoText {
     for (std::size_t a = 0; a < g.axes.size(); ++a) {
       std::vector<double> knots = g.axes[a].values;
       for (double& k : knots)
-        k = g.axes[a].scale == measure::AxisScale::Log     ? std::log(k)
-            : g.axes[a].scale == measure::AxisScale::Log1p ? std::log1p(k)
-                                                           : k;
+        k = g.axes[a].scale == AxisScale::Log ? std::log(k) : g.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : k;
       out += print::array(fmt::format("knots_{}_{}", index, a), knots);
     }
     if (g.channels == 1) return out + print::array(fmt::format("table_{}", index), {g.values.begin(), g.values.end()});

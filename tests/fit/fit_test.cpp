@@ -377,9 +377,9 @@ TEST(StoredFits, ServeColoursThatAreKnown) {
 
 /// An axis goes by factors where a number does.
 TEST(Fit, AxesAreSliders) {
-  for (const auto& [model, number, scale] : {std::tuple{"phong", "e", measure::AxisScale::Log},
-                                             {"blinn", "e", measure::AxisScale::Log1p},
-                                             {"oren_nayar", "sigma", measure::AxisScale::Linear}}) {
+  for (const auto& [model, number, scale] : {std::tuple{"phong", "e", AxisScale::Log},
+                                             {"blinn", "e", AxisScale::Log1p},
+                                             {"oren_nayar", "sigma", AxisScale::Linear}}) {
     const FitAxis axis = fit_axis(*find_model(model).info().param(number));
     EXPECT_EQ(axis.scale, scale) << model;
     for (const double x : {0.0, 0.21, 1.0}) EXPECT_NEAR(axis.place(axis.at(x)), x, 1e-12) << model;
