@@ -10,7 +10,6 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <tuple>
 
 #include "core/data_dir.h"
 #include "core/hash.h"
@@ -332,18 +331,6 @@ Fitted fit_views(const std::vector<View>& views, std::size_t stride, Family fami
   return out;
 }
 
-/// The number that values lack besides what there are terms by, or nothing. Throws std::logic_error for more.
-const ParamInfo* missing(const Model& model, const ParamValues& values) {
-  const Terms terms = terms_of(model, values);
-  const ParamInfo* out = nullptr;
-  for (const ParamInfo& p : model.info().params) {
-    if (values.count(p.name) || terms.has(p.name)) continue;
-    if (out || p.kind != ParamKind::Number) throw std::logic_error(model.info().name + ": a fit without " + p.name);
-    out = &p;
-  }
-  return out;
-}
-
 struct ScaledModel {
   measure::BoundModel model;
   double scale;  ///< what its f has to be divided by
@@ -377,64 +364,11 @@ template <class T> T FitAxis::place(const T& value) const {
 template double FitAxis::place(const double&) const;
 template Expr FitAxis::place(const Expr&) const;
 
-ParamValues without_factors(const Model& model, const ParamValues& known) {
-  ParamValues values = known;
-  for (const std::string& name : factors(model, known)) {
-    values.emplace(name, as_value(*model.info().param(name), Rgb<double>(1.0)));
-  }
-  missing(model, values);
-  return values;
-}
-
-std::pair<ParamValues, Rgb<double>> split_factors(const Model& model, ParamValues values) {
-  Rgb<double> factor(1.0);
-  for (const std::string& name : factors(model, values)) {
-    ParamValue& value = values.at(name);
-    factor = factor * as_rgb(value);
-    value = as_value(*model.info().param(name), Rgb<double>(1.0));
-  }
-  return {std::move(values), factor};
-}
-
-namespace {
-
-/// along_axis(), and the product of the factors.
-std::pair<ParamValues, Rgb<double>> split_along_axis(const Model& model, const ParamValues& values) {
-  ParamValues unknown = values, out = values;
-  for (const ParamInfo& p : model.info().params)
-    if (p.kind != ParamKind::Choice) unknown.erase(p.name);
-  for (const std::string& name : terms_of(model, unknown).parameters) out.erase(name);
-  // What is a factor only here, where others are known.
-  for (const std::string& name : factors(model, out))
-    if (const auto it = values.find(name); it != values.end()) out.insert(*it);
-  return split_factors(model, std::move(out));
-}
-
-}  // namespace
-
-ParamValues along_axis(const Model& model, const ParamValues& values) { return split_along_axis(model, values).first; }
-
-ParamValues with_number(const Model& model, const ParamValues& values, double number) {
-  ParamValues out = values;
-  if (const ParamInfo* p = missing(model, values)) out[p->name] = number;
-  return out;
-}
-
 Varied<double> Fit::varied(const ParamValues& values) const {
   Varied<double> out;
   if (axis_) out.number = std::get<double>(values.at(axis_->parameter));
   for (const std::string& name : terms_.parameters) out.parameters[name] = as_rgb(values.at(name));
   return out;
-}
-
-std::optional<std::string> unfit(const Model& model, const ParamValues& known) {
-  if (!model.has_scatter()) return "it only reflects and refracts ideally";
-  for (const ParamValues& values : places(model, known)) {
-    const auto brdf = model.make_double(values);
-    if (model.has_transmit() || model.has_medium() || brdf->scatters_through()) return "it lets light through";
-    if (!model.info().properties.isotropic && turns(*brdf)) return "it is anisotropic";
-  }
-  return std::nullopt;
 }
 
 namespace {
@@ -603,7 +537,7 @@ std::string samples_of(const Model& model, const ParamValues& values, const FitA
   return text;
 }
 std::string hash_of(const Model& model, const ParamValues& values) {
-  const FitAxis axis = fit_axis(*missing(model, values));
+  const FitAxis axis = fit_axis(*roles_of(model, values).axis());
   return sha256(fmt::format("{}\n{}\n{} {} {} {}\n{}\n{}", model.info().name, format_values(model.info(), values),
                             axis.parameter, axis.low, axis.high, name_of(axis.scale), settings(),
                             samples_of(model, values, axis)));
@@ -631,12 +565,11 @@ double mean_error(const std::vector<Fitted>& knots) {
 }  // namespace
 
 Fit::Fit(const Model& model, const ParamValues& given, From from) {
-  ParamValues values = given;
-  Rgb<double> factor(1.0);
-  const ParamInfo* p = missing(model, given);
-  // The same fit whether factors, and what there are terms by, are known or sockets.
-  if (p) std::tie(values, factor) = split_along_axis(model, given);
-  terms_ = terms_of(model, values);
+  const Roles& roles = roles_of(model, given);
+  const ParamInfo* p = roles.axis();
+  // The same fit whether factors and what is mixed are known or sockets.
+  const auto [values, factor] = p ? along_axis(model, roles.fitted()) : Split{roles.fitted(), Rgb<double>(1.0)};
+  terms_ = roles_of(model, values).terms();
   if (p) {
     axis_ = fit_axis(*p);
     const std::string hash = hash_of(model, values);
@@ -1194,10 +1127,12 @@ template Rgb<double> Fit::f_cos(const Vec3<double>&, const Vec3<double>&, const 
 template Rgb<Expr> Fit::f_cos(const Vec3<Expr>&, const Vec3<Expr>&, const Varied<Expr>&) const;
 
 std::filesystem::path stored_fit(const Model& model, const ParamValues& values) {
-  return path_of(model, hash_of(model, along_axis(model, values)));
+  return path_of(model, hash_of(model, along_axis(model, values).values));
 }
 
-const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }
+const Fit& fit_of(const Model& model, const ParamValues& values) {
+  return made_once<Fit>(model, roles_of(model, values).fitted());
+}
 
 Fit fit_of(const Model& model, const ParamValues& values, const Cosines& views) {
   const Fit& whole = fit_of(model, values);

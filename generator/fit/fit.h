@@ -24,6 +24,7 @@
 
 #include "closures/closure.h"
 #include "core/cosines.h"
+#include "fit/roles.h"
 #include "fit/terms.h"
 #include "fit/view.h"
 #include "measure/albedo_table.h"
@@ -46,16 +47,6 @@ struct FitAxis {
 /// The axis that a number of the schema would have.
 FitAxis fit_axis(const ParamInfo&);
 
-/// `known` with 1 for every factor that it lacks. Throws std::logic_error where it then lacks more than one number and
-/// what there are terms by.
-ParamValues without_factors(const Model&, const ParamValues& known);
-/// `values`, in which factors are, with 1 for each, and their product.
-std::pair<ParamValues, Rgb<double>> split_factors(const Model&, ParamValues values);
-/// What a fit along a number is kept by: `values` with 1 for each factor and without what there are terms by.
-ParamValues along_axis(const Model&, const ParamValues& values);
-/// Values with `number` for that which they may lack; what there are terms by stays away.
-ParamValues with_number(const Model&, const ParamValues& values, double number);
-
 /// What closures of a fit depend on besides the view: the value of its axis, if it has one, and of the parameters that
 /// it has terms by.
 template <class T> struct Varied {
@@ -65,10 +56,6 @@ template <class T> struct Varied {
   Varied(const T& n) : number(n) {}  // NOLINT: all that most fits need
 };
 
-/// Why closures can't be fitted to a model with these parameters; nothing if they can. They may lack one number and
-/// what there are terms by.
-std::optional<std::string> unfit(const Model&, const ParamValues&);
-
 /// The height, as a cosine, of the lowest view that closures are fitted to. Of a lower one, as bent and interpolated
 /// normals have it too, the normal is turned towards the viewer until the view is as high: about the normal itself
 /// closures would turn black one after the other, and what is left of the sum no longer cancels.
@@ -77,9 +64,10 @@ inline constexpr double kLowestView = 2e-3;
 class Fit {
  public:
   enum class From { Store, Scratch };
-  /// `values` may lack what there are terms by, and one number, which becomes the axis; then what there are terms by
+  /// `values` may lack factors, what is mixed, and one number, which becomes the axis (roles.h); then what is mixed
   /// stays open even where it is known, and a fit that is stored is read, unless it has to be made from scratch. Throws
-  /// ValueError where the model gives a value that is NaN, infinite or negative.
+  /// ValueError where the model gives a value that is NaN, infinite or negative; std::logic_error for values that lack
+  /// more.
   Fit(const Model&, const ParamValues& values, From from = From::Store);
 
   /// Writes the tables as a float EXR with a row a table, what they are in its attribute brdfc:table. One along an axis
@@ -184,7 +172,8 @@ class Fit {
 /// the model computes, along_axis() of the values, slider, settings.
 std::filesystem::path stored_fit(const Model&, const ParamValues& values);
 
-/// The fit for these values, made or read at first use and kept while the program runs.
+/// The fit for these values, made or read at first use and kept while the program runs. It has 1 for factors that they
+/// lack.
 const Fit& fit_of(const Model&, const ParamValues& values);
 /// The same for these views alone.
 Fit fit_of(const Model&, const ParamValues& values, const Cosines& views);

@@ -8,7 +8,7 @@
 
 #include "core/sequence.h"
 #include "fit/fit.h"
-#include "fit/terms.h"
+#include "fit/roles.h"
 #include "fit/twin.h"
 #include "fit/view.h"
 #include "forms/aimed.h"
@@ -195,14 +195,8 @@ ParamValues fit_values(const Model& model, const ParamValues& fixed) {
   ParamValues known = fixed;
   for (const ParamInfo& p : info.params)
     if (p.kind == ParamKind::Choice) known.insert(*defaults.find(p.name));
-  const std::set<std::string> free = fit::factors(model, known);
-  const fit::Terms terms = fit::terms_of(model, known);
-  std::vector<const ParamInfo*> open;
-  for (const ParamInfo& p : info.params)
-    if (!known.count(p.name) && !free.count(p.name) && !terms.has(p.name)) open.push_back(&p);
-  const bool axis = open.size() == 1 && open.front()->kind == ParamKind::Number;
-  for (const ParamInfo* p : open)
-    if (!axis && p->name != info.properties.fit_axis) known.insert(*defaults.find(p->name));
+  for (const std::string& name : fit::roles_of(model, known).with(fit::Role::Open))
+    if (name != info.properties.fit_axis) known.insert(*defaults.find(name));
   for (const auto& [name, value] : fixed) known.erase(name);
   return known;
 }
@@ -280,7 +274,7 @@ Recording record(const Model& model, RepresentationKind kind, const ParamValues&
     if (!sum) input_error("{}: has no exact representation", model.info().name);
     output_closures(*sum, program, closures);
   } else if (kind == RepresentationKind::Fitted) {
-    const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, fixed), views);
+    const fit::Fit fit = fit::fit_of(model, fixed, views);
     output_closures(recorded_fit(model, *brdf, fit, fixed), program, closures, division_of(fit));
   } else {
     output_sampled(model, *brdf, program);
@@ -305,7 +299,7 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
   };
   AimedRecording out;
   std::optional<fit::Fit> fit;
-  if (from == AimedBase::Fitted) fit = fit::fit_of(model, fit::without_factors(model, fixed), views);
+  if (from == AimedBase::Fitted) fit = fit::fit_of(model, fixed, views);
   const ClosureSum<Expr> base = recorded_base(model, *brdf, fit ? &*fit : nullptr, fixed);
   {
     Program program;
@@ -440,11 +434,11 @@ Recording record_mirror(const Model& model, const ParamValues& fixed, int indent
 RepresentationError measure_error(const Model& model, RepresentationKind kind, const ParamValues& fixed,
                                   const Cosines& views) {
   if (kind == RepresentationKind::Fitted) {
-    const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, fixed), views);
+    const fit::Fit fit = fit::fit_of(model, fixed, views);
     return fitted_error(fit.errors(), "closures", fit.axis());
   }
   if (kind == RepresentationKind::Twin)
-    return fitted_error(fit::twin_of(model, fit::without_factors(model, fixed)).errors(), "Blender's nodes");
+    return fitted_error(fit::twin_of(model, fixed).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   measure::Random random(20260101);
   double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;

@@ -6,7 +6,7 @@
 #include <optional>
 #include <set>
 
-#include "fit/terms.h"
+#include "fit/roles.h"
 #include "measure/bound_model.h"
 #include "model/choices.h"
 
@@ -140,9 +140,11 @@ Json highlight_json(const Model& model, RepresentationKind kind, const Shader& s
   constexpr int kValues = 9;
   const ModelInfo& info = model.info();
   std::vector<const ParamInfo*> numbers;
-  const std::set<std::string> scales = fit::factors(model, fixed);
-  for (const ParamInfo& p : info.params)
-    if (p.kind == ParamKind::Number && !fixed.count(p.name) && !scales.count(p.name)) numbers.push_back(&p);
+  const fit::Roles& roles = fit::roles_of(model, fixed);
+  for (const ParamInfo& p : info.params) {
+    const fit::Role role = roles.of(p.name);
+    if (p.kind == ParamKind::Number && role != fit::Role::Constant && role != fit::Role::Factor) numbers.push_back(&p);
+  }
   const auto declared =
       std::ranges::find(numbers, info.properties.fit_axis, [](const ParamInfo* p) { return p->name; });
   const ParamInfo* over = declared != numbers.end() ? *declared : numbers.size() == 1 ? numbers[0] : nullptr;
@@ -150,7 +152,7 @@ Json highlight_json(const Model& model, RepresentationKind kind, const Shader& s
   for (int i = 0; i < (over ? kValues : 1); ++i) {
     ParamValues at = fixed;
     if (over) {
-      const double number = fit::fit_axis(*over).at(double(i) / (kValues - 1));
+      const double number = over->slider().at(double(i) / (kValues - 1));
       at[over->name] = number;
       values.push_back(number);
     }

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "closures/closure_pool.h"
-#include "fit/fit.h"
 #include "fit/twin.h"
 
 namespace brdfc::pack {
@@ -42,7 +41,7 @@ Json by_channel(const fit::Channels& tables) {
 }  // namespace
 
 Shader write_nodes(const Model& model, const ParamValues& fixed) {
-  const fit::Twin& twin = fit::twin_of(model, fit::without_factors(model, fixed));
+  const fit::Twin& twin = fit::twin_of(model, fixed);
   Shader out;
   out.name = fmt::format("brdfc_{}_twin", model.info().name);
   Json closures = Json::array();

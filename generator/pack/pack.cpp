@@ -19,7 +19,6 @@
 #include "core/hash.h"
 #include "core/parse.h"
 #include "fit/fit.h"
-#include "fit/terms.h"
 #include "fit/twin.h"
 #include "forms/representation.h"
 #include "measure/albedo_table.h"
@@ -112,7 +111,7 @@ struct BuiltModel {
 const fit::Fit* fit_in(RepresentationKind kind, const plan::PlannedModel& plan, const ParamValues& fixed) {
   const bool base = kind == RepresentationKind::Aimed && plan.base == forms::AimedBase::Fitted;
   if (kind != RepresentationKind::Fitted && !base) return nullptr;
-  return &fit::fit_of(*plan.model, fit::without_factors(*plan.model, fixed));
+  return &fit::fit_of(*plan.model, fixed);
 }
 
 /// What a form of a plan has no parameters for.
@@ -124,7 +123,7 @@ ParamValues fixed_in(const plan::PlannedModel& plan, RepresentationKind kind) {
 
 /// Makes or reads what a form is made of, so that asking for it takes no time afterwards.
 void prepare_fit(const plan::PlannedModel& plan, RepresentationKind kind) {
-  const ParamValues values = fit::without_factors(*plan.model, fixed_in(plan, kind));
+  const ParamValues values = fixed_in(plan, kind);
   if (kind == RepresentationKind::Twin)
     fit::twin_of(*plan.model, values);
   else

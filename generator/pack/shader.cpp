@@ -8,7 +8,7 @@
 
 #include "closures/closure_pool.h"
 #include "fit/fit.h"
-#include "fit/terms.h"
+#include "fit/roles.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
@@ -483,8 +483,7 @@ Shader write_shader(const Model& model, RepresentationKind kind, const measure::
         ++shader.operations;
       }
     if (forms::is_fit(kind) || (aimed && base == forms::AimedBase::Fitted))
-      for (const std::string& name : fit::factors(model, fixed)) {
-        if (fixed.count(name)) continue;
+      for (const std::string& name : fit::roles_of(model, fixed).with(fit::Role::Factor)) {
         for (std::size_t c = 0; c < kinds.size(); ++c)
           if (kinds[c].kind != ClosureKind::Reflection) body += fmt::format("    weight_{} *= {};\n", c, name);
         ++shader.operations;

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "fit/fit.h"
-#include "fit/terms.h"
+#include "fit/roles.h"
 
 namespace brdfc::plan {
 namespace {
@@ -49,10 +49,11 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
   // What it lacks at any values comes before what the values are.
   if (!model.has_scatter()) return fit::unfit(model, fixed);
   std::optional<std::string> axis;
-  const std::set<std::string> may_vary = fit::factors(model, fixed);
-  const fit::Terms terms = kind == RepresentationKind::Twin ? fit::Terms{} : fit::terms_of(model, fixed);
+  const fit::Roles& roles = fit::roles_of(model, fixed);
   for (const ParamInfo& p : model.info().params) {
-    if (fixed.count(p.name) || may_vary.count(p.name) || terms.has(p.name)) continue;
+    const fit::Role role = roles.of(p.name);
+    if (role == fit::Role::Constant || role == fit::Role::Factor) continue;
+    if (role == fit::Role::Mixed && kind != RepresentationKind::Twin) continue;
     const std::string how = how_it_varies(p.name, needs);
     if (p.kind != ParamKind::Number || kind == RepresentationKind::Twin) return how;
     if (axis) return fmt::format("{}; {}", *axis, how);
@@ -65,7 +66,7 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
                            range.high);
     }
   }
-  return fit::unfit(model, fit::without_factors(model, fixed));
+  return fit::unfit(model, fixed);
 }
 
 /// What one of the materials can be seen from.
@@ -78,7 +79,7 @@ Cosines views_of(const Needs& needs) {
 /// Of the material that is off by most. The mean along an axis says little of a material at one end of it.
 double fitted_error(const Needs& needs) {
   const Model& model = *needs.front()->model;
-  const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, constants(needs)), views_of(needs));
+  const fit::Fit fit = fit::fit_of(model, constants(needs), views_of(needs));
   double worst = 0;
   for (const MaterialNeed* need : needs) {
     std::optional<double> number;

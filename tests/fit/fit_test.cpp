@@ -180,7 +180,7 @@ TEST(Fit, SaysWhyThereIsNone) {
 TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   const auto of = [](const char* name, const std::vector<std::string>& text = {}) {
     const Model& m = find_model(name);
-    return factors(m, values_of(m, text));
+    return roles_of(m, values_of(m, text)).proportional();
   };
   using testing::ElementsAre;
   EXPECT_THAT(of("phong"), ElementsAre("ks"));
@@ -236,7 +236,7 @@ TEST(Fit, RunsAlongANumber) {
   EXPECT_LE(l1[l1.size() / 2], 0.007);
   EXPECT_LE(l1.back(), 0.03);
   for (const double sigma : {0.0, 0.013, 0.35, 0.66}) {
-    const auto brdf = m.make_double(with_number(m, values, sigma));
+    const auto brdf = m.make_double(roles_of(m, values).fitted_at(sigma));
     measure::Random random(5);
     double off = 0, sum = 0;
     for (const auto& [wi, wo] : measure::direction_pairs(*brdf, 400, random, false)) {
@@ -395,7 +395,7 @@ std::vector<std::pair<const Model*, ParamValues>> stored() {
     if (model->info().properties.fit_axis.empty()) continue;
     ParamValues values = complete(model->info(), {});
     values.erase(model->info().properties.fit_axis);
-    out.emplace_back(model.get(), along_axis(*model, values));
+    out.emplace_back(model.get(), along_axis(*model, values).values);
   }
   return out;
 }
@@ -466,7 +466,7 @@ TEST(StoredFits, StateTheirErrors) {
                          [&](const ViewError& e) { return e.number == number; });
     std::vector<double> l1(stated.size()), albedo(stated.size());
     for (const Terms::Term& term : fit.terms().terms) {
-      ParamValues whole = with_number(*model, values, number);
+      ParamValues whole = roles_of(*model, values).fitted_at(number);
       for (const auto& [name, value] : term.judged) whole[name] = value;
       whole = complete(model->info(), whole);
       const Varied<double> varied = fit.varied(whole);
@@ -509,7 +509,7 @@ TEST(StoredFits, HaveNoStepsAlongTheSlider) {
       for (std::size_t i = 0; i <= kSteps; ++i) {
         varied.number = fit.axis()->at(double(i) / kSteps);
         const ClosureSum<double> sum = fit.closures(wo, varied);
-        const auto brdf = model->make_double(complete(model->info(), with_number(*model, values, varied.number)));
+        const auto brdf = model->make_double(complete(model->info(), roles_of(*model, values).fitted_at(varied.number)));
         for (std::size_t j = 0; j < lit.size(); ++j) {
           f[j].push_back(max_component(evaluate(sum, lit[j], wo)));
           truth[j].push_back(max_component(brdf->eval(lit[j], wo) * lit[j].z));
@@ -568,7 +568,7 @@ TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
   const Fit& fit = fit_of(*model, values);
   const double x = fit.knots()[random / all.size() % fit.knots().size()], number = fit.axis()->at(x);
   const Fit cell = fit.knot(*model, values, x);
-  const ParamValues whole = complete(model->info(), with_number(*model, values, number));
+  const ParamValues whole = complete(model->info(), roles_of(*model, values).fitted_at(number));
   const measure::BoundModel bound = measure::bind_model(*model, whole);
   const auto l1 = [&](const Fit& of) {
     const Varied<double> varied = of.varied(whole);
@@ -586,7 +586,7 @@ TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
 TEST(StoredFits, ServeFactorsThatAreKnown) {
   const auto [model, values] = stored().front();
   ParamValues half = values;
-  const std::string name = *factors(*model, values).begin();
+  const std::string name = *roles_of(*model, values).proportional().begin();
   half[name] = std::array<double, 3>{0.5, 0.25, 0.1};
   const Fit &white = fit_of(*model, values), &coloured = fit_of(*model, half);
   const Vec3<double> wo = direction(0.7, 0), wi = direction(0.6, 3);

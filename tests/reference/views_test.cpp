@@ -181,7 +181,7 @@ TEST(Views, CutFitsHoldTheSameNumbers) {
     const Model& m = find_model("phong");
     ParamValues known = complete(m.info(), {{"e", 20.0}});
     if (axis) known.erase("e");
-    const ParamValues values = fit::without_factors(m, known);
+    const ParamValues values = fit::roles_of(m, known).fitted();
     const fit::Fit& whole = fit::fit_of(m, values);
     const fit::Varied<double> varied(20);
     // Also less than what lies between two knots, and what ends at the last.
