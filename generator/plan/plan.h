@@ -9,7 +9,7 @@
 
 #include "core/cosines.h"
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "model/model.h"
 #include "plan/costs.h"
 
@@ -27,7 +27,7 @@ struct MaterialNeed {
 
 /// Why a form of a model is in a pack, or is not.
 struct FormChoice {
-  forms::RepresentationKind form;
+  const forms::Form* form;
   bool taken = false;
   bool exists = true;          ///< for these materials
   std::optional<double> cost;  ///< as Costs has it
@@ -39,7 +39,7 @@ struct FormChoice {
 /// What a budget makes of the form of a material.
 struct FormChange {
   std::string id;
-  forms::RepresentationKind before, after;        ///< without a budget, as in a pack of everything; and with it
+  const forms::Form *before, *after;              ///< without a budget, as in a pack of everything; and with it
   std::optional<double> cost_before, cost_after;  ///< none where they were not measured
 };
 
@@ -48,7 +48,7 @@ struct PlannedModel {
   const Model* model = nullptr;
   std::vector<std::string> materials;                  ///< that need it; none in a pack of everything
   ParamValues fixed;                                   ///< folded into shaders and tables: no sockets
-  std::vector<forms::RepresentationKind> forms;        ///< preferred first
+  std::vector<const forms::Form*> forms;               ///< preferred first
   int max_lamps = forms::kMaxLamps;                    ///< that aimed forms can be told of
   forms::AimedBase base = forms::AimedBase::Declared;  ///< of an aimed form
   Cosines views;                           ///< that one of the materials can be seen from; tables have no others

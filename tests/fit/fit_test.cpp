@@ -15,13 +15,12 @@
 #include "closures/lobe.h"
 #include "core/hash.h"
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/albedo.h"
 #include "measure/albedo_table.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
 #include "measure/probes.h"
-#include "pack/shader.h"
 #include "plan/plan.h"
 #include "support.h"
 #include "tables/table_file.h"
@@ -29,7 +28,6 @@
 namespace brdfc::fit {
 namespace {
 
-using forms::RepresentationKind;
 
 using testing::HasSubstr;
 
@@ -195,9 +193,8 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   const Model& m = find_model("phong");
   ParamValues fixed = values_of(m, {"e=20"});
   fixed.erase("ks");
-  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
-    const pack::Shader s = pack::write_shader(m, kind, measure::fold(measure::albedo_table_of(m), m, fixed), fixed, {},
-                                              forms::kMaxLamps, forms::AimedBase::Fitted);
+  for (const forms::Form* kind : {forms::form("fitted"), forms::form("aimed")}) {
+    const forms::Shader s = kind->write(m, measure::fold(measure::albedo_table_of(m), m, fixed), {fixed, {}, forms::kMaxLamps, forms::AimedBase::Fitted});
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
     const std::size_t factor = s.source.find("weight_0 *= ks;"), rest = s.source.find("excess");
     ASSERT_NE(factor, std::string::npos);
@@ -253,12 +250,12 @@ TEST(Fit, RunsAlongANumber) {
 
   ParamValues fixed = values;
   fixed.erase("rho");
-  const pack::Shader s =
-      pack::write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, fixed), fixed);
+  const forms::Shader s =
+      forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, fixed), {fixed});
   EXPECT_THAT(s.source, HasSubstr("float sigma = "));
   EXPECT_THAT(s.source, HasSubstr("color rho = color("));
   EXPECT_LE(s.operations, 600);
-  EXPECT_LE(forms::measure_error(m, RepresentationKind::Fitted, fixed).relative_l1.value_or(1), 0.02);
+  EXPECT_LE(forms::form("fitted")->error(m, {fixed}).relative_l1.value_or(1), 0.02);
 
   const Model& lafortune = find_model("lafortune");
   ParamValues two = values_of(lafortune, {});
@@ -345,8 +342,8 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
 
     ParamValues fixed = values_of(m, {});
     fixed.erase(open);
-    const pack::Shader s =
-        pack::write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, fixed), fixed);
+    const forms::Shader s =
+        forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, fixed), {fixed});
     EXPECT_THAT(s.source, HasSubstr(fmt::format("color {} = color(", open)));
     EXPECT_THAT(s.source, HasSubstr("ramp_0[entry] /= weight_0;"));
     EXPECT_LE(s.operations, 600) << model;
@@ -370,8 +367,8 @@ TEST(StoredFits, ServeColoursThatAreKnown) {
   EXPECT_EQ(a.r, b.r);
   EXPECT_EQ(a.b, b.b);
   EXPECT_GT(a.r, 2 * a.b);
-  const pack::Shader s =
-      pack::write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, known), known);
+  const forms::Shader s =
+      forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, known), {known});
   EXPECT_THAT(s.source, testing::Not(HasSubstr("f0")));
 }
 
@@ -636,8 +633,7 @@ TEST(Fit, ShadersStayWithinBounds) {
   for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
     const Model& m = find_model(name);
     const ParamValues values = values_of(m, {text});
-    const pack::Shader s = pack::write_shader(m, RepresentationKind::Fitted,
-                                              measure::fold(measure::albedo_table_of(m), m, values), values);
+    const forms::Shader s = forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, values), {values});
     EXPECT_LE(s.operations, 600) << name;
     EXPECT_LE(s.closures, 9) << name;
     EXPECT_THAT(s.source, HasSubstr("phong_ramp(normal_0, exponent_0, ramp_0)"));
