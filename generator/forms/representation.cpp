@@ -437,8 +437,7 @@ RepresentationError measure_error(const Model& model, RepresentationKind kind, c
     const fit::Fit fit = fit::fit_of(model, fixed, views);
     return fitted_error(fit.errors(), "closures", fit.axis());
   }
-  if (kind == RepresentationKind::Twin)
-    return fitted_error(fit::twin_of(model, fixed).errors(), "Blender's nodes");
+  if (kind == RepresentationKind::Twin) return fitted_error(fit::twin_of(model, fixed).errors(), "Blender's nodes");
   constexpr int kParameterSets = 4, kViews = 6, kPoints = 256;
   measure::Random random(20260101);
   double difference = 0, total = 0, squared_difference = 0, squared_total = 0, albedo_error = 0;

@@ -509,7 +509,8 @@ TEST(StoredFits, HaveNoStepsAlongTheSlider) {
       for (std::size_t i = 0; i <= kSteps; ++i) {
         varied.number = fit.axis()->at(double(i) / kSteps);
         const ClosureSum<double> sum = fit.closures(wo, varied);
-        const auto brdf = model->make_double(complete(model->info(), roles_of(*model, values).fitted_at(varied.number)));
+        const auto brdf =
+            model->make_double(complete(model->info(), roles_of(*model, values).fitted_at(varied.number)));
         for (std::size_t j = 0; j < lit.size(); ++j) {
           f[j].push_back(max_component(evaluate(sum, lit[j], wo)));
           truth[j].push_back(max_component(brdf->eval(lit[j], wo) * lit[j].z));
