@@ -13,7 +13,6 @@
 #include <fstream>
 #include <map>
 #include <mutex>
-#include <sstream>
 
 #include "closures/closure_pool.h"
 #include "core/hash.h"
@@ -21,9 +20,11 @@
 #include "fit/fit.h"
 #include "fit/twin.h"
 #include "forms/representation.h"
-#include "measure/albedo_table.h"
+#include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
+#include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/nodes.h"
 #include "pack/shader.h"
@@ -38,14 +39,6 @@ using forms::RepresentationKind;
 namespace fs = std::filesystem;
 
 constexpr const char* kExtensionId = "brdfc_shaders";
-
-std::string read_text(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) input_error("{}: cannot be read", path.string());
-  return text.str();
-}
 
 void write_text(const fs::path& path, const std::string& text) {
   fs::create_directories(path.parent_path());
@@ -164,7 +157,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
     const ParamValues fixed = fixed_in(plan, kind);
     const fit::Fit* fit = fit_in(kind, plan, fixed);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
-                      of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
+                      of_fit = fit && !plan.views.all() ? fit->cut_to(plan.views).size() : of_whole_fit;
     const measure::AlbedoTable of_form =
         fixed == plan.fixed ? table : measure::fold(whole_table, model, fixed, plan.views);
     const Shader shader = twin ? write_nodes(model, fixed)
@@ -213,8 +206,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
 
 Result build_pack(const Options& options) {
   const std::vector<plan::PlannedModel>& chosen = options.models;
-  if (!fs::exists(options.addon / "blender_manifest.toml"))
-    input_error("{}: expected the add-on's folder with blender_manifest.toml", options.addon.string());
+  std::map<std::string, std::string> members = addon_files(options.addon);
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error || !fs::is_directory(options.out))
@@ -241,7 +233,6 @@ Result build_pack(const Options& options) {
   tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   Result result;
-  std::map<std::string, std::string> members;
   // Blender's nodes that join closures take of the pool, too: Mix Shader makes two products and their sum.
   Json manifest = {{"format", 1},
                    {"generator", std::string("brdfc ") + BRDFC_VERSION},
@@ -252,10 +243,6 @@ Result build_pack(const Options& options) {
     manifest["models"][chosen[i].model->info().name] = built[i].manifest;
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
-  }
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(options.addon)) {
-    const std::string name = entry.path().lexically_relative(options.addon).generic_string();
-    if (entry.path().extension() == ".py" || name == "blender_manifest.toml") members[name] = read_text(entry.path());
   }
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;

@@ -10,8 +10,8 @@
 
 #include "forms/aimed.h"
 #include "forms/representation.h"
-#include "measure/albedo_table.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
 #include "pack/shader.h"
 
 namespace brdfc::plan {

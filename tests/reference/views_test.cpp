@@ -10,11 +10,12 @@
 
 #include "fit/fit.h"
 #include "forms/representation.h"
-#include "measure/albedo_table.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
 #include "model/horizon.h"
 #include "pack/shader.h"
 #include "plan/plan.h"
+#include "reference/shapes.h"
 
 namespace brdfc::reference {
 namespace {
