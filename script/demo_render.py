@@ -176,12 +176,13 @@ def render_blender(extension, folder, forms, spp, seeds):
     return render_jobs(extension, folder, jobs)
 
 
-def smaller(scene, longest):
-    """The scene with at most so many pixels along its longer side."""
+def smaller(scene, longest, spp=None):
+    """The scene with at most so many pixels along its longer side, and so many samples a pixel."""
     settings = scene["settings"]
     factor = min(1, longest / max(settings["width"], settings["height"]))
-    size = {k: max(1, round(settings[k] * factor)) for k in ("width", "height")}
-    return scene | {"settings": settings | size}
+    fewer = {k: max(1, round(settings[k] * factor)) for k in ("width", "height")}
+    fewer["spp"] = min(settings["spp"], spp or settings["spp"])
+    return scene | {"settings": settings | fewer}
 
 
 def render_convergence(extension, folder, scene, forms):
@@ -281,8 +282,9 @@ def render_scene(source, options, models, versions):
     folder = options.out / source.stem
     folder.mkdir(parents=True, exist_ok=True)
     run([options.tool, "scene", source, "--out", folder])
-    if options.size:
-        write_json(folder / "scene.json", smaller(read_json(folder / "scene.json"), options.size))
+    if options.size or options.spp:
+        whole = read_json(folder / "scene.json")
+        write_json(folder / "scene.json", smaller(whole, options.size or 1 << 14, options.spp))
     inputs = digest(*resolved_files(folder))
     scene = read_json(folder / "scene.json")
     settings = scene["settings"]
@@ -291,17 +293,23 @@ def render_scene(source, options, models, versions):
     native = options.native.get(source.stem, {}).get("materials", {})
     write_json(folder / "native.json", native)
     forms = forms_of(scene, models, native)
+    if options.forms != "all":
+        forms = [f for f in forms if f.name not in ("sampled", "scene")]
+    if options.forms == "auto":
+        forms = [f for f in forms if f.name != "glossy"]
 
     state_file = folder / "state.json"
     state = read_json(state_file) if state_file.exists() else {}
-    plan, kept_plan = cached(
-        state,
-        "plan",
-        digest(versions["tool"], inputs, options.plan),
-        [folder / "plan" / "brdfc_shaders" / "manifest.json"],
-        lambda: build_plan(options.tool, folder, options.plan),
-    )
-    forms += planned_forms(folder, scene)
+    plan, kept_plan = None, False
+    if options.forms == "all":
+        plan, kept_plan = cached(
+            state,
+            "plan",
+            digest(versions["tool"], inputs, options.plan),
+            [folder / "plan" / "brdfc_shaders" / "manifest.json"],
+            lambda: build_plan(options.tool, folder, options.plan),
+        )
+        forms += planned_forms(folder, scene)
     key = digest(versions["tool"], inputs, reference_spp)
     reference, kept_reference = cached(
         state,
@@ -316,7 +324,7 @@ def render_scene(source, options, models, versions):
         inputs,
         RENDER_SCENE,
         folder / "native.json",
-        plan["key"],
+        plan and plan["key"],
         forms,
         blender_spp,
         options.seeds,
@@ -373,7 +381,7 @@ def render_scene(source, options, models, versions):
             "commands": [
                 shown([str(options.tool), "scene", str(source), "--out", str(folder)]),
                 reference["command"],
-                plan["command"],
+                *([plan["command"]] if plan else []),
                 blender["command"],
                 *([convergence["command"]] if convergence else []),
             ],
@@ -415,6 +423,13 @@ def main():
         default=10,
         help="percent of the light that forms of a pack cut to the scene may be off (10)",
     )
+    parser.add_argument(
+        "--forms",
+        choices=("all", "unit", "auto"),
+        default="all",
+        help="auto: what `auto` makes of the scene; unit: beside Blender's Glossy node (all)",
+    )
+    parser.add_argument("--spp", type=int, help="at most so many samples a pixel")
     parser.add_argument("--size", type=int, help="at most so many pixels along the longer side")
     parser.add_argument(
         "--reference-factor", type=int, default=4, help="times the scene's samples (4)"

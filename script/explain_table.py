@@ -14,7 +14,7 @@ from markdown_table import heading, line
 # Options that show most: many materials of one model, a form that is too dear, forms that change.
 SCENES = {
     "as-fig2": [],
-    "gl-fig8-radziszewski_alda": ["--error", "5", "--time", "1.3x"],
+    "room-radziszewski_alda": ["--error", "5", "--time", "1.3x"],
     "small-lamp": ["--error", "5"],
 }
 

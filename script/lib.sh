@@ -125,6 +125,12 @@ setup_blender() {
   esac
 }
 
+# blender_ext COMMAND...: Blender 4.5's own program for extensions, which its wheel has as a script.
+blender_ext() {
+  local scripts=("$ENVS"/blender-4.5/lib/python3*/site-packages/bpy/4.5/scripts)
+  "$ENVS/blender-4.5/bin/python" "${scripts[0]}/addons_core/bl_pkg/cli/blender_ext.py" "$@"
+}
+
 setup_tools() {
   find_python 3.11 >/dev/null || install_packages python3.11 python3.11-venv
   setup_env tools 3.11 || die "Python 3.11 was not found"

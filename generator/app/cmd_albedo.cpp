@@ -8,9 +8,11 @@
 #include "app/commands.h"
 #include "core/csv.h"
 #include "measure/albedo.h"
-#include "measure/albedo_table.h"
+#include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
+#include "measure/stored_albedo.h"
+#include "measure/tabulate_albedo.h"
 #include "tables/table_file.h"
 
 namespace brdfc::app {

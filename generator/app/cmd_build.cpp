@@ -24,7 +24,6 @@
 namespace brdfc::app {
 namespace {
 
-
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false;
   std::optional<std::string> error, time;
@@ -139,7 +138,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
     fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
     for (const plan::FormChoice& c : p.choices) {
       const nlohmann::ordered_json error = error_of(p, c, result);
-      fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", XX, c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
+      fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", c.form->name(), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
                  error.is_number()   ? fmt::format("{:.2e}", error.get<double>())
                  : error.is_string() ? error.get<std::string>()
                                      : "-",

@@ -111,7 +111,8 @@ void add_fit_command(CLI::App& app) {
     }
     // What the fit is for, as it says of itself.
     const auto label = [&] {
-      return o->model + " " + format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values).values);
+      return o->model + " " +
+             format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values).values);
     };
     if (const auto reason = fit::unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
     const auto print = [&](const auto& form, const auto& closures) {

@@ -10,7 +10,6 @@
 namespace brdfc::app {
 namespace {
 
-
 using Json = nlohmann::ordered_json;
 
 const char* kind_name(ParamKind k) {

@@ -50,9 +50,9 @@ struct Terms {
 
 inline constexpr std::size_t kMaxTerms = 4;
 
-/// By parameters that `known` lacks and that are not among the factors(): those in which f is a polynomial, colours of second degree
-/// and numbers of first. They are 0 or 1 in the terms' values, or nearly 0. One term of weight 1 where there are none,
-/// or where they would make more than kMaxTerms.
+/// By parameters that `known` lacks and that are not among the factors(): those in which f is a polynomial, colours of
+/// second degree and numbers of first. They are 0 or 1 in the terms' values, or nearly 0. One term of weight 1 where
+/// there are none, or where they would make more than kMaxTerms.
 Terms terms_of(const Model&, const ParamValues& known, const std::set<std::string>& factors);
 
 extern template std::vector<Rgb<double>> Terms::weights(const std::map<std::string, Rgb<double>>&) const;

@@ -145,7 +145,7 @@ Twin::Twin(const Model& model, const ParamValues& values) {
   const auto [white, factor] = without_factors(model, values);
   const measure::BoundModel bound = measure::bind_model(model, white);
   std::vector<View> views(kTwinKnots);
-  for_all(kTwinKnots, [&](std::size_t k) { views[k] = seen(bound, view_at(int(k)), kPoints); });
+  for_all(kTwinKnots, [&](std::size_t k) { views[k] = view_of(bound, view_at(int(k)), kPoints); });
   // A mirror has a colour of its own.
   if (!model.has_mirror()) tint_ = make_grey(views);
   const Eigen::Index channels = views.front().f.cols();
@@ -153,7 +153,7 @@ Twin::Twin(const Model& model, const ParamValues& values) {
   // From the normal down, for what is found of one view is where the next one starts.
   std::vector<View> few;
   for (int k = kTwinKnots - 1; k >= 0; k -= kStride) {
-    View v = seen(bound, view_at(k), kFewPoints, views[std::size_t(k)].lobe);
+    View v = view_of(bound, view_at(k), kFewPoints, views[std::size_t(k)].lobe);
     if (tint_) v.f = brightest(v.f);
     few.push_back(std::move(v));
   }

@@ -108,11 +108,11 @@ MatrixXd scattering(const measure::BoundModel& model, const Points& points, cons
 
 VectorXd brightest(const MatrixXd& f) { return f.rowwise().maxCoeff(); }
 
-View seen(const measure::BoundModel& bound, const Vec3<double>& wo, int points) {
-  return seen(bound, wo, points, moments(bound, wo));
+View view_of(const measure::BoundModel& bound, const Vec3<double>& wo, int points) {
+  return view_of(bound, wo, points, moments(bound, wo));
 }
 
-View seen(const measure::BoundModel& bound, const Vec3<double>& wo, int points, const Moments& lobe) {
+View view_of(const measure::BoundModel& bound, const Vec3<double>& wo, int points, const Moments& lobe) {
   View v{wo, lobe, {}, {}};
   v.points = spread_points(*bound.brdf, wo, beside_mirror(wo, v.lobe.offset), v.lobe.narrow, points);
   v.f = scattering(bound, v.points, wo);
@@ -248,7 +248,7 @@ std::vector<ViewError> view_errors(const measure::BoundModel& bound,
   std::vector<ViewError> errors(kErrorViews);
   for_all(errors.size(), [&](std::size_t i) {
     const Vec3<double> wo = direction(1 - (double(i) + 0.5) / kErrorViews, 0);
-    const View v = seen(bound, wo, 2 * kPoints);
+    const View v = view_of(bound, wo, 2 * kPoints);
     const Points& points = v.points;
     const MatrixXd& f = v.f;
     const ClosureSum<double> sum = closures(wo);

@@ -54,9 +54,9 @@ struct View {
   Eigen::MatrixXd f;  ///< f cos(theta_i) of the points, a column a channel; of several models one after the other
 };
 /// Throws ValueError where the model gives a value that is NaN, infinite or negative.
-View seen(const measure::BoundModel&, const Vec3<double>& wo, int points);
+View view_of(const measure::BoundModel&, const Vec3<double>& wo, int points);
 /// The same where the lobe is known.
-View seen(const measure::BoundModel&, const Vec3<double>& wo, int points, const Moments& lobe);
+View view_of(const measure::BoundModel&, const Vec3<double>& wo, int points, const Moments& lobe);
 
 /// The largest channel of each point.
 Eigen::VectorXd brightest(const Eigen::MatrixXd& f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The aimed form (aimed.h): closures aimed at lamps that carry the model there, over a base, and one drawn direction for
-// the rest.
+// The aimed form (aimed.h): closures aimed at lamps that carry the model there, over a base, and one drawn direction
+// for the rest.
 #include "forms/aimed.h"
 
 #include <fmt/format.h>
@@ -41,9 +41,9 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
   std::optional<fit::Fit> fit;
   if (from == AimedBase::Fitted) fit = fit::fit_of(model, fixed, views);
   // None for what lies on both sides of the surface.
-  const ClosureSum<Expr> base = fit                                 ? recorded_fit(model, *fit, fixed, wo)
+  const ClosureSum<Expr> base = fit                                ? recorded_fit(model, *fit, fixed, wo)
                                 : measure::two_sided(model, *brdf) ? ClosureSum<Expr>()
-                                                                    : brdf->base(wo);
+                                                                   : brdf->base(wo);
   {
     Program program;
     const auto closures = output_closures(base, program, fit ? division_of(*fit) : Division::Done);
@@ -201,7 +201,6 @@ class AimedText {
   bool through_;
 };
 
-
 class Aimed final : public OslForm {
  public:
   Aimed() : OslForm("aimed") {}
@@ -268,9 +267,8 @@ void Aimed::write_closures(ShaderText& text) const {
   text.declare(base);
   shader.facets = false;  // none that is seen by more than the camera
   text.statements += block(by_choice.print(0), 1);
-  text.scale(base, setting.base == AimedBase::Fitted
-                       ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)
-                       : std::set<std::string>());
+  text.scale(base, setting.base == AimedBase::Fitted ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)
+                                                     : std::set<std::string>());
   // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then the
   // rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
   for (std::size_t c = 0; c < base.size(); ++c)
@@ -288,9 +286,9 @@ void Aimed::write_closures(ShaderText& text) const {
   if (!model.has_through()) text.statements += "    color rest_followed = rest_weight;\n";
   const char* ray = model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, {}, I, frame_n)"
                                         : "rest_followed * brdfc_ray_coloured({}, I, rest_colour)";
-  text.terms.push_back(fmt::format(fmt::runtime(ray), aimed
-                                                          ? "frame_t * ray_x + frame_b * ray_y + frame_n * ray_z"
-                                                          : "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
+  text.terms.push_back(
+      fmt::format(fmt::runtime(ray), aimed ? "frame_t * ray_x + frame_b * ray_y + frame_n * ray_z"
+                                           : "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
   text.turn(base);
 }
 

@@ -47,8 +47,8 @@ class Exact final : public OslForm {
  protected:
   void write_closures(ShaderText& text) const override {
     ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
-    const auto closures =
-        text.record(by_choice, [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
+    const auto closures = text.record(
+        by_choice, [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
     text.declare(closures);
     text.statements += by_choice.print(4);
     text.turn(closures);

@@ -69,8 +69,8 @@ class Fitted final : public OslForm {
   double lowest_view() const override { return fit::kLowestView; }
   void write_closures(ShaderText& text) const override {
     ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
-    const auto closures =
-        text.record(by_choice, [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
+    const auto closures = text.record(
+        by_choice, [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
     text.declare(closures);
     text.statements += by_choice.print(4);
     text.scale(closures, fit::roles_of(text.model, text.setting.fixed).with(fit::Role::Factor));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A form is a way to bring a model to Cycles: a shader, or a tree of Blender's nodes. Each is a file of this folder that
-// implements Form, and a line in registry.cpp. What else there is, the plan, the pack, the command line, asks forms
-// here and knows none by name.
+// A form is a way to bring a model to Cycles: a shader, or a tree of Blender's nodes. Each is a file of this folder
+// that implements Form, and a line in registry.cpp. What else there is, the plan, the pack, the command line, asks
+// forms here and knows none by name.
 #pragma once
 
 #include <optional>

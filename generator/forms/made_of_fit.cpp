@@ -10,7 +10,7 @@
 namespace brdfc::forms {
 
 FormError error_of_fit(const std::vector<fit::ViewError>& errors, const std::string& what,
-                                 const std::optional<fit::FitAxis>& axis) {
+                       const std::optional<fit::FitAxis>& axis) {
   FormError out;
   double sum1 = 0, sum2 = 0;
   fit::ViewError worst;

@@ -22,8 +22,8 @@ struct ShaderText {
   std::string statements = {};          ///< after the frame is known, before BSDF is assigned
   std::vector<std::string> terms = {};  ///< closures, the sum of which is BSDF
 
-  /// Records once for each combination of choices that what is fixed admits, together with what is fixed. Returns the closures, which are the same
-  /// for all, and counts the operations of the longest.
+  /// Records once for each combination of choices that what is fixed admits, together with what is fixed. Returns the
+  /// closures, which are the same for all, and counts the operations of the longest.
   std::vector<RecordedClosure> record(ChoiceSwitch&,
                                       const std::function<Recording(const Choices&, const ParamValues&)>& recording);
   /// Declares what recorded statements assign of the closures, makes them terms and counts what they take.

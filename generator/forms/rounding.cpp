@@ -69,8 +69,7 @@ double largest_difference(const Model& model, const ParamValues& confined,
     Program program;
     record(*recorded, program);
     for (int view = 0; view < kParameterSets * kViews; ++view) {
-      const ParamValues values =
-          measure::random_values(model.info(), with_choices(model.info(), choices), random);
+      const ParamValues values = measure::random_values(model.info(), with_choices(model.info(), choices), random);
       const measure::BoundModel truth = measure::bind_model(model, values);
       Vec3<double> wo = direction(0.02 + 0.98 * (view % kViews + measure::uniform(random)) / kViews,
                                   2 * kPi * measure::uniform(random));
@@ -107,8 +106,8 @@ FormError rounding_of_closures(const Model& model, const ParamValues& confined) 
     Rgb<double> difference(0.0);
     for (const Closure<double>& c : closures)
       if (c.kind == ClosureKind::Reflection || c.kind == ClosureKind::Refraction) difference += c.weight;
-    difference = difference -
-                 (at.truth.mirror(at.wo) + at.truth.transmit(at.wo)) * medium(at.truth, at.wo.z, at.distance);
+    difference =
+        difference - (at.truth.mirror(at.wo) + at.truth.transmit(at.wo)) * medium(at.truth, at.wo.z, at.distance);
     for (int i = 0; i < kPoints; ++i) {
       const Vec3<double> u = points.next(), wi = sample_cosine(u.x, u.y);
       const Rgb<double> f_cos = at.truth.eval(wi, at.wo) * wi.z;

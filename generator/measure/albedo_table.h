@@ -11,7 +11,6 @@
 // is shared between the combinations of choices that agree on it.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -61,29 +60,9 @@ struct AlbedoTable {
   std::size_t size() const;
 };
 
-/// Tabulates the whole admissible range of every parameter. Throws ValueError (naming model, parameters,
-/// directions and value) for a value that is NaN, infinite or negative, or when the albedo is not of the form above.
-AlbedoTable tabulate_albedo(const Model&);
-
-/// Does a pack have the table? Delta terms alone need none: the shader adds up their weights. With few parameters they
-/// still get one, for the panel, which can't run the formula.
-bool has_albedo_table(const Model&);
-/// Where the table of a model is kept: data/albedos/MODEL_HASH.exr, by hash of what the model computes, its
-/// parameters and the settings of tables.
-std::filesystem::path stored_albedo(const Model&);
-/// tabulate_albedo(), or what is kept of it. Throws InputError naming the file if that is damaged.
-AlbedoTable albedo_table_of(const Model&);
-
 /// Albedo, mirror included, by interpolation. Throws InputError for inadmissible parameters.
 Rgb<double> lookup(const AlbedoTable&, const Model&, const ParamValues&, double cos_theta_o);
 /// A grid interpolated at one coordinate per axis; r = g = b if it has one channel.
 Rgb<double> lookup(const AlbedoGrid&, const std::vector<double>& coordinates);
-
-/// Writes a float EXR: one row of pixels per grid, padded with zeros to the longest, and as JSON in the
-/// attribute "brdfc:table" the axes, scales, sizes, terms, errors and layout. Written beside and renamed.
-/// Throws InputError naming the path if it can't be written.
-void write_albedo_exr(const AlbedoTable&, const std::filesystem::path&);
-/// What write_albedo_exr() wrote, number for number. Throws InputError naming the path if it can't be read.
-AlbedoTable read_albedo_exr(const std::filesystem::path&);
 
 }  // namespace brdfc::measure

@@ -86,7 +86,8 @@ Json axis_json(const fit::Fit* fit) {
   return {{"name", fit->axis()->parameter}, {"min", fit->axis()->low}, {"max", fit->axis()->high}};
 }
 
-Json highlight_json(const Model& model, const forms::Form& form, const forms::Shader& shader, const ParamValues& fixed) {
+Json highlight_json(const Model& model, const forms::Form& form, const forms::Shader& shader,
+                    const ParamValues& fixed) {
   if (!form.highlights(model, shader)) return {};
   constexpr int kValues = 9;
   const ModelInfo& info = model.info();

@@ -13,16 +13,17 @@
 #include <fstream>
 #include <map>
 #include <mutex>
-#include <sstream>
 
 #include "closures/closure_pool.h"
 #include "core/hash.h"
 #include "core/parse.h"
 #include "fit/fit.h"
 #include "forms/form.h"
-#include "measure/albedo_table.h"
+#include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
+#include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/zip.h"
 #include "plan/costs.h"
@@ -33,14 +34,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kExtensionId = "brdfc_shaders";
-
-std::string read_text(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) input_error("{}: cannot be read", path.string());
-  return text.str();
-}
 
 void write_text(const fs::path& path, const std::string& text) {
   fs::create_directories(path.parent_path());
@@ -143,7 +136,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
     const ParamValues& fixed = setting.fixed;
     const fit::Fit* fit = form->fit(model, setting);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
-                      of_fit = fit && !plan.views.all() ? fit->seen(plan.views).size() : of_whole_fit;
+                      of_fit = fit && !plan.views.all() ? fit->cut_to(plan.views).size() : of_whole_fit;
     const measure::AlbedoTable of_form =
         fixed == plan.fixed ? table : measure::fold(whole_table, model, fixed, plan.views);
     const forms::Shader shader = form->write(model, of_form, setting);
@@ -151,19 +144,19 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
     // What is fitted exists for these parameters only.
     const ParamValues whole_fixed = form->made_of_fit() ? fixed : ParamValues{};
     const bool cut = !plan.views.all() || (!form->made_of_fit() && !plan.fixed.empty());
-    const forms::Shader whole =
-        cut && !form->native() ? form->write(model, measure::fold(whole_table, model, whole_fixed), {whole_fixed})
-                               : shader;
+    const forms::Shader whole = cut && !form->native()
+                                    ? form->write(model, measure::fold(whole_table, model, whole_fixed), {whole_fixed})
+                                    : shader;
     const forms::FormError error = form->error(model, setting);
     const std::optional<double> cost = form->cost_is_measured(setting) ? costs.of(model, *form) : std::nullopt;
     const std::string file = form->native() ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     const std::string albedo_file = "shaders/" + shader.name + "_albedo.osl";
     if (!shader.albedo.empty()) built.files[albedo_file] = shader.albedo;
-    built.lines.push_back({info.name, form->name(), shader.closures, shader.slots, shader.operations,
-                           shader.statements, error, of_form.size() + of_fit, table.error, shader.source.size(),
-                           shader.albedo.size(), whole.closures, whole.operations, whole.statements,
-                           whole_table.size() + of_whole_fit, whole.source.size() + whole.albedo.size()});
+    built.lines.push_back({info.name, form->name(), shader.closures, shader.slots, shader.operations, shader.statements,
+                           error, of_form.size() + of_fit, table.error, shader.source.size(), shader.albedo.size(),
+                           whole.closures, whole.operations, whole.statements, whole_table.size() + of_whole_fit,
+                           whole.source.size() + whole.albedo.size()});
     j["representations"][form->name()] = {
         {form->native() ? "nodes" : "shader", file},
         {"only", values_json(form->values(model, plan.fixed))},
@@ -190,8 +183,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
 
 Result build_pack(const Options& options) {
   const std::vector<plan::PlannedModel>& chosen = options.models;
-  if (!fs::exists(options.addon / "blender_manifest.toml"))
-    input_error("{}: expected the add-on's folder with blender_manifest.toml", options.addon.string());
+  std::map<std::string, std::string> members = addon_files(options.addon);
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error || !fs::is_directory(options.out))
@@ -216,7 +208,6 @@ Result build_pack(const Options& options) {
   tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   Result result;
-  std::map<std::string, std::string> members;
   // Blender's nodes that join closures take of the pool, too: Mix Shader makes two products and their sum.
   Json manifest = {{"format", 1},
                    {"generator", std::string("brdfc ") + BRDFC_VERSION},
@@ -227,10 +218,6 @@ Result build_pack(const Options& options) {
     manifest["models"][chosen[i].model->info().name] = built[i].manifest;
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
-  }
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(options.addon)) {
-    const std::string name = entry.path().lexically_relative(options.addon).generic_string();
-    if (entry.path().extension() == ".py" || name == "blender_manifest.toml") members[name] = read_text(entry.path());
   }
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;

@@ -41,8 +41,8 @@ std::string how_it_varies(const std::string& name, const Needs& needs) {
   throw std::logic_error(name + " does not vary");
 }
 
-/// Why the materials of a model have no common form of this kind; nothing if they have one. One made of a fit takes what
-/// varies by its role.
+/// Why the materials of a model have no common form of this kind; nothing if they have one. One made of a fit takes
+/// what varies by its role.
 std::optional<std::string> unfit(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "trace/graph.h"
@@ -57,6 +58,18 @@ std::string indented(const std::string& text, std::size_t levels) {
   while (start < text.size()) {
     const std::size_t end = text.find('\n', start);
     out += std::string(4 * levels, ' ') + text.substr(start, end + 1 - start);
+    start = end + 1;
+  }
+  return out;
+}
+
+std::string narrow(const std::string& text) {
+  std::string out;
+  std::size_t start = 0;
+  while (start < text.size()) {
+    const std::size_t end = std::min(text.find('\n', start), text.size());
+    const std::size_t word = std::min(text.find_first_not_of(' ', start), end);
+    out += std::string((word - start) / 2, ' ') + text.substr(word, end + 1 - word);
     start = end + 1;
   }
   return out;

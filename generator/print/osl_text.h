@@ -21,6 +21,9 @@ std::string comment(const std::string&);
 /// Every line of the text, `levels` steps further in.
 std::string indented(const std::string& text, std::size_t levels = 1);
 
+/// Every line with half its indent: a .blend keeps the text of each shader, and deep blocks are many.
+std::string narrow(const std::string& text);
+
 /// In a scope of their own, so that what they declare stands in no other's way. None where there is nothing to do.
 std::string block(const std::string& statements, std::size_t levels);
 

@@ -25,84 +25,6 @@ static_assert(std::endian::native == std::endian::little, "the .npy code writes 
 
 namespace {
 
-std::array<float, 3> to_float(double x, double y, double z) { return {float(x), float(y), float(z)}; }
-
-void add_triangle(Mesh& mesh, std::size_t a, std::size_t b, std::size_t c) {
-  mesh.triangles.push_back({std::int32_t(a), std::int32_t(b), std::int32_t(c)});
-}
-
-}  // namespace
-
-Mesh make_sphere(double radius, int segments, int rings, bool smooth) {
-  Mesh mesh;
-  // sin and cos of multiples of a right angle are not exact: clear them, so that poles and seam close exactly.
-  const auto clean = [](double x) { return abs(x) < 1e-15 ? 0.0 : x; };
-  for (int j = 0; j <= rings; ++j) {
-    const double theta = kPi * j / rings;  // 0 at the lower pole
-    const double s = clean(sin(theta)), z = -clean(cos(theta));
-    for (int i = 0; i <= segments; ++i) {
-      const double phi = 2 * kPi * (i % segments) / segments;
-      const double x = s * clean(cos(phi)), y = s * clean(sin(phi));
-      mesh.vertices.push_back(to_float(radius * x, radius * y, radius * z));
-      if (smooth) mesh.normals.push_back(to_float(x, y, z));
-      mesh.uvs.push_back({float(double(i) / segments), float(double(j) / rings)});
-    }
-  }
-  const int row = segments + 1;
-  for (int j = 0; j < rings; ++j)
-    for (int i = 0; i < segments; ++i) {
-      const std::size_t a = std::size_t(j) * row + i, b = a + 1, c = b + row, d = a + row;
-      if (j > 0) add_triangle(mesh, a, b, c);  // the first and the last ring have one triangle a segment
-      if (j < rings - 1) add_triangle(mesh, a, c, d);
-    }
-  return mesh;
-}
-
-Mesh make_quad(double width, double height) {
-  Mesh mesh;
-  const double x = width / 2, y = height / 2;
-  mesh.vertices = {to_float(-x, -y, 0), to_float(x, -y, 0), to_float(x, y, 0), to_float(-x, y, 0)};
-  mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
-  return mesh;
-}
-
-Mesh make_disk(double radius, int segments) {
-  Mesh mesh;
-  mesh.vertices.push_back({0, 0, 0});
-  mesh.uvs.push_back({0.5f, 0.5f});
-  for (int i = 0; i < segments; ++i) {
-    const double c = cos(2 * kPi * i / segments), s = sin(2 * kPi * i / segments);
-    mesh.vertices.push_back(to_float(radius * c, radius * s, 0));
-    mesh.uvs.push_back({float(0.5 + 0.5 * c), float(0.5 + 0.5 * s)});
-  }
-  for (int i = 0; i < segments; ++i) add_triangle(mesh, 0, 1 + i, 1 + (i + 1) % segments);
-  return mesh;
-}
-
-Mesh make_box(const std::array<double, 3>& size) {
-  Mesh mesh;
-  for (int axis = 0; axis < 3; ++axis)
-    for (int side = -1; side <= 1; side += 2) {
-      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-      const std::size_t first = mesh.vertices.size();
-      for (const auto& [s, t] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
-        std::array<float, 3> p;
-        p[axis] = float(side * size[axis] / 2);
-        // The lower side is mirrored, so that its corners are anticlockwise seen from outside.
-        p[u] = float(side * (s - 0.5) * size[u]);
-        p[v] = float((t - 0.5) * size[v]);
-        mesh.vertices.push_back(p);
-        mesh.uvs.push_back({float(s), float(t)});
-      }
-      add_triangle(mesh, first, first + 1, first + 2);
-      add_triangle(mesh, first, first + 2, first + 3);
-    }
-  return mesh;
-}
-
-namespace {
-
 /// Refuses a PLY file whose header is damaged or promises more than the file holds: there the importer loops for ever.
 void check_ply_header(const std::filesystem::path& path) {
   static const std::set<std::string> types{"char", "uchar", "short", "ushort", "int",   "uint",   "float",   "double",
@@ -188,8 +110,8 @@ Mesh read_mesh(const std::filesystem::path& path, bool smooth) {
     }
     for (unsigned i = 0; i < part.mNumFaces; ++i) {
       const aiFace& face = part.mFaces[i];
-      if (face.mNumIndices == 3)
-        add_triangle(mesh, index[face.mIndices[0]], index[face.mIndices[1]], index[face.mIndices[2]]);
+      const auto corner = [&](int k) { return std::int32_t(index[face.mIndices[k]]); };
+      if (face.mNumIndices == 3) mesh.triangles.push_back({corner(0), corner(1), corner(2)});
     }
   }
   check_mesh(mesh, path.string());

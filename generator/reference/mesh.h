@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Triangle meshes: made here once from shapes and files, so that both renderers see the same triangles.
+// Triangle meshes and their files. Shapes and files become triangles once, so that both renderers see the same ones.
 #pragma once
 
 #include <array>
@@ -17,15 +17,6 @@ struct Mesh {
   std::vector<std::array<std::int32_t, 3>> triangles;
 };
 
-/// Latitude-longitude sphere about the origin, poles on z; u runs once around from +x towards +y, v from the
-/// lower pole to the upper.
-Mesh make_sphere(double radius, int segments, int rings, bool smooth);
-/// Rectangle in the xy plane about the origin, front towards +z, u along x, v along y.
-Mesh make_quad(double width, double height);
-/// Disk in the xy plane about the origin, front towards +z; uv (1/2, 1/2) at the centre.
-Mesh make_disk(double radius, int segments);
-/// Box about the origin with flat faces; each face has the whole unit square as uv.
-Mesh make_box(const std::array<double, 3>& size);
 /// OBJ, PLY or another format that assimp reads. `smooth`: normals of the file, or averaged where it has none;
 /// otherwise flat. Throws InputError naming the file.
 Mesh read_mesh(const std::filesystem::path& path, bool smooth);

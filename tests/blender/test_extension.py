@@ -175,8 +175,8 @@ def statements(source):
 def test_shaders_are_short(extension_zip, subtests):
     """Every shader of the extension has fewer than 600 statements, counted by the generator as
     operations and here in its text. Aimed forms hold what is done with lamps beside a model's value
-    and its sampling, and a base: up to 1,100, which compile in some 0.4 s; `lossless`, whose value
-    is a long sum, 2,000."""
+    and its sampling, and a base: up to 1,300, which compile in some 0.4 s; `lossless`, whose value
+    is a long sum, 2,300."""
     import zipfile
 
     text = "shader x(float a = 0 [[ int b = 1; ]],\n    output color Albedo = 0)\n{\n"
@@ -194,7 +194,7 @@ def test_shaders_are_short(extension_zip, subtests):
             with subtests.test(name):
                 found = statements(archive.read(name).decode())
                 print(f"{name}: {operations} operations, {found} statements")
-                most = 2200 if "lossless_aimed" in name else 1200 if "_aimed" in name else 600
+                most = 2300 if "lossless_aimed" in name else 1300 if "_aimed" in name else 600
                 assert operations < most
                 assert 0 < found < most
 
@@ -407,7 +407,7 @@ def scripts_of(node):
 def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, empty, subtests):
     """A file holds source and bytecode of each. Fits hold tables of their own; what two aimed forms
     hold for each of their many choices is more than it should be."""
-    longer = {("ashikhmin_shirley", "aimed"): 140_000, ("radziszewski_alda", "aimed"): 190_000}
+    longer = {("ashikhmin_shirley", "aimed"): 140_000, ("radziszewski_alda", "aimed"): 175_000}
     for model, form in forms(extension):
         with subtests.test(model=model, form=form):
             source = extension.pack.source(model, form)[1]
@@ -799,7 +799,8 @@ def test_warnings_of_an_aimed_form_that_is_denoised(extension, empty):
     for model, expected in (
         ("cook_torrance", ["albedo_passes"]),
         ("lossless", ["albedo_passes", "normal_pass"]),
-        ("coupled", ["albedo_passes", "normal_pass"]),
+        ("coupled", ["albedo_passes"]),
+        ("phong", ["albedo_passes", "normal_pass"]),
         ("schlick_double", ["albedo_passes"]),
     ):
         material = clean(extension, empty, model, "aimed")

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 DRIVER = ROOT / "script" / "render_scene.py"
 SEEDS = 4
 #: Scenes with isotropic material of one model, and with four models.
-SCENES = ["gl-fig8-radziszewski_alda", pytest.param("small-lamp", marks=pytest.mark.full)]
+SCENES = ["room-radziszewski_alda", pytest.param("small-lamp", marks=pytest.mark.full)]
 
 
 def small(name):
@@ -174,7 +174,7 @@ def test_a_pack_that_is_none(empty, extension_zip, tool, tmp_path):
 
 def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):
     source = tmp_path / "s.json"
-    content = small("gl-fig8-radziszewski_alda")
+    content = small("room-radziszewski_alda")
     source.write_text(json.dumps(content))
     tool("build", "--scene", source, "--out", tmp_path / "cut", "--explain")
     cut = next((tmp_path / "cut").glob("*.zip"))

@@ -466,7 +466,7 @@ def test_driver_renders_and_reports(extension, extension_zip, empty, scene_file,
 def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_path):
     """Of a pixel's first sample, which goes through its centre, a drawn form would make the same in
     both: a correlation of 0.84. Two pictures of one sphere have 0.03 to 0.12 in common."""
-    content = json.loads((SCENES / "gl-fig8-coupled.json").read_text())
+    content = json.loads((SCENES / "room-coupled.json").read_text())
     content["settings"] |= {"width": 64, "height": 64, "spp": 1}
     source = tmp_path / "s.json"
     source.write_text(json.dumps(content))

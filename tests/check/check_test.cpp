@@ -9,8 +9,8 @@
 
 #include "faulty.h"
 #include "measure/albedo.h"
-#include "measure/albedo_table.h"
 #include "measure/bound_model.h"
+#include "measure/tabulate_albedo.h"
 #include "support.h"
 
 namespace brdfc::check {

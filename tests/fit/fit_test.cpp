@@ -17,17 +17,16 @@
 #include "forms/aimed.h"
 #include "forms/form.h"
 #include "measure/albedo.h"
-#include "measure/albedo_table.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
 #include "measure/probes.h"
+#include "measure/stored_albedo.h"
 #include "plan/plan.h"
 #include "support.h"
 #include "tables/table_file.h"
 
 namespace brdfc::fit {
 namespace {
-
 
 using testing::HasSubstr;
 
@@ -194,7 +193,8 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   ParamValues fixed = values_of(m, {"e=20"});
   fixed.erase("ks");
   for (const forms::Form* kind : {forms::form("fitted"), forms::form("aimed")}) {
-    const forms::Shader s = kind->write(m, measure::fold(measure::albedo_table_of(m), m, fixed), {fixed, {}, forms::kMaxLamps, forms::AimedBase::Fitted});
+    const forms::Shader s = kind->write(m, measure::fold(measure::albedo_table_of(m), m, fixed),
+                                        {fixed, {}, forms::kMaxLamps, forms::AimedBase::Fitted});
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
     const std::size_t factor = s.source.find("weight_0 *= ks;"), rest = s.source.find("excess");
     ASSERT_NE(factor, std::string::npos);
@@ -506,7 +506,8 @@ TEST(StoredFits, HaveNoStepsAlongTheSlider) {
       for (std::size_t i = 0; i <= kSteps; ++i) {
         varied.number = fit.axis()->at(double(i) / kSteps);
         const ClosureSum<double> sum = fit.closures(wo, varied);
-        const auto brdf = model->make_double(complete(model->info(), roles_of(*model, values).fitted_at(varied.number)));
+        const auto brdf =
+            model->make_double(complete(model->info(), roles_of(*model, values).fitted_at(varied.number)));
         for (std::size_t j = 0; j < lit.size(); ++j) {
           f[j].push_back(max_component(evaluate(sum, lit[j], wo)));
           truth[j].push_back(max_component(brdf->eval(lit[j], wo) * lit[j].z));
@@ -633,7 +634,8 @@ TEST(Fit, ShadersStayWithinBounds) {
   for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
     const Model& m = find_model(name);
     const ParamValues values = values_of(m, {text});
-    const forms::Shader s = forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, values), {values});
+    const forms::Shader s =
+        forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, values), {values});
     EXPECT_LE(s.operations, 600) << name;
     EXPECT_LE(s.closures, 9) << name;
     EXPECT_THAT(s.source, HasSubstr("phong_ramp(normal_0, exponent_0, ramp_0)"));

@@ -13,10 +13,11 @@
 #include <set>
 
 #include "faulty.h"
-#include "measure/albedo_table.h"
+#include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/cubature.h"
 #include "measure/guides.h"
+#include "measure/tabulate_albedo.h"
 #include "model/sampling.h"
 #include "support.h"
 

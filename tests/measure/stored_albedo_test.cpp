@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tables of albedos that are kept: those of the models as they are, and what a tabulation would find.
+#include "measure/stored_albedo.h"
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,8 +13,9 @@
 
 #include "core/error.h"
 #include "core/hash.h"
-#include "measure/albedo_table.h"
+#include "measure/albedo_file.h"
 #include "measure/probes.h"
+#include "measure/tabulate_albedo.h"
 #include "support.h"
 #include "tables/table_file.h"
 

@@ -9,7 +9,9 @@ namespace brdfc {
 namespace {
 
 ParamInfo number(double min, double max, bool by_factors) {
-  ParamInfo p{"x", "X", "", "", min, max, min, max};
+  ParamInfo p;
+  p.min = p.soft_min = min;
+  p.max = p.soft_max = max;
   p.by_factors = by_factors;
   return p;
 }

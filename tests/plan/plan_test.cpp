@@ -10,12 +10,11 @@
 
 #include "forms/aimed.h"
 #include "forms/form.h"
-#include "measure/albedo_table.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
 
 namespace brdfc::plan {
 namespace {
-
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -188,13 +187,12 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
 
   // Its shares add up, whatever they are; its exponents are two numbers.
   const auto phong = [](const char* id, const char* value) { return need(id, "phong_material", {value}, "fitted"); };
-  EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms,
-              ElementsAre(forms::form("fitted")));
+  EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms, ElementsAre(forms::form("fitted")));
   EXPECT_THROW(plan_scene({phong("a", "es=10"), phong("b", "e=20")}), InputError);
 }
 
 const forms::Form *const kExact = forms::form("exact"), *const kAimed = forms::form("aimed"),
-                  *const kSampled = forms::form("sampled"), *const kFitted = forms::form("fitted");
+                         *const kSampled = forms::form("sampled"), *const kFitted = forms::form("fitted");
 
 TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})}, coupled = {need("a", "coupled", {})};

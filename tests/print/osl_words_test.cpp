@@ -18,7 +18,6 @@
 
 namespace brdfc {
 
-
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace osl_words_test {
 
@@ -125,8 +124,7 @@ TEST(OslWords, AreAllThatShadersUseBesideTheirModelsNames) {
   for (const auto& [name, model] : models())
     for (const forms::Form* kind : forms::forms_of(*model)) {
       const ParamValues fixed = kind->values(*model, {});
-      const forms::Shader shader =
-          kind->write(*model, measure::fold(table_of(*model), *model, fixed), {fixed});
+      const forms::Shader shader = kind->write(*model, measure::fold(table_of(*model), *model, fixed), {fixed});
       std::set<std::string> own = declared_by(*model, kind, fixed);
       for (const ParamInfo& p : model->info().params) own.insert(p.name);
       const std::string text = without_comments_and_strings(shader.source);

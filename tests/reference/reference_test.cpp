@@ -13,6 +13,7 @@
 #include "reference/lights.h"
 #include "reference/procedural.h"
 #include "reference/render.h"
+#include "reference/shapes.h"
 
 namespace brdfc::reference {
 namespace reference_test {

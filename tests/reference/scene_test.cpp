@@ -11,6 +11,7 @@
 
 #include "reference/json_view.h"
 #include "reference/procedural.h"
+#include "reference/shapes.h"
 
 namespace brdfc::reference {
 namespace {
@@ -302,6 +303,73 @@ TEST(Mesh, ShapesFaceOutwards) {
   EXPECT_EQ(make_sphere(1, 3, 2, true).triangles.size(), 6u);
 }
 
+/// Normals as the triangles have them: of each, the largest angle between a corner's normal and the triangle's own.
+double largest_lean(const Mesh& m) {
+  double largest = 0;
+  for (const auto& t : m.triangles) {
+    const auto at = [&](const auto& list, int i) { return Vec3<double>{list[t[i]][0], list[t[i]][1], list[t[i]][2]}; };
+    const auto a = at(m.vertices, 0), b = at(m.vertices, 1), c = at(m.vertices, 2);
+    const Vec3<double> face = normalize(cross(b - a, c - a));
+    for (int i = 0; i < 3; ++i) largest = std::max(largest, acos(std::clamp(dot(face, at(m.normals, i)), -1.0, 1.0)));
+  }
+  return largest;
+}
+
+TEST(Mesh, ACylinderIsClosedAndRoundOnlyOnItsSide) {
+  const Mesh smooth = make_cylinder(0.5, 3, 256, true), flat = make_cylinder(0.5, 3, 256, false);
+  check_mesh(smooth, "cylinder");
+  EXPECT_NEAR(volume(smooth), kPi * 0.25 * 3, 1e-3);
+  EXPECT_NEAR(volume(flat), volume(smooth), 1e-6);
+  EXPECT_NEAR(largest_lean(smooth), kPi / 256, 1e-4) << "half a segment's angle";
+  EXPECT_LT(largest_lean(flat), 1e-3);
+}
+
+/// Pappus: a tube of radius r(t) about a curve has the volume pi r^2 along the curve, whatever its bends.
+TEST(Mesh, AKnotIsClosedAndHasNormalsOfItsSurface) {
+  const Mesh knot = make_knot(2, 3, 0.2, 48, 4096, 64);
+  check_mesh(knot, "knot");
+  EXPECT_EQ(knot.triangles.size(), 524'288u);
+  double length = 0;
+  Vec3<double> last;
+  constexpr int kSteps = 100'000;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double t = 2 * kPi * i / kSteps, r = 1 + 0.4 * cos(3 * t);
+    const Vec3<double> p{r * cos(2 * t), r * sin(2 * t), 0.4 * sin(3 * t)};
+    if (i > 0) length += sqrt(dot(p - last, p - last));
+    last = p;
+  }
+  // The mean of (1 + cos(x) / 4)^2
+  EXPECT_NEAR(volume(knot) / (kPi * 0.04 * length * (1 + 1.0 / 32)), 1, 0.01);
+  EXPECT_LT(largest_lean(knot), 0.15) << "a side's angle is 0.098";
+  EXPECT_EQ(knot.vertices.front(), knot.vertices[64]) << "closed around the tube";
+  EXPECT_EQ(knot.vertices.front(), knot.vertices[knot.vertices.size() - 65]) << "closed along the tube";
+}
+
+TEST(Mesh, TilesHaveTheReliefThatIsAskedForAndMeetInJoints) {
+  constexpr int kCount = 4, kResolution = 64, kSide = kCount * kResolution;
+  const Mesh tiles = make_tiles(kCount, 0.002, 0.02, kResolution, 1);
+  check_mesh(tiles, "tiles");
+  EXPECT_EQ(tiles.triangles.size(), 2u * kSide * kSide);
+  EXPECT_LT(largest_lean(tiles), atan(1.5 * (0.005 + 3 * 0.002) / 0.02 + 0.1))
+      << "the joint's depth and three times the relief within its width";
+  double squares = 0;
+  int count = 0;
+  for (int j = 0; j <= kSide; ++j)
+    for (int i = 0; i <= kSide; ++i) {
+      const double z = tiles.vertices[std::size_t(j) * (kSide + 1) + i][2];
+      const bool joint = i % kResolution == 0 || j % kResolution == 0;
+      if (joint) {
+        ASSERT_EQ(z, 0);
+      } else if (i % kResolution > 4 && i % kResolution < 60 && j % kResolution > 4 && j % kResolution < 60) {
+        squares += (z - 0.005) * (z - 0.005);
+        ++count;
+      }
+    }
+  EXPECT_NEAR(sqrt(squares / count), 0.002, 0.0004);
+  EXPECT_NE(make_tiles(1, 0.002, 0.02, 8, 1).vertices, make_tiles(1, 0.002, 0.02, 8, 2).vertices);
+  EXPECT_EQ(make_tiles(1, 0.002, 0.02, 8, 1).vertices, make_tiles(1, 0.002, 0.02, 8, 1).vertices);
+}
+
 TEST(Procedural, EquirectangularRoundTrip) {
   double u, v;
   direction_to_equirectangular({1, 0, 0}, u, v);
@@ -370,6 +438,9 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
       {"quad", "/objects/0/shape", {{"type", "quad"}}},
       {"disk", "/objects/0/shape", {{"type", "disk"}}},
       {"box", "/objects/0/shape", {{"type", "box"}}},
+      {"cylinder", "/objects/0/shape", {{"type", "cylinder"}}},
+      {"knot", "/objects/0/shape", {{"type", "knot"}}},
+      {"tiles", "/objects/0/shape", {{"type", "tiles"}}},
       {"mesh_file", "/objects/0/shape", {{"type", "mesh"}, {"file", "a.obj"}}},
       {"mesh_arrays", "/objects/0/shape", {{"type", "mesh"}, {"vertices", "a.npy"}}},
       {"point_light", "/lights/0", nullptr},

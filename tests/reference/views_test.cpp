@@ -10,10 +10,11 @@
 
 #include "fit/fit.h"
 #include "forms/form.h"
-#include "measure/albedo_table.h"
 #include "measure/fold.h"
+#include "measure/stored_albedo.h"
 #include "model/horizon.h"
 #include "plan/plan.h"
+#include "reference/shapes.h"
 
 namespace brdfc::reference {
 namespace {
@@ -235,7 +236,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   const measure::AlbedoTable table = measure::fold(measure::albedo_table_of(m), m, values, kSome);
   for (const forms::Form* kind : {forms::form("fitted"), forms::form("aimed")}) {
     const forms::Shader whole = kind->write(m, table, {values, {}, 0, forms::AimedBase::Fitted}),
-                       cut = kind->write(m, table, {values, kSome, 0, forms::AimedBase::Fitted});
+                        cut = kind->write(m, table, {values, kSome, 0, forms::AimedBase::Fitted});
     EXPECT_LT(cut.source.size(), whole.source.size());
     EXPECT_EQ(cut.operations, whole.operations);
   }

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/make.h"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "fit/evaluate.h"
+#include "fit/knots.h"
+#include "fit/roles.h"
+#include "fit/settings.h"
+
+namespace brdfc::fit {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Relative L1 of one view at a value of the axis, of the mixture that is off by most.
+double l1_at(const FitTables& fit, const View& view, double number) {
+  const VectorXd weight = weights_of(view.points);
+  const MatrixXd mixtures = mixtures_of(fit.terms);
+  const Eigen::Index terms = mixtures.cols(), channels = view.f.cols() / terms;
+  double worst = 0;
+  for (Eigen::Index mixture = 0; mixture < terms; ++mixture) {
+    std::vector<Rgb<double>> weights;
+    MatrixXd f = MatrixXd::Zero(view.f.rows(), channels);
+    for (Eigen::Index t = 0; t < terms; ++t) {
+      weights.emplace_back(mixtures(mixture, t));
+      f += mixtures(mixture, t) * view.f.middleCols(t * channels, channels);
+    }
+    const ClosureSum<double> sum = closures_by_weights(fit, view.wo, number, weights);
+    MatrixXd off = f;
+    for (Eigen::Index i = 0; i < off.rows(); ++i) {
+      const Rgb<double> v = evaluate(sum, view.points.wi[std::size_t(i)], view.wo);
+      const double of_sum[] = {v.r, v.g, v.b};
+      for (Eigen::Index channel = 0; channel < channels; ++channel) off(i, channel) -= of_sum[channel];
+    }
+    for (Eigen::Index channel = 0; channel < channels; ++channel)
+      if (const double albedo = f.col(channel).dot(weight); albedo > 0)
+        worst = std::max(worst, off.col(channel).cwiseAbs().dot(weight) / albedo);
+  }
+  return worst;
+}
+
+ViewError worse(const ViewError& a, const ViewError& b) {
+  return {a.cos_theta_o,
+          std::max(a.relative_l1, b.relative_l1),
+          std::max(a.relative_l2, b.relative_l2),
+          std::max(a.albedo, b.albedo),
+          std::max(a.negative, b.negative),
+          a.number};
+}
+
+double mean_error(const std::vector<Solution>& knots) {
+  double sum = 0;
+  for (const Solution& f : knots) sum += f.error;
+  return sum / double(knots.size());
+}
+
+/// Fills a fit whose axis and terms are set. False where `grey` and the channels do not differ by a factor alone.
+bool make(FitTables& fit, const Model& model, const ParamValues& values, bool grey) {
+  const std::optional<FitAxis>& axis = fit.axis;
+  Knots at(model, values, fit.axis, fit.terms, grey);
+  std::vector<double> knots = {0};
+  for (int i = 1; axis && i <= int(kSettings.first_steps); ++i)
+    knots.push_back(double(i) / double(kSettings.first_steps));
+  if (!at.see(knots) || !at.find_shapes()) return false;
+  // Few views tell which closures suit.
+  fit.tint = Rgb<double>(1.0);
+  Family family = kFamilies[0];
+  std::vector<Solution> trial;
+  for (const Family f : kFamilies) {
+    std::vector<Solution> found = at.fitted(knots, kSettings.trial_stride, f);
+    if (trial.empty() || mean_error(found) < mean_error(trial)) trial = std::move(found), family = f;
+  }
+  std::set<double> settled;  // middles between knots that need no knot
+  while (axis) {
+    fit.tabulate(knots, trial);
+    std::vector<double> needed;
+    for (std::size_t k = 1; k < knots.size(); ++k) {
+      const double x = (knots[k - 1] + knots[k]) / 2;
+      if (knots[k] - knots[k - 1] < 1.5 / double(kSettings.steps) || settled.count(x)) continue;
+      if (!at.see({x})) return false;
+      // At views that are knots.
+      double error = 0;
+      for (std::size_t v = 0; v < kSettings.views; v += kSettings.trial_stride)
+        error += l1_at(fit, at.views(x)[v], axis->at(x)) / double(trial[k].views.size());
+      if (error > kSettings.worse_between * (trial[k - 1].error + trial[k].error) / 2 + kSettings.slightly_off)
+        needed.push_back(x);
+      else
+        settled.insert(x);
+    }
+    if (needed.empty()) break;
+    std::vector<Solution> fresh = at.fitted(needed, kSettings.trial_stride, family);
+    for (std::size_t i = 0; i < needed.size(); ++i) {
+      const auto before = std::ranges::upper_bound(knots, needed[i]) - knots.begin();
+      knots.insert(knots.begin() + before, needed[i]);
+      trial.insert(trial.begin() + before, std::move(fresh[i]));
+    }
+  }
+  fit.tint = at.tint().value_or(Rgb<double>(1.0));
+  fit.tint = {rounded(fit.tint.r), rounded(fit.tint.g), rounded(fit.tint.b)};
+  fit.knots = knots, fit.family = int(family), fit.grey = grey;
+  fit.tabulate(knots, at.fitted(knots, 1, family));
+  // With an axis at both ends, and half way between knots.
+  std::vector<double> proof = {0};
+  for (std::size_t k = 1; k < knots.size(); ++k) proof.push_back((knots[k - 1] + knots[k]) / 2);
+  if (axis) proof.push_back(1);
+  for (const double x : proof) {
+    const double number = axis ? axis->at(x) : 0;
+    std::vector<ViewError> worst;
+    for (const Terms::Term& term : fit.terms.terms) {
+      Varied<double> varied(number);
+      varied.parameters = colours_of(term.judged);
+      const auto errors =
+          view_errors(at.bound(x, term.judged), [&](const Vec3<double>& wo) { return closures(fit, wo, varied); });
+      if (worst.empty()) worst = errors;
+      for (std::size_t i = 0; i < errors.size(); ++i) worst[i] = worse(worst[i], errors[i]);
+    }
+    for (ViewError e : worst) {
+      e.number = number;
+      for (double* x : numbers_of(e)) *x = rounded(*x);
+      fit.errors.push_back(e);
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+FitTables make_fit(const Model& model, const ParamValues& values) {
+  FitTables fit;
+  const Roles& roles = roles_of(model, values);
+  fit.terms = roles.terms();
+  if (const ParamInfo* p = roles.axis()) fit.axis = fit_axis(*p);
+  // Where the channels differ by a factor alone, one fit serves them all.
+  if (!make(fit, model, values, true) && !make(fit, model, values, false))
+    throw std::logic_error(model.info().name + ": a fit of colours that is not one");
+  return fit;
+}
+
+FitTables make_knot(const FitTables& fit, const Model& model, const ParamValues& values, double place) {
+  const Family family = Family(fit.family);
+  Knots at(model, values, fit.axis, fit.terms, fit.grey);
+  if (!at.see({place}) || (family == Family::Microfacet && !at.find_shapes()))
+    throw std::logic_error(model.info().name + ": a fit of another tint");
+  const Solution found = std::move(at.fitted({place}, 1, family).front());
+  FitTables out;
+  out.axis = fit.axis;
+  out.terms = fit.terms;
+  out.tint = fit.tint;
+  // Between two knots that are the same, views lie as they do in the whole.
+  out.tabulate({0, 1}, {found, found});
+  return out;
+}
+
+}  // namespace brdfc::fit
