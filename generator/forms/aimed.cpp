@@ -11,9 +11,9 @@
 #include "closures/closure_pool.h"
 #include "fit/roles.h"
 #include "forms/aimed_steps.h"
+#include "forms/error.h"
 #include "forms/made_of_fit.h"
 #include "forms/osl_form.h"
-#include "forms/rounding.h"
 #include "measure/probes.h"
 #include "print/osl_text.h"
 
@@ -214,7 +214,7 @@ class Aimed final : public OslForm {
   std::string under_sizeless_lamps(int lamps, int slots) const override;
 
   /// What it aims is the model's own value.
-  FormError error(const Model& model, const Setting&) const override { return rounding_of_samples(model); }
+  FormError error(const Model& model, const Setting&) const override { return error_of_samples(model); }
   /// Costs were measured with the base that a model declares.
   bool cost_is_measured(const Setting& setting) const override { return setting.base == AimedBase::Declared; }
   const fit::Fit* fit(const Model& model, const Setting& setting) const override {

@@ -2,8 +2,8 @@
 // The exact form: closures of Cycles that equal the model, as it declares them.
 #include <set>
 
+#include "forms/error.h"
 #include "forms/osl_form.h"
-#include "forms/rounding.h"
 
 namespace brdfc::forms {
 namespace {
@@ -17,7 +17,9 @@ class Exact final : public OslForm {
   ParamValues values(const Model& model, const ParamValues& fixed) const override;
 
   FormError error(const Model& model, const Setting&) const override {
-    return rounding_of_closures(model, values(model, {}));
+    return error_of_closures(
+        model, values(model, {}), [&](const Brdf<Expr>& brdf) { return closures(model, brdf); },
+        "closures equal the model; what is left is rounding");
   }
 
   std::vector<std::string> warnings(const Model& model, const Shader& shader) const override {
@@ -35,23 +37,19 @@ class Exact final : public OslForm {
   }
 
   std::vector<Recording> recordings(const Model& model, const ParamValues& values, const Setting&) const override {
-    Recorder recorder;
-    const std::unique_ptr<Brdf<Expr>> brdf = model.record(values);
-    Program program;
-    const auto sum = recorded_exact(model, *brdf);
-    if (!sum) input_error("{}: has no exact representation", model.info().name);
-    const std::vector<RecordedClosure> closures = output_closures(*sum, program);
-    return {recording_of(model, program, 4, closures)};
+    return {record_closures(model, values, 4, [&](const Brdf<Expr>& brdf) { return closures(model, brdf); })};
   }
 
- protected:
-  void write_closures(ShaderText& text) const override {
-    ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
-    const auto closures = text.record(
-        by_choice, [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
-    text.declare(closures);
-    text.statements += by_choice.print(4);
-    text.turn(closures);
+ private:
+  /// As the shader has to weigh them.
+  static ClosureSum<Expr> closures(const Model& model, const Brdf<Expr>& brdf) {
+    std::optional<ClosureSum<Expr>> sum = brdf.exact(recorded_wo(model, brdf));
+    if (!sum) input_error("{}: has no exact representation", model.info().name);
+    if (model.has_medium()) {
+      const Rgb<Expr> left = named("medium", medium(brdf, Expr::input("side"), Expr::input("path_length")));
+      for (Closure<Expr>& c : *sum) c.weight = c.weight * left;
+    }
+    return *sum;
   }
 };
 

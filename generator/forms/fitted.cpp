@@ -54,28 +54,18 @@ class Fitted final : public OslForm {
   /// They read the axis and what is mixed, not the factors.
   std::vector<Recording> recordings(const Model& model, const ParamValues& values,
                                     const Setting& setting) const override {
-    Recorder recorder;
-    const std::unique_ptr<Brdf<Expr>> brdf = model.record(values);
-    Program program;
     const fit::Fit fit = fit::fit_of(model, values, setting.views);
-    const Vec3<Expr> wo = recorded_wo(model, *brdf);
-    ClosureSum<Expr> sum = recorded_fit(model, fit, values, wo);
-    if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf->mirror(wo));
-    const std::vector<RecordedClosure> closures = output_closures(sum, program, division_of(fit));
-    return {recording_of(model, program, 4, closures)};
+    const auto closures = [&](const Brdf<Expr>& brdf) {
+      const Vec3<Expr> wo = recorded_wo(model, brdf);
+      ClosureSum<Expr> sum = recorded_fit(model, fit, values, wo);
+      if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf.mirror(wo));
+      return sum;
+    };
+    return {record_closures(model, values, 4, closures, division_of(fit))};
   }
 
  protected:
   double lowest_view() const override { return fit::kLowestView; }
-  void write_closures(ShaderText& text) const override {
-    ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
-    const auto closures = text.record(
-        by_choice, [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
-    text.declare(closures);
-    text.statements += by_choice.print(4);
-    text.scale(closures, fit::roles_of(text.model, text.setting.fixed).with(fit::Role::Factor));
-    text.turn(closures);
-  }
 };
 
 }  // namespace

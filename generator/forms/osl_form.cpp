@@ -135,6 +135,19 @@ void ShaderText::turn(const std::vector<RecordedClosure>& closures) {
   }
 }
 
+void OslForm::write_closures(ShaderText& text) const {
+  ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
+  const auto closures = text.record(by_choice, [&](const Choices&, const ParamValues& values) {
+    return recordings(text.model, values, text.setting).at(0);
+  });
+  text.declare(closures);
+  text.statements += by_choice.print(4);
+  // Closures of a fit are made without them.
+  text.scale(closures, made_of_fit() ? fit::roles_of(text.model, text.setting.fixed).with(fit::Role::Factor)
+                                     : std::set<std::string>());
+  text.turn(closures);
+}
+
 Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, const Setting& given) const {
   const ModelInfo& info = model.info();
   Setting setting = given;

@@ -40,8 +40,9 @@ class OslForm : public Form {
   Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const final;
 
  protected:
-  /// Writes statements and terms of all but the mirror of a form that draws().
-  virtual void write_closures(ShaderText&) const = 0;
+  /// Writes statements and terms of all but the mirror of a form that draws(). Here of the closures that recordings()
+  /// assign, its first.
+  virtual void write_closures(ShaderText&) const;
   /// The lowest view, as a cosine, that its closures are for: of a lower one the normal is turned; 0: any.
   virtual double lowest_view() const { return 0; }
 };

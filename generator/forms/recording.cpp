@@ -103,21 +103,21 @@ Division division_of(const fit::Fit& fit) {
   return fit.terms().parameters.empty() ? Division::ByLargest : Division::ByChannel;
 }
 
-std::optional<ClosureSum<Expr>> recorded_exact(const Model& model, const Brdf<Expr>& brdf) {
-  auto sum = brdf.exact(recorded_wo(model, brdf));
-  if (sum && model.has_medium()) {
-    const Rgb<Expr> left = named("medium", medium(brdf, Expr::input("side"), Expr::input("path_length")));
-    for (Closure<Expr>& c : *sum) c.weight = c.weight * left;
-  }
-  return sum;
-}
-
 void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program) {
   const Vec3<Expr> wo = recorded_wo(model, brdf);
   Sample<Expr> s = brdf.sample(wo, recorded_u());
   if (brdf.scatters_through()) s.wi.z = s.wi.z * Expr::input("side");
   program.output("wi", s.wi);
   program.output("weight", s.weight);
+}
+
+Recording record_closures(const Model& model, const ParamValues& fixed, int indent, const RecordClosures& closures,
+                          Division division) {
+  Recorder recorder;
+  Program program;
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  const std::vector<RecordedClosure> recorded = output_closures(closures(*brdf), program, division);
+  return recording_of(model, program, indent, recorded);
 }
 
 Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {

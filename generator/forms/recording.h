@@ -3,6 +3,7 @@
 // wo_x, wo_y, wo_z, the viewer's direction in the shader's frame, whose normal is on the viewer's side.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -66,10 +67,13 @@ ClosureSum<Expr> recorded_fit(const Model&, const fit::Fit&, const ParamValues& 
 /// What ramps of a fit have to be divided by.
 Division division_of(const fit::Fit&);
 
-/// The closures that equal a model, as the shader has to weigh them; nothing if none do.
-std::optional<ClosureSum<Expr>> recorded_exact(const Model&, const Brdf<Expr>&);
 /// Assigns wi_x, wi_y, wi_z and weight, from u_0, u_1, u_2: the model's own sample.
 void output_sampled(const Model&, const Brdf<Expr>&, Program&);
+/// What closures a form makes of a model.
+using RecordClosures = std::function<ClosureSum<Expr>(const Brdf<Expr>&)>;
+/// Assigns what they take: see output_closures(). What `fixed` lacks is an input.
+Recording record_closures(const Model&, const ParamValues& fixed, int indent, const RecordClosures&,
+                          Division = Division::Done);
 /// Assigns mirror_weight, the weight of ideal reflection.
 Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
 

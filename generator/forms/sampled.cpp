@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The sampled form: the shader draws a direction from the model itself, one narrow lobe per sample.
 #include "closures/closure_pool.h"
+#include "forms/error.h"
 #include "forms/osl_form.h"
-#include "forms/rounding.h"
 
 namespace brdfc::forms {
 namespace {
@@ -15,7 +15,7 @@ class Sampled final : public OslForm {
   bool draws() const override { return true; }
   std::string under_sizeless_lamps(int, int) const override { return "as rare bright dots"; }
 
-  FormError error(const Model& model, const Setting&) const override { return rounding_of_samples(model); }
+  FormError error(const Model& model, const Setting&) const override { return error_of_samples(model); }
 
   std::vector<std::string> warnings(const Model& model, const Shader&) const override {
     // A clamp or a lamp of no size meets the lobe differently from Blender's own closures, and its normal is not the

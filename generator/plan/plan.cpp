@@ -47,7 +47,7 @@ std::optional<std::string> unfit(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
   // What it lacks at any values comes before what the values are.
-  if (!model.has_scatter()) return form.why_not(model, fixed);
+  if (!model.has_scatter() || !form.made_of_fit()) return form.why_not(model, fixed);
   std::optional<std::string> axis;
   const fit::Roles& roles = fit::roles_of(model, fixed);
   for (const ParamInfo& p : model.info().params) {

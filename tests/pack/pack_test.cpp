@@ -15,6 +15,7 @@
 #include "measure/fold.h"
 #include "measure/stored_albedo.h"
 #include "measure/tabulate_albedo.h"
+#include "model/choices.h"
 #include "model/sampling.h"
 #include "plan/costs.h"
 #include "plan/plan.h"
@@ -359,7 +360,7 @@ TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {
 
 TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
   const fs::path table = temp.path() / "costs.csv";
-  EXPECT_EQ(plan::Costs(table).of(find_model("lambert"), forms::form("exact")), std::nullopt) << "there is no file";
+  EXPECT_EQ(plan::Costs(table).of(find_model("lambert"), *forms::form("exact")), std::nullopt) << "there is no file";
   const auto refusal = [&](const std::string& text) -> std::string {
     std::ofstream(table) << text;
     try {
@@ -387,7 +388,7 @@ TEST(Costs, ThoseOfTheExtensionAreMeasured) {
        {std::pair("coupled", forms::form("exact")), std::pair("ward", forms::form("sampled")),
         std::pair("phong", forms::form("fitted")), std::pair("ward", forms::form("aimed")),
         std::pair("phong", forms::form("twin"))}) {
-    const std::optional<double> cost = costs.of(find_model(model), kind);
+    const std::optional<double> cost = costs.of(find_model(model), *kind);
     ASSERT_TRUE(cost) << model << " " << kind->name();
     EXPECT_GT(*cost, 0.2);
     EXPECT_LT(*cost, 10);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "forms/rounding.h"
+#include "forms/error.h"
 
 #include <fmt/format.h>
 
@@ -86,11 +86,15 @@ double largest_difference(const Model& model, const ParamValues& confined,
 
 }  // namespace
 
-FormError rounding_of_closures(const Model& model, const ParamValues& confined) {
+FormError error_of_closures(const Model& model, const ParamValues& confined, const RecordClosures& closures_of,
+                            const std::string& note) {
   double off = 0, total = 0, squared_off = 0, squared_total = 0;
   std::vector<RecordedClosure> kinds;
   const auto record = [&](const Brdf<Expr>& brdf, Program& program) {
-    kinds = output_closures(*recorded_exact(model, brdf), program);
+    kinds = output_closures(closures_of(brdf), program);
+    for (const RecordedClosure& c : kinds)
+      if (has_facets(c.kind) || c.turned)
+        throw std::logic_error(model.info().name + ": the error of facets or of closures with normals is not executed");
   };
   const double albedo = largest_difference(model, confined, record, [&](Case& at, Sequence3& points) {
     const auto out = at.run();
@@ -120,11 +124,10 @@ FormError rounding_of_closures(const Model& model, const ParamValues& confined) 
     }
     return difference;
   });
-  return {total > 0 ? off / total : 0, squared_total > 0 ? std::sqrt(squared_off / squared_total) : 0, albedo,
-          "closures equal the model; what is left is rounding"};
+  return {total > 0 ? off / total : 0, squared_total > 0 ? std::sqrt(squared_off / squared_total) : 0, albedo, note};
 }
 
-FormError rounding_of_samples(const Model& model) {
+FormError error_of_samples(const Model& model) {
   const auto record = [&](const Brdf<Expr>& brdf, Program& program) { output_sampled(model, brdf, program); };
   const double albedo = largest_difference(model, {}, record, [&](Case& at, Sequence3& points) {
     Rgb<double> difference(0.0);
