@@ -4,10 +4,22 @@
 Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 """
 
+import bpy
+
 from . import lamps, operators, ui
 
 
+def _refuse_beside_another():
+    """An extension that is cut to a scene has the menus and operators of the whole one: the second
+    of them would take the first one's away."""
+    other = getattr(bpy.types, ui.MATERIAL_PT_brdfc.__name__, None)
+    if other is not None and other.__module__ != ui.__name__:
+        package = other.__module__.rpartition(".")[0]
+        raise RuntimeError(f"{package} is enabled, which has the same menus: disable it first")
+
+
 def register():
+    _refuse_beside_another()
     operators.register()
     ui.register()
     lamps.register()

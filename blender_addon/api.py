@@ -16,12 +16,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, lamps, lean, nodes, pack
+from . import checks, lamps, lean, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
 from .lamps import Lamp
 from .lean import PlanError
-from .nodes import CompileError
+from .nodes import CompileError, has_twin
 from .pack import PackError
+from .update import Update
 
 __all__ = [
     "CompileError",
@@ -29,12 +30,14 @@ __all__ = [
     "PlanError",
     "Finding",
     "Lamp",
+    "Update",
     "add_albedo",
     "add_twin",
     "albedo",
     "bake",
     "enable_osl",
     "get_parameters",
+    "has_twin",
     "models",
     "new_material",
     "plan",
@@ -43,6 +46,7 @@ __all__ = [
     "set_kernel",
     "set_parameters",
     "switch_representation",
+    "update_materials",
     "used_materials",
     "warnings",
     "write_materials",
@@ -192,6 +196,20 @@ def switch_representation(material, representation):
     prepare_material(material)
 
 
+def update_materials():
+    """Gives the models of the open file that another version of the extension made the shaders of
+    this one; values, links and forms stay.
+
+    Returns an Update: `count` of nodes, `refusals` and `notes`, sentences. A node that would lose
+    something stays as it is and is named there.
+    """
+    result = update.update()
+    for material in bpy.data.materials:
+        if material.library is None:
+            prepare_material(material)
+    return result
+
+
 def add_albedo(material):
     """Gives the node of a material with one model its Albedo output: what the surface reflects of a
     white world. Where that takes large tables nodes are made without, so that files stay small.
@@ -203,14 +221,6 @@ def add_albedo(material):
 
 #: The form that is made of Blender's own nodes.
 TWIN = "twin"
-
-
-def has_twin(material):
-    """Whether a material shows a twin in EEVEE."""
-    return any(
-        n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE"
-        for n in material.node_tree.nodes
-    )
 
 
 def add_twin(material):
@@ -303,15 +313,14 @@ def write_materials(path):
     return len(materials)
 
 
-def plan(error=None, time=None, fit=False):
-    """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
-    lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
+def start_plan(error=None, time=None, fit=False):
+    """Starts the program brdfc on a plan for the open file; a lean.Job, whose result is the Plan.
 
     `error` in percent and `time` in units of Blender's Glossy node let it choose the forms. With
     `fit` aimed forms get closures fitted to these materials for a base, which takes seconds to
     minutes a material and leaves less noise under skies and images.
     Nothing is changed. Raises ValueError where no material has a model, PlanError without the
-    program or where it refuses.
+    program.
     """
     used = [
         (name, node, entry)
@@ -320,7 +329,20 @@ def plan(error=None, time=None, fit=False):
     ]
     if not used:
         raise ValueError(_NO_MATERIAL)
-    return lean.Plan(used, error, time, fit)
+    return lean.Planning(used, error, time, fit)
+
+
+def plan(error=None, time=None, fit=False):
+    """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
+    lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
+
+    As start_plan(), and waits for the program. Raises PlanError where it refuses.
+    """
+    job = start_plan(error, time, fit)
+    try:
+        return job.wait()
+    finally:
+        job.cancel()
 
 
 def bake(made):
@@ -330,11 +352,18 @@ def bake(made):
     Raises CompileError, and PlanError where brdfc is of another version than the extension; the
     file is then as it was.
     """
-    count = made.bake()
-    for material in bpy.data.materials:
-        if material.library is None:
-            prepare_material(material)
-    return count
+    return start_bake(made).wait()
+
+
+def start_bake(made):
+    """The same as a lean.Job, a model a step. Until the last one the file is as it was."""
+
+    def prepare_all():
+        for material in bpy.data.materials:
+            if material.library is None:
+                prepare_material(material)
+
+    return lean.Baking(made, prepare_all)
 
 
 def see_lamps(scene):

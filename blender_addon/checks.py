@@ -306,6 +306,33 @@ DECLARED = {
 }
 
 
+def is_eevee(scene):
+    """Whether a scene renders with EEVEE, which has another name in each version."""
+    return scene.render.engine.startswith("BLENDER_EEVEE")
+
+
+def engine_name(scene):
+    """The render engine as people call it."""
+    known = {"BLENDER_WORKBENCH": "Workbench"}
+    return "EEVEE" if is_eevee(scene) else known.get(scene.render.engine, scene.render.engine)
+
+
+def _under_eevee(found, ours, material):
+    """The findings of a scene for a material with these nodes: EEVEE shows twins."""
+    if nodes.has_twin(material):
+        return [f for f in found if f.code != "engine"]
+    model_name, _ = nodes.identity(ours[0])
+    forms = pack.manifest()["models"].get(model_name, {}).get("representations", {})
+    if len(ours) > 1 or "twin" not in forms:
+        return found
+    values = nodes.all_values(ours[0])
+    if pack.refusal(model_name, "twin", values):
+        return found
+    return [
+        Finding("eevee_twin", f.severity, f.message) if f.code == "engine" else f for f in found
+    ]
+
+
 def scene_warnings(scene):
     """What keeps any form from rendering in a scene."""
     found = []
@@ -314,33 +341,29 @@ def scene_warnings(scene):
             Finding(
                 "blender_version",
                 "ERROR",
-                f"Blender {bpy.app.version_string} is too old; "
-                f"{'.'.join(map(str, BLENDER_MIN[:2]))} or newer is needed",
+                f"Blender {'.'.join(map(str, bpy.app.version[:2]))} is too old: "
+                f"{'.'.join(map(str, BLENDER_MIN[:2]))} is needed",
             )
         )
     if not osl_available():
-        found.append(
-            Finding("no_osl", "ERROR", "This Blender was built without Open Shading Language")
-        )
+        found.append(Finding("no_osl", "ERROR", "This Blender lacks Open Shading Language"))
     if scene.render.engine != "CYCLES":
         found.append(
             Finding(
                 "engine",
                 "ERROR",
-                f"The render engine is {scene.render.engine}; these shaders need Cycles",
+                f"{engine_name(scene)} can't run these shaders",
             )
         )
         return found
     if not scene.cycles.shading_system:
-        found.append(
-            Finding("osl_off", "ERROR", "Open Shading Language is off in the render settings")
-        )
+        found.append(Finding("osl_off", "ERROR", "Open Shading Language is off"))
     if backend := device_without_osl(scene):
         found.append(
             Finding(
                 "device",
                 "ERROR",
-                f"{backend} devices can't run Open Shading Language; use the CPU or OptiX",
+                f"{backend} devices can't run these shaders",
             )
         )
     if OPTIX_RUN is None and runs_on_optix(scene):
@@ -348,8 +371,7 @@ def scene_warnings(scene):
             Finding(
                 "optix_untested",
                 "ERROR",
-                "These shaders have not been tested on OptiX devices; the CPU is what they are "
-                "tested on",
+                "These shaders are untested on OptiX devices",
             )
         )
     return found
@@ -367,6 +389,12 @@ def _clamp_highlight(node, form, scene):
         return "WARNING", f"Clamp Indirect is {clamp:g}: it darkens highlights; 0 is exact"
 
 
+def _of_another_version(node, label):
+    if nodes.is_newer(node):
+        return Finding("newer", "WARNING", f"{label}made by a later version, {nodes.made_by(node)}")
+    return Finding("outdated", "WARNING", f"{label}made by another version")
+
+
 def node_warnings(node, material, scene):
     """What is wrong with one group node of a material."""
     label = f"{node.label or node.name}: "
@@ -375,13 +403,7 @@ def node_warnings(node, material, scene):
         found.append(Finding("script_failed", "ERROR", f"{label}the shader {problem}"))
     form, schema = nodes.manifest_entry(node) or ({}, {})
     if not form:
-        found.append(
-            Finding(
-                "outdated",
-                "WARNING",
-                f"{label}made by another version of the extension; Update replaces it",
-            )
-        )
+        found.append(_of_another_version(node, label))
     declared = form.get("warnings", [])
     for name, parameter in schema.items():
         value = nodes.get_value(node, name)
@@ -440,6 +462,8 @@ def warnings(material, scene):
     # Blender's own nodes run anywhere.
     scripted = any(not nodes.is_native(node.node_tree) for node in ours)
     found = scene_warnings(scene) if scripted else []
+    if is_eevee(scene):
+        found = _under_eevee(found, ours, material)
     for node in ours:
         found += node_warnings(node, material, scene)
     found += _pool_findings(material, scene)

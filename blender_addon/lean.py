@@ -4,8 +4,10 @@
 What can be left out the program brdfc knows, which the extension does not contain; see program().
 """
 
+import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -57,41 +59,100 @@ def needs(materials):
     return found
 
 
-class Plan:
-    """What a pack of the open file alone holds, and the pack."""
+class Job:
+    """Work in steps, between which Blender stays alive. What is wrong is raised by step(); the file
+    is then as it was, as it is after cancel()."""
+
+    result = None
+
+    def step(self):
+        """Does a part of the work; returns the share that is done, None once `result` is there."""
+        raise NotImplementedError
+
+    def cancel(self):
+        """Gives up; may be called at any time, also twice."""
+
+    def wait(self):
+        """All of it at once; returns the result."""
+        while self.step() is not None:
+            pass
+        return self.result
+
+
+class Planning(Job):
+    """The program brdfc at work on a Plan, beside Blender."""
+
+    #: Seconds that step() waits for the program.
+    PATIENCE = 0.05
 
     def __init__(self, used, error=None, time=None, fit=False):
         """`used`: [(id, group node, entry)], entries as `materials` of a scene file has them.
         Budgets leave the form open; without one each keeps its own. `fit`: aimed forms get closures
         fitted to the materials for a base. Raises PlanError."""
-        self._budget = error is not None or time is not None
-        self.used = [(node, self._open(entry)) for _, node, entry in used]
+        budget = error is not None or time is not None
+        self._used = [(node, _open(entry) if budget else entry) for _, node, entry in used]
         options = [] if error is None else ["--error", f"{error:.17g}"]
         options += [] if time is None else ["--time", f"{time:.17g}x"]
         options += ["--fit"] if fit else []
-        materials = {name: entry for (name, _, _), (_, entry) in zip(used, self.used, strict=True)}
+        materials = {name: entry for (name, _, _), (_, entry) in zip(used, self._used, strict=True)}
         self._folder = tempfile.TemporaryDirectory(prefix="brdfc-lean-")
         folder = Path(self._folder.name)
         file = folder / "materials.json"
         file.write_text(json.dumps(needs(materials)), encoding="utf-8")
         command = [program(), "build", "--materials", file, "--explain", *options, "--out", folder]
+        self._program = command[0]
+        self._said, self._log = folder / "said.json", folder / "log.txt"
         try:
-            done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+            with self._said.open("wb") as said, self._log.open("wb") as log:
+                self._process = subprocess.Popen(
+                    [str(c) for c in command], stdin=subprocess.DEVNULL, stdout=said, stderr=log
+                )
         except OSError as failed:
             raise PlanError(f"{command[0]}: {failed}") from failed
-        if done.returncode != 0:
-            said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]
+
+    def step(self):
+        if self.result is not None:
+            return None
+        try:
+            status = self._process.wait(self.PATIENCE)
+        except subprocess.TimeoutExpired:
+            return self._share()
+        log = self._log.read_text(encoding="utf-8", errors="replace")
+        if status != 0:
+            said = log.strip().splitlines() or [f"exit status {status}"]
             raise PlanError(said[-1])
         try:
-            self.explanation = json.loads(done.stdout)
+            explanation = json.loads(self._said.read_text(encoding="utf-8"))
         except ValueError as bad:
-            raise PlanError(f"{command[0]}: expected an explanation: {bad}") from bad
-        self.pack = folder / "brdfc_shaders"
+            raise PlanError(f"{self._program}: expected an explanation: {bad}") from bad
+        self.result = Plan(self._used, explanation, self._folder)
+        return None
 
-    def _open(self, entry):
-        if self._budget and entry["representation"] not in ASKED_FOR:
-            return entry | {"representation": "auto"}
-        return entry
+    def _share(self):
+        """Of the models that the program says it has begun."""
+        log = self._log.read_text(encoding="utf-8", errors="replace")
+        counted = re.findall(r"^brdfc build: (\d+)/(\d+) ", log, re.M)
+        return int(counted[-1][0]) / max(int(counted[-1][1]), 1) if counted else 0.0
+
+    def cancel(self):
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        if self.result is None:
+            self._folder.cleanup()
+
+
+def _open(entry):
+    asked = entry["representation"] in ASKED_FOR
+    return entry if asked else entry | {"representation": "auto"}
+
+
+class Plan:
+    """What a pack of the open file alone holds, and the pack."""
+
+    def __init__(self, used, explanation, folder):
+        self.used, self.explanation, self._folder = used, explanation, folder
+        self.pack = Path(folder.name) / "brdfc_shaders"
 
     def lines(self):
         """What is taken and left out, and what that saves, in words."""
@@ -118,36 +179,71 @@ class Plan:
             out.append(f"without the models that no material uses: {', '.join(unused)}")
         return out
 
-    def bake(self):
-        """Puts the lean groups into the materials; values and links stay. Returns how many nodes
-        have one now. Raises PlanError, CompileError, PackError; the file is then as it was."""
-        whole, before = pack.root, pack.manifest()
-        known = set(bpy.data.node_groups)
-        swaps = []
-        pack.use(self.pack)
+
+class Baking(Job):
+    """Puts the lean groups of a Plan into the materials; values and links stay. The result is how
+    many nodes have one now. Steps raise PlanError, CompileError, PackError."""
+
+    def __init__(self, plan, afterwards):
+        """`afterwards` is called when all is in place."""
+        self._plan, self._afterwards = plan, afterwards
+        self._made, self._steps = [], self._work()
+
+    def step(self):
+        if self.result is not None:
+            return None
         try:
-            if pack.manifest()["generator"] != before["generator"]:
-                raise PlanError(
-                    f"{program()} is {pack.manifest()['generator']}, the extension was made by "
-                    f"{before['generator']}"
-                )
-            for node, entry in self.used:
-                model = entry["model"]
-                # A linked value is None to pack.refusal().
-                given = {
-                    k: None if isinstance(v, dict) else v for k, v in entry["parameters"].items()
-                }
-                form = pack.resolve(model, entry["representation"], given)
-                albedo = nodes.uses_albedo(node)
-                group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
-                swaps.append((node, group))
+            return next(self._steps)
+        except StopIteration:
+            return None
         except BaseException:
-            for group in set(bpy.data.node_groups) - known:
-                nodes.remove_group(group)
+            self.cancel()
             raise
-        finally:
-            pack.use(whole)
+
+    def cancel(self):
+        self._steps.close()
+        if self.result is None:
+            for group in self._made:
+                nodes.remove_group(group)
+            self._made = []
+
+    def _work(self):
+        """A group a step, and then all of them at once into their nodes."""
+        before, swaps = pack.manifest(), []
+        for node, entry in self._plan.used:
+            with _taken(self._plan.pack):
+                swaps.append((node, self._group(node, entry, before)))
+            yield len(swaps) / len(self._plan.used)
         for node, group in swaps:
             nodes.replace_group(node, group)
         nodes.remove_unused_groups()
-        return sum(nodes.is_baked(node) for node, _ in swaps)
+        self._afterwards()
+        self.result = sum(nodes.is_baked(node) for node, _ in swaps)
+
+    def _group(self, node, entry, before):
+        if pack.manifest()["generator"] != before["generator"]:
+            raise PlanError(
+                f"{program()} is {pack.manifest()['generator']}, the extension was made by "
+                f"{before['generator']}"
+            )
+        # A linked value is None to pack.refusal().
+        given = {k: None if isinstance(v, dict) else v for k, v in entry["parameters"].items()}
+        model = entry["model"]
+        form = pack.resolve(model, entry["representation"], given)
+        known = set(bpy.data.node_groups)
+        albedo = nodes.uses_albedo(node)
+        group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
+        # The list of lamps, which may be new as well, goes with the last group that reads it.
+        self._made += [group] if group not in known else []
+        return group
+
+
+@contextlib.contextmanager
+def _taken(folder):
+    """Another pack in place of the extension's, for a moment: panels are drawn between two."""
+    whole = pack.root
+    pack.use(folder)
+    try:
+        yield
+    finally:
+        pack.use(whole)

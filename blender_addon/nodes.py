@@ -260,7 +260,8 @@ def _add_parameter(group, group_input, script_input, parameter):
     return socket
 
 
-_VECTORS = {
+#: Sockets of a group beside its model's parameters, and their tooltips.
+VECTORS = {
     pack.NORMAL: "Shading normal; unlinked, the one of the surface",
     pack.TANGENT: "First axis of anisotropy; unlinked, the object's Z axis along the surface",
 }
@@ -291,7 +292,7 @@ def _fill_native_group(group, model_name, representation, source):
         relay.location = (-100, -40 * len(factors))
         sockets[name] = _add_parameter(group, group_input, relay.inputs[0], parameter)
         factors.append(relay.outputs[0])
-    sockets |= {name: _vector_socket(group, name, text) for name, text in _VECTORS.items()}
+    sockets |= {name: _vector_socket(group, name, text) for name, text in VECTORS.items()}
     normal = group_input.outputs[pack.NORMAL]
     made = twin.wire(group, json.loads(source), normal, factors)
     for name, output in zip(OUTPUTS, made, strict=True):
@@ -336,7 +337,7 @@ def _fill_group(group, model_name, representation, texts):
     sockets = {}
     for name, parameter in pack.socket_parameters(model_name, representation).items():
         sockets[name] = _add_parameter(group, group_input, inputs[name], parameter)
-    for name, text_ in _VECTORS.items():
+    for name, text_ in VECTORS.items():
         sockets[name] = _vector_socket(group, name, text_)
         group.links.new(group_input.outputs[-2], inputs[name])
     if lamp_inputs := _lamp_inputs(model_name, representation):
@@ -400,6 +401,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
             "model": model_name,
             "representation": representation,
             "digest": pack.digest(model_name, representation),
+            "made_by": pack.manifest()["generator"],
             "choices": json.dumps(pack.form_choices(model_name, representation)),
             "only": json.dumps(
                 pack.fixed(model_name) | pack.form_values(model_name, representation)
@@ -448,6 +450,24 @@ def identity(node):
 def is_baked(node):
     """Whether the group was made for the open file alone; see lean.py."""
     return "baked" in node.node_tree[TAG]
+
+
+def made_by(node):
+    """Which version made a node's group, as "brdfc 1.2.3"; the first ones did not say."""
+    return node.node_tree[TAG].get("made_by", "brdfc 0")
+
+
+def is_newer(node):
+    """Whether a later version than the installed one made a node's group."""
+    return pack.version(made_by(node)) > pack.version(pack.manifest()["generator"])
+
+
+def has_twin(material):
+    """Whether a material shows a twin in EEVEE."""
+    return any(
+        n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE"
+        for n in material.node_tree.nodes
+    )
 
 
 def manifest_entry(node):
@@ -535,7 +555,8 @@ def group_nodes(material):
     return [node for tree in trees for node in tree.nodes if is_ours(node)]
 
 
-def _all_values(node):
+def all_values(node):
+    """Value of each parameter by name, as get_value() has it."""
     choices = json.loads(node.node_tree[TAG]["choices"])
     names = dict.fromkeys((*choices, *_only(node), *sockets(node)))
     return {name: get_value(node, name) for name in names}
@@ -566,7 +587,7 @@ def switch(node, representation):
     Raises ValueError, CompileError; the node is then as it was.
     """
     model_name, _ = identity(node)
-    form = pack.resolve(model_name, representation, _all_values(node))
+    form = pack.resolve(model_name, representation, all_values(node))
     replace_group(node, ensure_group(model_name, form, albedo=uses_albedo(node)))
 
 
@@ -599,7 +620,7 @@ def replace_group(node, group):
     if group == node.node_tree:
         return
     tree = node.id_data
-    values = _all_values(node)
+    values = all_values(node)
     incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
     outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
     for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:

@@ -208,6 +208,65 @@ class BRDFC_OT_find_lamps(Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_details(Operator):
+    """The error is the part of the reflected light that a form sends in other directions than its
+    model, on average over views; 1 % is hard to see. More figures are behind this button"""
+
+    bl_idname = "brdfc.details"
+    bl_label = "What This Means"
+    bl_options = {"INTERNAL"}
+
+    node: StringProperty(name="Node", description="Name of the group node")
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_popup(self, width=500)
+
+    def draw(self, context):
+        for line in self.lines(context):
+            self.layout.label(text=line)
+
+    def execute(self, context):
+        for line in self.lines(context):
+            self.report({"INFO"}, line)
+        return {"FINISHED"}
+
+    def lines(self, context):
+        from . import ui
+
+        try:
+            node = _model_node(context.object.active_material, self.node)
+            made = nodes.manifest_entry(node)
+        except _ERRORS as error:
+            return [str(error)]
+        return (
+            ui.details(node, made[0]) if made else ["Another version made this: nothing is known"]
+        )
+
+
+class BRDFC_OT_update(Operator):
+    """Give the models that another version of the extension made the shaders of this one, where all
+    that they are set to can stay"""
+
+    bl_idname = "brdfc.update"
+    bl_label = "Update Materials"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            result = api.update_materials()
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for sentence in (*result.refusals, *result.notes):
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"Models updated: {result.count}")
+        return {"FINISHED"}
+
+
 class BRDFC_OT_add_albedo(Operator):
     """Give the model's node an output for its albedo, whose tables make the file larger"""
 
@@ -326,17 +385,54 @@ class BRDFC_OT_write_materials(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_bake(Operator):
-    """Give the materials shaders that hold no more than this file needs; brdfc makes them"""
+class _Long:
+    """An operator whose work is a lean.Job: it goes on beside the interface, which shows how far it
+    is; Esc gives up, and then nothing is changed."""
 
-    bl_idname = "brdfc.bake"
-    bl_label = "Bake Lean Materials"
-    bl_options = {"REGISTER", "UNDO"}
+    def begin(self, context, job):
+        self.job = job
+        manager = context.window_manager
+        self.timer = manager.event_timer_add(0.1, window=context.window)
+        manager.progress_begin(0, 100)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
 
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self.cancel(context)
+            self.report({"INFO"}, f"{self.bl_label}: cancelled, nothing is changed")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            share = self.job.step()
+        except _ERRORS as error:
+            self.cancel(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if share is None:
+            self.end(context)
+            return self.finish(context, self.job.result)
+        context.window_manager.progress_update(100 * share)
+        context.workspace.status_text_set(f"{self.bl_label}: {share:.0%}   Esc: cancel")
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Also what Blender calls when a window closes or a file is opened."""
+        self.job.cancel()
+        self.end(context)
+
+    def end(self, context):
+        context.window_manager.event_timer_remove(self.timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+
+
+class _Budget:
     error: FloatProperty(
         name="Error in Percent",
-        description="Part of the light that a fitted form may be off, which is then taken in place "
-        "of a sampled one; 0: every material keeps its form",
+        description="Part of the light that a fitted form may misplace, which is then taken in "
+        "place of a sampled one; 0: every material keeps its form",
         min=0,
         max=100,
         default=0,
@@ -349,36 +445,86 @@ class BRDFC_OT_bake(Operator):
         default=False,
     )
 
-    def _options(self):
+    def budget(self):
         return {"error": self.error or None, "fit": self.fit}
 
-    def _planned(self):
-        return api.plan(**self._options())
+
+class BRDFC_OT_bake(_Long, _Budget, Operator):
+    """Give the materials shaders that hold no more than this file needs; brdfc makes them"""
+
+    bl_idname = "brdfc.bake"
+    bl_label = "Bake Lean Materials"
+    bl_options = {"REGISTER", "UNDO"}
 
     def invoke(self, context, event):
         try:
-            self._plan, self._planned_with = self._planned(), self._options()
+            return self.begin(context, api.start_plan(**self.budget()))
         except _ERRORS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+
+    def finish(self, context, plan):
+        BRDFC_OT_bake_plan.plan, BRDFC_OT_bake_plan.planned_with = plan, self.budget()
+        bpy.ops.brdfc.bake_plan("INVOKE_DEFAULT", error=self.error, fit=self.fit)
+        return {"CANCELLED"}  # nothing is changed yet, so there is nothing to undo
+
+    def execute(self, context):
+        try:
+            count = api.bake(api.plan(**self.budget()))
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Nodes that are lean now: {count}")
+        return {"FINISHED"}
+
+
+class BRDFC_OT_bake_plan(_Budget, Operator):
+    """Show what lean materials would hold, and bake them"""
+
+    bl_idname = "brdfc.bake_plan"
+    bl_label = "Bake Lean Materials"
+    bl_options = {"INTERNAL"}
+
+    plan, planned_with = None, None  # of the class: brdfc.bake leaves them here
+
+    @classmethod
+    def poll(cls, context):
+        return cls.plan is not None
+
+    def invoke(self, context, event):
         return context.window_manager.invoke_props_dialog(self, width=800)
 
     def draw(self, context):
         self.layout.prop(self, "error")
         self.layout.prop(self, "fit")
         column = self.layout.column(align=True)
-        for line in self._plan.lines():
+        for line in self.plan.lines():
             column.label(text=line)
 
     def execute(self, context):
-        try:
-            plan = getattr(self, "_plan", None)
-            if plan is None or self._planned_with != self._options():
-                plan = self._planned()
-            count = api.bake(plan)
-        except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        if self.budget() == self.planned_with:
+            bpy.ops.brdfc.bake_apply("INVOKE_DEFAULT")
+        else:  # then another plan is to be seen first
+            bpy.ops.brdfc.bake("INVOKE_DEFAULT", error=self.error, fit=self.fit)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_bake_apply(_Long, Operator):
+    """Put the lean shaders of a plan into the materials"""
+
+    bl_idname = "brdfc.bake_apply"
+    bl_label = "Bake Lean Materials"
+    bl_options = {"INTERNAL", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return BRDFC_OT_bake_plan.plan is not None
+
+    def invoke(self, context, event):
+        plan, BRDFC_OT_bake_plan.plan = BRDFC_OT_bake_plan.plan, None
+        return self.begin(context, api.start_bake(plan))
+
+    def finish(self, context, count):
         self.report({"INFO"}, f"Nodes that are lean now: {count}")
         return {"FINISHED"}
 
@@ -399,8 +545,12 @@ class BrdfcPreferences(AddonPreferences):
 _CLASSES = (
     BrdfcPreferences,
     BRDFC_OT_bake,
+    BRDFC_OT_bake_plan,
+    BRDFC_OT_bake_apply,
     BRDFC_OT_add_albedo,
     BRDFC_OT_add_twin,
+    BRDFC_OT_details,
+    BRDFC_OT_update,
     BRDFC_OT_find_lamps,
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,

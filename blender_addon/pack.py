@@ -4,6 +4,7 @@
 import hashlib
 import json
 import math
+import re
 from functools import cache, lru_cache
 from numbers import Real
 from pathlib import Path
@@ -47,6 +48,11 @@ def manifest():
     if data.get("format") != FORMAT:
         raise PackError(f"{path}: format {data.get('format')!r}, expected {FORMAT}")
     return data
+
+
+def version(generator):
+    """The numbers of "brdfc 1.2.3"; empty where there are none."""
+    return tuple(int(n) for n in re.findall(r"\d+", generator))
 
 
 def model_names():

@@ -59,12 +59,30 @@ def error_text(entry):
     error = entry["error"]
     parts = []
     if error.get("relative_l1") is not None:
-        parts.append(f"L1 {error['relative_l1']:.2g}")
-    if error.get("albedo") is not None:
-        parts.append(f"albedo {error['albedo']:.2g}")
+        parts.append(f"{100 * error['relative_l1']:.2g} % of the light")
     if error.get("note"):
         parts.append(error["note"])
     return ", ".join(parts) or "not measured"
+
+
+def details(node, form):
+    """What the panel leaves out of a node's form, a sentence a line."""
+    error = form["error"]
+    out = [
+        f"{what}: {100 * error[key]:.2g} %"
+        for key, what in (
+            ("relative_l1", "Light that leaves in other directions than the model's"),
+            ("relative_l2", "The same by squares, to which bright spots count more"),
+            ("albedo", "Largest error of how much is reflected, of a white surface"),
+        )
+        if error.get(key) is not None
+    ]
+    if error.get("note"):
+        out.append(error["note"].capitalize())
+    out.append(f"Run time at equal samples: {cost_text(node, form)}")
+    if form.get("closures"):
+        out.append(f"Closures of Cycles: {form['closures']}")
+    return out
 
 
 def cost_text(node, form):
@@ -126,6 +144,7 @@ def _draw_form(layout, node, form, scene, editable):
     for refusal in refusals:
         _wrapped(column, refusal[0].upper() + refusal[1:])
     _wrapped(column, f"Error: {error_text(form)}")
+    column.operator("brdfc.details", icon="QUESTION", emboss=False).node = node.name
     _wrapped(column, f"Cost: {cost_text(node, form)}")
     if form.get("closures"):
         _wrapped(column, f"Closures: {form['closures']}")
@@ -152,10 +171,6 @@ def draw_node(layout, node, material, scene, editable=True):
         entry = pack.model(model_name)
         _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
         _draw_form(layout, node, made[0], scene, editable)
-    else:
-        button = layout.operator("brdfc.switch", text="Update", icon="FILE_REFRESH")
-        button.node = node.name
-        button.representation = "auto" if nodes.is_baked(node) else representation
     _draw_values(layout, node)
     if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
@@ -191,20 +206,36 @@ def draw_lamps(layout, material, scene):
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
 
 
+_DOWNLOAD = ("wm.url_open", "Get Blender", {"url": "https://www.blender.org/download/"})
+#: The button under a finding of each code: operator, text, properties.
+BUTTONS = {
+    "blender_version": _DOWNLOAD,
+    "no_osl": _DOWNLOAD,
+    "engine": ("brdfc.enable_osl", "Use Cycles", {}),
+    "eevee_twin": ("brdfc.add_twin", "Add Twin for EEVEE", {}),
+    "osl_off": ("brdfc.enable_osl", "Turn On OSL", {}),
+    "device": ("brdfc.enable_osl", "Use the CPU", {}),
+    "outdated": ("brdfc.update", "Update Materials", {}),
+    "newer": ("screen.userpref_show", "Look for Updates", {"section": "EXTENSIONS"}),
+    "bump_correction": ("brdfc.fix_material", "Set Up Material", {}),
+    "path_guiding": ("brdfc.no_guiding", "Turn Off Path Guiding", {}),
+}
+
+
 def draw_warnings(layout, material, scene):
     """The findings for a material, with buttons that mend what can be mended."""
     found = checks.warnings(material, scene)
-    codes = {f.code for f in found}
+    offered = set()
     for finding in found:
         row = layout.column(align=True)
         row.alert = finding.severity == "ERROR"
         _wrapped(row, finding.message, "ERROR" if finding.severity == "ERROR" else "INFO")
-    if codes & {"osl_off", "engine", "device"}:
-        layout.operator("brdfc.enable_osl", icon="CHECKMARK")
-    if "bump_correction" in codes:
-        layout.operator("brdfc.fix_material", icon="CHECKMARK")
-    if "path_guiding" in codes:
-        layout.operator("brdfc.no_guiding", icon="CHECKMARK")
+        if finding.code in BUTTONS and finding.code not in offered:
+            offered.add(finding.code)
+            operator, text, settings = BUTTONS[finding.code]
+            button = layout.operator(operator, text=text, icon="CHECKMARK")
+            for key, value in settings.items():
+                setattr(button, key, value)
     return found
 
 

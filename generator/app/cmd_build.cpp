@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "forms/aimed.h"
 #include "forms/form.h"
 #include "pack/pack.h"
+#include "pack/standalone.h"
 #include "plan/costs.h"
 #include "plan/plan.h"
 #include "reference/scene.h"
@@ -27,7 +29,7 @@ namespace {
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false;
   std::optional<std::string> error, time;
-  std::string scene, materials, out, addon;
+  std::string scene, materials, out, osl, addon;
   std::vector<std::string> models;
 };
 
@@ -178,7 +180,30 @@ double parse_error(const std::string& text) {
   return *value / 100;
 }
 
+/// The models as OSL that needs no extension. All texts are made before the first is written.
+void write_osl(const Options& options) {
+  if (!options.scene.empty() || !options.materials.empty() || !options.out.empty() || !options.addon.empty() ||
+      options.error || options.time || options.json || options.twin || options.fit_bases)
+    input_error("build: --osl DIR goes with --all or --model NAME alone");
+  const auto files = pack::standalone_files(options.models);
+  for (const auto& [name, text] : files) {
+    const std::filesystem::path path = std::filesystem::path(options.osl) / name;
+    std::error_code ignored;
+    std::filesystem::create_directories(path.parent_path(), ignored);
+    std::ofstream out(path, std::ios::binary);
+    out << text;
+    out.close();
+    if (!out) input_error("{}: cannot be written", path.string());
+  }
+  fmt::print(stderr, "brdfc build: wrote {} files to {}\n", files.size(), options.osl);
+}
+
 void run(const Options& options) {
+  if (!options.osl.empty()) {
+    write_osl(options);
+    return;
+  }
+  if (options.out.empty()) input_error("build: expected --out DIR, the folder for the extension, or --osl DIR");
   if (int(options.all) + int(!options.scene.empty()) + int(!options.materials.empty()) + int(!options.models.empty()) !=
       1)
     input_error("build: expected one of --all, --scene FILE, --materials FILE or --model NAME");
@@ -221,6 +246,8 @@ void run(const Options& options) {
     plan = plan::plan_models(options.models);
   }
   pack::Options pack{options.out, addon, plan, budget.costs, {}};
+  const std::string& cut_to = options.scene.empty() ? options.materials : options.scene;
+  pack.cut = std::filesystem::path(cut_to).stem().string();
   const auto start = std::chrono::steady_clock::now();
   pack.progress = [&](const std::string& what, int done, int total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -265,7 +292,11 @@ void add_build_command(CLI::App& app) {
       "With --scene or --materials: also twins, Blender's own nodes for where Open Shading Language does not run,\n"
       "of every material whose parameters are constant");
   c->add_option("--model", options->models, "Only these models (repeat for several)");
-  c->add_option("--out", options->out, "Folder for the extension and its zip")->required();
+  c->add_option("--out", options->out, "Folder for the extension and its zip");
+  c->add_option(
+      "--osl", options->osl,
+      "Instead of an extension: every model, or those of --model, as a shader for Blender's Script node, and\n"
+      "its formulas as OSL without closures, into this folder");
   c->add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`");
   c->callback([options] { run(*options); });
 }

@@ -15,9 +15,11 @@ namespace brdfc::forms {
 /// Statements that differ by combination of choices: equal ones are written once.
 class ChoiceSwitch {
  public:
+  /// Both must outlive it. Choices among `fixed` are tested nowhere.
   ChoiceSwitch(const ModelInfo& info, const ParamValues& fixed) : info_(info), fixed_(fixed) {}
+
   void add(const Choices&, const std::string& statements);
-  /// The statements, which have this indent, as they are where all combinations have the same.
+  /// Branches on the parameters' names, or the statements alone where all are equal; `indent` is that of the branches.
   std::string print(int indent) const;
 
  private:

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/addon.h"
 
+#include <fmt/format.h>
+
+#include <cctype>
 #include <fstream>
 #include <sstream>
 
@@ -12,12 +15,29 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kManifest = "blender_manifest.toml";
+constexpr const char *kId = "brdfc_shaders", *kName = "brdfc Shaders";
 
-std::string stamped(std::string manifest, const fs::path& path) {
-  const std::string line = "version = \"@version@\"";
+/// `manifest` with another value for a key, which has this one.
+void stamp(std::string& manifest, const fs::path& path, const char* key, const std::string& before,
+           const std::string& after) {
+  const std::string line = fmt::format("\n{} = \"{}\"\n", key, before);
   const std::size_t at = manifest.find(line);
-  if (at == std::string::npos) input_error("{}: expected the line {}", path.string(), line);
-  return manifest.replace(at, line.size(), std::string("version = \"") + BRDFC_VERSION + "\"");
+  if (at == std::string::npos) input_error("{}: expected the line {} = \"{}\"", path.string(), key, before);
+  manifest.replace(at, line.size(), fmt::format("\n{} = \"{}\"\n", key, after));
+}
+
+/// Small letters, digits and single underscores between them.
+std::string slug(const std::string& name) {
+  std::string out;
+  for (const char c : name) {
+    const bool letter = std::isalnum(static_cast<unsigned char>(c)) != 0;
+    if (letter)
+      out += char(std::tolower(static_cast<unsigned char>(c)));
+    else if (!out.empty() && out.back() != '_')
+      out += '_';
+  }
+  while (!out.empty() && out.back() == '_') out.pop_back();
+  return out;
 }
 
 }  // namespace
@@ -30,7 +50,13 @@ std::string read_text(const fs::path& path) {
   return text.str();
 }
 
-std::map<std::string, std::string> addon_files(const fs::path& folder) {
+std::string extension_id(const std::string& cut) {
+  if (cut.empty()) return kId;
+  const std::string own = slug(cut);
+  return fmt::format("{}_{}", kId, own.empty() ? "scene" : own);
+}
+
+std::map<std::string, std::string> addon_files(const fs::path& folder, const std::string& cut) {
   if (!fs::exists(folder / kManifest))
     input_error("{}: expected the add-on's folder with {}", folder.string(), kManifest);
   std::map<std::string, std::string> files;
@@ -38,7 +64,14 @@ std::map<std::string, std::string> addon_files(const fs::path& folder) {
     const std::string name = entry.path().lexically_relative(folder).generic_string();
     if (entry.path().extension() == ".py") files[name] = read_text(entry.path());
   }
-  files[kManifest] = stamped(read_text(folder / kManifest), folder / kManifest);
+  std::string& manifest = files[kManifest] = read_text(folder / kManifest);
+  const fs::path path = folder / kManifest;
+  stamp(manifest, path, "version", "@version@", BRDFC_VERSION);
+  if (!cut.empty()) {
+    const std::string id = extension_id(cut);
+    stamp(manifest, path, "id", kId, id);
+    stamp(manifest, path, "name", kName, fmt::format("{} ({})", kName, id.substr(std::string(kId).size() + 1)));
+  }
   return files;
 }
 

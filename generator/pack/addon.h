@@ -9,9 +9,14 @@
 namespace brdfc::pack {
 
 /// Contents by path within the folder, of .py files and of blender_manifest.toml, which gets the version of this
-/// program in place of @version@. Throws InputError for a file that can't be read, and for a manifest without a line
-/// `version = "@version@"`: its version might be another one than that of the shaders.
-std::map<std::string, std::string> addon_files(const std::filesystem::path& folder);
+/// program in place of @version@, and where `cut` is not empty an id and a name of its own: Blender puts an extension
+/// in the place of another one of its id, and what is cut to a scene must not take that of the whole. Throws InputError
+/// for a file that can't be read, and for a manifest without the lines `version = "@version@"`, `id = "brdfc_shaders"`
+/// and `name = "brdfc Shaders"`.
+std::map<std::string, std::string> addon_files(const std::filesystem::path& folder, const std::string& cut = "");
+
+/// The extension's id: brdfc_shaders, and where `cut`, the name of a file, is not empty what of it an id may have.
+std::string extension_id(const std::string& cut);
 
 /// The whole file. Throws InputError.
 std::string read_text(const std::filesystem::path&);

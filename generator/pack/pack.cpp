@@ -33,7 +33,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kExtensionId = "brdfc_shaders";
+/// Whatever the extension's id is: what reads packs knows this folder.
+constexpr const char* kFolder = "brdfc_shaders";
 
 void write_text(const fs::path& path, const std::string& text) {
   fs::create_directories(path.parent_path());
@@ -183,7 +184,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
 
 Result build_pack(const Options& options) {
   const std::vector<plan::PlannedModel>& chosen = options.models;
-  std::map<std::string, std::string> members = addon_files(options.addon);
+  std::map<std::string, std::string> members = addon_files(options.addon, options.cut);
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error || !fs::is_directory(options.out))
@@ -224,12 +225,12 @@ Result build_pack(const Options& options) {
   manifest["hash"] = sha256(everything);
   members["manifest.json"] = manifest.dump(1) + "\n";
 
-  const fs::path folder = staging.path() / kExtensionId;
+  const fs::path folder = staging.path() / kFolder;
   for (const auto& [name, data] : members) write_text(folder / name, data);
-  const std::string zip_name = fmt::format("{}-{}.zip", kExtensionId, BRDFC_VERSION);
+  const std::string zip_name = fmt::format("{}-{}.zip", extension_id(options.cut), BRDFC_VERSION);
   write_zip(staging.path() / zip_name, members);
 
-  result.folder = options.out / kExtensionId;
+  result.folder = options.out / kFolder;
   result.zip = options.out / zip_name;
   replace_folder(folder, result.folder, staging.path() / "old");
   fs::rename(staging.path() / zip_name, result.zip);

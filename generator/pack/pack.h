@@ -14,11 +14,12 @@
 namespace brdfc::pack {
 
 struct Options {
-  std::filesystem::path out;               ///< folder that receives brdfc_shaders/ and brdfc_shaders-<version>.zip
+  std::filesystem::path out;               ///< folder that receives brdfc_shaders/ and the zip, ID-<version>.zip
   std::filesystem::path addon;             ///< folder with the add-on's Python and blender_manifest.toml
   std::vector<plan::PlannedModel> models;  ///< what of each model
   plan::Costs costs = {};                  ///< for the panel
   std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty
+  std::string cut = {};  ///< name of what the models are cut to, for an id of its own (addon.h); empty: nothing
 };
 
 /// A line of the table that a build prints.

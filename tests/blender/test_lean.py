@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lean materials: baked from inside Blender, with the program brdfc."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import bpy
 import helpers
 import numpy as np
@@ -232,3 +235,133 @@ def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeyp
 def test_a_file_without_models_has_nothing_to_bake(extension, empty):
     with pytest.raises(RuntimeError, match="no material of this file has a reflection model"):
         bpy.ops.brdfc.bake()
+
+
+# ---- beside the interface ------------------------------------------------------------------------
+
+
+class Stand:
+    """An operator as Blender has it while it is modal."""
+
+    bl_label = "Bake Lean Materials"
+
+    def __init__(self, operator):
+        self.reports, self.finished, self.kind = [], None, operator
+
+    def report(self, kind, text):
+        self.reports.append(text)
+
+    def __getattr__(self, name):
+        return getattr(self.kind, name).__get__(self)
+
+    def finish(self, context, result):
+        self.finished = result
+        return {"FINISHED"}
+
+
+@pytest.fixture
+def manager():
+    """What operators ask of Blender's windows while they are modal, and what they told them."""
+    told = []
+    window_manager = SimpleNamespace(
+        event_timer_add=lambda step, window: told.append("timer") or "timer",
+        event_timer_remove=lambda timer: told.append("no timer"),
+        progress_begin=lambda low, high: told.append("begin"),
+        progress_update=lambda share: told.append(share),
+        progress_end=lambda: told.append("end"),
+        modal_handler_add=lambda operator: told.append("modal"),
+    )
+    context = SimpleNamespace(
+        window_manager=window_manager,
+        window=None,
+        workspace=SimpleNamespace(status_text_set=lambda text: told.append(text)),
+    )
+    return SimpleNamespace(context=context, told=told)
+
+
+def run_through(stand, context, job, event="TIMER"):
+    """How a modal operator ends."""
+    assert stand.begin(context, job) == {"RUNNING_MODAL"}
+    for _ in range(2000):
+        result = stand.modal(context, SimpleNamespace(type=event))
+        if result != {"RUNNING_MODAL"}:
+            return result
+    raise AssertionError("it does not end")
+
+
+def test_plan_and_bake_go_on_beside_the_interface(extension, used, manager):
+    operator = extension.operators.BRDFC_OT_bake
+    stand = Stand(operator)
+    before = counts()
+    assert run_through(stand, manager.context, extension.api.start_plan()) == {"FINISHED"}
+    assert manager.told[:3] == ["timer", "begin", "modal"]
+    assert manager.told[-3:] == ["no timer", "end", None], "nothing of it is left on the screen"
+    assert any("Esc: cancel" in str(text) for text in manager.told)
+    assert counts() == before, "a plan changes nothing"
+    plan = stand.finished
+    apply = Stand(extension.operators.BRDFC_OT_bake_apply)
+    assert run_through(apply, manager.context, extension.api.start_bake(plan)) == {"FINISHED"}
+    assert apply.finished == 3
+    assert all(extension.nodes.is_baked(the_node(extension, m)) for m in used.values())
+    assert any(0 < t < 100 for t in manager.told if isinstance(t, float))
+
+
+def test_esc_while_planning_ends_the_program_and_leaves_no_file(
+    extension, used, manager, monkeypatch, tmp_path
+):
+    slow = tmp_path / "brdfc"
+    slow.write_text("#!/bin/sh\necho 'brdfc build: 1/4 ward  0.1 s' >&2\nexec sleep 600\n")
+    slow.chmod(0o755)
+    monkeypatch.setenv("BRDFC_TOOL", str(slow))
+    job = extension.api.start_plan()
+    stand = Stand(extension.operators.BRDFC_OT_bake)
+    stand.begin(manager.context, job)
+    for _ in range(100):
+        assert stand.modal(manager.context, SimpleNamespace(type="TIMER")) == {"RUNNING_MODAL"}
+        if 25.0 in manager.told:
+            break
+    assert 25.0 in manager.told, "the share is what the program says"
+    # Other events wait: what the user would change meanwhile is not in the plan.
+    assert stand.modal(manager.context, SimpleNamespace(type="A")) == {"RUNNING_MODAL"}
+    assert stand.modal(manager.context, SimpleNamespace(type="ESC")) == {"CANCELLED"}
+    assert "nothing is changed" in stand.reports[0]
+    assert job._process.poll() is not None
+    assert not Path(job._folder.name).exists()
+    job.cancel()
+
+
+def test_esc_while_baking_leaves_the_file_as_it_was(extension, used, manager):
+    plan = extension.api.plan()
+    before = counts()
+    groups = {name: the_node(extension, m).node_tree for name, m in used.items()}
+    stand = Stand(extension.operators.BRDFC_OT_bake_apply)
+    stand.begin(manager.context, extension.api.start_bake(plan))
+    for _ in range(2):
+        assert stand.modal(manager.context, SimpleNamespace(type="TIMER")) == {"RUNNING_MODAL"}
+    assert counts() != before, "two models are made by now"
+    assert extension.pack.root == extension.pack._INSTALLED, "panels are drawn meanwhile"
+    assert stand.modal(manager.context, SimpleNamespace(type="ESC")) == {"CANCELLED"}
+    assert counts() == before
+    for name, material in used.items():
+        assert the_node(extension, material).node_tree == groups[name]
+
+
+def test_a_failure_beside_the_interface_is_said_and_changes_nothing(
+    extension, used, manager, monkeypatch, tmp_path
+):
+    fake = tmp_path / "brdfc"
+    fake.write_text("#!/bin/sh\necho 'brdfc: no such thing' >&2\nexit 2\n")
+    fake.chmod(0o755)
+    monkeypatch.setenv("BRDFC_TOOL", str(fake))
+    before = counts()
+    stand = Stand(extension.operators.BRDFC_OT_bake)
+    job = extension.api.start_plan()
+    assert run_through(stand, manager.context, job) == {"CANCELLED"}
+    assert stand.reports == ["brdfc: no such thing"]
+    assert counts() == before
+    assert manager.told[-3:] == ["no timer", "end", None]
+
+
+def test_without_a_plan_there_is_none_to_show_or_to_bake(extension, empty):
+    assert not bpy.ops.brdfc.bake_plan.poll()
+    assert not bpy.ops.brdfc.bake_apply.poll()

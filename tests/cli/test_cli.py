@@ -42,6 +42,21 @@ def refused(result, *words, status=2):
     return result.stderr
 
 
+def test_models_as_osl_that_stands_alone(tmp_path):
+    for out in ("a", "b"):
+        assert run("build", "--osl", tmp_path / out, "--model", "phong").returncode == 0
+        made = {p.name: p.read_text() for p in (tmp_path / out).rglob("*.*")}
+        assert set(made) == {"phong.osl", "brdfc_phong.h", "brdfc_library.h"}
+    assert made == {p.name: p.read_text() for p in (tmp_path / "a").rglob("*.*")}
+    for argument in ("color ks", "float e"):
+        assert argument in made["phong.osl"]
+        assert argument in made["brdfc_phong.h"]
+    assert "Lamp" not in made["phong.osl"], "a node of Blender's has no list of lamps"
+    assert (
+        "color brdfc_phong_eval(vector wi, vector wo, color ks, float e)" in made["brdfc_phong.h"]
+    )
+
+
 # ---- list ---------------------------------------------------------------------------------------
 
 
@@ -483,6 +498,11 @@ def test_fit_prints_its_error_by_view_and_its_closures():
         (["build", "--model", "phong", "--twin", "--out", "x"], ["--twin", "--scene"]),
         (["build", "--model", "phong", "--time", "1x", "--out", "x"], ["--time", "--scene"]),
         (["build", "--model", "phong", "--fit", "--out", "x"], ["--fit", "--scene"]),
+        (["build", "--all"], ["--out DIR", "--osl DIR"]),
+        (["build", "--all", "--osl", "x", "--out", "x"], ["--osl", "--model"]),
+        (["build", "--osl", "x", "--error", "5"], ["--osl", "--model"]),
+        (["build", "--osl", "x", "--model", "pong"], ["pong"]),
+        (["build", "--osl", "/dev/null", "--model", "phong"], ["/dev/null", "cannot be written"]),
     ],
 )
 def test_what_can_not_be_fitted(args, words, tmp_path):

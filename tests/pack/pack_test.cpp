@@ -17,6 +17,7 @@
 #include "measure/tabulate_albedo.h"
 #include "model/choices.h"
 #include "model/sampling.h"
+#include "pack/addon.h"
 #include "plan/costs.h"
 #include "plan/plan.h"
 #include "print/osl_library.h"
@@ -345,6 +346,21 @@ TEST_F(PackFiles, TheManifestForBlenderHasTheVersionOfTheBuild) {
   std::ofstream(other.addon / "blender_manifest.toml") << "version = \"3\"\n";
   EXPECT_THAT([&] { build_pack(other); },
               ThrowsMessage<InputError>(HasSubstr("blender_manifest.toml: expected the line version = \"@version@\"")));
+}
+
+TEST_F(PackFiles, WhatIsCutToASceneHasAnIdOfItsOwn) {
+  EXPECT_EQ(extension_id(""), "brdfc_shaders");
+  EXPECT_EQ(extension_id("small-lamp"), "brdfc_shaders_small_lamp");
+  EXPECT_EQ(extension_id("__My  Scene (2)__"), "brdfc_shaders_my_scene_2");
+  EXPECT_EQ(extension_id("\xc3\xa9\"\n"), "brdfc_shaders_scene") << "an id has small letters of ASCII";
+  Options o = options(temp.path() / "out");
+  o.cut = "small-lamp";
+  const Result pack = build_pack(o);
+  EXPECT_EQ(pack.zip.filename(), "brdfc_shaders_small_lamp-" BRDFC_VERSION ".zip");
+  EXPECT_EQ(pack.folder.filename(), "brdfc_shaders");
+  const std::string toml = read(pack.folder / "blender_manifest.toml");
+  EXPECT_THAT(toml, HasSubstr("\nid = \"brdfc_shaders_small_lamp\"\n"));
+  EXPECT_THAT(toml, HasSubstr("\nname = \"brdfc Shaders (small_lamp)\"\n"));
 }
 
 TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {

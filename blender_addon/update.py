@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials of another version of the extension, in a file that is opened with this one."""
+
+from dataclasses import dataclass
+
+import bpy
+
+from . import nodes, pack
+
+
+@dataclass(frozen=True)
+class Update:
+    """What update() did: how many nodes have this version's shaders now, and a sentence for each
+    that kept what it had, or that took another form."""
+
+    count: int
+    refusals: tuple
+    notes: tuple
+
+
+def others():
+    """[(material, node)]: group nodes of the open file that are of another version."""
+    found = []
+    for material in bpy.data.materials:
+        for node in nodes.group_nodes(material):
+            # A group that several materials share has its node in each of them.
+            if nodes.manifest_entry(node) is None and node not in [n for _, n in found]:
+                found.append((material, node))
+    return found
+
+
+def refusal(material, node):
+    """Why a node can't take this version's shader with all that it is set to; None if it can."""
+    model_name, _ = nodes.identity(node)
+    for block in (material, node.id_data):
+        if block.library is not None:
+            return f"it is linked from {block.library.filepath}; update it there"
+    if nodes.is_newer(node):
+        return f"{nodes.made_by(node)} made it, and this is {pack.manifest()['generator']}"
+    if model_name not in pack.model_names():
+        return f"this version has no model {model_name!r}"
+    known = pack.parameters(model_name)
+    for name, value in nodes.all_values(node).items():
+        if name in pack.fixed(model_name) or name in nodes.VECTORS:
+            continue
+        if name not in known:
+            return f"this version's {model_name} has no parameter {name!r}"
+        choices = known[name].get("choices")
+        if choices and value is not None and value not in choices:
+            return f"{model_name}.{name} is {value!r} there, and no longer a choice"
+    return None
+
+
+def update():
+    """Gives every node of another version the shader of this one; values, links and form stay.
+
+    A form that is no more becomes "auto". What can't be kept is not lost: such a node stays as it
+    is, with its old shader, which goes on rendering. Returns an Update.
+    """
+    count, refusals, notes = 0, [], []
+    for material, node in others():
+        what = f"{material.name}, {node.label or node.name}"
+        if why := refusal(material, node):
+            refusals.append(f"{what}: {why}")
+            continue
+        model_name, form = nodes.identity(node)
+        try:
+            try:
+                nodes.switch(node, form)
+            except ValueError:
+                nodes.switch(node, "auto")
+                notes.append(f"{what}: {form} is now {nodes.identity(node)[1]}")
+        except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors
+            refusals.append(f"{what}: {error}")
+            continue
+        count += 1
+    nodes.remove_unused_groups()
+    return Update(count, tuple(refusals), tuple(notes))

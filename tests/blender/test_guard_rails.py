@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What keeps a person from a wrong picture: one line and one button for each thing that is wrong,
+and files that other versions of the extension made."""
+
+import contextlib
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+import helpers
+import pytest
+
+
+def shown(extension, material, scene):
+    layout = helpers.Layout()
+    extension.ui.draw_warnings(layout, material, scene)
+    return layout.log
+
+
+def old_gpu(extension, scene, monkeypatch):
+    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "CUDA")
+    scene.cycles.device = "GPU"
+
+
+def no_osl(extension, scene, monkeypatch):
+    scene.cycles.shading_system = False
+
+
+def eevee(extension, scene, monkeypatch):
+    names = bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items.keys()
+    new = bpy.app.version >= (5, 0, 0)
+    scene.render.engine = (
+        "BLENDER_EEVEE" if new or "BLENDER_EEVEE" in names else "BLENDER_EEVEE_NEXT"
+    )
+
+
+def workbench(extension, scene, monkeypatch):
+    scene.render.engine = "BLENDER_WORKBENCH"
+
+
+def old_blender(extension, scene, monkeypatch):
+    monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
+
+
+SPOILED = [
+    (old_gpu, "CUDA devices can't run these shaders", "brdfc.enable_osl Use the CPU"),
+    (no_osl, "Open Shading Language is off", "brdfc.enable_osl Turn On OSL"),
+    (eevee, "EEVEE can't run these shaders", "brdfc.enable_osl Use Cycles"),
+    (workbench, "Workbench can't run these shaders", "brdfc.enable_osl Use Cycles"),
+    (old_blender, "99.0 is needed", "wm.url_open Get Blender"),
+]
+
+
+@pytest.fixture
+def phong(extension, empty):
+    extension.scene_loader.apply_clean_settings(empty)
+    material = extension.api.new_material("phong", e=20.0)
+    mesh = bpy.data.meshes.new("m")
+    mesh.materials.append(material)
+    item = bpy.data.objects.new("o", mesh)
+    empty.collection.objects.link(item)
+    bpy.context.view_layer.objects.active = item
+    assert shown(extension, material, empty) == []
+    return material
+
+
+@pytest.mark.parametrize(("spoil", "line", "button"), SPOILED)
+def test_one_line_and_one_button(extension, empty, phong, monkeypatch, spoil, line, button):
+    spoil(extension, empty, monkeypatch)
+    said, offered = shown(extension, phong, empty)
+    assert line in said
+    assert len(said) <= extension.ui._WRAP, "it fits a line of the panel"
+    assert offered == f"operator {button}"
+    if button.startswith("brdfc."):
+        assert bpy.ops.brdfc.enable_osl() == {"FINISHED"}
+        assert shown(extension, phong, empty) == []
+
+
+def test_every_button_is_an_operator_with_these_settings(extension):
+    for operator, text, settings in extension.ui.BUTTONS.values():
+        group, name = operator.split(".")
+        known = getattr(getattr(bpy.ops, group), name).get_rna_type().properties
+        assert text
+        assert set(settings) <= set(known.keys())
+
+
+def test_eevee_shows_twins(extension, empty, phong, use_pack, monkeypatch):
+    use_pack({"m": {"model": "phong", "parameters": {"ks": [0.5, 0.5, 0.5], "e": 20}}}, "--twin")
+    material = extension.api.new_material("phong")
+    bpy.context.object.active_material = material
+    eevee(extension, empty, monkeypatch)
+    assert shown(extension, material, empty)[1] == "operator brdfc.add_twin Add Twin for EEVEE"
+    assert bpy.ops.brdfc.add_twin() == {"FINISHED"}
+    assert shown(extension, material, empty) == []
+
+
+# ---- files of other versions ---------------------------------------------------------------------
+
+
+def aged(extension, material, made_by="brdfc 0.0.1"):
+    """As a file of another version has it."""
+    (node,) = extension.nodes.group_nodes(material)
+    tag = node.node_tree[extension.nodes.TAG]
+    tag["digest"], tag["made_by"] = "of another version", made_by
+    return node
+
+
+def test_materials_of_an_older_version_are_updated_at_once(extension, empty, phong):
+    api, nodes = extension.api, extension.nodes
+    other = api.new_material("ward", "sampled", ax=0.25, normalisation="duer")
+    old = [aged(extension, phong), aged(extension, other)]
+    groups = [node.node_tree for node in old]
+    line, button = shown(extension, phong, empty)
+    assert "made by another version" in line
+    assert button == "operator brdfc.update Update Materials"
+    assert bpy.ops.brdfc.update() == {"FINISHED"}
+    assert api.get_parameters(phong)["e"] == pytest.approx(20)
+    assert api.get_parameters(other)["ax"] == pytest.approx(0.25)
+    assert api.get_parameters(other)["normalisation"] == "duer"
+    assert nodes.identity(old[1]) == ("ward", "sampled")
+    assert shown(extension, phong, empty) == []
+    del groups
+    assert len(bpy.data.node_groups) == 3, "the old groups are gone; two models and their lamps"
+    again = api.update_materials()
+    assert (again.count, again.refusals, again.notes) == (0, (), ())
+
+
+def test_a_file_of_a_later_version_says_so(extension, empty, phong):
+    node = aged(extension, phong, "brdfc 99.1.0")
+    group = node.node_tree
+    line, button = shown(extension, phong, empty)[-2:]
+    assert "brdfc 99.1.0" in " ".join(shown(extension, phong, empty))
+    assert button == "operator screen.userpref_show Look for Updates"
+    result = extension.api.update_materials()
+    assert result.count == 0
+    assert "brdfc 99.1.0 made it, and this is brdfc" in result.refusals[0]
+    assert node.node_tree == group
+
+
+def lose_the_model(tag):
+    tag["model"] = "phony"
+
+
+def lose_a_parameter(tag):
+    tag["only"] = '{"gone": 1.0}'
+
+
+def lose_a_choice(tag):
+    tag["choices"] = '{"normalisation": ["bounded", "round", "ward"]}'
+
+
+@pytest.mark.parametrize(
+    ("lose", "why"),
+    [
+        (lose_the_model, "this version has no model 'phony'"),
+        (lose_a_parameter, "has no parameter 'gone'"),
+        (lose_a_choice, "'round' there, and no longer a choice"),
+    ],
+)
+def test_what_would_be_lost_is_said_and_kept(extension, empty, lose, why):
+    api, nodes = extension.api, extension.nodes
+    material = api.new_material("ward", normalisation="duer")
+    kept = api.new_material("ward")
+    node = aged(extension, material)
+    if kept_node := nodes.group_nodes(kept):
+        assert kept_node[0].node_tree == node.node_tree, "one group serves both"
+    group = node.node_tree
+    lose(group[nodes.TAG])
+    if lose is lose_a_choice and nodes.has_menus():
+        pytest.skip("menus of later versions of Blender hold labels, which can't be pretended")
+    result = api.update_materials()
+    assert node.node_tree == group
+    assert any(why in sentence and material.name in sentence for sentence in result.refusals)
+
+
+def test_a_form_that_is_no_more_becomes_another(extension, empty, phong):
+    node = aged(extension, phong)
+    node.node_tree[extension.nodes.TAG]["representation"] = "perfect"
+    result = extension.api.update_materials()
+    assert result.count == 1 and "perfect is now aimed" in result.notes[0]
+    assert extension.nodes.identity(node) == ("phong", "aimed")
+    assert extension.api.get_parameters(phong)["e"] == pytest.approx(20)
+
+
+def test_linked_materials_are_left_to_their_file(extension, empty, phong, tmp_path):
+    aged(extension, phong)
+    path = tmp_path / "library.blend"
+    bpy.data.libraries.write(str(path), {phong}, fake_user=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(path), link=True) as (there, here):
+        here.materials = there.materials
+    result = extension.api.update_materials()
+    assert result.count == 0
+    assert "is linked from" in result.refusals[0] and "library.blend" in result.refusals[0]
+
+
+# ---- beside an extension that is cut to a scene --------------------------------------------------
+
+
+def test_what_is_cut_to_a_file_never_replaces_the_whole(extension, empty, phong, lean_pack):
+    folder = lean_pack({"m": {"model": "phong", "parameters": {"e": 20}}})
+    (cut,) = folder.parent.glob("*.zip")
+    assert cut.name.startswith("brdfc_shaders_materials-")
+    repository = bpy.context.preferences.extensions.repos["User Default"].directory
+    whole = extension.pack.manifest()["hash"]
+    bpy.ops.extensions.package_install_files(
+        filepath=str(cut), repo="user_default", enable_on_install=False
+    )
+    module = f"{extension.package}_materials"
+    try:
+        found = {p.name for p in Path(repository).iterdir() if not p.name.startswith(".")}
+        assert found == {"brdfc_shaders", "brdfc_shaders_materials"}
+        with pytest.raises(RuntimeError, match=f"{extension.package} is enabled"):
+            import_module(module).register()
+        with contextlib.suppress(RuntimeError):
+            bpy.ops.preferences.addon_enable(module=module)
+        assert module not in bpy.context.preferences.addons
+        extension.pack.manifest.cache_clear()
+        assert extension.pack.manifest()["hash"] == whole
+        assert shown(extension, phong, empty) == []
+        assert bpy.ops.brdfc.switch(
+            node=extension.nodes.group_nodes(phong)[0].name, representation="sampled"
+        ) == {"FINISHED"}
+    finally:
+        bpy.ops.extensions.package_uninstall(
+            repo_directory=repository, pkg_id="brdfc_shaders_materials"
+        )
+    assert [p.name for p in Path(repository).iterdir() if p.name.startswith("b")] == [
+        "brdfc_shaders"
+    ]
