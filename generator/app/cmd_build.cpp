@@ -245,7 +245,7 @@ void run(const Options& options) {
   } else {
     plan = plan::plan_models(options.models);
   }
-  pack::Options pack{options.out, addon, plan, budget.costs, {}};
+  pack::Options pack{options.out, addon, data_dir() / "python" / "brdfc", plan, budget.costs, {}};
   const std::string& cut_to = options.scene.empty() ? options.materials : options.scene;
   pack.cut = std::filesystem::path(cut_to).stem().string();
   const auto start = std::chrono::steady_clock::now();

@@ -68,9 +68,9 @@ template <Numeric T, std::size_t N, class Step> std::array<T, N> iterate(int cou
   return state;
 }
 
-/// Steps that a safeguarded Newton iteration takes: to 2e-7 of the target in single precision (float, and the recorded
-/// form, which OSL executes in float), to 1e-15 otherwise.
-template <class T> constexpr int newton_steps() { return std::same_as<T, double> || std::same_as<T, Wide> ? 24 : 10; }
+/// Steps that a safeguarded Newton iteration takes: to 2e-7 of the target in float, to 1e-15 otherwise. A recording
+/// takes those of the precision that it is made for.
+template <class T> int newton_steps() { return std::same_as<T, float> ? 10 : 24; }
 
 /// Gives a subexpression the name it has in the paper; only the recorded form keeps it.
 template <Numeric T> const T& named(const char*, const T& x) { return x; }

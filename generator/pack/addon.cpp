@@ -17,15 +17,6 @@ namespace fs = std::filesystem;
 constexpr const char* kManifest = "blender_manifest.toml";
 constexpr const char *kId = "brdfc_shaders", *kName = "brdfc Shaders";
 
-/// `manifest` with another value for a key, which has this one.
-void stamp(std::string& manifest, const fs::path& path, const char* key, const std::string& before,
-           const std::string& after) {
-  const std::string line = fmt::format("\n{} = \"{}\"\n", key, before);
-  const std::size_t at = manifest.find(line);
-  if (at == std::string::npos) input_error("{}: expected the line {} = \"{}\"", path.string(), key, before);
-  manifest.replace(at, line.size(), fmt::format("\n{} = \"{}\"\n", key, after));
-}
-
 /// Small letters, digits and single underscores between them.
 std::string slug(const std::string& name) {
   std::string out;
@@ -41,6 +32,14 @@ std::string slug(const std::string& name) {
 }
 
 }  // namespace
+
+void stamp(std::string& manifest, const fs::path& path, const char* key, const std::string& before,
+           const std::string& after) {
+  const std::string line = fmt::format("\n{} = \"{}\"\n", key, before);
+  const std::size_t at = manifest.find(line);
+  if (at == std::string::npos) input_error("{}: expected the line {} = \"{}\"", path.string(), key, before);
+  manifest.replace(at, line.size(), fmt::format("\n{} = \"{}\"\n", key, after));
+}
 
 std::string read_text(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);

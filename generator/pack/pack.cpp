@@ -25,6 +25,7 @@
 #include "measure/stored_albedo.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
+#include "pack/python_package.h"
 #include "pack/zip.h"
 #include "plan/costs.h"
 
@@ -220,6 +221,10 @@ Result build_pack(const Options& options) {
     members.merge(built[i].files);
     result.lines.insert(result.lines.end(), built[i].lines.begin(), built[i].lines.end());
   }
+  std::vector<const Model*> formulas;
+  for (const plan::PlannedModel& plan : chosen) formulas.push_back(plan.model);
+  for (const auto& [name, data] : python_package(formulas, options.python))
+    if (name.ends_with(".py")) members["brdfc/" + name] = data;
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;
   manifest["hash"] = sha256(everything);

@@ -16,6 +16,7 @@ namespace brdfc::pack {
 struct Options {
   std::filesystem::path out;               ///< folder that receives brdfc_shaders/ and the zip, ID-<version>.zip
   std::filesystem::path addon;             ///< folder with the add-on's Python and blender_manifest.toml
+  std::filesystem::path python;            ///< folder with what the Python package has by hand
   std::vector<plan::PlannedModel> models;  ///< what of each model
   plan::Costs costs = {};                  ///< for the panel
   std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty

@@ -87,6 +87,10 @@ Expr named(const char* name, const Expr&);
 
 }  // namespace trace
 
+template <> inline int newton_steps<Expr>() {
+  return Recorder::current().precision() == Precision::Single ? newton_steps<float>() : newton_steps<double>();
+}
+
 /// A recorded colour: one node, so that the printed text works on colours as the paper does.
 template <> struct Rgb<Expr> {
   Rgb() = default;

@@ -19,7 +19,7 @@ const char* name_of(Op op) {
   return names[int(op)];
 }
 
-Recorder::Recorder() : outer_(current_recorder) { current_recorder = this; }
+Recorder::Recorder(Precision precision) : precision_(precision), outer_(current_recorder) { current_recorder = this; }
 Recorder::~Recorder() { current_recorder = outer_; }
 
 Recorder& Recorder::current() {

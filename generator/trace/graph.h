@@ -72,15 +72,19 @@ struct ExprNode {
   std::shared_ptr<const Table> table{};  ///< Lookup
 };
 
+/// What a recording will be executed in.
+enum class Precision : std::uint8_t { Single, Double };
+
 /// Owns the nodes of one recording; the innermost one alive on this thread is the current one.
 class Recorder {
  public:
-  Recorder();
+  explicit Recorder(Precision = Precision::Single);
   ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
   static Recorder& current();
+  Precision precision() const { return precision_; }
   int add(ExprNode node);
   /// The node equal to this one, or -1.
   int find(const ExprNode& node) const;
@@ -95,6 +99,7 @@ class Recorder {
   static Key key_of(const ExprNode& node);
   int scope_of(const ExprNode& node) const;
 
+  Precision precision_;
   std::vector<ExprNode> nodes_;
   std::map<Key, int> interned_;
   int loops_ = 0;

@@ -60,6 +60,11 @@ def test_it_lists_and_builds_what_the_built_one_does(installed, tmp_path):
         assert "no stored" not in done.stderr
         (zip_file,) = out.glob("brdfc_shaders-*.zip")
         hashes.add(hashlib.sha256(zip_file.read_bytes()).hexdigest())
+        done = run(tool, "python", "--out", out / "python")
+        assert done.returncode == 0, done.stderr
+        assert (out / "python" / "LICENSE").read_bytes() and (
+            out / "python" / "pyproject.toml"
+        ).exists()
     assert len(hashes) == 1
 
 

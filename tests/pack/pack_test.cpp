@@ -309,7 +309,9 @@ TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
 class PackFiles : public ::testing::Test {
  protected:
   Options options(const fs::path& out) const {
-    return {out, BRDFC_SOURCE_DIR "/blender_addon", plan::plan_models({"lambert"}), {}, {}};
+    return {
+        out, BRDFC_SOURCE_DIR "/blender_addon", BRDFC_SOURCE_DIR "/python/brdfc", plan::plan_models({"lambert"}), {},
+        {}};
   }
   TempFolder temp;
 };

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc python: the Python package of models.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "app/commands.h"
+#include "core/data_dir.h"
+#include "core/error.h"
+#include "pack/addon.h"
+#include "pack/python_package.h"
+
+namespace brdfc::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+void write(const fs::path& path, const std::string& text) {
+  std::error_code ignored;
+  fs::create_directories(path.parent_path(), ignored);
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) input_error("{}: cannot be written", path.string());
+}
+
+void run(const fs::path& out) {
+  const fs::path data = data_dir(), package = out / "brdfc";
+  // Modules of models that are no longer there would be part of a wheel.
+  if (fs::exists(package) && !fs::exists(package / "models"))
+    input_error("{}: expected a folder that this command wrote, or none", package.string());
+  const auto files = pack::python_package(models_named(""), data / "python" / "brdfc");
+  fs::remove_all(package);
+  for (const auto& [name, module] : files) write(package / name, module);
+  const fs::path project = data / "python" / "pyproject.toml";
+  std::string text = pack::read_text(project);
+  pack::stamp(text, project, "version", "@version@", BRDFC_VERSION);
+  write(out / "pyproject.toml", text);
+  write(out / "LICENSE", pack::read_text(data / "LICENSE"));
+  std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; pip wheel " << out.string()
+            << " makes a wheel of them\n";
+}
+
+}  // namespace
+
+void add_python_command(CLI::App& app) {
+  auto out = std::make_shared<std::string>();
+  CLI::App* cmd =
+      app.add_subcommand("python",
+                         "Writes the Python package `brdfc`: every model's formulas on NumPy arrays, in double\n"
+                         "precision, with pyproject.toml. `pip install DIR` installs it.");
+  cmd->add_option("--out", *out, "Folder for the package")->required();
+  cmd->callback([out] { run(*out); });
+}
+
+}  // namespace brdfc::app

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pack/python_package.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cctype>
+
+#include "core/error.h"
+#include "model/choices.h"
+#include "pack/addon.h"
+#include "print/numpy.h"
+
+namespace brdfc::pack {
+namespace {
+
+namespace fs = std::filesystem;
+
+using print::python_number;
+using print::python_string;
+
+constexpr const char* kHead =
+    "# SPDX-License-Identifier: GPL-3.0-or-later\n"
+    "# Made by brdfc " BRDFC_VERSION " of the formulas in C++: changes belong there.\n";
+
+std::string color(const std::array<double, 3>& c) {
+  return fmt::format("({}, {}, {})", python_number(c[0]), python_number(c[1]), python_number(c[2]));
+}
+
+/// As a constructor's call.
+std::string parameter(const ParamInfo& p) {
+  const std::string name = python_string(p.name), label = python_string(p.label), doc = python_string(p.doc);
+  switch (p.kind) {
+    case ParamKind::Number:
+      return fmt::format("Number({}, {}, {}, {}, {}, {}, {}, {}, {})", name, label, python_string(p.unit), doc,
+                         python_number(p.value[0]), python_number(p.min), python_number(p.max),
+                         python_number(p.soft_min), python_number(p.soft_max));
+    case ParamKind::Color:
+      return fmt::format("Color({}, {}, {}, {})", name, label, doc, color(p.value));
+    default: {
+      std::string choices;
+      for (const std::string& c : p.choices) choices += python_string(c) + ", ";
+      return fmt::format("Choice({}, {}, {}, {}, ({}))", name, label, doc,
+                         python_string(p.choices[std::size_t(p.value[0])]), choices);
+    }
+  }
+}
+
+/// A line of documentation.
+std::string described(const ParamInfo& p) {
+  switch (p.kind) {
+    case ParamKind::Number:
+      return fmt::format("{}: {}. In [{:g}, {:g}]{}{}, default {:g}.", p.name, p.doc, p.min, p.max,
+                         p.unit.empty() ? "" : " ", p.unit, p.value[0]);
+    case ParamKind::Color:
+      return fmt::format("{}: {}. A colour in [0, 1], default {:g}, {:g}, {:g}.", p.name, p.doc, p.value[0], p.value[1],
+                         p.value[2]);
+    default:
+      return fmt::format("{}: {}. One of {}, default {}.", p.name, p.doc, fmt::join(p.choices, ", "),
+                         p.choices[std::size_t(p.value[0])]);
+  }
+}
+
+/// "ashikhmin_shirley" as "AshikhminShirley".
+std::string class_name(const std::string& name) {
+  std::string out;
+  bool start = true;
+  for (const char c : name) {
+    if (c != '_') out += start ? char(std::toupper(static_cast<unsigned char>(c))) : c;
+    start = c == '_';
+  }
+  return out;
+}
+
+/// A module's functions: those of equal text are one.
+class Functions {
+ public:
+  explicit Functions(const Model& model) : model_(model) {
+    for (const ParamInfo& p : model.info().params)
+      if (p.kind != ParamKind::Choice) parameters_.push_back(p.name);
+  }
+
+  /// The functions of one combination of choices, as a constructor's call.
+  std::string add(const Choices& choices) {
+    const ModelInfo& info = model_.info();
+    std::string suffix;
+    std::size_t k = 0;
+    for (const ParamInfo& p : info.params)
+      if (p.kind == ParamKind::Choice) suffix.append("_").append(p.choices[std::size_t(choices[k++])]);
+    Recorder recorder(Precision::Double);
+    const std::unique_ptr<Brdf<Expr>> brdf = model_.record(with_choices(info, choices));
+    const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
+    Program eval, pdf, sample, mirror, transmit;
+    if (model_.has_scatter()) {
+      eval.output("f", brdf->eval(wi, wo));
+      pdf.output("pdf", brdf->pdf(wi, wo));
+      const Sample<Expr> s = brdf->sample(wo, input3("u"));
+      sample.output("wi", s.wi);
+      sample.output("weight", s.weight);
+      sample.output("pdf", s.pdf);
+    }
+    if (model_.has_mirror()) mirror.output("weight", brdf->mirror(wo));
+    if (model_.has_transmit()) transmit.output("weight", brdf->transmit(wo));
+    const std::array<std::string, 5> names = {
+        function("eval", suffix, eval, {"wi", "wo"}), function("pdf", suffix, pdf, {"wi", "wo"}),
+        function("sample", suffix, sample, {"wo", "u"}), function("mirror", suffix, mirror, {"wo"}),
+        function("transmit", suffix, transmit, {"wo"})};
+    return fmt::format("Formulas({})", fmt::join(names, ", "));
+  }
+
+  std::string print() const {
+    std::string out;
+    for (const auto& [name, table] : tables_) out.append("\n").append(print::numpy_table(*table));
+    return out + text_;
+  }
+
+ private:
+  /// Its name, or None for no outputs.
+  std::string function(const std::string& what, const std::string& suffix, const Program& program,
+                       const std::vector<std::string>& directions) {
+    if (program.outputs().empty()) return "None";
+    std::vector<std::string> arguments;
+    for (const std::string& d : directions)
+      for (const char* component : {"_x", "_y", "_z"}) arguments.push_back(d + component);
+    arguments.insert(arguments.end(), parameters_.begin(), parameters_.end());
+    const std::string text = print::numpy_function(program, what, arguments, tables_);
+    const auto [it, is_new] = names_.emplace(text, what + suffix);
+    if (is_new) text_ += fmt::format("\n\ndef {}{}", it->second, text.substr(4 + what.size()));
+    return it->second;
+  }
+
+  const Model& model_;
+  std::vector<std::string> parameters_;
+  std::map<std::string, std::string> names_;
+  print::NumpyTables tables_;
+  std::string text_;
+};
+
+std::string module_of(const Model& model) {
+  const ModelInfo& info = model.info();
+  Functions functions(model);
+  std::string formulas;
+  for (const Choices& choices : choice_combinations(info)) {
+    std::string key;
+    std::size_t k = 0;
+    for (const ParamInfo& p : info.params)
+      if (p.kind == ParamKind::Choice) key += python_string(p.choices[std::size_t(choices[k++])]) + ", ";
+    const std::string call = functions.add(choices);
+    formulas += fmt::format("        ({}): {},\n", key, call);
+  }
+  std::string parameters, list = "Parameters";
+  for (const ParamInfo& p : info.params) {
+    parameters += fmt::format("        {}: {},\n", python_string(p.name), parameter(p));
+    list += "\n- " + described(p);
+  }
+  const std::string text = functions.print(), name = class_name(info.name);
+  std::string out = kHead + print::python_docstring({info.label + ". " + info.doc}, 0);
+  out += "\nimport numpy as np\n\nfrom .._formula import lookup, rgb, table\n";
+  out += "from .._model import Choice, Color, Formulas, Model, Number\n" + text;
+  out += fmt::format("\n\nclass {}(Model):\n    {}\n", name,
+                     print::python_docstring({info.label + ". " + info.doc, info.paper, info.equations, list}, 4));
+  for (const auto& [key, value] :
+       {std::pair{"name", &info.name}, std::pair{"label", &info.label}, std::pair{"paper", &info.paper},
+        std::pair{"equations", &info.equations}, std::pair{"doc", &info.doc}})
+    out += fmt::format("    {} = {}\n", key, python_string(*value));
+  out += fmt::format("    two_sided = {}\n", model.two_sided() ? "True" : "False");
+  out += "    parameters = {\n" + parameters + "    }\n    formulas = {\n" + formulas + "    }\n";
+  return out + fmt::format("\n\nMODEL = {}()\n", name);
+}
+
+}  // namespace
+
+std::map<std::string, std::string> python_package(const std::vector<const Model*>& models, const fs::path& source) {
+  if (!fs::exists(source / "__init__.py"))
+    input_error("{}: expected the Python package's folder with __init__.py", source.string());
+  std::map<std::string, std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source))
+    if (entry.path().extension() == ".py" || entry.path().extension() == ".typed")
+      files[entry.path().filename().string()] = read_text(entry.path());
+  files["_version.py"] = std::string(kHead) + "__version__ = " + python_string(BRDFC_VERSION) + "\n";
+  std::string names;
+  for (const Model* model : models) {
+    files["models/" + model->info().name + ".py"] = module_of(*model);
+    names += "    " + python_string(model->info().name) + ",\n";
+  }
+  files["models/__init__.py"] =
+      std::string(kHead) + "\"\"\"The formulas, a module a model.\"\"\"\n\nNAMES = (\n" + names + ")\n";
+  return files;
+}
+
+}  // namespace brdfc::pack

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A reflection model: its parameters, and its formulas on arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+#: Points that a formula takes at a time: what it holds between two steps then stays in the cache.
+BLOCK = 8192
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter that is one number, or an array of one a point."""
+
+    name: str
+    label: str
+    unit: str  #: "" for a pure number
+    doc: str
+    default: float
+    min: float  #: the accepted range, inclusive
+    max: float
+    soft_min: float  #: the range of a slider
+    soft_max: float
+
+
+@dataclass(frozen=True)
+class Color:
+    """Three numbers of linear RGB in [0, 1], one for grey, or an array (..., 3)."""
+
+    name: str
+    label: str
+    doc: str
+    default: tuple[float, float, float]
+    min: ClassVar[float] = 0.0
+    max: ClassVar[float] = 1.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several words."""
+
+    name: str
+    label: str
+    doc: str
+    default: str
+    choices: tuple[str, ...]
+
+
+Parameter = Number | Color | Choice
+
+
+class Sample(NamedTuple):
+    """Directions drawn from a model. Where pdf is 0 there is none, and the weight is 0."""
+
+    wi: Array  #: (..., 3), unit vectors
+    weight: Array  #: (..., 3), f cos(theta_i) / pdf
+    pdf: Array  #: (...), per solid angle
+
+
+class Formulas(NamedTuple):
+    """Functions of components of directions and of parameters; None for a term that is not."""
+
+    eval: Callable[..., Any] | None
+    pdf: Callable[..., Any] | None
+    sample: Callable[..., Any] | None
+    mirror: Callable[..., Any] | None
+    transmit: Callable[..., Any] | None
+
+
+class Model:
+    """A reflection model. Derived classes are made from the formulas in C++, one a model.
+
+    Arrays of directions, parameters and random numbers broadcast against one another. A parameter
+    that is left out takes its default. Errors name model and parameter: ValueError for what is out
+    of range, TypeError for a name that the model doesn't have or a value of another kind.
+    """
+
+    name: ClassVar[str]
+    label: ClassVar[str]
+    paper: ClassVar[str]
+    equations: ClassVar[str]
+    doc: ClassVar[str]
+    parameters: ClassVar[Mapping[str, Parameter]]
+    #: Whether wo may lie below the surface: a boundary of two media.
+    two_sided: ClassVar[bool]
+    formulas: ClassVar[Mapping[tuple[str, ...], Formulas]]  # by choices, in the order of parameters
+
+    def __repr__(self) -> str:
+        return f"brdfc.model({self.name!r})"
+
+    def eval(self, wi: ArrayLike, wo: ArrayLike, **parameters: ArrayLike) -> Array:
+        """The BRDF in 1/sr, without the cosine and without ideal reflection and refraction.
+
+        wi, wo: unit vectors (..., 3) to the light and to the viewer; z is the normal.
+        Returns (..., 3), linear RGB; 0 where a direction lies below the surface.
+        """
+        vectors = [self._directions("wi", wi), self._directions("wo", wo)]
+        (f,) = self._run("eval", vectors, parameters, "c")
+        return f
+
+    def pdf(self, wi: ArrayLike, wo: ArrayLike, **parameters: ArrayLike) -> Array:
+        """The density of sample() at wi for the same wo, per solid angle.
+
+        wi, wo: unit vectors (..., 3). Returns (...).
+        """
+        vectors = [self._directions("wi", wi), self._directions("wo", wo)]
+        (p,) = self._run("pdf", vectors, parameters, "r")
+        return p
+
+    def sample(self, wo: ArrayLike, u: ArrayLike, **parameters: ArrayLike) -> Sample:
+        """Directions drawn from the model.
+
+        wo: unit vectors (..., 3); u: numbers in [0, 1), (..., 3): choice of lobe, and two for the
+        direction.
+        """
+        numbers = self._vectors("u", u)
+        if not np.all((numbers >= 0) & (numbers < 1)):
+            raise ValueError(f"{self.name}: u: expected numbers in [0, 1)")
+        vectors = [self._directions("wo", wo), numbers]
+        x, y, z, weight, pdf = self._run("sample", vectors, parameters, "rrrcr")
+        return Sample(np.stack([x, y, z], axis=-1), weight, pdf)
+
+    def mirror(self, wo: ArrayLike, **parameters: ArrayLike) -> Array:
+        """The weight of ideal reflection; wo: (..., 3), returns (..., 3)."""
+        (weight,) = self._run("mirror", [self._directions("wo", wo)], parameters, "c")
+        return weight
+
+    def transmit(self, wo: ArrayLike, **parameters: ArrayLike) -> Array:
+        """The weight of ideal refraction; wo: (..., 3), returns (..., 3)."""
+        (weight,) = self._run("transmit", [self._directions("wo", wo)], parameters, "c")
+        return weight
+
+    def albedo(
+        self,
+        cos_theta_o: ArrayLike,
+        phi_o: ArrayLike = 0.0,
+        *,
+        samples: int = 4096,
+        **parameters: ArrayLike,
+    ) -> Array:
+        """The share of the light that a surface reflects, lit from everywhere.
+
+        The integral of f cos(theta_i) over wi, as the mean weight of so many low-discrepancy
+        samples, and the weights of ideal reflection and refraction.
+
+        cos_theta_o: cosine (...) between view and normal in (0, 1], negative inside of a model of
+        two sides; phi_o: azimuth (...) of the view in radians. Returns (..., 3).
+        """
+        cosine, phi = np.asarray(cos_theta_o, np.float64), np.asarray(phi_o, np.float64)
+        if not np.all((np.abs(cosine) <= 1) & (cosine != 0) & ((cosine > 0) | self.two_sided)):
+            least = "[-1, 1], not 0" if self.two_sided else "(0, 1]"
+            raise ValueError(f"{self.name}: cos_theta_o: expected numbers in {least}")
+        sine = np.sqrt((1 - cosine) * (1 + cosine))
+        wo = np.stack(np.broadcast_arrays(sine * np.cos(phi), sine * np.sin(phi), cosine), axis=-1)
+        total = self.mirror(wo, **parameters) + self.transmit(wo, **parameters)
+        # One more axis, of samples, after those that all share.
+        inner = {}
+        for name, value in parameters.items():
+            if isinstance(self.parameters.get(name), Choice):
+                inner[name] = value
+                continue
+            value = np.asarray(value, np.float64)
+            colour = isinstance(self.parameters.get(name), Color)
+            lead = value.ndim - (1 if colour and value.ndim else 0)
+            inner[name] = np.expand_dims(value, lead) if lead else value
+        return total + self.sample(wo[..., None, :], sequence(samples), **inner).weight.mean(
+            axis=-2
+        )
+
+    # ---- what the methods above share ----------------------------------------------------------
+
+    def _vectors(self, name: str, value: ArrayLike) -> Array:
+        array = np.asarray(value, np.float64)
+        if array.ndim == 0 or array.shape[-1] != 3:
+            raise ValueError(f"{self.name}: {name}: expected shape (..., 3), got {array.shape}")
+        return array
+
+    def _directions(self, name: str, value: ArrayLike) -> Array:
+        array = self._vectors(name, value)
+        x, y, z = array[..., 0], array[..., 1], array[..., 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        if not np.all(np.abs(length - 1) <= 1e-6):
+            wrong = np.ravel(length)[~(np.abs(np.ravel(length) - 1) <= 1e-6)][0]
+            raise ValueError(
+                f"{self.name}: {name}: expected unit vectors, the length of one is {wrong:.9g}"
+            )
+        return array / length[..., None]
+
+    def _bind(self, given: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], dict[str, Array]]:
+        """Choices, and numbers (...) and colours (..., 3) by name."""
+        for name in given:
+            if name not in self.parameters:
+                raise TypeError(
+                    f"{self.name}: unknown parameter {name!r}: expected one of "
+                    f"{', '.join(self.parameters)}"
+                )
+        choices, values = [], {}
+        for name, p in self.parameters.items():
+            value = given.get(name, p.default)
+            if isinstance(p, Choice):
+                if not isinstance(value, str) or value not in p.choices:
+                    raise ValueError(
+                        f"{self.name}: {name}: expected one of {', '.join(p.choices)}, "
+                        f"got {value!r}"
+                    )
+                choices.append(value)
+                continue
+            what = "three numbers or one" if isinstance(p, Color) else "a number"
+            try:
+                array = np.asarray(value, np.float64)
+            except (TypeError, ValueError):
+                raise TypeError(f"{self.name}: {name}: expected {what}, got {value!r}") from None
+            if isinstance(p, Color):
+                if array.ndim == 0:
+                    array = np.repeat(array, 3)
+                if array.shape[-1] != 3:
+                    raise ValueError(
+                        f"{self.name}: {name}: expected {what}, or an array (..., 3), "
+                        f"got the shape {array.shape}"
+                    )
+            inside = (array >= p.min) & (array <= p.max)  # false for NaN
+            if not np.all(inside):
+                raise ValueError(
+                    f"{self.name}: {name}: expected {what} in [{p.min:g}, {p.max:g}], got "
+                    f"{array[~inside].flat[0] if array.ndim else array}"
+                )
+            values[name] = array
+        return tuple(choices), values
+
+    def _run(
+        self, what: str, vectors: list[Array], given: Mapping[str, ArrayLike], kinds: str
+    ) -> list[Array]:
+        """The outputs of a formula, whose kinds are letters: r, a real, or c, a colour."""
+        choices, values = self._bind(given)
+        formula = getattr(self.formulas[choices], what)
+        leads = [v.shape[:-1] for v in vectors]
+        for name, value in values.items():
+            leads.append(
+                value.shape[:-1] if isinstance(self.parameters[name], Color) else value.shape
+            )
+        try:
+            shape = np.broadcast_shapes(*leads)
+        except ValueError:
+            names = ["wi or wo"] * len(vectors) + list(values)
+            described = ", ".join(f"{n} {s}" for n, s in zip(names, leads, strict=True))
+            raise ValueError(f"{self.name}: shapes do not broadcast: {described}") from None
+        size = int(np.prod(shape))
+        out = [np.zeros((3, size) if k == "c" else size) for k in kinds]
+        if formula is None:
+            if what == "sample":
+                out[2][:] = 1.0  # every sample is lost; the direction is one all the same
+        else:
+            arguments = [
+                np.broadcast_to(v[..., i], shape).reshape(size) for v in vectors for i in range(3)
+            ]
+            for name, value in values.items():
+                colour = isinstance(self.parameters[name], Color)
+                lead = value.shape[:-1] if colour else value.shape
+                if lead:
+                    value = np.broadcast_to(value, (*shape, 3) if colour else shape)
+                    value = value.reshape(size, 3).T if colour else value.reshape(size)
+                else:
+                    value = value[:, None] if colour else value[()]
+                arguments.append(value)
+            # Both arms of a selection are evaluated, and what is not taken may be anything.
+            with np.errstate(all="ignore"):
+                for first in range(0, size, BLOCK):
+                    block = slice(first, first + BLOCK)
+                    results = formula(
+                        *(
+                            a[..., block] if a.shape and a.shape[-1] == size else a
+                            for a in arguments
+                        )
+                    )
+                    for array, result in zip(
+                        out, results if len(out) > 1 else (results,), strict=True
+                    ):
+                        array[..., block] = result
+        for array in out:
+            if not np.isfinite(array).all():
+                at = int(np.argwhere(~np.isfinite(array))[0][-1])
+                where = [np.broadcast_to(v, (*shape, 3)).reshape(-1, 3)[at] for v in vectors]
+                raise FloatingPointError(
+                    f"{self.name}: {what} is {array[..., at]} at {where} with {dict(given)}"
+                )
+        return [
+            (a.T.reshape(*shape, 3) if k == "c" else a.reshape(shape))
+            for a, k in zip(out, kinds, strict=True)
+        ]
+
+
+def sequence(count: int) -> Array:
+    """Points (count, 3) that fill [0, 1)^3 evenly: multiples of powers of a root of x^4 = x + 1."""
+    root = 1.2207440846057596
+    steps = np.array([1 / root, 1 / root**2, 1 / root**3])
+    return (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0

@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The package of `brdfc python`: its formulas against the tool's, its errors, wheel and page.
+
+The tool evaluates the C++ in double precision. Values agree to 1e-12 of themselves, for every
+model, at defaults, at random parameters and at the stiff ones of tests/models/cases.csv. A sample's
+density is given 1e-11: the narrowest lobes, of exponents of 1e8, multiply by 1e4 what their own
+direction is rounded by. NumPy's exp, sin and log differ from the C library's by a unit in the last
+place.
+"""
+
+import csv
+import doctest
+import importlib.util
+import io
+import os
+import re
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+from support import MODELS, ROOT, TOOL
+
+CASES = {
+    row["model"]: row["cases"].split("|") + row["stiff"].split("|")
+    for row in csv.DictReader((ROOT / "tests/models/cases.csv").open(encoding="utf-8"))
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """What `brdfc python` writes."""
+    out = tmp_path_factory.mktemp("python")
+    done = subprocess.run([TOOL, "python", "--out", out], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.fixture(scope="module")
+def brdfc(folder):
+    sys.path.insert(0, str(folder))
+    try:
+        yield importlib.import_module("brdfc")
+    finally:
+        sys.path.remove(str(folder))
+
+
+def tool(command, model, values, rows, header):
+    """What the tool says, a row for each."""
+    words = [
+        f"{k}={v if isinstance(v, str) else ','.join(repr(float(c)) for c in np.atleast_1d(v))}"
+        for k, v in values.items()
+    ]
+    lines = [header, *(",".join(repr(float(x)) for x in row) for row in rows)]
+    done = subprocess.run(
+        [TOOL, command, model, *words], input="\n".join(lines), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+
+
+def values_of(model, text):
+    """A case of cases.csv: "n=3 tint=0.9:0.5:0.1"."""
+    values = {}
+    for name, value in (assignment.split("=") for assignment in text.split()):
+        is_word = type(model.parameters[name]).__name__ == "Choice"
+        numbers = [] if is_word else [float(c) for c in value.split(":")]
+        values[name] = value if is_word else numbers[0] if len(numbers) == 1 else numbers
+    return values
+
+
+def random_values(model, random):
+    values = {}
+    for name, p in model.parameters.items():
+        match type(p).__name__:
+            case "Choice":
+                values[name] = str(random.choice(p.choices))
+            case "Color":
+                values[name] = random.uniform(size=3).tolist()
+            case _:
+                values[name] = float(random.uniform(p.soft_min, p.soft_max))
+    return values
+
+
+def all_values(model, random):
+    return [values_of(model, text) for text in CASES[model.name]] + [
+        random_values(model, random) for _ in range(4)
+    ]
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def pairs(random, count):
+    """Directions anywhere, below the surface too; light near the mirror direction and near the
+    viewer, closer and closer; the normal; grazing."""
+    wi, wo = unit(random.normal(size=(2, count, 3)))
+    lights, views = [wi], [wo]
+    above = wo * [1, 1, np.nan] + 0  # filled below
+    above[:, 2] = np.abs(wo[:, 2])
+    for spread in (0.3, 0.03, 1e-3, 1e-4):
+        for around in (above * [-1, -1, 1], above):
+            lights.append(unit(around + spread * random.normal(size=above.shape)))
+            views.append(above)
+    lights.append(np.array([[0, 0, 1], [0.6, 0, 0.8], [1, 0, 0], [np.sqrt(1 - 1e-12), 0, 1e-6]]))
+    views.append(np.array([[0, 0, 1], [0, 0, 1], [-0.6, 0, 0.8], [-np.sqrt(1 - 1e-8), 0, 1e-4]]))
+    return np.concatenate(lights), np.concatenate(views)
+
+
+def off(got, expected):
+    """The largest difference in units of the expected value; where that is 0 both must be."""
+    same = got == expected
+    return np.max(
+        np.where(same, 0, np.abs(got - expected) / np.where(expected == 0, 1e-300, expected))
+    )
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_values_are_those_of_the_formulas_in_cpp(brdfc, name):
+    model, random = brdfc.model(name), np.random.default_rng(5)
+    some = 0
+    for values in all_values(model, random):
+        wi, wo = pairs(random, 24)
+        header = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
+        expected = tool("eval", name, values, np.hstack([wi, wo]), header)
+        assert off(model.eval(wi, wo, **values), expected[:, :3]) <= 1e-12, values
+        assert off(model.pdf(wi, wo, **values), expected[:, 3]) <= 1e-12, values
+        some += np.count_nonzero(expected[:, 3])
+    scatters = next(iter(model.formulas.values())).eval is not None
+    assert (some > 100) == scatters
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_samples_are_those_of_the_formulas_in_cpp(brdfc, name):
+    model, random = brdfc.model(name), np.random.default_rng(6)
+    some = 0
+    for values in all_values(model, random):
+        u = random.uniform(size=(60, 3))
+        wo = unit(random.normal(size=u.shape))
+        if not model.two_sided:
+            wo[:, 2] = np.abs(wo[:, 2])
+        s = model.sample(wo, u, **values)
+        if next(iter(model.formulas.values())).sample is None:
+            assert not s.pdf.any() and not s.weight.any()
+            continue
+        header = "wo_x,wo_y,wo_z,u1,u2,u3"
+        expected = tool("sample", name, values, np.hstack([wo, u]), header)
+        assert np.abs(s.wi - expected[:, :3]).max() <= 1e-12, values
+        assert off(s.weight, expected[:, 3:6]) <= 1e-12, values
+        assert off(s.pdf, expected[:, 6]) <= 1e-11, values
+        some += np.count_nonzero(s.pdf)
+    scatters = next(iter(model.formulas.values())).sample is not None
+    assert (some > 100) == scatters
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_albedo_is_that_of_the_tools_quadrature(brdfc, name):
+    """Of 4096 samples, as docs/python.md says; the mirror's share, no integral, to 1e-12."""
+    model, random = brdfc.model(name), np.random.default_rng(7)
+    cosines = np.array([0.2, 0.7, 1])
+    for values in ({}, random_values(model, random)):
+        expected = tool("albedo", name, values, cosines[:, None], "cos_theta_o")
+        sine = np.sqrt((1 - cosines) * (1 + cosines))
+        wo = np.stack([sine, 0 * sine, cosines], axis=-1)
+        assert off(model.mirror(wo, **values), expected[:, 4:7]) <= 1e-12, values
+        got = model.albedo(cosines, **values)
+        assert np.abs(got - expected[:, 1:4]).max() <= 5e-3 + expected[:, 7].max(), values
+
+
+def test_arrays_broadcast_and_blocks_are_joined(brdfc):
+    model, random = brdfc.model("ward"), np.random.default_rng(8)
+    wi, wo = unit(np.abs(random.normal(size=(2, 20000, 3))))
+    ax, ks = random.uniform(0.02, 0.5, size=20000), random.uniform(size=(20000, 3))
+    f = model.eval(wi, wo, ax=ax, ks=ks)
+    for i in (0, 8191, 8192, 19999):
+        np.testing.assert_array_equal(
+            f[i], model.eval(wi[i], wo[i], ax=ax[i], ks=ks[i]), strict=True
+        )
+    grid = model.eval(wi[:4, None], wo[:5], ax=ax[:5])
+    assert grid.shape == (4, 5, 3)
+    np.testing.assert_array_equal(grid[2, 3], model.eval(wi[2], wo[3], ax=ax[3]))
+    assert model.eval(np.zeros((0, 3)), wo[0]).shape == (0, 3)
+    # Textures of an albedo: one more axis inside.
+    many = model.albedo([0.5, 0.9], ks=ks[:2], ax=ax[:2])
+    for i, cosine in enumerate((0.5, 0.9)):
+        np.testing.assert_allclose(many[i], model.albedo(cosine, ks=ks[i], ax=ax[i]), rtol=1e-13)
+
+
+UP = [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda b: b.model("wart"), ValueError, "unknown model 'wart'.*ashikhmin_shirley"),
+        (
+            lambda b: b.model("ward").eval(UP, UP, ax=2),
+            ValueError,
+            r"ward: ax: .*\[0.0001, 1\].*2.0",
+        ),
+        (lambda b: b.model("ward").pdf(UP, UP, ay=float("nan")), ValueError, "ward: ay: .*nan"),
+        (lambda b: b.model("ward").eval(UP, UP, ks=[0, 0.5, 1.5]), ValueError, "ward: ks: .*1.5"),
+        (
+            lambda b: b.model("ward").eval(UP, UP, ks=[1, 1]),
+            ValueError,
+            "ward: ks: .*three numbers",
+        ),
+        (lambda b: b.model("ward").eval(UP, UP, ax="wide"), TypeError, "ward: ax: .*'wide'"),
+        (lambda b: b.model("ward").eval(UP, UP, alpha=1), TypeError, "ward: .*'alpha'.*ks, ax, ay"),
+        (
+            lambda b: b.model("ward").albedo(1, normalisation="old"),
+            ValueError,
+            "ward: normalisation: .*bounded, duer, ward.*'old'",
+        ),
+        (lambda b: b.model("ward").eval([0, 0, 2], UP), ValueError, "ward: wi: .*length.* 2"),
+        (lambda b: b.model("ward").eval(UP, [0, 1]), ValueError, r"ward: wo: .*\(\.\.\., 3\)"),
+        (lambda b: b.model("ward").sample(UP, [0, 0, 1]), ValueError, r"ward: u: .*\[0, 1\)"),
+        (lambda b: b.model("ward").albedo(0), ValueError, r"ward: cos_theta_o: .*\(0, 1\]"),
+        (lambda b: b.model("ward").albedo(-0.5), ValueError, r"ward: cos_theta_o: .*\(0, 1\]"),
+        (
+            lambda b: b.model("ward").eval([UP, UP], UP, ax=[0.1, 0.2, 0.3]),
+            ValueError,
+            r"ward: shapes do not broadcast: .*ax \(3,\)",
+        ),
+    ],
+)
+def test_errors_name_model_and_parameter(brdfc, call, error, words):
+    with pytest.raises(error, match=words):
+        call(brdfc)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_documentation_has_equation_paper_and_every_parameter(brdfc, name):
+    model = brdfc.model(name)
+    text = " ".join(model.__doc__.split())
+    assert model.paper and model.equations
+    for part in (model.label, model.paper, model.equations, *model.parameters):
+        assert " ".join(part.split()) in text
+    for p in model.parameters.values():
+        assert type(p).__name__ == "Choice" or 0 <= p.max - p.min
+
+
+def test_the_tool_does_not_overwrite_a_folder_of_another_kind(tmp_path):
+    (tmp_path / "brdfc").mkdir()
+    (tmp_path / "brdfc" / "mine.txt").write_text("mine")
+    done = subprocess.run([TOOL, "python", "--out", tmp_path], capture_output=True, text=True)
+    assert done.returncode == 2 and str(tmp_path / "brdfc") in done.stderr
+    assert (tmp_path / "brdfc" / "mine.txt").read_text() == "mine"
+
+
+def test_the_same_bytes_each_time(folder, tmp_path):
+    subprocess.run([TOOL, "python", "--out", tmp_path], check=True, capture_output=True)
+    subprocess.run([TOOL, "python", "--out", tmp_path], check=True, capture_output=True)
+    files = {p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file()}
+    assert len(files) > len(MODELS)
+    for file in files:
+        assert (folder / file).read_bytes() == (tmp_path / file).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def wheel(folder, tmp_path_factory):
+    out = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index"]
+    command += ["--no-build-isolation", "--wheel-dir", out, folder]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (made,) = out.glob("*.whl")
+    return made
+
+
+def test_the_wheel_is_python_alone(wheel):
+    version = re.search(r"project\(brdfc VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1]
+    assert wheel.name == f"brdfc-{version}-py3-none-any.whl"
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        for name in names:
+            if name.endswith(".py"):
+                assert archive.read(name).startswith(b"# SPDX-License-Identifier: GPL-3.0-or-later")
+    assert {f"brdfc/models/{name}.py" for name in MODELS} <= set(names)
+    assert any(name.endswith("LICENSE") for name in names)
+    assert all(name.endswith((".py", ".typed")) or ".dist-info/" in name for name in names)
+
+
+def test_the_wheel_works_in_a_clean_environment(wheel, tmp_path):
+    """Without network: of what is installed here the environment gets NumPy alone."""
+    subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    install = [python, "-m", "pip", "install", "--no-deps", "--no-index", wheel]
+    done = subprocess.run(install, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    numpy = tmp_path / "numpy"
+    numpy.mkdir()
+    site = importlib.util.find_spec("numpy").submodule_search_locations[0]
+    for found in (site, site + ".libs"):
+        if os.path.exists(found):
+            (numpy / os.path.basename(found)).symlink_to(found)
+    code = (
+        "import sys, brdfc\n"
+        "loaded = [m for m in sys.modules if m.startswith('brdfc.models.')]\n"
+        "f = brdfc.model('ward').eval([[0, 0, 1]] * 2, [0, 0, 1], ax=.1)\n"
+        "print(brdfc.__version__, len(brdfc.models()), loaded, f.shape, brdfc.__file__)"
+    )
+    done = subprocess.run(
+        [python, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(numpy)},
+    )
+    assert done.returncode == 0, done.stderr
+    assert f" {len(MODELS)} [] (2, 3) " in done.stdout  # no model is loaded before it is asked for
+    assert str(tmp_path / "venv") in done.stdout
+
+
+def test_examples_of_the_page(brdfc):
+    page = ROOT / "docs" / "python.md"
+    failed, tried = doctest.testfile(str(page), module_relative=False, globs={})
+    assert (failed, tried > 10) == (0, True)
+
+
+def test_the_plots_of_the_page(folder, tmp_path):
+    out = tmp_path / "plots.png"
+    script = ROOT / "script" / "plot_models.py"
+    environment = os.environ | {"PYTHONPATH": str(folder), "MPLCONFIGDIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, script, out], capture_output=True, text=True, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+    image = importlib.import_module("matplotlib.image").imread(out)
+    assert image.shape == (450, 1500, 4) and image[..., :3].std() > 0.05
+    shown = importlib.import_module("matplotlib.image").imread(ROOT / "docs" / "python.png")
+    assert np.abs(image - shown).mean() < 0.01, "script/plot_models.py docs/python.png"
