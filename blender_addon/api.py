@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, lamps, lean, nodes, pack, update
+from . import checks, convert, lamps, lean, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
 from .lamps import Lamp
 from .lean import PlanError
@@ -35,12 +35,15 @@ __all__ = [
     "add_twin",
     "albedo",
     "bake",
+    "convert_back",
+    "convert_materials",
     "enable_osl",
     "get_parameters",
     "has_twin",
     "models",
     "new_material",
     "plan",
+    "plan_conversion",
     "prepare_material",
     "see_lamps",
     "set_kernel",
@@ -208,6 +211,32 @@ def update_materials():
         if material.library is None:
             prepare_material(material)
     return result
+
+
+def plan_conversion(materials):
+    """For each Diffuse, Glossy, Principled or Glass node of these materials that is shown: which
+    model comes nearest, with which values, and what part of the light that misplaces; or why none
+    does. Nothing is changed. Returns [convert.Plan], with line() in words."""
+    return convert.plan(materials)
+
+
+def convert_materials(plans):
+    """Puts the models of plan_conversion() in place of the nodes; links stay. Returns how many.
+
+    The nodes of before stay in the materials, unlinked, for convert_back(). Raises CompileError;
+    nothing is changed then.
+    """
+    count = convert.apply(plans)
+    for plan_ in plans:
+        if not plan_.refusal:
+            prepare_material(plan_.material)
+    return count
+
+
+def convert_back(material):
+    """Puts Blender's own nodes back; where the ones of before are gone, the model's twin. Returns
+    how many; ValueError where there is neither."""
+    return convert.restore(material)
 
 
 def add_albedo(material):

@@ -208,6 +208,79 @@ class BRDFC_OT_find_lamps(Operator):
         return {"FINISHED"}
 
 
+def _selected_materials(context):
+    objects = context.selected_objects or ([context.object] if context.object else [])
+    found = [slot.material for o in objects for slot in o.material_slots if slot.material]
+    return list(dict.fromkeys(found))
+
+
+class BRDFC_OT_convert(Operator):
+    """Put the nearest model in place of each Principled, Glossy, Diffuse or Glass node of the
+    selected objects' materials; links stay, and it can be taken back"""
+
+    bl_idname = "brdfc.convert"
+    bl_label = "Convert to Reflection Models"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return bool(_selected_materials(context))
+
+    def invoke(self, context, event):
+        try:
+            self._plans = api.plan_conversion(_selected_materials(context))
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if not self._plans:
+            self.report(
+                {"ERROR"}, "No selected material has a Principled, Glossy, Diffuse or Glass"
+            )
+            return {"CANCELLED"}
+        return context.window_manager.invoke_props_dialog(self, width=600)
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        for made in self._plans:
+            column.label(text=made.line(), icon="ERROR" if made.refusal else "CHECKMARK")
+
+    def execute(self, context):
+        try:
+            plans = getattr(self, "_plans", None)
+            if plans is None:
+                plans = api.plan_conversion(_selected_materials(context))
+            count = api.convert_materials(plans)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for made in plans:
+            self.report({"WARNING" if made.refusal else "INFO"}, made.line())
+        _report_osl(self, context.scene)
+        return {"FINISHED"} if count else {"CANCELLED"}
+
+
+class BRDFC_OT_convert_back(Operator):
+    """Put Blender's own nodes back into the active material; where they were deleted, the model's
+    twin"""
+
+    bl_idname = "brdfc.convert_back"
+    bl_label = "Back to Blender's Nodes"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+    def execute(self, context):
+        try:
+            count = api.convert_back(context.object.active_material)
+        except _ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Nodes put back: {count}")
+        return {"FINISHED"} if count else {"CANCELLED"}
+
+
 class BRDFC_OT_details(Operator):
     """The error is the part of the reflected light that a form sends in other directions than its
     model, on average over views; 1 % is hard to see. More figures are behind this button"""
@@ -549,6 +622,8 @@ _CLASSES = (
     BRDFC_OT_bake_apply,
     BRDFC_OT_add_albedo,
     BRDFC_OT_add_twin,
+    BRDFC_OT_convert,
+    BRDFC_OT_convert_back,
     BRDFC_OT_details,
     BRDFC_OT_update,
     BRDFC_OT_find_lamps,

@@ -6,7 +6,7 @@ import math
 import bpy
 from bpy.types import Menu, Panel
 
-from . import api, checks, energy, lamps, nodes, pack
+from . import api, checks, convert, energy, lamps, nodes, pack
 
 _WRAP = 46  # characters of a panel's line; Blender does not wrap labels
 
@@ -52,6 +52,7 @@ def draw_add_menu(self, context):
 
 def draw_material_menu(self, context):
     self.layout.menu(MATERIAL_MT_brdfc.bl_idname, icon="SHADING_RENDERED")
+    self.layout.operator("brdfc.convert", icon="FILE_REFRESH")
 
 
 def error_text(entry):
@@ -245,6 +246,8 @@ def draw_material(layout, material, scene):
     for node in nodes.group_nodes(material):
         draw_node(layout.box(), node, material, scene)
     draw_lamps(layout, material, scene)
+    if any(convert.is_converted(node) for node in nodes.group_nodes(material)):
+        layout.operator("brdfc.convert_back", icon="LOOP_BACK")
     layout.operator("brdfc.write_materials", icon="EXPORT")
     layout.operator("brdfc.bake", icon="MOD_DECIM")
 

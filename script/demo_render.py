@@ -92,17 +92,20 @@ def write_json(path, value):
     beside.replace(path)
 
 
-def forms_of(scene, models, native):
+def forms_of(scene, models, native, wanted="all"):
     """Forms to render: what `auto` makes of the scene, by the name of the one form that it is or,
     where materials differ, as auto; drawn directions where every material has them; what the scene
     itself asks for; Blender's own node as the unit of cost, and others of its nodes where they were
-    fitted to every material."""
+    fitted to every material. Wanted: all of them, that of `auto`, or that and the unit."""
+    used = [models[m["model"]] for m in scene["materials"].values()]
+    chosen = {u["auto"] for u in used}
+    auto = chosen.pop() if len(chosen) == 1 else "auto"
+    if wanted != "all":
+        return [Form(name, name) for name in (["glossy", auto] if wanted == "unit" else [auto])]
     forms = ["glossy"]
     fitted = [native.get(name, {}) for name in scene["materials"]]
     forms += [node for node in ("principled", "metallic") if all(node in f for f in fitted)]
-    used = [models[m["model"]] for m in scene["materials"].values()]
-    chosen = {u["auto"] for u in used}
-    forms.append(chosen.pop() if len(chosen) == 1 else "auto")
+    forms.append(auto)
     if all("sampled" in u["representations"] for u in used):
         forms.append("sampled")
     if any(m.get("representation", "auto") != "auto" for m in scene["materials"].values()):
@@ -292,11 +295,7 @@ def render_scene(source, options, models, versions):
     reference_spp = settings["spp"] * options.reference_factor
     native = options.native.get(source.stem, {}).get("materials", {})
     write_json(folder / "native.json", native)
-    forms = forms_of(scene, models, native)
-    if options.forms != "all":
-        forms = [f for f in forms if f.name not in ("sampled", "scene")]
-    if options.forms == "auto":
-        forms = [f for f in forms if f.name != "glossy"]
+    forms = forms_of(scene, models, native, options.forms)
 
     state_file = folder / "state.json"
     state = read_json(state_file) if state_file.exists() else {}

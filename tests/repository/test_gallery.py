@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which pictures the gallery shows, and its pages."""
+
+import json
+
+import demo_render
+import gallery_pages
+import OpenImageIO as oiio
+import pytest
+
+MODELS = {"plain": {"auto": "exact", "representations": {"exact": {}, "sampled": {}}}}
+SCENE = {
+    "settings": {"width": 400, "height": 200, "spp": 64, "seed": 1},
+    "materials": {"a": {"model": "plain"}},
+}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "expected"),
+    [("auto", ["exact"]), ("unit", ["glossy", "exact"]), ("all", ["glossy", "exact", "sampled"])],
+)
+def test_forms_that_are_rendered(wanted, expected):
+    assert [f.name for f in demo_render.forms_of(SCENE, MODELS, {}, wanted)] == expected
+
+
+def test_pictures_are_made_smaller_and_never_larger():
+    small = demo_render.smaller(SCENE, 100, 16)["settings"]
+    assert small == {"width": 100, "height": 50, "spp": 16, "seed": 1}
+    assert demo_render.smaller(SCENE, 1000, 1000)["settings"] == SCENE["settings"]
+
+
+def scene(name, passed):
+    test = {"passed": passed, "accepted": 0.9987, "rejected_tiles": 2, "tiles": 30}
+    form = {
+        "form": "exact",
+        "test": test,
+        "materials": [{"representation": "exact"}],
+        "images": ["a", "b"],
+        "spp": 32,
+        "cpu_seconds": [1.5, 2.0],
+        "rel_mse": 0.0012,
+        "noise_floor": 0.001,
+        "bias": -0.001,
+        "bias_standard_error": 0.002,
+    }
+    return {
+        "scene": name,
+        "description": f"What {name} shows.",
+        "forms": [form],
+        "reference": {"spp": 256, "wall_seconds": 9.0},
+        "provenance": {"Blender": "4.5.15", "Processor": "one", "Tool": "brdfc 1.2.3, sha256 0"},
+    }
+
+
+def test_a_page_a_paper(tmp_path, monkeypatch):
+    names = ("gl-fig5", "ra-fig1", "lamps")
+    for name in names:
+        (tmp_path / name).mkdir()
+        for i, file in enumerate(("exact.png", "reference.png", "exact-difference.png")):
+            region = oiio.ROI(0, 20, 0, 10, 0, 1, 0, 3)
+            picture = oiio.ImageBufAlgo.fill(
+                ((i == 0) * 1.0, (i == 1) * 1.0, (i == 2) * 1.0), region
+            )
+            assert picture.write(str(tmp_path / name / file), "uint8")
+    scenes = [scene(name, name != "lamps") for name in names]
+    (tmp_path / "report.json").write_text(json.dumps({"scenes": scenes}))
+    pages = tmp_path / "pages"
+    monkeypatch.setattr("sys.argv", ["gallery_pages.py", str(tmp_path), str(pages)])
+    gallery_pages.main()
+
+    index = (pages / "index.md").read_text()
+    assert "(suffern.md) | 1 | 1 |" in index and "(more.md) | 1 | 0 |" in index
+    assert "shirley.md" not in index, "no page without scenes"
+    page = (pages / "more.md").read_text()
+    assert "**differs**: 99.87 % of pixels accepted, 2 of 30 tiles rejected" in page
+    assert "exact, 64 samples, 3.5 s CPU" in page and "What lamps shows." in page
+    strip = oiio.ImageBuf(str(pages / "gl-fig5.jpg"))
+    gap = gallery_pages.GAP
+    assert (strip.spec().width, strip.spec().height) == (60 + 2 * gap, 10)
+    for i in range(3):
+        colour = strip.getpixel(i * (20 + gap) + 10, 5)
+        assert max(range(3), key=lambda c: colour[c]) == i, "Blender, reference, difference"
