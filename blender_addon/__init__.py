@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import lamps, operators, ui
+from . import lamps, operators, ui, update
 
 
 def _refuse_beside_another():
@@ -23,9 +23,11 @@ def register():
     operators.register()
     ui.register()
     lamps.register()
+    update.register()
 
 
 def unregister():
+    update.unregister()
     lamps.unregister()
     ui.unregister()
     operators.unregister()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import closure_pool, nodes, pack
+from . import closure_pool, nodes, pack, update
 
 BLENDER_MIN = (4, 5, 0)
 #: Devices other than the CPU whose kernels can run OSL.
@@ -389,9 +389,11 @@ def _clamp_highlight(node, form, scene):
         return "WARNING", f"Clamp Indirect is {clamp:g}: it darkens highlights; 0 is exact"
 
 
-def _of_another_version(node, label):
+def _of_another_version(material, node, label):
     if nodes.is_newer(node):
         return Finding("newer", "WARNING", f"{label}made by a later version, {nodes.made_by(node)}")
+    if why := update.refusal(material, node):
+        return Finding("kept", "WARNING", f"{label}stays as another version made it: {why}")
     return Finding("outdated", "WARNING", f"{label}made by another version")
 
 
@@ -403,7 +405,7 @@ def node_warnings(node, material, scene):
         found.append(Finding("script_failed", "ERROR", f"{label}the shader {problem}"))
     form, schema = nodes.manifest_entry(node) or ({}, {})
     if not form:
-        found.append(_of_another_version(node, label))
+        found.append(_of_another_version(material, node, label))
     declared = form.get("warnings", [])
     for name, parameter in schema.items():
         value = nodes.get_value(node, name)

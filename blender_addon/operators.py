@@ -610,9 +610,16 @@ class BrdfcPreferences(AddonPreferences):
         description="The generator, which Bake Lean Materials runs; empty: found on the PATH",
         subtype="FILE_PATH",
     )
+    update_on_load: BoolProperty(
+        name="Update Materials of Files That Are Opened",
+        description="Give models that another version of this extension made the shaders of this "
+        "one when a file is opened, where all that they are set to can stay. Pictures may change",
+        default=False,
+    )
 
     def draw(self, context):
         self.layout.prop(self, "program")
+        self.layout.prop(self, "update_on_load")
 
 
 _CLASSES = (

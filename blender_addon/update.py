@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import bpy
+from bpy.app.handlers import persistent
 
 from . import nodes, pack
 
@@ -16,6 +17,30 @@ class Update:
     count: int
     refusals: tuple
     notes: tuple
+
+
+#: What the update of the file that was opened last did, if the preferences ask for one.
+last = None
+
+
+@persistent
+def _after_load(_path):
+    global last
+    last = None
+    addon = bpy.context.preferences.addons.get(__package__)
+    if addon is None or not addon.preferences.update_on_load or not others():
+        return
+    last = update()
+    for sentence in (*last.refusals, *last.notes):
+        print(f"brdfc: {sentence}")
+
+
+def register():
+    bpy.app.handlers.load_post.append(_after_load)
+
+
+def unregister():
+    bpy.app.handlers.load_post.remove(_after_load)
 
 
 def others():

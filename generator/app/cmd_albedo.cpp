@@ -13,7 +13,7 @@
 #include "measure/probes.h"
 #include "measure/stored_albedo.h"
 #include "measure/tabulate_albedo.h"
-#include "tables/table_file.h"
+#include "tables/store.h"
 
 namespace brdfc::app {
 
@@ -51,7 +51,7 @@ void add_albedo_command(CLI::App& app) {
         return;
       }
       const measure::AlbedoTable table = measure::tabulate_albedo(model);
-      replace_stored(measure::stored_albedo(model), o->model,
+      replace_stored(measure::stored_albedo(model),
                      [&](const std::filesystem::path& path) { measure::write_albedo_exr(table, path); });
       return;
     }

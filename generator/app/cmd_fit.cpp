@@ -11,7 +11,7 @@
 #include "fit/terms.h"
 #include "fit/twin.h"
 #include "fit/view.h"
-#include "tables/table_file.h"
+#include "tables/store.h"
 
 namespace brdfc::app {
 namespace {
@@ -124,7 +124,7 @@ void add_fit_command(CLI::App& app) {
     if (o->store) {
       values = fit::along_axis(model, values).values;
       const fit::Fit fit(model, values, fit::Fit::From::Scratch);
-      replace_stored(fit::stored_fit(model, values), model.info().name,
+      replace_stored(fit::stored_fit(model, values),
                      [&](const std::filesystem::path& path) { fit.store(model, values, path); });
       print_errors(fit.errors(), o->over, label());
     } else if (o->twin) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Cycles closures a form may use, as data over a scalar type. evaluate() is their definition (read off what Cycles
 // computes and proved against it by the closure conformance tests); the generator prints the same data as OSL.
-// Directions are in the local frame of the model.
+// Directions are unit vectors in the local frame of the model, the surface's normal along z.
 #pragma once
 
 #include <array>
@@ -32,17 +32,20 @@ enum class Tangent {
 
 /// How many entries a ramp has.
 inline constexpr int kRampSize = 8;
+/// Does it take the colours of a ramp?
 inline bool has_ramp(ClosureKind kind) { return kind == ClosureKind::DiffuseRamp || kind == ClosureKind::PhongRamp; }
 
+/// Does it take a roughness?
 inline bool has_facets(ClosureKind kind) { return kind == ClosureKind::Ggx || kind == ClosureKind::Beckmann; }
 
+/// A closure with its settings; those that its kind does not take have no meaning.
 template <class T> struct Closure {
   ClosureKind kind;
-  Rgb<T> weight;
-  Vec3<T> normal;
+  Rgb<T> weight;                       ///< factor of all that it scatters; not negative in Cycles
+  Vec3<T> normal;                      ///< unit
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
-  T exponent;                          ///< PhongRamp
-  T alpha;                             ///< Ggx, Beckmann: roughness, of stretched facets along `tangent`
+  T exponent;                          ///< PhongRamp: >= 0
+  T alpha;                             ///< Ggx, Beckmann: roughness in (0, 1], of stretched facets along `tangent`
   T alpha_across;                      ///< of stretched facets: across it
   Vec3<T> tangent;                     ///< of stretched facets: unit, perpendicular to the normal
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
@@ -60,6 +63,7 @@ template <class T> struct Closure {
         ior(1) {}
 };
 
+/// A shader's closures, added up.
 template <class T> using ClosureSum = std::vector<Closure<T>>;
 
 /// Smith's Lambda for the square of alpha times the tangent of the direction.

@@ -29,15 +29,16 @@ const char* name_of(LobeKind);
 /// Throws InputError that lists the known names.
 LobeKind lobe_named(const std::string&);
 
+/// A closure with its settings, in double precision; those that its kind does not take have no meaning.
 struct Lobe {
   LobeKind kind = LobeKind::Diffuse;
-  Rgb<double> weight{1, 1, 1};
-  Vec3<double> normal{0, 0, 1};
+  Rgb<double> weight{1, 1, 1};              ///< factor of all that it scatters
+  Vec3<double> normal{0, 0, 1};             ///< unit
   std::array<Rgb<double>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp
   double exponent = 1;                      ///< PhongRamp
   Vec3<double> tangent{1, 0, 0};            ///< microfacets; need not be perpendicular to the normal
-  double alpha_x = 0.5, alpha_y = 0.5;      ///< microfacets
-  double size = 0.5, smooth = 0;            ///< toons
+  double alpha_x = 0.5, alpha_y = 0.5;      ///< microfacets: roughness along the tangent and across it, in (0, 1]
+  double size = 0.5, smooth = 0;            ///< toons: in units of 90 degrees, from 0 to 1
 };
 
 /// f cos(theta_i) with its weight; delta closures are 0. Directions above the surface.

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/data_dir.h"
 
-#include <fmt/format.h>
-
-#include <cstdio>
 #include <cstdlib>
 #include <vector>
 
@@ -48,10 +45,6 @@ fs::path data_dir() {
   for (const fs::path& place : places) tried += (tried.empty() ? "" : " or ") + place.string();
   input_error("the tool's data: expected {} in {}; the environment variable BRDFC_DATA names another folder", kSign,
               tried);
-}
-
-void note_missing(const std::string& what, const fs::path& store, const std::string& how_long) {
-  fmt::print(stderr, "brdfc: no {} in {}: making it, which takes {}\n", what, store.string(), how_long);
 }
 
 }  // namespace brdfc::inline core

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 
 namespace brdfc::inline core {
 
@@ -12,8 +11,5 @@ namespace brdfc::inline core {
 /// sources that the program was built from. Stored fits and albedos are in its folder data, the Python in
 /// blender_addon. Throws InputError that names what was looked for and where.
 std::filesystem::path data_dir();
-
-/// Tells on stderr that something is not in its store and is made, which takes that long.
-void note_missing(const std::string& what, const std::filesystem::path& store, const std::string& how_long);
 
 }  // namespace brdfc::inline core

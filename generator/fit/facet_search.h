@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fit/parts.h"
+#include "fit/settings.h"
 #include "fit/view.h"
 
 namespace brdfc::fit {
@@ -16,7 +17,7 @@ namespace brdfc::fit {
 using FacetShape = std::vector<double>;
 inline constexpr std::size_t kNumbersOfFacet = 3;
 /// Where the first search begins.
-inline const FacetShape kFirstShape = {0, 1, 0, 0, 0.85, 0};
+inline const FacetShape kFirstShape{kSettings.first_shape.begin(), kSettings.first_shape.end()};
 
 /// The facets of a shape at a view; `at_normal` is the model's lobe at normal incidence.
 std::vector<Facet> facets_of(const FacetShape&, const Moments& at_normal, const Vec3<double>& wo);

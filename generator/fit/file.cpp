@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -13,6 +14,19 @@
 #include "tables/table_file.h"
 
 namespace brdfc::fit {
+namespace {
+
+/// What the tables of a fit along an axis run over: files have their sizes alone.
+std::vector<TableAxis> fit_axes(const std::string& table, const std::vector<int>& sizes) {
+  static const std::vector<std::string> position = {"place_on_axis"}, errors = {"place", "number"},
+                                        others = {"knot", "place_of_view", "position_in_ramp"};
+  const std::vector<std::string>& names = table == "position_on_axis" ? position : table == "errors" ? errors : others;
+  std::vector<TableAxis> axes;
+  for (std::size_t i = 0; i < sizes.size(); ++i) axes.push_back(even_axis(names.at(i), sizes[i]));
+  return axes;
+}
+
+}  // namespace
 
 void write_fit(const FitTables& fit, const Model& model, const ParamValues& values, const std::string& hash,
                const std::filesystem::path& path) {
@@ -20,18 +34,17 @@ void write_fit(const FitTables& fit, const Model& model, const ParamValues& valu
   std::vector<double> errors;
   for (ViewError e : fit.errors)
     for (const double* x : numbers_of(e)) errors.push_back(*x);
-  const std::vector<int> errors_sizes = {int(fit.errors.size()), int(errors.size() / fit.errors.size())};
+  const int count = int(fit.errors.size()), numbers = int(errors.size()) / count;
   std::vector<TablePtr> rows = fit.all();
-  rows.push_back(make_table("errors", errors_sizes, std::move(errors)));
-  TableImage image;
-  image.height = int(rows.size());
-  for (const auto& table : rows) image.width = std::max(image.width, int(table->values.size()));
+  rows.push_back(make_table("errors", {even_axis("place", count), even_axis("number", numbers)}, std::move(errors)));
+  std::vector<const Table*> pointers;
   Json facets = Json::array(), tables = Json::array();
   for (const FitTables::FacetTables& f : fit.facets) facets.push_back(f.kind == ClosureKind::Ggx ? "ggx" : "beckmann");
   for (const auto& table : rows) {
-    image.pixels.insert(image.pixels.end(), table->values.begin(), table->values.end());
-    image.pixels.resize(std::size_t(image.width) * (tables.size() + 1), 0.f);
-    tables.push_back({{"row", tables.size()}, {"name", table->name}, {"sizes", table->sizes}});
+    pointers.push_back(table.get());
+    Json sizes = Json::array();
+    for (const TableAxis& a : table->axes) sizes.push_back(a.size());
+    tables.push_back({{"row", tables.size()}, {"name", table->name}, {"sizes", sizes}});
   }
   // Each by what its parameters are where f is this term over `scale`.
   Json terms = Json::array();
@@ -60,6 +73,7 @@ void write_fit(const FitTables& fit, const Model& model, const ParamValues& valu
                {"tables", tables}};
   // Other than 1 only where factors are not 1.
   if (fit.scale != 1) meta["scale"] = fit.scale;
+  TableImage image = image_of(pointers);
   image.meta = meta.dump();
   write_table_image(image, path);
 }
@@ -79,11 +93,10 @@ FitTables read_fit(const FitAxis& axis, const Terms& all_terms, const std::strin
       const auto sizes = t.at("sizes").get<std::vector<int>>();
       std::size_t count = 1;
       for (const int n : sizes) count *= std::size_t(n);
-      const auto first = image.pixels.begin() + t.at("row").get<std::ptrdiff_t>() * image.width;
-      if (count > std::size_t(image.width) || t.at("row").get<int>() >= image.height)
-        input_error("{}: tables: {} has more numbers than there are", path.string(), t.at("name").dump());
       const std::string name = t.at("name");
-      tables[name] = make_table(name, sizes, {first, first + std::ptrdiff_t(count)});
+      std::optional<std::vector<double>> values = values_in(image, t.at("row"), count, 1);
+      if (!values) input_error("{}: tables: {} has more numbers than there are", path.string(), t.at("name").dump());
+      tables[name] = make_table(name, fit_axes(name, sizes), std::move(*values));
     }
     fit.knots = meta.at("knots").get<std::vector<double>>();
     fit.family = meta.at("family");

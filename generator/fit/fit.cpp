@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <map>
 
-#include "core/data_dir.h"
 #include "fit/file.h"
 #include "fit/make.h"
 
@@ -21,17 +20,17 @@ Fit::Fit(const Model& model, const ParamValues& given, From from) {
   }
   // The same fit whether factors and mixed parameters are known or sockets.
   const auto [values, factor] = along_axis(model, roles.fitted());
-  const std::string hash = hash_of(model, values);
-  const std::filesystem::path path = path_of(model, hash);
-  if (from == From::Store && std::filesystem::exists(path)) {
-    tables_ = read_fit(fit_axis(*number), roles_of(model, values).terms(), hash, path);
-  } else {
-    if (from == From::Store)
-      note_missing(fmt::format("stored fit of {} {} over {}", model.info().name, format_values(model.info(), values),
-                               number->name),
-                   path.parent_path(), "about a minute");
+  std::optional<std::filesystem::path> file;
+  const StoreKey key = stored_fit(model, values);
+  if (from == From::Store)
+    file = find_stored(key,
+                       fmt::format("stored fit of {} {} over {}", model.info().name,
+                                   format_values(model.info(), values), number->name),
+                       "about a minute");
+  if (file)
+    tables_ = read_fit(fit_axis(*number), roles_of(model, values).terms(), key.hash(), *file);
+  else
     tables_ = make_fit(model, values);
-  }
   tables_.multiply(factor);
 }
 
@@ -43,7 +42,7 @@ Varied<double> Fit::varied(const ParamValues& values) const {
 }
 
 void Fit::store(const Model& model, const ParamValues& values, const std::filesystem::path& path) const {
-  write_fit(tables_, model, values, axis() ? hash_of(model, values) : "", path);
+  write_fit(tables_, model, values, axis() ? stored_fit(model, values).hash() : "", path);
 }
 
 Fit Fit::knot(const Model& model, const ParamValues& values, double place) const {

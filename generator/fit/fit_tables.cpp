@@ -10,6 +10,7 @@
 
 #include "fit/settings.h"
 #include "fit/view_axis.h"
+#include "tables/algebra.h"
 
 namespace brdfc::fit {
 namespace {
@@ -38,7 +39,7 @@ void FitTables::tabulate(const std::vector<double>& places, const std::vector<So
       const double between = (x - places[above - 1]) / (places[above] - places[above - 1]);
       positions.push_back((double(above - 1) + between) / double(places.size() - 1));
     }
-    position = make_table("position_on_axis", {kSteps + 1}, std::move(positions));
+    position = make_table("position_on_axis", {even_axis("place_on_axis", kSteps + 1)}, std::move(positions));
   }
   lobes.clear();
   linear.clear();
@@ -59,11 +60,13 @@ void FitTables::tabulate(const std::vector<double>& places, const std::vector<So
   const auto name_of_term = [&](const std::string& name, std::size_t term) {
     return term_count == 1 ? name : fmt::format("{}_{}", name, term);
   };
+  std::vector<TableAxis> over = {even_axis("place_of_view", views)};
+  if (axis) over.insert(over.begin(), even_axis("knot", count));
   const auto table = [&](const std::string& name, const auto& value) {
     std::vector<double> numbers;
     for (const Solution& knot : solutions)
       for (const ViewSolution& c : knot.views) numbers.push_back(value(c));
-    return make_table(name, axis ? std::vector<int>{count, views} : std::vector<int>{views}, rounded_all(numbers));
+    return make_table(name, over, rounded_all(numbers));
   };
   amplitude.clear();
   for (std::size_t t = 0; axis && t < term_count; ++t)
@@ -108,10 +111,10 @@ void FitTables::tabulate(const std::vector<double>& places, const std::vector<So
           for (const ViewSolution& c : knot.views)
             for (int k = 0; k < entries; ++k)
               numbers.push_back(c.x(first + k, column) / c.scale[first + k] / unit(c, t));
-        std::vector<int> sizes = {views};
-        if (axis) sizes.insert(sizes.begin(), count);
-        if (ramp) sizes.push_back(kRampSize);
-        l.colour[t].push_back(make_table(fmt::format("colour_of_{}_{}", j, column), sizes, rounded_all(numbers)));
+        std::vector<TableAxis> axes = over;
+        if (ramp) axes.push_back(even_axis("position_in_ramp", kRampSize));
+        l.colour[t].push_back(
+            make_table(fmt::format("colour_of_{}_{}", j, column), std::move(axes), rounded_all(numbers)));
       }
     }
     linear.push_back(std::move(l));
@@ -142,7 +145,9 @@ FitTables FitTables::cut_to(const Cosines& views) const {
             last = std::clamp(int(std::ceil(knot(views.low))), first + 1, int(kSettings.views) - 1);
   out.first_view = double(first) / (int(kSettings.views) - 1);
   out.view_length = double(last - first) / (int(kSettings.views) - 1);
-  const auto cut = [&](TablePtr& table) { table = part(*table, axis ? 1 : 0, first, last); };
+  const auto cut = [&](TablePtr& table) {
+    table = std::make_shared<const Table>(part(*table, axis ? 1 : 0, first, last));
+  };
   for (auto& table : out.amplitude) cut(table);
   for (LobeTables& l : out.lobes) cut(l.offset), cut(l.exponent);
   for (FacetTables& f : out.facets) cut(f.offset), cut(f.log_alpha), cut(f.log_stretch);

@@ -2,12 +2,14 @@
 // The numbers that decide what a fit becomes. A fit that is kept is known by all of them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 namespace brdfc::fit {
 
 /// Angles are in radians. Errors are relative L1: the integral of |closures - model| over the model's albedo.
 struct FitSettings {
+  std::size_t code = 1;          ///< to be raised when the code changes so that fits become others
   std::size_t views = 33;        ///< angles of the viewer, from the normal to kLowestView, that closures are fitted at
   std::size_t trial_stride = 4;  ///< every so-many-th of them is looked at while a family and knots are chosen
   std::size_t points = 3000;     ///< directions of the light at each, about as many
@@ -52,7 +54,20 @@ struct FitSettings {
   double least_ratio = 0.3, most_ratio = 2;
   std::size_t shape_places = 9;  ///< places of the axis at which shapes of facets are sought
   std::size_t shape_stride = 2;  ///< at every so-many-th view
+  /// The shape of both facets (facet_search.h) that searches begin with.
+  std::array<double, 6> first_shape = {0, 1, 0, 0, 0.85, 0};
+  double lowest_view = 2e-3;  ///< kLowestView of view_axis.h
 };
 inline constexpr FitSettings kSettings;
+
+/// How models are looked at from one view and closures are sought for it, by fits and twins (view.h).
+struct ViewSettings {
+  std::size_t error_views = 64;  ///< views at which errors are measured, at cosines evenly spaced from 1 to 0
+  std::size_t points = 3000;     ///< directions, about as many, that a lobe's moments are taken from; twice for errors
+  std::size_t solve_steps = 14;  ///< of solve(): least squares with new weights each time
+  std::size_t search_trials = 160;  ///< the most that a search for a shape tries
+  double search_tolerance = 3e-4;   ///< a search ends when the error falls by less than this share
+};
+inline constexpr ViewSettings kViewSettings;
 
 }  // namespace brdfc::fit

@@ -195,7 +195,7 @@ Twin::Twin(const Model& model, const ParamValues& values) {
     }
   }
   const auto table = [](const std::string& name, const auto& column) {
-    return make_table(name, {kTwinKnots}, {column.begin(), column.end()});
+    return make_table(name, {even_axis("cos_theta_o", kTwinKnots)}, {column.begin(), column.end()});
   };
   for (std::size_t j = 0; j <= kFacets; ++j) {
     TwinClosure part{j < kFacets ? dictionary.kinds[j] : ClosureKind::Diffuse, {}, {}, {}, {}};

@@ -27,19 +27,23 @@ using Channels = std::vector<std::shared_ptr<const Table>>;
 
 /// What a node takes, over the cosine of the view.
 struct TwinClosure {
-  ClosureKind kind;                        ///< Ggx, Beckmann, Diffuse or Reflection
-  std::shared_ptr<const Table> lean;       ///< facets: along (1 - lean) N + lean wo
-  std::shared_ptr<const Table> roughness;  ///< facets: root of alpha
-  std::shared_ptr<const Table> spread;     ///< facets: how far a pair leans to the sides, by (N x wo) spread
-  Channels weight;                         ///< without the tint
+  ClosureKind kind;  ///< Ggx, Beckmann, Diffuse or Reflection
+  /// Facets, else null: their normal is along (1 - lean) N + lean wo; negative values lean away from the viewer.
+  std::shared_ptr<const Table> lean;
+  std::shared_ptr<const Table> roughness;  ///< facets: root of alpha, in [0, 1]
+  /// Facets: they are a pair, of half the weight each, that also leans to both sides of the plane of incidence, by
+  /// (N x wo) times this and its negative.
+  std::shared_ptr<const Table> spread;
+  Channels weight;  ///< not negative; without the tint
 };
 
 class Twin {
  public:
-  /// `values` are complete; unfit() has nothing against them. Throws ValueError where the model gives a value that is
-  /// NaN, infinite or negative.
+  /// Takes seconds. `values` has every parameter, and unfit() (values.h) nothing against them. Throws ValueError where
+  /// the model gives a value that is NaN, infinite or negative.
   Twin(const Model&, const ParamValues& values);
 
+  /// What the nodes are.
   const std::vector<TwinClosure>& parts() const { return parts_; }
   /// One factor of all weights and of the albedo, where that is all that tells channels apart.
   const std::optional<Rgb<double>>& tint() const { return tint_; }
@@ -47,6 +51,7 @@ class Twin {
   const Channels& albedo() const { return albedo_; }
   /// What the nodes make of it for a view above the surface.
   ClosureSum<double> closures(const Vec3<double>& wo) const;
+  /// How far they are from the model, as view_errors() measures it.
   const std::vector<ViewError>& errors() const { return errors_; }
 
  private:

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/sequence.h"
+#include "fit/settings.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
 #include "model/power_lobe.h"
@@ -16,8 +17,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr int kErrorViews = 64, kPoints = 3000, kSteps = 14, kTrials = 160;
 
 /// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
 /// down to the whole sphere, each direction counted by the density of all of them together.
@@ -58,7 +57,8 @@ Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec
 Moments moments(const measure::BoundModel& model, const Vec3<double>& wo) {
   Moments m;
   for (int step = 0; step < 4; ++step) {
-    const Points points = spread_points(*model.brdf, wo, beside_mirror(wo, m.offset), m.narrow, kPoints);
+    const Points points =
+        spread_points(*model.brdf, wo, beside_mirror(wo, m.offset), m.narrow, int(kViewSettings.points));
     const VectorXd f = brightest(scattering(model, points, wo));
     Vec3<double> axis{0, 0, 0};
     double total = 0;
@@ -151,7 +151,7 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
   VectorXd r = weight.cwiseQuotient(f.cwiseMax(1e-3 * scale)), fine = VectorXd::Zero(f.size()), x;
   std::vector<bool> out(std::size_t(n), false);
   if (none) out[std::size_t(*none)] = true;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < int(kViewSettings.solve_steps); ++step) {
     // A fined point pulls towards 0 with its own weight, beside the pull towards f.
     const MatrixXd scaled = (r + fine).cwiseSqrt().asDiagonal() * a;
     MatrixXd normal = MatrixXd::Zero(n, n);
@@ -227,8 +227,8 @@ std::vector<double> argmin(const std::vector<Variable>& variables,
   search.set_lower_bounds(low);
   search.set_upper_bounds(high);
   search.set_initial_step(step);
-  search.set_maxeval(kTrials);
-  search.set_ftol_rel(3e-4);
+  search.set_maxeval(int(kViewSettings.search_trials));
+  search.set_ftol_rel(kViewSettings.search_tolerance);
   search.set_min_objective(
       [](const std::vector<double>& at, std::vector<double>&, void* f) {
         return (*static_cast<const std::function<double(const std::vector<double>&)>*>(f))(at);
@@ -245,10 +245,10 @@ std::vector<double> argmin(const std::vector<Variable>& variables,
 
 std::vector<ViewError> view_errors(const measure::BoundModel& bound,
                                    const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures) {
-  std::vector<ViewError> errors(kErrorViews);
+  std::vector<ViewError> errors(kViewSettings.error_views);
   for_all(errors.size(), [&](std::size_t i) {
-    const Vec3<double> wo = direction(1 - (double(i) + 0.5) / kErrorViews, 0);
-    const View v = view_of(bound, wo, 2 * kPoints);
+    const Vec3<double> wo = direction(1 - (double(i) + 0.5) / double(kViewSettings.error_views), 0);
+    const View v = view_of(bound, wo, 2 * int(kViewSettings.points));
     const Points& points = v.points;
     const MatrixXd& f = v.f;
     const ClosureSum<double> sum = closures(wo);

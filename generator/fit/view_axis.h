@@ -7,13 +7,14 @@
 
 #include "core/scalar.h"
 #include "core/vec.h"
+#include "fit/settings.h"
 
 namespace brdfc::fit {
 
 /// The height, as a cosine, of the lowest view that closures are fitted to. Of a lower one, as bent and interpolated
 /// normals have it too, the normal is turned towards the viewer until the view is as high: about the normal itself
 /// closures would turn black one after the other, and what is left of the sum no longer cancels.
-inline constexpr double kLowestView = 2e-3;
+inline constexpr double kLowestView = kSettings.lowest_view;
 
 /// How much of the way from the normal to the horizon the axis leaves out, on the scale of its places.
 inline double beyond_lowest_view() { return std::sqrt(2 * kInvPi * std::asin(kLowestView)); }

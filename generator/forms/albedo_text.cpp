@@ -3,12 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <set>
 #include <vector>
 
 #include "forms/choice_switch.h"
-#include "forms/shader.h"
+#include "print/osl_table.h"
 #include "print/osl_text.h"
 
 namespace brdfc::forms {
@@ -29,7 +28,7 @@ class AlbedoText {
     const std::string body = by_choice.print(4);
     std::string out;
     for (std::size_t g = 0; g < table_.grids.size(); ++g)
-      if (used_.count(int(g))) out += arrays(g);
+      if (used_.count(int(g))) out += print::table_arrays(table_.grids[g], std::to_string(g));
     return out + positions_ + body;
   }
 
@@ -52,60 +51,20 @@ class AlbedoText {
     return number(std::get<double>(it->second));
   }
 
-  std::string scaled(const measure::TableAxis& axis) const {
-    const std::string x = operand(axis.name);
-    switch (axis.scale) {
-      case AxisScale::Log:
-        return fmt::format("log(max({}, {}))", x, number(axis.values.front()));
-      case AxisScale::Log1p:
-        return fmt::format("log(1.0 + {})", x);
-      default:
-        return x;
-    }
-  }
-
   std::string lookup(int index) {
-    const measure::AlbedoGrid& g = table_.grids.at(std::size_t(index));
-    if (g.axes.empty()) {
-      if (g.channels == 1) return number(g.values[0]);
-      return print::color({g.values[0], g.values[1], g.values[2]});
-    }
+    const Table& g = table_.grids.at(std::size_t(index));
     if (g.axes.size() > 4)
       input_error("{}: the albedo table has {} axes, and OSL look-ups exist for 4", info_.name, g.axes.size());
-    if (g.values.size() > kMaxArray)
+    if (g.values.size() > print::kMaxArray)
       input_error("{}: the albedo table has {} numbers, and an OSL array may have {}", info_.name, g.values.size(),
-                  kMaxArray);
-    if (used_.insert(index).second)
-      for (std::size_t a = 0; a < g.axes.size(); ++a)
-        positions_ += fmt::format("    float position_{}_{} = brdfc_position(knots_{}_{}, {}, {});\n", index, a, index,
-                                  a, g.axes[a].values.size(), scaled(g.axes[a]));
-    if (g.channels == 1) return call(g, index, "");
-    return fmt::format("color({}, {}, {})", call(g, index, "_r"), call(g, index, "_g"), call(g, index, "_b"));
-  }
-
-  static std::string call(const measure::AlbedoGrid& g, int index, const std::string& channel) {
-    std::string text = fmt::format("brdfc_table{}(table{}_{}", g.axes.size(), channel, index);
-    for (const measure::TableAxis& a : g.axes) text += fmt::format(", {}", a.values.size());
-    for (std::size_t a = 0; a < g.axes.size(); ++a) text += fmt::format(", position_{}_{}", index, a);
-    return text + ")";
-  }
-
-  std::string arrays(std::size_t index) const {
-    const measure::AlbedoGrid& g = table_.grids[index];
-    std::string out;
-    for (std::size_t a = 0; a < g.axes.size(); ++a) {
-      std::vector<double> knots = g.axes[a].values;
-      for (double& k : knots)
-        k = g.axes[a].scale == AxisScale::Log ? std::log(k) : g.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : k;
-      out += print::array(fmt::format("knots_{}_{}", index, a), knots);
+                  print::kMaxArray);
+    const std::string suffix = std::to_string(index);
+    if (!g.axes.empty() && used_.insert(index).second) {
+      std::vector<std::string> coordinates;
+      for (const TableAxis& a : g.axes) coordinates.push_back(operand(a.name));
+      positions_ += print::positions(g, coordinates, suffix);
     }
-    if (g.channels == 1) return out + print::array(fmt::format("table_{}", index), {g.values.begin(), g.values.end()});
-    for (std::size_t c = 0; c < 3; ++c) {
-      std::vector<double> channel;
-      for (std::size_t i = c; i < g.values.size(); i += 3) channel.push_back(g.values[i]);
-      out += print::array(fmt::format("table_{}_{}", "rgb"[c], index), channel);
-    }
-    return out;
+    return print::look_up(g, suffix);
   }
 
   const ModelInfo& info_;

@@ -24,7 +24,4 @@ struct Shader {
 /// Characters of tables that a shader holds for an output that most materials leave unlinked.
 inline constexpr std::size_t kMaxAlbedoText = 4096;
 
-/// Numbers in one OSL array; more compile slowly.
-inline constexpr std::size_t kMaxArray = 32768;
-
 }  // namespace brdfc::forms

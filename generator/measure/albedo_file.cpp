@@ -22,26 +22,15 @@ std::optional<AxisScale> scale_named(const std::string& name) {
 
 void write_albedo_exr(const AlbedoTable& table, const std::filesystem::path& path) {
   using Json = nlohmann::ordered_json;
-  std::size_t width = 1;
-  int channels = 1;
-  for (const AlbedoGrid& g : table.grids) {
-    width = std::max(width, g.values.size() / std::size_t(g.channels));
-    channels = std::max(channels, g.channels);
-  }
-  const std::size_t height = std::max<std::size_t>(1, table.grids.size());
-  std::vector<float> pixels(width * height * std::size_t(channels), 0.f);
+  std::vector<const Table*> rows;
   Json grids = Json::array(), terms = Json::array();
-  for (std::size_t row = 0; row < table.grids.size(); ++row) {
-    const AlbedoGrid& g = table.grids[row];
-    const std::size_t n = g.values.size() / std::size_t(g.channels);
-    for (std::size_t i = 0; i < n; ++i)
-      for (int c = 0; c < channels; ++c)
-        pixels[(row * width + i) * std::size_t(channels) + std::size_t(c)] =
-            g.values[i * std::size_t(g.channels) + std::size_t(g.channels == 1 ? 0 : c)];
+  for (const Table& g : table.grids) {
     Json axes = Json::array();
     for (const TableAxis& a : g.axes)
       axes.push_back({{"name", a.name}, {"scale", name_of(a.scale)}, {"values", a.values}});
-    grids.push_back({{"row", row}, {"points", n}, {"channels", g.channels}, {"error", g.error}, {"axes", axes}});
+    grids.push_back(
+        {{"row", rows.size()}, {"points", g.points()}, {"channels", g.channels}, {"error", g.error}, {"axes", axes}});
+    rows.push_back(&g);
   }
   for (const auto& combination : table.terms) {
     Json list = Json::array();
@@ -60,7 +49,9 @@ void write_albedo_exr(const AlbedoTable& table, const std::filesystem::path& pat
                   {"choice_sizes", table.choice_sizes},
                   {"terms", terms},
                   {"grids", grids}};
-  write_table_image({int(width), int(height), channels, std::move(pixels), meta.dump()}, path);
+  TableImage image = image_of(rows);
+  image.meta = meta.dump();
+  write_table_image(image, path);
 }
 
 AlbedoTable read_albedo_exr(const std::filesystem::path& path) {
@@ -76,27 +67,25 @@ AlbedoTable read_albedo_exr(const std::filesystem::path& path) {
     table.choices = meta.at("choices").get<std::vector<std::string>>();
     table.choice_sizes = meta.at("choice_sizes").get<std::vector<int>>();
     for (const auto& g : meta.at("grids")) {
-      AlbedoGrid grid;
+      Table grid;
       grid.channels = g.at("channels");
       grid.error = g.at("error");
       std::size_t size = 1;
       for (const auto& a : g.at("axes")) {
         const std::string name = a.at("name"), scale = a.at("scale");
-        TableAxis axis{name, AxisScale::Linear, a.at("values").get<std::vector<double>>()};
-        if (const auto known = scale_named(scale))
-          axis.scale = *known;
+        TableAxis axis{name, AxisScale::Linear, a.at("values").get<std::vector<double>>(), false};
+        if (const auto named = scale_named(scale))
+          axis.scale = *named;
         else
           input_error("{}: scale of {}: expected linear, log or log1p, got {}", path.string(), name, scale);
         size *= axis.values.size();
         grid.axes.push_back(std::move(axis));
       }
-      const std::size_t row = table.grids.size(), all = std::size_t(image.channels);
-      if (row >= std::size_t(image.height) || size > std::size_t(image.width) || g.at("points") != size ||
-          grid.channels < 1 || grid.channels > image.channels)
+      const std::size_t row = table.grids.size();
+      std::optional<std::vector<double>> values = values_in(image, row, size, grid.channels);
+      if (!values || g.at("points") != size)
         input_error("{}: grids: {} has other numbers than its axes", path.string(), row);
-      for (std::size_t i = 0; i < size; ++i)
-        for (std::size_t c = 0; c < std::size_t(grid.channels); ++c)
-          grid.values.push_back(image.pixels[(row * std::size_t(image.width) + i) * all + c]);
+      grid.values = std::move(*values);
       table.grids.push_back(std::move(grid));
     }
     for (const auto& combination : meta.at("terms")) {

@@ -77,7 +77,7 @@ std::vector<TableAxis> place_knots(const AlbedoPolynomial& polynomial, const Par
   std::vector<TableAxis> out;
   for (std::size_t a = 0; a < axes.size(); ++a) {
     const Coordinate& c = coordinates[axes[a]];
-    TableAxis axis{c.name, c.range.scale, {}};
+    TableAxis axis{c.name, c.range.scale, {}, false};
     std::vector<double> sum{0};
     for (int j = 0; j + 1 < kProfile; ++j)
       sum.push_back(sum.back() + 0.5 * (density[a][std::size_t(j)] + density[a][std::size_t(j) + 1]) *

@@ -7,6 +7,7 @@
 namespace brdfc::measure {
 
 struct AlbedoTableSettings {
+  std::size_t code = 1;  ///< to be raised when the code changes so that tables become others
   /// Least cosine of the view; below it the end of the axis serves: a view direction within 0.06 degrees of the
   /// horizon.
   double min_cos = 1e-3;

@@ -16,23 +16,9 @@
 
 #include "core/axis_scale.h"
 #include "model/model.h"
+#include "tables/table.h"
 
 namespace brdfc::measure {
-
-struct TableAxis {
-  std::string name;  ///< "cos_theta_o" or the name of a Number parameter
-  AxisScale scale = AxisScale::Linear;
-  std::vector<double> values;  ///< knots in units of the parameter, increasing, at least 2; ends clamp
-};
-
-/// A tabulated coefficient.
-struct AlbedoGrid {
-  std::vector<TableAxis> axes;  ///< none for a constant; cos_theta_o comes first if present
-  int channels = 1;             ///< 1: equal in r, g and b; or 3
-  std::vector<float> values;    ///< row-major, first axis slowest, channel innermost; may be negative
-  double error = 0;             ///< largest |interpolated - quadrature| at random points off the grid, of the value
-                                ///< itself where that is more than 1
-};
 
 /// A coefficient of the polynomial in the colours.
 struct AlbedoTerm {
@@ -43,7 +29,10 @@ struct AlbedoTerm {
 
 struct AlbedoTable {
   std::string model;
-  std::vector<AlbedoGrid> grids;
+  /// Coefficients, over cos_theta_o, which comes first if a grid has it, and Number parameters. The error of each is
+  /// the largest |interpolated - quadrature| at random points off the grid, of the value itself where that is more
+  /// than 1.
+  std::vector<Table> grids;
   std::vector<std::string> choices;  ///< the Choice parameters in schema order
   std::vector<int> choice_sizes;     ///< how many identifiers each has
   /// The terms of every combination of choices, at index ((c0 * size1) + c1) * size2 + c2 ... with c the index
@@ -62,7 +51,5 @@ struct AlbedoTable {
 
 /// Albedo, mirror included, by interpolation. Throws InputError for inadmissible parameters.
 Rgb<double> lookup(const AlbedoTable&, const Model&, const ParamValues&, double cos_theta_o);
-/// A grid interpolated at one coordinate per axis; r = g = b if it has one channel.
-Rgb<double> lookup(const AlbedoGrid&, const std::vector<double>& coordinates);
 
 }  // namespace brdfc::measure

@@ -9,6 +9,7 @@
 
 namespace brdfc::measure {
 
+/// From x0 to x1 and from y0 to y1; the unit square unless told.
 struct Rect {
   double x0 = 0, x1 = 1, y0 = 0, y1 = 1;
 };
@@ -16,6 +17,7 @@ struct Rect {
 /// Writes the components of the integrand at (x, y).
 using Integrand2 = std::function<void(double x, double y, double* out)>;
 
+/// When integrate() stops.
 struct CubatureOptions {
   double absolute = 1e-8;  ///< stop when every component's error estimate is below this
   double relative = 0;     ///< or below this times its value
@@ -23,10 +25,10 @@ struct CubatureOptions {
 };
 
 struct CubatureResult {
-  std::vector<double> value;
+  std::vector<double> value;  ///< the integral of each component
   std::vector<double> error;  ///< estimate per component, usually far above the true error
-  int cells = 0;
-  bool converged = false;
+  int cells = 0;              ///< into which the domain was cut in the end
+  bool converged = false;     ///< the errors are as small as asked for
 };
 
 /// Genz and Malik's rule of degree 7 with its embedded rule of degree 5, 17 points a cell; the cell with the

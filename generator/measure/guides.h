@@ -19,13 +19,14 @@ std::vector<double> lobe_borders(const Brdf<double>&, const Vec3<double>& wo);
 /// smooth functions of the direction are smooth up to the pole.
 class Guides {
  public:
-  /// `each` samples a lobe.
+  /// Draws `each` samples of each lobe of the model for this view.
   Guides(const Brdf<double>&, const Vec3<double>& wo, int each);
   /// theta in [0, pi], phi in [0, 2 pi) from the azimuth of wo; the mirror direction has phi = pi.
   Point2 angles(const Vec3<double>& wi) const;
+  /// The direction of these angles.
   Vec3<double> direction_at(double theta, double phi) const;
-  /// Cells that cover the hemisphere, or the sphere if the model scatters through: cut at the mirror direction, small
-  /// where samples crowd.
+  /// Cells that cover the hemisphere, or the sphere if the model scatters through: cut at the mirror direction, and
+  /// halved until none has more than `most` samples of a lobe.
   std::vector<Rect> cells(std::size_t most) const;
   /// Cells that cover a rectangle that holds many samples.
   std::vector<Rect> cells(const Rect&, std::size_t most) const;

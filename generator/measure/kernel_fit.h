@@ -16,7 +16,7 @@ struct KernelCurve {
   std::vector<double> k;  ///< > 0, as many
 };
 
-/// The lobe of the curve itself. The curve's distance u is n |x' - y'|.
+/// The lobe of the curve itself, not of a fit to it. The curve's distance u is n |x' - y'|.
 KernelLobe<double, FreeKnots<double>> kernel_lobe(const KernelCurve&, double n);
 
 struct KernelFit {

@@ -13,13 +13,14 @@
 
 namespace brdfc::measure {
 
+/// The generator that all checks draw from: seeded, so that they repeat.
 using Random = std::mt19937_64;
 
 double uniform(Random&);                  ///< in [0, 1)
 Vec3<double> uniform_direction(Random&);  ///< above the surface, uniform in solid angle
 Vec3<double> uniform_cube(Random&);       ///< three numbers for sample()
 
-/// Are views from inside meant?
+/// Has the model values for a viewer below the surface too?
 template <class T> bool two_sided(const Model& model, const Brdf<T>& brdf) {
   return model.has_transmit() || brdf.scatters_through();
 }
@@ -33,18 +34,19 @@ template <class T> double relative(const Rgb<T>& a, const Rgb<T>& b) {
   return std::max({relative(a.r, b.r), relative(a.g, b.g), relative(a.b, b.b)});
 }
 
+/// The same in double precision.
 template <class T> Rgb<double> to_double(const Rgb<T>& c) { return {double(c.r), double(c.g), double(c.b)}; }
 template <class T> Vec3<double> to_double(const Vec3<T>& v) { return {double(v.x), double(v.y), double(v.z)}; }
 
-/// What rounding and symmetries are judged by: f, or the weight of the term on wi's side where there are delta
-/// terms alone.
+/// The value that rounding and symmetries are measured on: f, or for a model of delta terms alone the weight of the one
+/// on wi's side.
 template <class T> Rgb<T> value_of(const Model& model, const Brdf<T>& brdf, const Vec3<T>& wi, const Vec3<T>& wo) {
   if (model.has_scatter()) return brdf.eval(wi, wo);
   return (wi.z > T(0)) == (wo.z > T(0)) ? brdf.mirror(wo) : brdf.transmit(wo);
 }
 
-/// Pairs of directions (wi, wo): anywhere, where the model scatters to, and where formulas break: the normal, grazing,
-/// mirror and backscattering directions.
+/// `count` pairs of unit directions (wi, wo): anywhere, where the model scatters to, and where formulas break: the
+/// normal, grazing, mirror and backscattering directions.
 std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>&, int count, Random&,
                                                          bool two_sided = false);
 
@@ -54,7 +56,7 @@ ParamValues random_values(const ModelInfo&, ParamValues choices, Random&);
 std::vector<ParamValues> slider_cases(const ModelInfo&, int random, std::uint64_t seed);
 /// With the default choices, every number at both ends of a range and colours at 0 and 1, one by one and all together.
 std::vector<ParamValues> end_cases(const ModelInfo&, bool sliders);
-/// At most `most` of them: the first ones cover every pair of choices as far as possible.
+/// At most `most` of these values: the first ones cover every pair of choices as far as possible.
 std::vector<ParamValues> thin_out(const ModelInfo&, const std::vector<ParamValues>&, std::size_t most);
 
 }  // namespace brdfc::measure

@@ -18,16 +18,17 @@ std::optional<std::string> find_dark_place(const Model&, const ParamValues&, int
 /// The largest jump of a first derivative of f that arcs through the four-dimensional space of pairs of directions
 /// cross, in units of the largest derivative (or value, if that is larger) on the arc.
 struct Edge {
-  double jump = 0;
-  std::string where;
+  double jump = 0;    ///< 0 for a smooth model
+  std::string where;  ///< directions and values there, for messages
 };
+/// Looks along so many random arcs.
 Edge sharpest_edge(const BoundModel&, int arcs, Random&);
 
 /// Weights of sample() for one view direction.
 struct Weights {
   double spread = 0;    ///< (largest - smallest) / largest over samples that exist, worst channel
   double variance = 0;  ///< over the square of the mean, lost samples counted as 0; worst channel
-  int kept = 0;
+  int kept = 0;         ///< samples that exist, of those drawn
 };
 Weights sampled_weights(const BoundModel&, const Vec3<double>& wo, int samples, Random&);
 
@@ -46,14 +47,14 @@ std::optional<double> grazing_anisotropy(const BoundModel&);
 
 /// What the table reports beside the declarations, with default parameters and colours at 1.
 struct ModelFacts {
-  bool scatters = true;  ///< false for a model that is a mirror term alone
-  double reflected = 0;  ///< share of the light reflected, seen at 80 degrees
-  double variance = 0;   ///< of f cos / pdf over its mean squared, seen at 45 degrees
-  std::optional<double> anisotropy;
+  bool scatters = true;              ///< false for a model that is a mirror term alone
+  double reflected = 0;              ///< share of the light reflected, seen at 80 degrees
+  double variance = 0;               ///< of f cos / pdf over its mean squared, seen at 45 degrees
+  std::optional<double> anisotropy;  ///< grazing_anisotropy()
 };
 ModelFacts measure_facts(const Model&);
 
-/// A row a registered model.
+/// The table of docs: a row for each registered model, as Markdown or as text in columns.
 std::string property_table(bool markdown);
 
 }  // namespace brdfc::measure

@@ -19,11 +19,11 @@ namespace brdfc::measure {
 /// epsilon (1 + condition), where the condition is the sum over all inputs (components of the directions, renormalised,
 /// and numbers) of the relative change of f for a relative change of the input.
 struct Stability {
-  double relative = 0;
-  double amplified = 0;
-  std::string where;
-  std::string amplified_where;
-  long points = 0;
+  double relative = 0;          ///< largest relative error of f
+  double amplified = 0;         ///< largest of what the text above says; about 1 for a formula that loses nothing
+  std::string where;            ///< parameters and directions of the largest relative error
+  std::string amplified_where;  ///< and of the largest amplified one
+  long points = 0;              ///< pairs of directions looked at
 };
 /// float against double, or double against Wide, for one set of parameters and directions as direction_pairs gives.
 Stability float_stability(const Model&, const ParamValues&, int points, std::uint64_t seed);
@@ -33,10 +33,10 @@ Stability double_stability(const Model&, const ParamValues&, int points, std::ui
 /// numbers, half of them in the sliders' ranges; stiff places (grazing, normal, mirror and backscattering directions
 /// and close to them, ends of ranges); then hill climbing from the worst places found.
 struct Hunt {
-  long points = 20000;
-  int climbs = 4;
-  int steps = 120;  ///< of a climb
-  std::uint64_t seed = 1;
+  long points = 20000;     ///< random and stiff places to begin with
+  int climbs = 4;          ///< hill climbings, from as many of the worst places
+  int steps = 120;         ///< of a climb
+  std::uint64_t seed = 1;  ///< the same one gives the same hunt
 };
 Stability hunt_rounding(const Model&, const Hunt&);
 
@@ -48,9 +48,9 @@ long evaluate_everywhere(const Model&, long calls, std::uint64_t seed);
 /// double, by decade of the largest Number parameter; `inherent` is what rounding the directions to float does to f in
 /// double.
 struct SinglePrecision {
-  double native = 0, recorded = 0, inherent = 0;
-  std::string where;
-  int cases = 0;
+  double native = 0, recorded = 0, inherent = 0;  ///< the largest of each among the cases
+  std::string where;                              ///< the case of the largest of `native` and `recorded`
+  int cases = 0;                                  ///< sets of parameters in this decade
 };
 std::map<int, SinglePrecision> single_precision_by_decade(const Model&, int cases, int samples, std::uint64_t seed);
 

@@ -14,28 +14,11 @@
 #include "measure/albedo.h"
 #include "measure/albedo_knots.h"
 #include "measure/albedo_polynomial.h"
+#include "measure/formula.h"
 #include "model/choices.h"
-#include "print/osl_program.h"
-#include "trace/program.h"
+#include "tables/algebra.h"
 
 namespace brdfc::measure {
-
-std::string formula(const Model& model, const ParamValues& fixed) {
-  Recorder recorder;
-  const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
-  const auto brdf = model.record(fixed);
-  const Sample<Expr> sample = brdf->sample(wo, input3("u"));
-  Program program;
-  program.output("f", brdf->eval(wi, wo));
-  program.output("pdf", brdf->pdf(wi, wo));
-  program.output("sample", sample.wi);
-  program.output("sample_weight", sample.weight);
-  program.output("sample_pdf", sample.pdf);
-  program.output("mirror", brdf->mirror(wo));
-  program.output("transmit", brdf->transmit(wo));
-  program.output("ior", brdf->ior());
-  return print::osl_program(program, 0, {});
-}
 
 namespace {
 
@@ -55,7 +38,7 @@ DistinctChoices distinct_choices(const Model& model) {
   for (const Choices& c : all) {
     const ParamValues combination = with_choices(model.info(), c);
     // A choice may say nothing beside another one.
-    const std::string text = all.size() > 1 ? formula(model, combination) : "";
+    const std::string text = all.size() > 1 ? formula_of(model, combination) : "";
     const auto [it, is_new] = seen.emplace(text, out.combinations.size());
     if (is_new) out.combinations.push_back(combination);
     out.stands_for.push_back(it->second);
@@ -194,14 +177,14 @@ class Tabulator {
     for (std::size_t g = 0; g < signatures_.size(); ++g)
       for (const double offset : {0., 1.}) {
         if (!same(g, offset, -1, slack)) continue;
-        AlbedoGrid grid = table_.grids[g];
-        for (float& v : grid.values) v = float(offset) - v;
+        Table grid = table_.grids[g];
+        subtract_from(offset, grid);
         return add_grid(std::move(grid), t, at_probe);
       }
     return -1;
   }
 
-  int add_grid(AlbedoGrid grid, const NewTerm& t, const std::vector<Coefficients>& at_probe) {
+  int add_grid(Table grid, const NewTerm& t, const std::vector<Coefficients>& at_probe) {
     table_.grids.push_back(std::move(grid));
     signatures_.emplace_back();
     for (const Coefficients& c : at_probe) signatures_.back().push_back(t.monomial.in(c));
@@ -236,16 +219,16 @@ class Tabulator {
     });
     std::vector<int> out;
     for (std::size_t t = 0; t < group.size(); ++t) {
-      AlbedoGrid g;
+      Table g;
       g.axes = knots;
       double chroma = 0;
       for (const Rgb<double>& v : values[t]) chroma = std::max({chroma, std::abs(v.r - v.g), std::abs(v.r - v.b)});
       g.channels = chroma > 1e-12 ? 3 : 1;
       for (const Rgb<double>& v : values[t]) {
-        g.values.push_back(float(v.r));
+        g.values.push_back(double(float(v.r)));
         if (g.channels == 3) {
-          g.values.push_back(float(v.g));
-          g.values.push_back(float(v.b));
+          g.values.push_back(double(float(v.g)));
+          g.values.push_back(double(float(v.b)));
         }
       }
       out.push_back(add_grid(std::move(g), group[t], at_probe));
@@ -320,9 +303,9 @@ class Tabulator {
       if (polynomial_.depends_on_azimuth())
         table_.anisotropy = std::max(table_.anisotropy, max_abs(polynomial_.combine(one, p.colors) - truth));
       for (const AlbedoTerm& t : known_terms(p.combination)) {
-        AlbedoGrid& g = table_.grids[std::size_t(t.grid)];
+        Table& g = table_.grids[std::size_t(t.grid)];
         const Rgb<double> coefficient = Monomial{t.mirror, polynomial_.monomial_of(t.colors)}.in(all);
-        g.error = std::max(g.error, max_abs(lookup(g, position_in(g, p.x)) - coefficient) / unit_of(coefficient));
+        g.error = std::max(g.error, max_abs(interpolate(g, position_in(g, p.x)) - coefficient) / unit_of(coefficient));
       }
     });
   }
@@ -331,7 +314,7 @@ class Tabulator {
     return table_.terms_for(model_, combinations_[combination]);
   }
 
-  std::vector<double> position_in(const AlbedoGrid& g, const Position& x) const {
+  std::vector<double> position_in(const Table& g, const Position& x) const {
     std::vector<double> out;
     for (const TableAxis& a : g.axes)
       for (std::size_t p = 0; p < polynomial_.coordinates().size(); ++p)

@@ -12,7 +12,4 @@ namespace brdfc::measure {
 /// form in albedo_table.h.
 AlbedoTable tabulate_albedo(const Model&);
 
-/// The text of all that a model computes with these values fixed: equal texts are equal models.
-std::string formula(const Model&, const ParamValues& fixed);
-
 }  // namespace brdfc::measure

@@ -7,7 +7,8 @@
 
 namespace brdfc::inline model {
 
-/// Numbers and colours by their names.
+/// Sets the inputs of a recorded model to the numbers and colours among these values, by their names: choices are not
+/// recorded.
 template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values) {
   for (const auto& [name, value] : values) {
     if (const double* v = std::get_if<double>(&value)) set_input(inputs, name, *v);

@@ -9,16 +9,17 @@
 
 namespace brdfc::inline model {
 
+/// A metal with its spectra.
 struct Metal {
   std::string name;              ///< "cu"
   std::string label;             ///< "copper"
   std::string source;            ///< of the spectra
   std::vector<double> nm, n, k;  ///< wavelengths, increasing; complex refractive index n + i k there
 
-  /// Linear between the published wavelengths.
+  /// Linear between the published wavelengths, constant beyond them; `wavelength` in nm.
   double n_at(double wavelength) const { return at(n, wavelength); }
   double k_at(double wavelength) const { return at(k, wavelength); }
-  /// Fresnel reflectance, unpolarised, integrated over the spectrum.
+  /// Fresnel reflectance, unpolarised, integrated over the spectrum, as linear Rec.709; `cosTheta` in [0, 1].
   Rgb<double> reflectance(double cosTheta) const;
 
  private:

@@ -277,20 +277,20 @@ double rounded(double v, int digits) {
   return std::round(v / unit) * unit;
 }
 
-/// A table of at(coordinates in [0, 1]).
+/// A table of at(coordinates in [0, 1]) over even axes.
 template <class F>
-std::shared_ptr<const Table> tabulate(const char* name, const std::vector<int>& sizes, int precision, const F& at) {
+std::shared_ptr<const Table> tabulate(const char* name, std::vector<TableAxis> axes, int precision, const F& at) {
   std::size_t count = 1;
-  for (const int n : sizes) count *= std::size_t(n);
+  for (const TableAxis& a : axes) count *= a.values.size();
   std::vector<double> values;
   for (std::size_t i = 0; i < count; ++i) {
     std::array<double, 4> x{};
     std::size_t digits = i;
-    for (std::size_t d = sizes.size(); d-- > 0; digits /= std::size_t(sizes[d]))
-      x[d] = double(digits % std::size_t(sizes[d])) / (sizes[d] - 1);
+    for (std::size_t d = axes.size(); d-- > 0; digits /= axes[d].values.size())
+      x[d] = axes[d].values[digits % axes[d].values.size()];
     values.push_back(rounded(at(x), precision));
   }
-  return make_table(name, sizes, values);
+  return make_table(name, std::move(axes), std::move(values));
 }
 
 /// A and B for a lobe with these slopes; the axes are turned so that u is the wider one.
@@ -339,30 +339,35 @@ template <class F> double mean_over_views(double width, double roundness, const 
 
 const LobeTables& lobe_tables() {
   static const LobeTables tables = {
-      .loss = tabulate("specular_loss", {12, 13, 10, 4}, 4,
-                       [](const std::array<double, 4>& x) {
-                         const double along = std::sqrt(x[1]), across = std::sqrt(x[2]);
-                         // sunk = reach / (cosTheta + reach) with reach = 2 along sinTheta
-                         const double cotTheta =
-                             x[0] > 0 ? 2 * std::max(along, kNarrowest) * (1 - x[0]) / x[0] : HUGE_VAL;
-                         return 1 - specular_albedos(along, across, x[3], 1 / std::hypot(1, 1 / cotTheta)).r;
-                       }),
-      .softness = tabulate("specular_softness", {18, 13, 7, 4}, 3, [](const std::array<double, 4>& x) {
-        const Rgb<double> a = specular_albedos(sqr(x[1]), sqr(x[2]), x[3], sqr(x[0]));
-        return 1 - a.g / a.r;
-      })};
+      .loss = tabulate(
+          "specular_loss",
+          {even_axis("sunk", 12), even_axis("along2", 13), even_axis("across2", 10), even_axis("correlation2", 4)}, 4,
+          [](const std::array<double, 4>& x) {
+            const double along = std::sqrt(x[1]), across = std::sqrt(x[2]);
+            // sunk = reach / (cosTheta + reach) with reach = 2 along sinTheta
+            const double cotTheta = x[0] > 0 ? 2 * std::max(along, kNarrowest) * (1 - x[0]) / x[0] : HUGE_VAL;
+            return 1 - specular_albedos(along, across, x[3], 1 / std::hypot(1, 1 / cotTheta)).r;
+          }),
+      .softness = tabulate("specular_softness",
+                           {even_axis("sqrt_cosTheta", 18), even_axis("sqrt_along", 13), even_axis("sqrt_across", 7),
+                            even_axis("correlation2", 4)},
+                           3, [](const std::array<double, 4>& x) {
+                             const Rgb<double> a = specular_albedos(sqr(x[1]), sqr(x[2]), x[3], sqr(x[0]));
+                             return 1 - a.g / a.r;
+                           })};
   return tables;
 }
 
 const MeanTables& mean_tables() {
   static const MeanTables tables = {
-      .loss = tabulate("mean_loss", {17, 17}, 4,
+      .loss = tabulate("mean_loss", {even_axis("width", 17), even_axis("roundness", 17)}, 4,
                        [](const std::array<double, 4>& x) {
                          return mean_over_views(x[0], x[1], [](const LobeAtView<double>& lobe) { return lobe.loss(); });
                        }),
-      .matte = tabulate("mean_matte", {17, 17}, 4, [](const std::array<double, 4>& x) {
-        return mean_over_views(x[0], x[1], [](const LobeAtView<double>& lobe) { return lobe.matte(); });
-      })};
+      .matte = tabulate(
+          "mean_matte", {even_axis("width", 17), even_axis("roundness", 17)}, 4, [](const std::array<double, 4>& x) {
+            return mean_over_views(x[0], x[1], [](const LobeAtView<double>& lobe) { return lobe.matte(); });
+          })};
   return tables;
 }
 

@@ -68,7 +68,7 @@ const std::shared_ptr<const Table>& table_of_S() {
       values.push_back(boost::math::quadrature::gauss<double, 30>::integrate(
           [&](double t) { return 6 * coat.That(t * t * t) * t * t * t * t * t; }, 0., 1.));
     }
-    return make_table("coupled_S", {kKnots}, values);
+    return make_table("coupled_S", {even_axis("sqrt_nu", kKnots)}, values);
   }();
   return table;
 }

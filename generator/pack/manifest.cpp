@@ -55,9 +55,9 @@ Json values_json(const ParamValues& values) {
 
 Json table_json(const measure::AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
   Json grids = Json::array(), terms = Json::array();
-  for (const measure::AlbedoGrid& g : t.grids) {
+  for (const Table& g : t.grids) {
     Json axes = Json::array();
-    for (const measure::TableAxis& a : g.axes)
+    for (const TableAxis& a : g.axes)
       axes.push_back({{"name", a.name}, {"scale", name_of(a.scale)}, {"values", a.values}});
     grids.push_back({{"axes", axes}, {"channels", g.channels}, {"error", g.error}, {"values", g.values}});
   }

@@ -23,6 +23,7 @@ class Costs {
   /// file, line, column and what was expected.
   explicit Costs(const std::filesystem::path&);
 
+  /// Of a form of a model; nothing where it was not measured.
   std::optional<double> of(const Model&, const forms::Form&) const;
 
  private:

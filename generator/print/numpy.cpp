@@ -187,8 +187,10 @@ std::string python_docstring(const std::vector<std::string>& paragraphs, int ind
 }
 
 std::string numpy_table(const Table& table) {
-  std::string out = fmt::format("table_{} = table(({}{}), \"\"\"", table.name, fmt::join(table.sizes, ", "),
-                                table.sizes.size() == 1 ? "," : "");
+  std::vector<int> sizes;
+  for (const TableAxis& a : table.axes) sizes.push_back(a.size());
+  std::string out =
+      fmt::format("table_{} = table(({}{}), \"\"\"", table.name, fmt::join(sizes, ", "), sizes.size() == 1 ? "," : "");
   std::size_t width = 200;
   for (double v : table.values) {
     const std::string s = fmt::format("{}", v);

@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "print/osl_table.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
 #include "print/program_printer.h"
@@ -25,14 +26,7 @@ class OslPrinter : public ProgramPrinter {
       if (!reachable_[i] || n.op != Op::Lookup || array_names_.count(n.name)) continue;
       const std::string name = fresh(n.name);
       array_names_[n.name] = name;
-      // Tables are most of a long shader's text: without what is not needed to read it.
-      std::string out = fmt::format("{:{}}float {}[{}] = {{", "", indent, name, n.table->values.size());
-      for (std::size_t k = 0; k < n.table->values.size(); ++k) {
-        std::string value = number(n.table->values[k]);
-        if (value.starts_with("0.") && value != "0.0") value.erase(0, 1);
-        out += (k == 0 ? "" : k % 16 == 0 ? ",\n" : ",") + value;
-      }
-      all.push_back(out + "};\n");
+      all.push_back(compact_array(name, n.table->values, indent));
     }
     return all;
   }
@@ -107,11 +101,11 @@ class OslPrinter : public ProgramPrinter {
         return {use(n.args[0], 1) + " ? " + arm(1) + " : " + arm(2), 0};
       }
       case Op::Lookup: {
-        std::string text = fmt::format("brdfc_table{}({}", n.args.size(), array_names_.at(n.name));
-        for (int size : n.table->sizes) text += fmt::format(", {}", size);
+        std::vector<std::string> positions;
         for (std::size_t i = 0; i < n.args.size(); ++i)
-          text += fmt::format(", {} * clamp({}, 0.0, 1.0)", number(n.table->sizes[i] - 1), use(n.args[i], 0));
-        return {text + ")", 6};
+          positions.push_back(
+              fmt::format("{} * clamp({}, 0.0, 1.0)", number(n.table->axes[i].size() - 1), use(n.args[i], 0)));
+        return {table_call(*n.table, array_names_.at(n.name), positions), 6};
       }
       case Op::LoopOut:
         return {loop_out(n), 6};

@@ -3,6 +3,8 @@
 
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace brdfc::inline tables {
@@ -11,6 +13,37 @@ namespace {
 constexpr const char* kMeta = "brdfc:table";
 
 }  // namespace
+
+TableImage image_of(const std::vector<const Table*>& tables) {
+  TableImage image;
+  for (const Table* t : tables) {
+    image.width = std::max(image.width, int(t->points()));
+    image.channels = std::max(image.channels, t->channels);
+  }
+  image.height = std::max(1, int(tables.size()));
+  const auto width = std::size_t(image.width), channels = std::size_t(image.channels);
+  image.pixels.resize(width * std::size_t(image.height) * channels, 0.f);
+  for (std::size_t row = 0; row < tables.size(); ++row) {
+    const Table& t = *tables[row];
+    for (std::size_t i = 0; i < t.points(); ++i)
+      for (std::size_t c = 0; c < channels; ++c)
+        image.pixels[(row * width + i) * channels + c] =
+            float(t.values[i * std::size_t(t.channels) + (t.channels == 1 ? 0 : c)]);
+  }
+  return image;
+}
+
+std::optional<std::vector<double>> values_in(const TableImage& image, std::size_t row, std::size_t points,
+                                             int channels) {
+  if (row >= std::size_t(image.height) || points > std::size_t(image.width) || channels < 1 ||
+      channels > image.channels)
+    return std::nullopt;
+  std::vector<double> out;
+  for (std::size_t i = 0; i < points; ++i)
+    for (std::size_t c = 0; c < std::size_t(channels); ++c)
+      out.push_back(image.pixels[(row * std::size_t(image.width) + i) * std::size_t(image.channels) + c]);
+  return out;
+}
 
 void write_table_image(const TableImage& image, const std::filesystem::path& path) {
   OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::FLOAT);
@@ -42,22 +75,6 @@ TableImage read_table_image(const std::filesystem::path& path) {
   if (!in->read_image(0, 0, 0, image.channels, OIIO::TypeDesc::FLOAT, image.pixels.data()))
     input_error("{}: cannot be read: {}", path.string(), in->geterror());
   return image;
-}
-
-void replace_stored(const std::filesystem::path& path, const std::string& model,
-                    const std::function<void(const std::filesystem::path&)>& write) {
-  const std::filesystem::path folder = path.parent_path();
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) input_error("{}: cannot be created: {}", folder.string(), error.message());
-  write(path);
-  const std::string prefix = model + "_";
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string name = entry.path().stem().string();
-    // Names of models may begin alike: what follows is a hash of 16 digits and no more.
-    if (name.starts_with(prefix) && name.size() == prefix.size() + 16 && entry.path() != path)
-      std::filesystem::remove(entry.path());
-  }
 }
 
 }  // namespace brdfc::inline tables

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "tables/table.h"
 
 namespace brdfc::inline tables {
 
@@ -16,15 +18,16 @@ struct TableImage {
   std::string meta;           ///< JSON, in the attribute "brdfc:table"
 };
 
+/// A row a table, in this order, without meta. A table of one channel beside others of three is the same in all.
+TableImage image_of(const std::vector<const Table*>&);
+/// The values of a table with so many points and channels, by its row; nothing if the image has no such row, or it is
+/// shorter.
+std::optional<std::vector<double>> values_in(const TableImage&, std::size_t row, std::size_t points, int channels);
+
 /// The same image gives the same bytes. Written beside and renamed. Throws InputError naming the path if it can't be
 /// written.
 void write_table_image(const TableImage&, const std::filesystem::path&);
 /// Throws InputError naming the path if it can't be read or has no such attribute.
 TableImage read_table_image(const std::filesystem::path&);
-
-/// Writes the file FOLDER/MODEL_HASH.exr, of a hash of 16 digits, and removes what is there of the model by other
-/// hashes. Throws InputError naming the folder if it can't be created.
-void replace_stored(const std::filesystem::path&, const std::string& model,
-                    const std::function<void(const std::filesystem::path&)>& write);
 
 }  // namespace brdfc::inline tables

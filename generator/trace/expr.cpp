@@ -225,8 +225,9 @@ Rgb<Expr> named(const char* name, const Rgb<Expr>& c) {
 }
 
 Expr record_lookup(const std::shared_ptr<const Table>& table, const std::vector<Expr>& coordinates) {
-  if (coordinates.size() != table->sizes.size())
+  if (coordinates.size() != table->axes.size())
     throw ExprError("table " + table->name + ": wrong number of coordinates");
+  require_lookup(*table, coordinates.size());
   ExprNode node{Op::Lookup, ExprType::Real, {}, {}, table->name, 0, -1, "", table};
   for (const Expr& x : coordinates) node.args.push_back(x.id());
   const int id = Recorder::current().add(std::move(node));

@@ -27,13 +27,16 @@ class Expr {
  public:
   Expr() = default;
   Expr(double literal) : literal_(literal) {}  // NOLINT: formulas mix literals and scalars
+  /// What a program is given under this name.
   static Expr input(const std::string& name);
+  /// The value of a node of the current recorder.
   static Expr of_node(int id);
 
+  /// Is it a number, and not yet part of a recording?
   bool is_literal() const { return id_ < 0; }
   bool is_literal(double value) const { return id_ < 0 && literal_ == value; }
   double literal() const { return literal_; }
-  int id() const;  ///< interns a literal
+  int id() const;  ///< of its node in the current recorder; a literal becomes one
 
   friend Expr operator-(const Expr&);
   friend Expr operator+(const Expr&, const Expr&);
@@ -83,6 +86,7 @@ Expr pow(const Expr& base, const Expr& exponent);
 Expr minimum(const Expr&, const Expr&);
 Expr maximum(const Expr&, const Expr&);
 Expr select(const Condition&, const Expr&, const Expr&);
+/// The same, under a name that a printed program declares a variable by.
 Expr named(const char* name, const Expr&);
 
 }  // namespace trace
@@ -98,6 +102,7 @@ template <> struct Rgb<Expr> {
   explicit Rgb(const Expr& grey);
   static Rgb input(const std::string& name);
   static Rgb of_node(int id);
+  /// Is it known while recording? Then, unless null, `value` becomes it.
   bool is_constant(std::array<double, 3>* value = nullptr) const;
   int id() const;
 
@@ -125,7 +130,7 @@ inline Vec3<Expr> input3(const std::string& name) {
   return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
 }
 
-// What the templates below are made of.
+// What the templates below are made of; formulas call those.
 Expr record_lookup(const std::shared_ptr<const Table>&, const std::vector<Expr>& coordinates);
 std::vector<Expr> loop_variables(int count, int serial);
 std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& init, const std::vector<Expr>& next);

@@ -20,6 +20,7 @@ struct ExprError : std::logic_error {
   using std::logic_error::logic_error;
 };
 
+/// What a node computes from its arguments.
 enum class Op : std::uint8_t {
   Const,
   Input,
@@ -58,12 +59,14 @@ enum class Op : std::uint8_t {
 /// As messages call it, and OSL those that it has.
 const char* name_of(Op);
 
+/// Of a node's value: a number, three, or a truth value. A number among colours is grey.
 enum class ExprType : std::uint8_t { Real, Color, Bool };
 
+/// A node of the graph. Its arguments are nodes with smaller numbers.
 struct ExprNode {
   Op op;
   ExprType type;
-  std::vector<int> args;                 ///< Loop: N initial values, then N values of the next state
+  std::vector<int> args;                 ///< numbers of nodes. Loop: N initial values, then N values of the next state
   std::array<double, 3> value{};         ///< Const; a Real uses element 0
   std::string name;                      ///< Input
   int index = 0;                         ///< Loop: count. LoopVar, LoopOut: which state element
@@ -75,7 +78,7 @@ struct ExprNode {
 /// What a recording will be executed in.
 enum class Precision : std::uint8_t { Single, Double };
 
-/// Owns the nodes of one recording; the innermost one alive on this thread is the current one.
+/// Owns the nodes of one recording, and shares equal ones; the innermost one alive on this thread is the current one.
 class Recorder {
  public:
   explicit Recorder(Precision = Precision::Single);
@@ -83,14 +86,20 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
+  /// Throws ExprError where there is none.
   static Recorder& current();
   Precision precision() const { return precision_; }
+  /// The number of a node equal to this one, which is added if there is none. Throws ExprError if an argument is not of
+  /// this recorder.
   int add(ExprNode node);
   /// The node equal to this one, or -1.
   int find(const ExprNode& node) const;
+  /// The node of a number from 0 to size() - 1.
   const ExprNode& node(int id) const { return nodes_[std::size_t(id)]; }
   int size() const { return int(nodes_.size()); }
+  /// The name that a printed program gives this node's value; the first one counts.
   void hint(int id, const char* name);
+  /// The serial of a loop that begins, whose variables have it for a scope. Throws ExprError inside a loop.
   int open_loop();
   void close_loop();
 

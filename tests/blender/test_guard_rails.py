@@ -168,6 +168,9 @@ def test_what_would_be_lost_is_said_and_kept(extension, empty, lose, why):
     lose(group[nodes.TAG])
     if lose is lose_a_choice and nodes.has_menus():
         pytest.skip("menus of later versions of Blender hold labels, which can't be pretended")
+    said = shown(extension, material, empty)
+    assert why in " ".join(said)
+    assert "operator brdfc.update Update Materials" not in said
     result = api.update_materials()
     assert node.node_tree == group
     assert any(why in sentence and material.name in sentence for sentence in result.refusals)
@@ -180,6 +183,35 @@ def test_a_form_that_is_no_more_becomes_another(extension, empty, phong):
     assert result.count == 1 and "perfect is now aimed" in result.notes[0]
     assert extension.nodes.identity(node) == ("phong", "aimed")
     assert extension.api.get_parameters(phong)["e"] == pytest.approx(20)
+
+
+def test_files_are_updated_when_they_are_opened_if_the_preferences_say_so(
+    extension, empty, phong, tmp_path
+):
+    api, nodes = extension.api, extension.nodes
+    lost = api.new_material("ward")
+    lose_a_parameter(aged(extension, lost).node_tree[nodes.TAG])
+    aged(extension, phong)
+    names = phong.name, lost.name
+    for material in (phong, lost):
+        material.use_fake_user = True
+    path = tmp_path / "old.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    preferences = bpy.context.preferences.addons[extension.package].preferences
+    assert not preferences.update_on_load, "pictures do not change unasked"
+    for wanted in (False, True):
+        preferences.update_on_load = wanted
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(path))
+        finally:
+            preferences.update_on_load = False
+        phong, lost = (bpy.data.materials[n] for n in names)
+        codes = [{f.code for f in api.warnings(m, bpy.context.scene)} for m in (phong, lost)]
+        assert ("outdated" in codes[0]) != wanted
+        assert "kept" in codes[1]
+    assert api.get_parameters(phong)["e"] == pytest.approx(20)
+    update = import_module(f"{extension.package}.update")
+    assert update.last.count == 1 and "'gone'" in update.last.refusals[0]
 
 
 def test_linked_materials_are_left_to_their_file(extension, empty, phong, tmp_path):

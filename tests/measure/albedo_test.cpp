@@ -204,7 +204,7 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
   EXPECT_LT(t.error, 0.05);
   EXPECT_GT(t.anisotropy, 0.01);
   EXPECT_THAT(t.doc, HasSubstr("azimuth"));
-  for (const AlbedoGrid& g : t.grids)
+  for (const Table& g : t.grids)
     for (const TableAxis& a : g.axes) EXPECT_NE(a.name, "rotation");
   const auto& both = t.terms_for(m, parse_values(m.info(), {"part=both"}));
   const auto& specular = t.terms_for(m, parse_values(m.info(), {"part=specular"}));
@@ -277,17 +277,6 @@ TEST(AlbedoTableFile, HoldsTheNumbersAndTheirMeaning) {
       EXPECT_EQ(pixels[(g * std::size_t(spec.width) + i) * std::size_t(spec.nchannels)], t.grids[g].values[i]);
   }
   EXPECT_THROW(write_albedo_exr(t, "/nowhere/at/all.exr"), InputError);
-}
-
-TEST(AlbedoTableFile, LookUpClampsAtItsEndsAndMeetsItsKnots) {
-  AlbedoGrid g;
-  g.axes = {{"a", AxisScale::Linear, {0, 1, 4}}, {"b", AxisScale::Log1p, {0, 9, 99}}};
-  g.values = {0, 1, 2, 10, 11, 12, 40, 41, 42};
-  EXPECT_NEAR(lookup(g, {1, 9}).r, 11, 1e-12);
-  EXPECT_NEAR(lookup(g, {2.5, 0}).r, 25, 1e-12);
-  EXPECT_NEAR(lookup(g, {4, std::sqrt(10.) * 10 - 1}).r, 41.5, 1e-12);
-  EXPECT_NEAR(lookup(g, {-5, 1e9}).r, 2, 1e-12);
-  EXPECT_NEAR(lookup(g, {77, -1}).r, 40, 1e-12);
 }
 
 }  // namespace

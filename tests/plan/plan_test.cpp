@@ -335,8 +335,8 @@ TEST(Plan, FoldedTablesInterpolateToTheSame) {
     for (const std::string& t : fixed_text) fixed[t.substr(0, 2)] = all.at(t.substr(0, 2));
     const measure::AlbedoTable cut = measure::fold(whole, m, fixed);
     EXPECT_LE(cut.size(), 3 * whole.size());
-    for (const measure::AlbedoGrid& g : cut.grids)
-      for (const measure::TableAxis& a : g.axes) EXPECT_EQ(fixed.count(a.name), 0u);
+    for (const Table& g : cut.grids)
+      for (const TableAxis& a : g.axes) EXPECT_EQ(fixed.count(a.name), 0u);
     for (const double c : {0.01, 0.3, 0.77, 1.0}) {
       const Rgb<double> want = lookup(whole, m, all, c), got = lookup(cut, m, all, c);
       EXPECT_NEAR(got.r, want.r, 1e-6) << fixed_text[0];

@@ -50,7 +50,7 @@ TEST(NumPy, AnIterationStaysALoopOfTheStepsOfItsPrecision) {
 
 TEST(NumPy, ColoursAndTables) {
   Recorder recorder(Precision::Double);
-  const auto table = make_table("t", {2, 2}, {0, 1.0 / 3, 2, 1e-20});
+  const auto table = make_table("t", {even_axis("x", 2), even_axis("y", 2)}, {0, 1.0 / 3, 2, 1e-20});
   const Expr x = Expr::input("x");
   Program program;
   program.output("c", Rgb<Expr>::input("k") * Rgb<Expr>(x, Expr(0.5), Expr(1.0)));
@@ -60,7 +60,7 @@ TEST(NumPy, ColoursAndTables) {
             "def f(x, k):\n    return k * rgb(x, 0.5, 1.0), lookup(table_t, x, np.max(k, axis=0))\n");
   EXPECT_EQ(tables.at("t"), table);
   EXPECT_EQ(numpy_table(*table), "table_t = table((2, 2), \"\"\"\n0 0.3333333333333333 2 1e-20\n\"\"\")\n");
-  const auto other = make_table("t", {2}, {0, 1});
+  const auto other = make_table("t", {even_axis("x", 2)}, {0, 1});
   tables["t"] = other;
   EXPECT_THROW(numpy_function(program, "f", {"x", "k"}, tables), ExprError);
 }

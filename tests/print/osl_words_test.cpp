@@ -83,7 +83,7 @@ using ::testing::HasSubstr;
 measure::AlbedoTable table_of(const Model& model) {
   measure::AlbedoTable t;
   t.model = model.info().name;
-  t.grids.push_back({{{"cos_theta_o", AxisScale::Linear, {0, 1}}}, 3, {0, 0, 0, 1, 1, 1}, 0});
+  t.grids.push_back({"", {{"cos_theta_o", AxisScale::Linear, {0, 1}}}, 3, {0, 0, 0, 1, 1, 1}, 0});
   t.terms.assign(choice_combinations(model.info()).size(), {measure::AlbedoTerm{}});
   return t;
 }

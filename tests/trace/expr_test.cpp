@@ -97,19 +97,20 @@ TEST(Expr, TwoLoopsWithTheSameBodyStayApart) {
 TEST(Expr, ALookUpIsAnArrayAndACall) {
   Recorder recorder;
   Program program;
-  const auto table = make_table("grid", {2, 3}, {0, 1, 4, 10, 11, 14});
+  const auto table = make_table("grid", {even_axis("x", 2), even_axis("y", 3)}, {0, 1, 4, 10, 11, 14});
   program.output("z", lookup(table, std::array<Expr, 2>{Expr::input("x"), Expr::input("y")}));
   const std::string text = print::osl_program(program, 0, {});
   EXPECT_THAT(text, HasSubstr("float grid[6] = {0.0,1.0,4.0,10.0,11.0,14.0};"));
-  EXPECT_THAT(text, HasSubstr("brdfc_table2(grid, 2, 3, 1.0 * clamp(x, 0.0, 1.0), 2.0 * clamp(y, 0.0, 1.0))"));
+  EXPECT_THAT(text, HasSubstr("brdfc_table2(grid, 2, 3, 1.0 * clamp(x, 0.0, "
+                              "1.0), 2.0 * clamp(y, 0.0, 1.0))"));
   for (const double x : {0.0, 0.3, 1.0, 2.0})
     for (const double y : {-1.0, 0.0, 0.4, 0.9, 1.0}) {
       const double z = program.run<double>({{"x", {x, x, x}}, {"y", {y, y, y}}}).at("z")[0];
       EXPECT_EQ(z, lookup(table, std::array<double, 2>{x, y}));
     }
   EXPECT_DOUBLE_EQ(lookup(table, std::array<double, 2>{0.5, 0.75}), 0.5 * (2.5 + 12.5));
-  EXPECT_THROW(make_table("bad", {2}, {0, std::nan("")}), ValueError);
-  const auto other = make_table("grid", {2}, {0, 1});
+  EXPECT_THROW(make_table("bad", {even_axis("x", 2)}, {0, std::nan("")}), ValueError);
+  const auto other = make_table("grid", {even_axis("x", 2)}, {0, 1});
   EXPECT_THROW(lookup(other, std::array<Expr, 2>{Expr::input("x"), Expr::input("y")}), ExprError);
 }
 
@@ -118,7 +119,8 @@ TEST(Expr, ALookUpOverFourAxesIsTheSameRecordedAndComputed) {
   Program program;
   std::vector<double> values;
   for (int i = 0; i < 2 * 3 * 2 * 4; ++i) values.push_back((i * 7) % 11);
-  const auto table = make_table("grid", {2, 3, 2, 4}, values);
+  const auto table =
+      make_table("grid", {even_axis("x", 2), even_axis("y", 3), even_axis("z", 2), even_axis("w", 4)}, values);
   const char* names[] = {"x", "y", "z", "w"};
   std::array<Expr, 4> inputs;
   for (std::size_t k = 0; k < 4; ++k) inputs[k] = Expr::input(names[k]);
@@ -174,8 +176,9 @@ TEST(Expr, ColoursAreOneNode) {
   EXPECT_THAT(print::osl_program(program, 0, {}), HasSubstr("z = c + (1.0 - c) * f;"));
 }
 
-/// Every model's recorded eval, pdf and sample, executed in float, against its float instantiation: the same bits,
-/// but for constants, which the recording folds in double and rounds once.
+/// Every model's recorded eval, pdf and sample, executed in float, against its
+/// float instantiation: the same bits, but for constants, which the recording
+/// folds in double and rounds once.
 class RecordedFormula : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
