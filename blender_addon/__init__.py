@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import lamps, operators, ui, update
+from . import lamps, operators, plot_panel, ui, update
 
 
 def _refuse_beside_another():
@@ -22,6 +22,7 @@ def register():
     _refuse_beside_another()
     operators.register()
     ui.register()
+    plot_panel.register()
     lamps.register()
     update.register()
 
@@ -29,5 +30,6 @@ def register():
 def unregister():
     update.unregister()
     lamps.unregister()
+    plot_panel.unregister()
     ui.unregister()
     operators.unregister()

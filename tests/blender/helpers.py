@@ -296,6 +296,9 @@ class Layout:
     def separator(self, **_):
         pass
 
+    def template_icon(self, icon_value, scale):
+        self.log.append(f"picture {scale:g}")
+
     def menu(self, name, **_):
         self.log.append(f"menu {name}")
 

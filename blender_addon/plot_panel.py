@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Plots: pictures of plots.py, kept as previews, which no file holds."""
+
+import bpy
+import bpy.utils.previews
+import numpy as np
+from bpy.types import Panel
+
+from . import nodes, pack
+
+#: Pictures that are kept; the oldest gives its place away.
+_KEPT = 16
+_previews = None
+_places = {}  # what is shown, to the name of a preview and the roughness of the nearest Glossy node
+
+
+def _values(node):
+    """A node's values by name, and the names of what a link controls."""
+    model_name, _ = nodes.identity(node)
+    values = dict(pack.fixed(model_name))
+    values |= {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
+    return values, [name for name, value in values.items() if value is None]
+
+
+def picture(node):
+    """The preview of a node's values and the roughness of the nearest Glossy node, or None; drawn
+    where the values are new. Raises ValueError for a model that the extension does not have."""
+    from . import plots  # NumPy's formulas, when they are first looked at
+
+    model_name, _ = nodes.identity(node)
+    values, _ = _values(node)
+    key = (model_name, *((n, tuple(np.ravel(v))) for n, v in values.items() if v is not None))
+    if key not in _places:
+        pixels, roughness = plots.draw(model_name, values)
+        if len(_previews) < _KEPT:
+            name = f"plot {len(_previews)}"
+            _previews.new(name)
+        else:
+            name, _ = _places.pop(next(iter(_places)))
+        preview = _previews[name]
+        preview.image_size = (plots.SIZE, plots.SIZE)
+        # Four bytes a pixel, as one integer.
+        packed = np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)).view(np.int32)
+        preview.image_pixels.foreach_set(packed.ravel())
+        _places[key] = (name, roughness)
+    name, roughness = _places[key]
+    return _previews[name], roughness
+
+
+def draw_plots(layout, material):
+    for node in nodes.group_nodes(material):
+        column = layout.column(align=True)
+        column.label(text=node.label or node.name, icon="MATERIAL")
+        try:
+            preview, roughness = picture(node)
+        except ValueError as error:
+            column.label(text=str(error), icon="ERROR")
+            continue
+        column.template_icon(icon_value=preview.icon_id, scale=12.0)
+        column.label(text="Above: light from 45\u00b0, and where it goes")
+        if roughness is not None:
+            column.label(text=f"Grey: Glossy, roughness {roughness:.2f}, the nearest")
+        column.label(text="Below: under a lamp; reflected share, 0\u00b0 to 90\u00b0")
+        _, linked = _values(node)
+        if linked:
+            labels = pack.parameters(nodes.identity(node)[0])
+            names = ", ".join(labels[name]["label"] for name in linked)
+            column.label(text=f"At the default of {names}", icon="INFO")
+
+
+def _material(context):
+    return getattr(context.object, "active_material", None)
+
+
+class _Plots:
+    bl_label = "Plots"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return _material(context) is not None
+
+    def draw(self, context):
+        try:
+            draw_plots(self.layout, _material(context))
+        except pack.PackError as error:
+            self.layout.label(text=str(error), icon="ERROR")
+
+
+class MATERIAL_PT_brdfc_plots(_Plots, Panel):
+    bl_idname = "MATERIAL_PT_brdfc_plots"
+    bl_parent_id = "MATERIAL_PT_brdfc"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "material"
+
+
+class NODE_PT_brdfc_plots(_Plots, Panel):
+    bl_idname = "NODE_PT_brdfc_plots"
+    bl_parent_id = "NODE_PT_brdfc"
+    bl_space_type = "NODE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "brdfc"
+
+
+_register, _unregister = bpy.utils.register_classes_factory(
+    (MATERIAL_PT_brdfc_plots, NODE_PT_brdfc_plots)
+)
+
+
+def register():
+    global _previews
+    _previews = bpy.utils.previews.new()
+    _register()
+
+
+def unregister():
+    global _previews
+    _unregister()
+    _places.clear()
+    bpy.utils.previews.remove(_previews)
+    _previews = None
