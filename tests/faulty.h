@@ -49,7 +49,7 @@ template <Defect D> struct Faulty {
     }
     template <class Visitor> void parameters(const Visitor& v) {
       v(rho, ColorSpec{"rho", "Reflectance", {0.8, 0.8, 0.8}, ""});
-      v(level, NumberSpec{"level", "Level", 1, 0, 1000, 0, 1000, ""});
+      v(level, NumberSpec{"level", "Level", 1, 0, 1000, 0, 1000, ""}.by_factors());
     }
     Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
       Rgb<T> f = rho / pi<T>();

@@ -15,7 +15,7 @@
 #include "core/data_dir.h"
 #include "core/parse.h"
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "pack/pack.h"
 #include "pack/standalone.h"
 #include "plan/costs.h"
@@ -25,8 +25,6 @@
 
 namespace brdfc::app {
 namespace {
-
-using forms::RepresentationKind;
 
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false;
@@ -62,15 +60,13 @@ nlohmann::ordered_json error_of(const plan::PlannedModel& plan, const plan::Form
                                 const pack::Result& result) {
   constexpr const char* kExpectation = "expectation";
   if (!choice.exists) return nullptr;
-  if (choice.form == RepresentationKind::Fitted)
-    return choice.error ? nlohmann::ordered_json(*choice.error) : nlohmann::ordered_json(nullptr);
+  if (choice.error) return *choice.error;
   for (const pack::Line& l : result.lines)
-    if (l.model == plan.model->info().name && l.representation == name_of(choice.form))
+    if (l.model == plan.model->info().name && l.representation == choice.form->name())
       return l.error.relative_l1 ? nlohmann::ordered_json(*l.error.relative_l1) : kExpectation;
-  if (choice.form == RepresentationKind::Twin) return nullptr;
-  if (choice.form == RepresentationKind::Exact)
-    return *forms::measure_error(*plan.model, choice.form, plan.fixed).relative_l1;
-  return kExpectation;
+  if (choice.form->made_of_fit()) return nullptr;
+  if (choice.form->draws()) return kExpectation;
+  return *choice.form->error(*plan.model, {plan.fixed}).relative_l1;
 }
 
 nlohmann::ordered_json cost_json(const std::optional<double>& cost) {
@@ -81,7 +77,7 @@ nlohmann::ordered_json explanation(const plan::PlannedModel& plan, const pack::R
   const ModelInfo& info = plan.model->info();
   nlohmann::ordered_json choices = nlohmann::ordered_json::array();
   for (const plan::FormChoice& c : plan.choices)
-    choices.push_back({{"form", name_of(c.form)},
+    choices.push_back({{"form", c.form->name()},
                        {"taken", c.taken},
                        {"cost", cost_json(c.cost)},
                        {"error", error_of(plan, c, result)},
@@ -89,8 +85,8 @@ nlohmann::ordered_json explanation(const plan::PlannedModel& plan, const pack::R
   nlohmann::ordered_json of_materials = nlohmann::ordered_json::array();
   for (const plan::FormChange& m : plan.material_forms)
     of_materials.push_back({{"material", m.id},
-                            {"before", {{"form", name_of(m.before)}, {"cost", cost_json(m.cost_before)}}},
-                            {"after", {{"form", name_of(m.after)}, {"cost", cost_json(m.cost_after)}}}});
+                            {"before", {{"form", m.before->name()}, {"cost", cost_json(m.cost_before)}}},
+                            {"after", {{"form", m.after->name()}, {"cost", cost_json(m.cost_after)}}}});
   nlohmann::ordered_json forms = nlohmann::ordered_json::array(), free = nlohmann::ordered_json::array();
   for (const pack::Line& l : result.lines)
     if (l.model == info.name)
@@ -144,7 +140,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
     fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
     for (const plan::FormChoice& c : p.choices) {
       const nlohmann::ordered_json error = error_of(p, c, result);
-      fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", name_of(c.form), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
+      fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", c.form->name(), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
                  error.is_number()   ? fmt::format("{:.2e}", error.get<double>())
                  : error.is_string() ? error.get<std::string>()
                                      : "-",

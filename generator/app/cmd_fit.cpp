@@ -99,19 +99,20 @@ void add_fit_command(CLI::App& app) {
       values.erase(name);
     }
     if (!o->any.empty() || !o->over.empty()) {
-      const fit::Terms terms = fit::terms_of(model, values);
+      const fit::Roles& roles = fit::roles_of(model, values);
       for (const std::string& name : o->any)
-        if (!terms.has(name) && !fit::factors(model, values).count(name))
+        if (roles.of(name) != fit::Role::Mixed && roles.of(name) != fit::Role::Factor)
           input_error("fit: --any {}: expected a parameter that f of {} is a polynomial of, with at most {} terms",
                       name, o->model, fit::kMaxTerms);
-      if (terms.has(o->over))
+      if (!o->over.empty() && roles.of(o->over) == fit::Role::Mixed)
         input_error("fit: --over {0}: f of {1} is proportional to it or a sum with it: take --any {0}", o->over,
                     o->model);
-      values = fit::without_factors(model, values);
+      values = roles.fitted();
     }
     // What the fit is for, as it says of itself.
     const auto label = [&] {
-      return o->model + " " + format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values));
+      return o->model + " " +
+             format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values).values);
     };
     if (const auto reason = fit::unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
     const auto print = [&](const auto& form, const auto& closures) {
@@ -121,7 +122,7 @@ void add_fit_command(CLI::App& app) {
         print_errors(form.errors(), o->over, label());
     };
     if (o->store) {
-      values = fit::along_axis(model, values);
+      values = fit::along_axis(model, values).values;
       const fit::Fit fit(model, values, fit::Fit::From::Scratch);
       replace_stored(fit::stored_fit(model, values),
                      [&](const std::filesystem::path& path) { fit.store(model, values, path); });

@@ -4,13 +4,11 @@
 
 #include "app/commands.h"
 #include "core/error.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "model/model.h"
 
 namespace brdfc::app {
 namespace {
-
-using forms::RepresentationKind;
 
 using Json = nlohmann::ordered_json;
 
@@ -20,7 +18,7 @@ const char* kind_name(ParamKind k) {
 
 std::vector<std::string> names_of_forms(const Model& m) {
   std::vector<std::string> names;
-  for (RepresentationKind kind : forms::representations(m)) names.push_back(name_of(kind));
+  for (const forms::Form* form : forms::forms_of(m)) names.push_back(form->name());
   return names;
 }
 
@@ -71,13 +69,13 @@ Json describe(const Model& m) {
 void print_text(const Model& m) {
   const ModelInfo& info = m.info();
   fmt::print("{}  {}\n  {} ({})\n  {}\n", info.name, info.label, info.paper, info.equations, info.doc);
-  std::string forms;
-  for (RepresentationKind kind : forms::representations(m)) {
-    forms += (forms.empty() ? "" : ", ") + std::string(name_of(kind));
-    if (const ParamValues only = forms::form_values(m, kind); !only.empty())
-      forms += fmt::format(" (only {})", format_values(info, only));
+  std::string names;
+  for (const forms::Form* form : forms::forms_of(m)) {
+    names += (names.empty() ? "" : ", ") + form->name();
+    if (const ParamValues only = form->values(m, {}); !only.empty())
+      names += fmt::format(" (only {})", format_values(info, only));
   }
-  fmt::print("  representations: {}\n", forms);
+  fmt::print("  representations: {}\n", names);
   for (const ParamInfo& p : info.params) {
     std::string range, value;
     if (p.kind == ParamKind::Choice) {

@@ -6,20 +6,11 @@
 namespace brdfc::fit {
 
 FitAxis fit_axis(const ParamInfo& p) {
-  FitAxis axis{p.name, p.soft_min, p.soft_max, AxisScale::Linear};
-  // What a factor of ten changes is looked at by factors.
-  if (axis.low > 0 && axis.high > 10 * axis.low)
-    axis.scale = AxisScale::Log;
-  else if (axis.low >= 0 && axis.high > 10)
-    axis.scale = AxisScale::Log1p;
-  return axis;
+  const ScaledRange slider = p.slider();
+  return {p.name, slider.low, slider.high, slider.scale};
 }
 
-double FitAxis::at(double x) const {
-  if (x <= 0) return low;
-  if (x >= 1) return high;
-  return from_scale(scale, to_scale(scale, low) + x * (to_scale(scale, high) - to_scale(scale, low)));
-}
+double FitAxis::at(double x) const { return ScaledRange{scale, low, high}.at(x); }
 
 template <class T> T FitAxis::place(const T& value) const {
   const double first = to_scale(scale, low), span = to_scale(scale, high) - first;

@@ -21,8 +21,7 @@ struct FitAxis {
   template <class T> T place(const T& value) const;
 };
 
-/// The axis that a Number parameter gives: logarithmic if its slider spans more than a factor of 10, by log(1 + x) if
-/// it begins at 0 and passes 10, else linear.
+/// The axis that a Number parameter gives: its slider, on the scale that the schema declares.
 FitAxis fit_axis(const ParamInfo&);
 
 }  // namespace brdfc::fit

@@ -12,13 +12,14 @@
 namespace brdfc::fit {
 
 Fit::Fit(const Model& model, const ParamValues& given, From from) {
-  const ParamInfo* number = open_number(model, given);
+  const Roles& roles = roles_of(model, given);
+  const ParamInfo* number = roles.axis();
   if (!number) {
-    tables_ = make_fit(model, given);
+    tables_ = make_fit(model, roles.fitted());
     return;
   }
   // The same fit whether factors and mixed parameters are known or sockets.
-  const auto [values, factor] = split_along_axis(model, given);
+  const auto [values, factor] = along_axis(model, roles.fitted());
   std::optional<std::filesystem::path> file;
   const StoreKey key = stored_fit(model, values);
   if (from == From::Store)
@@ -27,7 +28,7 @@ Fit::Fit(const Model& model, const ParamValues& given, From from) {
                                    format_values(model.info(), values), number->name),
                        "about a minute");
   if (file)
-    tables_ = read_fit(fit_axis(*number), terms_of(model, values), key.hash(), *file);
+    tables_ = read_fit(fit_axis(*number), roles_of(model, values).terms(), key.hash(), *file);
   else
     tables_ = make_fit(model, values);
   tables_.multiply(factor);
@@ -71,7 +72,9 @@ double Fit::mean_l1(const std::optional<double>& number) const {
   return worst;
 }
 
-const Fit& fit_of(const Model& model, const ParamValues& values) { return made_once<Fit>(model, values); }
+const Fit& fit_of(const Model& model, const ParamValues& values) {
+  return made_once<Fit>(model, roles_of(model, values).fitted());
+}
 
 Fit fit_of(const Model& model, const ParamValues& values, const Cosines& views) {
   const Fit& whole = fit_of(model, values);

@@ -12,9 +12,9 @@
 // plane and across it, is found by a search from one view to the next. All is tabulated over the number and the view
 // angle, and linear between.
 //
-// A file for each step: values.h, what must be known; knots.h, the model at places of the number; facet_search.h and
-// solution.h, the two parts of the search; make.h, which closures and knots there are; fit_tables.h, the tables;
-// evaluate.h, closures of them; file.h and stored.h, how they are kept.
+// A file for each step: roles.h, what each parameter is to it; knots.h, the model at places of the number;
+// facet_search.h and solution.h, the two parts of the search; make.h, which closures and knots there are; fit_tables.h,
+// the tables; evaluate.h, closures of them; file.h and stored.h, how they are kept.
 #pragma once
 
 #include <filesystem>
@@ -26,8 +26,8 @@
 #include "core/cosines.h"
 #include "fit/evaluate.h"
 #include "fit/fit_tables.h"
+#include "fit/roles.h"
 #include "fit/stored.h"
-#include "fit/values.h"
 #include "fit/view_axis.h"
 #include "model/model.h"
 #include "trace/expr.h"
@@ -40,9 +40,9 @@ class Fit {
     Store,   ///< a fit along a number is read if it is kept (stored.h), and made with a line on stderr if not
     Scratch  ///< it is made whatever there is
   };
-  /// `values` may lack mixed parameters, and one number, which becomes the axis: then parameters that are mixed when
-  /// all are open stay open even where `values` have them. Throws ValueError where the model gives a value that is NaN,
-  /// infinite or negative; InputError naming the file that is kept if it is damaged.
+  /// `values` may lack factors, mixed parameters, and one number, which becomes the axis: then parameters that are
+  /// mixed when all are open stay open even where `values` have them. Throws ValueError where the model gives a value
+  /// that is NaN, infinite or negative; InputError naming the file that is kept if it is damaged.
   Fit(const Model&, const ParamValues& values, From from = From::Store);
 
   /// write_fit() of this; `values` are those of the constructor. One along an axis that was made with factors of 1 can
@@ -87,7 +87,8 @@ class Fit {
   FitTables tables_;
 };
 
-/// The fit for these values, made or read at first use and kept while the program runs. Throws as Fit does.
+/// The fit for these values, made or read at first use and kept while the program runs. It has 1 for factors that
+/// they lack. Throws as Fit does.
 const Fit& fit_of(const Model&, const ParamValues& values);
 /// The same for these views alone.
 Fit fit_of(const Model&, const ParamValues& values, const Cosines& views);

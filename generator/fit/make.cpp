@@ -8,8 +8,8 @@
 
 #include "fit/evaluate.h"
 #include "fit/knots.h"
+#include "fit/roles.h"
 #include "fit/settings.h"
-#include "fit/values.h"
 
 namespace brdfc::fit {
 namespace {
@@ -132,8 +132,9 @@ bool make(FitTables& fit, const Model& model, const ParamValues& values, bool gr
 
 FitTables make_fit(const Model& model, const ParamValues& values) {
   FitTables fit;
-  fit.terms = terms_of(model, values);
-  if (const ParamInfo* p = open_number(model, values)) fit.axis = fit_axis(*p);
+  const Roles& roles = roles_of(model, values);
+  fit.terms = roles.terms();
+  if (const ParamInfo* p = roles.axis()) fit.axis = fit_axis(*p);
   // Where the channels differ by a factor alone, one fit serves them all.
   if (!make(fit, model, values, true) && !make(fit, model, values, false))
     throw std::logic_error(model.info().name + ": a fit of colours that is not one");

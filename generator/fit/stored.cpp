@@ -4,15 +4,15 @@
 #include <fmt/format.h>
 
 #include "fit/axis.h"
+#include "fit/roles.h"
 #include "fit/settings.h"
-#include "fit/values.h"
 #include "measure/formula.h"
 
 namespace brdfc::fit {
 
 StoreKey stored_fit(const Model& model, const ParamValues& given) {
-  const ParamValues values = along_axis(model, given);
-  const FitAxis axis = fit_axis(*open_number(model, values));
+  const ParamValues values = along_axis(model, given).values;
+  const FitAxis axis = fit_axis(*roles_of(model, values).axis());
   StoreKey key("fits", model.info().name);
   key.add("values", format_values(model.info(), values));
   key.add("axis", fmt::format("{} {} {} {}", axis.parameter, axis.low, axis.high, name_of(axis.scale)));

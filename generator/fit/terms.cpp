@@ -259,15 +259,14 @@ std::set<std::string> factors(const Model& model, const ParamValues& known) {
   return out;
 }
 
-Terms terms_of(const Model& model, const ParamValues& known) {
+Terms terms_of(const Model& model, const ParamValues& known, const std::set<std::string>& factors) {
   if (!model.has_scatter()) return {};
   const ModelInfo& info = model.info();
   const auto is_open = [&](const ParamInfo& p) { return !known.count(p.name) && may_be_any_share(p); };
   if (std::ranges::none_of(info.params, is_open)) return {};
-  const std::set<std::string> proportional = factors(model, known);
   std::vector<const ParamInfo*> candidates, open;
   for (const ParamInfo& p : info.params)
-    if (is_open(p) && !proportional.count(p.name)) candidates.push_back(&p);
+    if (is_open(p) && !factors.count(p.name)) candidates.push_back(&p);
   const std::vector<ParamValues> asked = places(model, known);
   Powers degrees;
   for (const ParamInfo* p : candidates) {

@@ -19,7 +19,8 @@ namespace brdfc::fit {
 
 /// Parameters that f is proportional to, the other parameters being as they are: colours, and numbers that may be 1.
 /// Closures are fitted without them, and take them as factors of their weights, so they need not be known. Those that
-/// `known` lacks have their defaults, and numbers the ends of their sliders, too.
+/// `known` lacks have their defaults, and numbers the ends of their sliders, too. Who asks for more than this one set
+/// takes Roles (roles.h), which keeps it.
 std::set<std::string> factors(const Model&, const ParamValues& known);
 
 /// A colour, or a number as a grey one; and back.
@@ -49,10 +50,10 @@ struct Terms {
 
 inline constexpr std::size_t kMaxTerms = 4;
 
-/// By parameters that `known` lacks and that are no factors: those in which f is a polynomial, colours of second degree
-/// and numbers of first. They are 0 or 1 in the terms' values, or nearly 0. One term of weight 1 where there are none,
-/// or where they would make more than kMaxTerms.
-Terms terms_of(const Model&, const ParamValues& known);
+/// By parameters that `known` lacks and that are not among the factors(): those in which f is a polynomial, colours of
+/// second degree and numbers of first. They are 0 or 1 in the terms' values, or nearly 0. One term of weight 1 where
+/// there are none, or where they would make more than kMaxTerms.
+Terms terms_of(const Model&, const ParamValues& known, const std::set<std::string>& factors);
 
 extern template std::vector<Rgb<double>> Terms::weights(const std::map<std::string, Rgb<double>>&) const;
 extern template std::vector<Rgb<Expr>> Terms::weights(const std::map<std::string, Rgb<Expr>>&) const;

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/parallel.h"
-#include "fit/values.h"
+#include "fit/roles.h"
 #include "measure/bound_model.h"
 
 namespace brdfc::fit {
@@ -142,7 +142,7 @@ Rgb<double> colour(const Channels& channels, const std::array<double, 1>& at) {
 
 Twin::Twin(const Model& model, const ParamValues& values) {
   // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
-  const auto [white, factor] = split_factors(model, values);
+  const auto [white, factor] = without_factors(model, values);
   const measure::BoundModel bound = measure::bind_model(model, white);
   std::vector<View> views(kTwinKnots);
   for_all(kTwinKnots, [&](std::size_t k) { views[k] = view_of(bound, view_at(int(k)), kPoints); });
@@ -242,6 +242,8 @@ ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {
   return sum;
 }
 
-const Twin& twin_of(const Model& model, const ParamValues& values) { return made_once<Twin>(model, values); }
+const Twin& twin_of(const Model& model, const ParamValues& values) {
+  return made_once<Twin>(model, roles_of(model, values).fitted());
+}
 
 }  // namespace brdfc::fit

@@ -61,7 +61,8 @@ class Twin {
   std::vector<ViewError> errors_;
 };
 
-/// The twin for these values, made at first use and kept while the program runs.
+/// The twin for these values, made at first use and kept while the program runs. They may lack factors (roles.h), for
+/// which it has 1.
 const Twin& twin_of(const Model&, const ParamValues& values);
 
 }  // namespace brdfc::fit

@@ -344,7 +344,7 @@ struct AimedSum {
   double density;                   ///< of drawing it
 };
 
-/// As the shader goes about it (pack/shader.cpp), with the base for wo. u: three numbers that draw the direction; v:
+/// As the shader goes about it (aimed.cpp), with the base for wo. u: three numbers that draw the direction; v:
 /// two a lamp that choose a point of it, independent of one another.
 AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
                    const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 2>>& v);

@@ -19,7 +19,7 @@ std::vector<TableAxis> place_knots(const AlbedoPolynomial& polynomial, const Par
   std::vector<double> bend(axes.size(), 0.);  // error = bend / knots^2
   for (std::size_t a = 0; a < axes.size(); ++a) {
     const Coordinate& c = coordinates[axes[a]];
-    for (int j = 0; j < kProfile; ++j) s[a][std::size_t(j)] = to_scale(c.scale, c.at(double(j) / (kProfile - 1)));
+    for (int j = 0; j < kProfile; ++j) s[a][std::size_t(j)] = to_scale(c.range.scale, c.at(double(j) / (kProfile - 1)));
     std::vector<Coefficients> profile(lines * kProfile);
     for_all(profile.size(), [&](std::size_t i) {
       Position x = probes[i / kProfile];
@@ -77,25 +77,26 @@ std::vector<TableAxis> place_knots(const AlbedoPolynomial& polynomial, const Par
   std::vector<TableAxis> out;
   for (std::size_t a = 0; a < axes.size(); ++a) {
     const Coordinate& c = coordinates[axes[a]];
-    TableAxis axis{c.name, c.scale, {}, false};
+    TableAxis axis{c.name, c.range.scale, {}, false};
     std::vector<double> sum{0};
     for (int j = 0; j + 1 < kProfile; ++j)
       sum.push_back(sum.back() + 0.5 * (density[a][std::size_t(j)] + density[a][std::size_t(j) + 1]) *
                                      (s[a][std::size_t(j) + 1] - s[a][std::size_t(j)]));
     for (int i = 0; i < count[a]; ++i) {
       if (i == 0) {
-        axis.values.push_back(c.min);
+        axis.values.push_back(c.range.low);
         continue;
       }
       if (i + 1 == count[a]) {
-        axis.values.push_back(c.max);
+        axis.values.push_back(c.range.high);
         continue;
       }
       const double target = sum.back() * i / (count[a] - 1);
       const std::size_t j = std::min<std::size_t>(
           std::size_t(std::upper_bound(sum.begin(), sum.end(), target) - sum.begin()) - 1, kProfile - 2);
       const double t = (target - sum[j]) / (sum[j + 1] - sum[j]);
-      axis.values.push_back(std::clamp(from_scale(c.scale, s[a][j] + t * (s[a][j + 1] - s[a][j])), c.min, c.max));
+      axis.values.push_back(
+          std::clamp(from_scale(c.range.scale, s[a][j] + t * (s[a][j + 1] - s[a][j])), c.range.low, c.range.high));
     }
     out.push_back(std::move(axis));
   }

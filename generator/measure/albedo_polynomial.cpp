@@ -31,28 +31,17 @@ bool differ(const Coefficients& a, const Coefficients& b) {
 }  // namespace
 
 double Coordinate::at(double t) const {
-  if (name == "cos_theta_o") return min + (max - min) * t * t;
-  if (t <= 0) return min;
-  if (t >= 1) return max;
-  return std::clamp(from_scale(scale, to_scale(scale, min) + t * (to_scale(scale, max) - to_scale(scale, min))), min,
-                    max);
+  return name == "cos_theta_o" ? range.low + (range.high - range.low) * t * t : range.at(t);
 }
 
-Coordinate coordinate_of(const ParamInfo& p) {
-  Coordinate c{p.name, AxisScale::Linear, p.min, p.max};
-  if (p.min > 0 && p.max / p.min > 100)
-    c.scale = AxisScale::Log;
-  else if (p.min >= 0 && p.max > 100)
-    c.scale = AxisScale::Log1p;
-  return c;
-}
+Coordinate coordinate_of(const ParamInfo& p) { return {p.name, p.accepted()}; }
 
 double max_abs(const Rgb<double>& c) { return max_component(magnitude(c)); }
 
 double unit_of(const Rgb<double>& albedo) { return std::max(1.0, max_abs(albedo)); }
 
 AlbedoPolynomial::AlbedoPolynomial(const Model& model, const std::vector<ParamValues>& combinations) : model_(model) {
-  coordinates_.push_back({"cos_theta_o", AxisScale::Linear, kTableSettings.min_cos, 1});
+  coordinates_.push_back({"cos_theta_o", {AxisScale::Linear, kTableSettings.min_cos, 1}});
   for (const ParamInfo& p : model.info().params) {
     if (p.kind == ParamKind::Number) coordinates_.push_back(coordinate_of(p));
     if (p.kind == ParamKind::Color) colors_.push_back(p.name);
@@ -245,11 +234,11 @@ void AlbedoPolynomial::study_azimuth(const std::vector<ParamValues>& combination
   }
   turns_.assign(coordinates_.size(), false);
   for (std::size_t p = 1; p < coordinates_.size(); ++p) {
-    if (coordinates_[p].max - coordinates_[p].min < 1) continue;
+    if (coordinates_[p].range.high - coordinates_[p].range.low < 1) continue;
     // The same samples in the turned frame: equal up to rounding, if it is a turn.
     turns_[p] = all_equal([&](const Case& c) {
       Position x = c.x;
-      const double sign = x[p] + c.turn <= coordinates_[p].max ? 1 : -1;
+      const double sign = x[p] + c.turn <= coordinates_[p].range.high ? 1 : -1;
       x[p] += sign * c.turn;
       return coefficients(c.combination, x, c.phi + sign * c.turn);
     });

@@ -18,13 +18,12 @@ namespace brdfc::measure {
 /// A coordinate of the albedo: the view cosine or a Number parameter, in units of the parameter.
 struct Coordinate {
   std::string name;
-  AxisScale scale = AxisScale::Linear;
-  double min = 0, max = 1;
+  ScaledRange range;
 
   /// A value at t in [0, 1], uniform on the scale; the cosine crowds towards grazing, where albedos bend most.
   double at(double t) const;
 };
-/// That of a Number parameter, over its whole range. A range of more than two decades is looked at by factors.
+/// That of a Number parameter, over its whole range.
 Coordinate coordinate_of(const ParamInfo&);
 
 /// A value for each coordinate.

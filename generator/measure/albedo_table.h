@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "core/axis_scale.h"
 #include "model/model.h"
 #include "tables/table.h"
 

@@ -11,22 +11,6 @@
 #include "model/sampling.h"
 
 namespace brdfc::measure {
-namespace {
-
-double random_number(const ParamInfo& p, Random& random) {
-  const double u = uniform(random);
-  // The mapping of the albedo tables: by factors where the range spans decades.
-  double v;
-  if (p.soft_min > 0 && p.soft_max / p.soft_min > 100)
-    v = p.soft_min * std::pow(p.soft_max / p.soft_min, u);
-  else if (p.soft_min >= 0 && p.soft_max > 100)
-    v = std::expm1(std::log1p(p.soft_min) + u * (std::log1p(p.soft_max) - std::log1p(p.soft_min)));
-  else
-    v = p.soft_min + u * (p.soft_max - p.soft_min);
-  return std::clamp(v, p.soft_min, p.soft_max);
-}
-
-}  // namespace
 
 double uniform(Random& random) { return double(random() >> 11) * 0x1p-53; }
 
@@ -65,23 +49,24 @@ std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brd
   return out;
 }
 
+ParamValues random_values(const ModelInfo& info, ParamValues values, Random& random) {
+  for (const ParamInfo& p : info.params) {
+    if (p.kind == ParamKind::Number) values[p.name] = p.slider().at(uniform(random));
+    if (p.kind == ParamKind::Color) {
+      const double r = uniform(random), g = uniform(random), b = uniform(random);
+      values[p.name] = std::array<double, 3>{r, g, b};
+    }
+  }
+  return complete(info, values);
+}
+
 std::vector<ParamValues> slider_cases(const ModelInfo& info, int draws, std::uint64_t seed) {
   Random random(seed);
   std::vector<ParamValues> out;
   for (const Choices& c : choice_combinations(info)) {
     const ParamValues choices = with_choices(info, c);
     out.push_back(complete(info, choices));
-    for (int i = 0; i < draws; ++i) {
-      ParamValues v = choices;
-      for (const ParamInfo& p : info.params) {
-        if (p.kind == ParamKind::Number) v[p.name] = random_number(p, random);
-        if (p.kind == ParamKind::Color) {
-          const double r = uniform(random), g = uniform(random), b = uniform(random);
-          v[p.name] = std::array<double, 3>{r, g, b};
-        }
-      }
-      out.push_back(complete(info, v));
-    }
+    for (int i = 0; i < draws; ++i) out.push_back(random_values(info, choices, random));
   }
   return out;
 }

@@ -50,8 +50,9 @@ template <class T> Rgb<T> value_of(const Model& model, const Brdf<T>& brdf, cons
 std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>&, int count, Random&,
                                                          bool two_sided = false);
 
-/// For every combination of choices the defaults and `random` draws (log-uniform where a range spans decades) within
-/// the sliders' ranges.
+/// `choices`, and numbers and colours drawn uniformly within the sliders' ranges; by factors where the schema says so.
+ParamValues random_values(const ModelInfo&, ParamValues choices, Random&);
+/// For every combination of choices the defaults and `random` draws of random_values().
 std::vector<ParamValues> slider_cases(const ModelInfo&, int random, std::uint64_t seed);
 /// With the default choices, every number at both ends of a range and colours at 0 and 1, one by one and all together.
 std::vector<ParamValues> end_cases(const ModelInfo&, bool sliders);

@@ -33,7 +33,17 @@ void check_identifier(const std::string& what, const std::string& name) {
     throw std::logic_error(what + " '" + name + "': expected lower-case letters, digits and underscores");
 }
 
+ScaledRange range(const ParamInfo& p, double low, double high) {
+  if (!p.by_factors) return {AxisScale::Linear, low, high};
+  if (low > 0) return {AxisScale::Log, low, high};
+  // Where factors lead to no end; up to 1, log(1 + x) is as good as straight.
+  return {high > 1 ? AxisScale::Log1p : AxisScale::Linear, low, high};
+}
+
 }  // namespace
+
+ScaledRange ParamInfo::slider() const { return range(*this, soft_min, soft_max); }
+ScaledRange ParamInfo::accepted() const { return range(*this, min, max); }
 
 const ParamInfo* ModelInfo::param(const std::string& wanted) const {
   for (const ParamInfo& p : params)
@@ -66,6 +76,8 @@ bool register_model(std::unique_ptr<Model> model) {
     for (const std::string& c : p.choices) check_identifier(info.name + ": " + p.name + ": choice", c);
     if (!(p.min <= p.soft_min && p.soft_min <= p.soft_max && p.soft_max <= p.max))
       throw std::logic_error(info.name + ": " + p.name + ": the slider's range must lie inside the accepted one");
+    if (p.by_factors && !(p.min >= 0))
+      throw std::logic_error(info.name + ": " + p.name + ": a number that goes by factors must not be negative");
   }
   const std::string name = info.name;
   if (!registry().emplace(name, std::move(model)).second) throw std::logic_error("two models are named " + name);

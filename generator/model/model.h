@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "closures/closure.h"
+#include "core/axis_scale.h"
 #include "core/error.h"
 #include "core/vec.h"
 #include "trace/expr.h"
@@ -48,6 +49,12 @@ struct ParamInfo {
   std::array<double, 3> value{0, 0, 0};  ///< default; a Number uses element 0, a Choice its index
   std::vector<std::string> choices;      ///< identifiers, for a Choice
   ParamKind kind = ParamKind::Number;
+  /// Its effect changes by factors of the number rather than by differences.
+  bool by_factors = false;
+
+  /// What it is stepped through by, from one end to the other: of the slider, and of all that is accepted.
+  ScaledRange slider() const;
+  ScaledRange accepted() const;
 };
 
 /// A choice under which f holds tables of an integral instead of a formula for it.
@@ -187,6 +194,14 @@ struct NumberSpec {
   double soft_min, soft_max;
   const char* doc;
   const char* unit = "";
+  bool factors = false;
+
+  /// The same, declared as ParamInfo::by_factors.
+  NumberSpec by_factors() const {
+    NumberSpec out = *this;
+    out.factors = true;
+    return out;
+  }
 };
 struct ColorSpec {
   const char* name;
@@ -206,8 +221,18 @@ namespace detail {
 struct SchemaVisitor {
   std::vector<ParamInfo>& out;
   template <class T> void operator()(T&, const NumberSpec& s) const {
-    out.push_back(
-        {s.name, s.label, s.unit, s.doc, s.min, s.max, s.soft_min, s.soft_max, {s.value, 0, 0}, {}, ParamKind::Number});
+    out.push_back({s.name,
+                   s.label,
+                   s.unit,
+                   s.doc,
+                   s.min,
+                   s.max,
+                   s.soft_min,
+                   s.soft_max,
+                   {s.value, 0, 0},
+                   {},
+                   ParamKind::Number,
+                   s.factors});
   }
   template <class T> void operator()(Rgb<T>&, const ColorSpec& s) const {
     out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color});

@@ -32,7 +32,8 @@ template <class T> struct Blinn {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of a facet, k_s"});
-    v(e, NumberSpec{"e", "Exponent", 50, 0, 1e8, 0, 1000, "Exponent of the facets' distribution: larger is smoother"});
+    v(e, NumberSpec{"e", "Exponent", 50, 0, 1e8, 0, 1000, "Exponent of the facets' distribution: larger is smoother"}
+             .by_factors());
   }
 
   T D(const Vec3<T>& h) const {

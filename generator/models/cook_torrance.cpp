@@ -35,7 +35,7 @@ template <class T> struct CookTorrance {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"});
-    v(m, NumberSpec{"m", "Slope", 0.3, 1e-4, 1, 0.05, 1, "Root mean square slope of the facets, m"});
+    v(m, NumberSpec{"m", "Slope", 0.3, 1e-4, 1, 0.05, 1, "Root mean square slope of the facets, m"}.by_factors());
   }
 
   T D(const Vec3<T>& h) const {

@@ -36,9 +36,12 @@ template <class T> struct FresnelConductor {
     for (const Metal& m : metals()) names.push_back(m.name);
     names.push_back("custom");
     v(metal, ChoiceSpec{"metal", "Metal", names, "Copper, gold, silver, aluminium, iron, chromium, or own n and k"});
-    v(n_r, NumberSpec{"n_r", "n Red", 0.2, 1e-3, 100, 0.05, 5, "Real part of the refractive index, for custom"});
-    v(n_g, NumberSpec{"n_g", "n Green", 0.9, 1e-3, 100, 0.05, 5, "Real part of the refractive index, for custom"});
-    v(n_b, NumberSpec{"n_b", "n Blue", 1.1, 1e-3, 100, 0.05, 5, "Real part of the refractive index, for custom"});
+    v(n_r, NumberSpec{"n_r", "n Red", 0.2, 1e-3, 100, 0.05, 5, "Real part of the refractive index, for custom"}
+               .by_factors());
+    v(n_g, NumberSpec{"n_g", "n Green", 0.9, 1e-3, 100, 0.05, 5, "Real part of the refractive index, for custom"}
+               .by_factors());
+    v(n_b, NumberSpec{"n_b", "n Blue", 1.1, 1e-3, 100, 0.05, 5, "Real part of the refractive index, for custom"}
+               .by_factors());
     v(k_r, NumberSpec{"k_r", "k Red", 3.9, 0, 100, 0, 10, "Imaginary part of the refractive index, for custom"});
     v(k_g, NumberSpec{"k_g", "k Green", 2.4, 0, 100, 0, 10, "Imaginary part of the refractive index, for custom"});
     v(k_b, NumberSpec{"k_b", "k Blue", 2.2, 0, 100, 0, 10, "Imaginary part of the refractive index, for custom"});

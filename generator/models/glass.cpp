@@ -32,7 +32,7 @@ template <class T> struct Glass {
                              "Attenuation",
                              {0.5, 0.9, 0.7},
                              "Share of the light that is left after one unit of length inside, at density 1"});
-    v(density, NumberSpec{"density", "Density", 1, 0, 1e6, 0, 10, "Multiplies the absorption per length"});
+    v(density, NumberSpec{"density", "Density", 1, 0, 1e6, 0, 10, "Multiplies the absorption per length"}.by_factors());
   }
 
   T ior() const { return index; }

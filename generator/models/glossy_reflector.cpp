@@ -37,7 +37,8 @@ template <class T> struct GlossyReflector {
   template <class Visitor> void parameters(const Visitor& v) {
     v(kr, NumberSpec{"kr", "Reflection", 0.9, 0, 1, 0, 1, "Share of the light that is reflected, k_r"});
     v(cr, ColorSpec{"cr", "Reflection Color", {1, 1, 1}, "Color of the reflection, c_r"});
-    v(e, NumberSpec{"e", "Exponent", 100, 1, 1e7, 1, 100000, "1 is matte about the mirror direction; larger sharper"});
+    v(e, NumberSpec{"e", "Exponent", 100, 1, 1e7, 1, 100000, "1 is matte about the mirror direction; larger sharper"}
+             .by_factors());
     v(below, ChoiceSpec{"below",
                         "Rays Below",
                         {"mirror", "lose"},

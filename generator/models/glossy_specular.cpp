@@ -38,7 +38,7 @@ template <class T> struct GlossySpecular {
   template <class Visitor> void parameters(const Visitor& v) {
     v(ks, NumberSpec{"ks", "Specular", 0.65, 0, 1, 0, 1, "Strength of the highlight, k_s"});
     v(cs, ColorSpec{"cs", "Specular Color", {1, 1, 1}, "Color of the highlight, c_s"});
-    v(e, NumberSpec{"e", "Exponent", 25, 1, 1e7, 1, 100000, "Width of the highlight; larger is sharper"});
+    v(e, NumberSpec{"e", "Exponent", 25, 1, 1e7, 1, 100000, "Width of the highlight; larger is sharper"}.by_factors());
     v(normalisation,
       ChoiceSpec{"normalisation",
                  "Normalisation",

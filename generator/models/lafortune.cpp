@@ -40,7 +40,7 @@ template <class T> struct Lafortune {
     v(cxy,
       NumberSpec{"cxy", "Horizontal", -1, -1, 1, -1, 1, "C_xy: -1 mirrors, 1 returns the light, 0 ignores azimuths"});
     v(cz, NumberSpec{"cz", "Vertical", 0.8, 0, 1, 0, 1, "C_z: smaller than |C_xy| bends the lobe towards the horizon"});
-    v(e, NumberSpec{"e", "Exponent", 10, 0, 300, 1, 100, "Exponent of the lobe: larger is narrower"});
+    v(e, NumberSpec{"e", "Exponent", 10, 0, 300, 1, 100, "Exponent of the lobe: larger is narrower"}.by_factors());
     v(ks,
       ColorSpec{
           "ks", "Specular", {0.5, 0.5, 0.5}, "Share of the light that is reflected, seen from above, with C_z = 1"});

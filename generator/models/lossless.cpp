@@ -26,14 +26,15 @@ template <class T> struct Lossless : KernelLobe<T, EvenKnots<T, 4>> {
                  "Kernel",
                  {"sech2", "exponential", "table"},
                  "Shape k(u): sech^2 u (eq. 14), e^-u, or a curve drawn by its heights at u = 0, 1, 2, 3"});
-    v(this->n, NumberSpec{"n", "Glossiness", 4, 0, 1e4, 0, 100, "Glossiness n: 0 is matte"});
+    v(this->n, NumberSpec{"n", "Glossiness", 4, 0, 1e4, 0, 100, "Glossiness n: 0 is matte"}.by_factors());
     static constexpr const char* kNames[] = {"h0", "h1", "h2", "h3"};
     static constexpr const char* kLabels[] = {"Height 0", "Height 1", "Height 2", "Height 3"};
     static constexpr double kDrawn[] = {1, 0.6, 0.2, 0.1};
     for (int i = 0; i < this->drawn.count(); ++i)
       v(this->drawn.heights[std::size_t(i)],
         NumberSpec{kNames[i], kLabels[i], kDrawn[i], 1e-3, 1, 1e-3, 1,
-                   "Height of the drawn kernel at the distance of this number, over 1 / n"});
+                   "Height of the drawn kernel at the distance of this number, over 1 / n"}
+            .by_factors());
     v(this->tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
   }
 };

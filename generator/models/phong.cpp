@@ -34,7 +34,8 @@ template <class T> struct Phong {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Height of the highlight, k_s"});
-    v(e, NumberSpec{"e", "Exponent", 20, 0, 1e8, 1, 1000, "Phong exponent: larger is narrower, and darker as a whole"});
+    v(e, NumberSpec{"e", "Exponent", 20, 0, 1e8, 1, 1000, "Phong exponent: larger is narrower, and darker as a whole"}
+             .by_factors());
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {

@@ -42,10 +42,12 @@ template <class T> struct PhongMaterial {
     v(cd, ColorSpec{"cd", "Diffuse Color", {1, 1, 0.3}, "Color of the matte term, c_d"});
     v(ks, NumberSpec{"ks", "Specular", 0.2, 0, 1, 0, 1, "Height of the highlight, k_s"});
     v(cs, ColorSpec{"cs", "Specular Color", {1, 1, 1}, "Color of the highlight, c_s"});
-    v(es, NumberSpec{"es", "Specular Exponent", 25, 1, 1e7, 1, 1000, "Width of the highlight; larger is sharper"});
+    v(es, NumberSpec{"es", "Specular Exponent", 25, 1, 1e7, 1, 1000, "Width of the highlight; larger is sharper"}
+              .by_factors());
     v(kr, NumberSpec{"kr", "Reflection", 0.4, 0, 1, 0, 1, "Share of the light that is reflected, k_r"});
     v(cr, ColorSpec{"cr", "Reflection Color", {1, 1, 0.3}, "Color of the reflection, c_r"});
-    v(e, NumberSpec{"e", "Reflection Exponent", 100, 1, 1e7, 1, 100000, "Blur of the reflection; larger is sharper"});
+    v(e, NumberSpec{"e", "Reflection Exponent", 100, 1, 1e7, 1, 100000, "Blur of the reflection; larger is sharper"}
+             .by_factors());
   }
 
   /// (e + 1) / (2 pi) cos^e alpha, twice that where the partner about r is below the surface.

@@ -49,10 +49,11 @@ template <class T> struct RadziszewskiAlda {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e8, 0, 100, "Glossiness n: 0 is matte, infinity a mirror"});
-    v(n_theta,
-      NumberSpec{"n_theta", "Latitudinal Glossiness", 4, 0, 1e8, 0, 100, "n_theta, for the custom proportion"});
-    v(n_phi, NumberSpec{"n_phi", "Longitudinal Glossiness", 4, 0, 1e8, 0, 100, "n_phi, for the custom proportion"});
+    v(n, NumberSpec{"n", "Glossiness", 4, 0, 1e8, 0, 100, "Glossiness n: 0 is matte, infinity a mirror"}.by_factors());
+    v(n_theta, NumberSpec{"n_theta", "Latitudinal Glossiness", 4, 0, 1e8, 0, 100, "n_theta, for the custom proportion"}
+                   .by_factors());
+    v(n_phi, NumberSpec{"n_phi", "Longitudinal Glossiness", 4, 0, 1e8, 0, 100, "n_phi, for the custom proportion"}
+                 .by_factors());
     v(proportion, ChoiceSpec{"proportion",
                              "Proportion",
                              {"paper", "equal", "custom"},

@@ -10,7 +10,8 @@
 //
 // The light that G blocks is lost here; the paper also offers to give it back as (1 - G G') / (4 pi v v'), whose albedo
 // grows without limit towards grazing angles. Z (n.h) A integrates to pi for p = 1 only: the mean of A over azimuths is
-// (2 / pi) sqrt(p) K(sqrt(1 - p^2)) (K: complete elliptic integral), so that anisotropy costs light.
+// (2 / pi) sqrt(p) K(sqrt(1 - p^2)) (K: complete elliptic integral), so that anisotropy costs light. Beside a strong
+// mirror term it gains some at grazing angles: with r = 1, p = 1, s = 0.05 the albedo is 1.11 at v = 0.02.
 //
 // There are no edges, but with p < 1 one point at h = n where f depends on the way that one comes from: so A is made.
 //
@@ -34,7 +35,8 @@ template <class T> struct Schlick {
                 "1994",
             .equations = "f = S (a / pi + b G G' Z A / (4 pi v v') + c delta)",
             .doc = "Rational approximation of a microfacet model: Lambertian, glossy and mirror-like by one roughness.",
-            .properties = {.isotropic = false,
+            .properties = {.conserving = false,
+                           .isotropic = false,
                            .exact_sampling = false,
                            .diffuse_limit = "r=1 rough=1",
                            .specular_limit = "rough=0",
@@ -47,7 +49,8 @@ template <class T> struct Schlick {
     v(p, NumberSpec{"p", "Isotropy", 1, 0.01, 1, 0.05, 1,
                     "1 is isotropic; smaller stretches the highlight across the tangent"});
     v(rough,
-      NumberSpec{"rough", "Roughness", 0.2, 0, 1, 0.01, 1, "0 is a mirror, 1 Lambertian but for the Fresnel term"});
+      NumberSpec{"rough", "Roughness", 0.2, 0, 1, 0.01, 1, "0 is a mirror, 1 Lambertian but for the Fresnel term"}
+          .by_factors());
   }
 
   Rgb<T> S(const T& one_minus_u) const { return named("S", r + (Rgb<T>(T(1)) - r) * pow5(one_minus_u)); }

@@ -38,10 +38,11 @@ template <class T> struct Ward {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of the lobe, k_s"});
-    v(ax,
-      NumberSpec{"ax", "Roughness X", 0.15, 1e-4, 1, 0.02, 0.5, "Standard deviation of the slope along the tangent"});
+    v(ax, NumberSpec{"ax", "Roughness X", 0.15, 1e-4, 1, 0.02, 0.5, "Standard deviation of the slope along the tangent"}
+              .by_factors());
     v(ay,
-      NumberSpec{"ay", "Roughness Y", 0.15, 1e-4, 1, 0.02, 0.5, "Standard deviation of the slope across the tangent"});
+      NumberSpec{"ay", "Roughness Y", 0.15, 1e-4, 1, 0.02, 0.5, "Standard deviation of the slope across the tangent"}
+          .by_factors());
     v(normalisation, ChoiceSpec{"normalisation",
                                 "Normalisation",
                                 {"bounded", "duer", "ward"},

@@ -6,24 +6,11 @@
 #include <optional>
 #include <set>
 
-#include "fit/terms.h"
+#include "fit/roles.h"
 #include "measure/bound_model.h"
 #include "model/choices.h"
 
 namespace brdfc::pack {
-namespace {
-
-using forms::RepresentationKind;
-
-/// Whether a clamp shows in a form by how bright its highlight is: in closures that are glossy, and directions drawn
-/// beside a base or lobes; not where a mirror shows it before.
-bool has_highlight(RepresentationKind kind, bool mirror, const Shader& shader) {
-  const bool ramps = shader.slots > shader.closures;
-  return !mirror && (kind == RepresentationKind::Twin || kind == RepresentationKind::Aimed ||
-                     ((kind == RepresentationKind::Exact || kind == RepresentationKind::Fitted) && ramps));
-}
-
-}  // namespace
 
 Json parameter_json(const ParamInfo& p) {
   Json j = {{"name", p.name}, {"label", p.label}};
@@ -53,7 +40,7 @@ Json parameter_json(const ParamInfo& p) {
   return j;
 }
 
-Json error_json(const forms::RepresentationError& e) {
+Json error_json(const forms::FormError& e) {
   return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
           {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
           {"albedo", e.albedo},
@@ -64,42 +51,6 @@ Json values_json(const ParamValues& values) {
   Json j = Json::object();
   for (const auto& [name, value] : values) j[name] = std::visit([](const auto& v) { return Json(v); }, value);
   return j;
-}
-
-std::vector<std::string> warnings(RepresentationKind kind, bool mirror, const Shader& shader) {
-  // Measured in Cycles (script/conditions): bump-map correction turns closures where a normal is bent; a clamp or a
-  // lamp of no size meets a sampled lobe differently from Blender's own closures, and its lobes' normals are not the
-  // surface's; a clamp darkens lights in a mirror and, by how bright they are, highlights; Filter Glossy blurs mirrors
-  // and facets; mirrors and drawn directions do not meet lamps without multiple importance.
-  std::vector<std::string> codes = {"bump_correction"};
-  if (mirror || kind == RepresentationKind::Sampled || kind == RepresentationKind::Aimed)
-    codes.push_back("multiple_importance");
-  if (kind == RepresentationKind::Twin) {
-    // Blender's own nodes: a matte one, glossy ones whose facets lean, and a mirror.
-    codes.insert(codes.end(), {"leaning_facets", "caustics", "filter_glossy"});
-    if (mirror) codes.push_back("clamp_mirror");
-    return codes;
-  }
-  if (kind == RepresentationKind::Aimed) {
-    // Path Guiding and the passes know nothing of closures that take light away: pictures get 2 % too bright, the
-    // albedo too high by what base and rest cancel. Normals are those of the drawn lobes where no base outweighs them.
-    codes.insert(codes.end(), {"path_guiding", "orthographic_far", "albedo_passes"});
-    if (mirror) codes.push_back("clamp_mirror");
-    if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
-  } else if (kind == RepresentationKind::Sampled) {
-    codes.insert(codes.end(),
-                 {"clamp_indirect", "clamp_direct", "zero_size_lights", "orthographic_far", "normal_pass"});
-  } else if (mirror) {
-    codes.push_back("clamp_mirror");
-  }
-  // Cycles drops glossy closures behind a diffuse surface; ramps it does not.
-  if (shader.facets) codes.push_back("caustics");
-  if (mirror || shader.facets) codes.push_back("filter_glossy");
-  if (mirror && kind == RepresentationKind::Sampled) codes.push_back("albedo_passes_mirror");
-  // Only ramps take more slots than closures, and in an exact form they are signed: what they take away the passes
-  // do not see.
-  if (kind == RepresentationKind::Exact && shader.slots > shader.closures) codes.push_back("albedo_passes");
-  return codes;
 }
 
 Json table_json(const measure::AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
@@ -135,14 +86,17 @@ Json axis_json(const fit::Fit* fit) {
   return {{"name", fit->axis()->parameter}, {"min", fit->axis()->low}, {"max", fit->axis()->high}};
 }
 
-Json highlight_json(const Model& model, RepresentationKind kind, const Shader& shader, const ParamValues& fixed) {
-  if (!has_highlight(kind, model.has_mirror(), shader)) return {};
+Json highlight_json(const Model& model, const forms::Form& form, const forms::Shader& shader,
+                    const ParamValues& fixed) {
+  if (!form.highlights(model, shader)) return {};
   constexpr int kValues = 9;
   const ModelInfo& info = model.info();
   std::vector<const ParamInfo*> numbers;
-  const std::set<std::string> scales = fit::factors(model, fixed);
-  for (const ParamInfo& p : info.params)
-    if (p.kind == ParamKind::Number && !fixed.count(p.name) && !scales.count(p.name)) numbers.push_back(&p);
+  const fit::Roles& roles = fit::roles_of(model, fixed);
+  for (const ParamInfo& p : info.params) {
+    const fit::Role role = roles.of(p.name);
+    if (p.kind == ParamKind::Number && role != fit::Role::Constant && role != fit::Role::Factor) numbers.push_back(&p);
+  }
   const auto declared =
       std::ranges::find(numbers, info.properties.fit_axis, [](const ParamInfo* p) { return p->name; });
   const ParamInfo* over = declared != numbers.end() ? *declared : numbers.size() == 1 ? numbers[0] : nullptr;
@@ -150,7 +104,7 @@ Json highlight_json(const Model& model, RepresentationKind kind, const Shader& s
   for (int i = 0; i < (over ? kValues : 1); ++i) {
     ParamValues at = fixed;
     if (over) {
-      const double number = fit::fit_axis(*over).at(double(i) / (kValues - 1));
+      const double number = over->slider().at(double(i) / (kValues - 1));
       at[over->name] = number;
       values.push_back(number);
     }

@@ -7,10 +7,9 @@
 #include <vector>
 
 #include "fit/fit.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/albedo_table.h"
 #include "model/model.h"
-#include "pack/shader.h"
 
 namespace brdfc::pack {
 
@@ -18,16 +17,14 @@ using Json = nlohmann::ordered_json;
 
 Json parameter_json(const ParamInfo&);
 Json values_json(const ParamValues&);
-Json error_json(const forms::RepresentationError&);
+Json error_json(const forms::FormError&);
 /// Without what is fixed. `file`: where the pack has the table as an image.
 Json table_json(const measure::AlbedoTable&, const std::string& file, const Model&, const ParamValues& fixed);
-/// What a user must know of a form; the add-on turns each into words where it applies.
-std::vector<std::string> warnings(forms::RepresentationKind, bool mirror, const Shader&);
 /// The number that a fit runs over, and how far; null without one.
 Json axis_json(const fit::Fit*);
 /// How bright a form's highlight is: f cos about the mirror direction, the brighter of two views; and over which number
 /// of its sliders, if any. A clamp on indirect light shows the earlier the brighter it is. Null for a form in which a
 /// clamp does not show by that.
-Json highlight_json(const Model&, forms::RepresentationKind, const Shader&, const ParamValues& fixed);
+Json highlight_json(const Model&, const forms::Form&, const forms::Shader&, const ParamValues& fixed);
 
 }  // namespace brdfc::pack

@@ -18,25 +18,19 @@
 #include "core/hash.h"
 #include "core/parse.h"
 #include "fit/fit.h"
-#include "fit/terms.h"
-#include "fit/twin.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
 #include "measure/stored_albedo.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
-#include "pack/nodes.h"
 #include "pack/python_package.h"
-#include "pack/shader.h"
 #include "pack/zip.h"
 #include "plan/costs.h"
 
 namespace brdfc::pack {
 namespace {
-
-using forms::RepresentationKind;
 
 namespace fs = std::filesystem;
 
@@ -103,27 +97,11 @@ struct BuiltModel {
   std::vector<Line> lines;
 };
 
-/// What a form looks its closures up in; none but a fitted one, and an aimed one whose base is a fit, do.
-const fit::Fit* fit_in(RepresentationKind kind, const plan::PlannedModel& plan, const ParamValues& fixed) {
-  const bool base = kind == RepresentationKind::Aimed && plan.base == forms::AimedBase::Fitted;
-  if (kind != RepresentationKind::Fitted && !base) return nullptr;
-  return &fit::fit_of(*plan.model, fit::without_factors(*plan.model, fixed));
-}
-
-/// What a form of a plan has no parameters for.
-ParamValues fixed_in(const plan::PlannedModel& plan, RepresentationKind kind) {
-  ParamValues fixed = plan.fixed;
-  fixed.merge(forms::form_values(*plan.model, kind, plan.fixed));
-  return fixed;
-}
-
-/// Makes or reads what a form is made of, so that asking for it takes no time afterwards.
-void prepare_fit(const plan::PlannedModel& plan, RepresentationKind kind) {
-  const ParamValues values = fit::without_factors(*plan.model, fixed_in(plan, kind));
-  if (kind == RepresentationKind::Twin)
-    fit::twin_of(*plan.model, values);
-  else
-    fit::fit_of(*plan.model, values);
+/// What a form of a plan is made for.
+forms::Setting setting_of(const plan::PlannedModel& plan, const forms::Form& form) {
+  forms::Setting setting{plan.fixed, plan.views, plan.max_lamps, plan.base};
+  setting.fixed.merge(form.values(*plan.model, plan.fixed));
+  return setting;
 }
 
 BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs, const fs::path& scratch) {
@@ -154,38 +132,36 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
     fs::remove(exr);
   }
 
-  j["auto"] = name_of(plan.forms.front());
-  for (RepresentationKind kind : plan.forms) {
-    const bool twin = kind == RepresentationKind::Twin;
-    const ParamValues fixed = fixed_in(plan, kind);
-    const fit::Fit* fit = fit_in(kind, plan, fixed);
+  j["auto"] = plan.forms.front()->name();
+  for (const forms::Form* form : plan.forms) {
+    const forms::Setting setting = setting_of(plan, *form);
+    const ParamValues& fixed = setting.fixed;
+    const fit::Fit* fit = form->fit(model, setting);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
                       of_fit = fit && !plan.views.all() ? fit->cut_to(plan.views).size() : of_whole_fit;
     const measure::AlbedoTable of_form =
         fixed == plan.fixed ? table : measure::fold(whole_table, model, fixed, plan.views);
-    const Shader shader = twin ? write_nodes(model, fixed)
-                               : write_shader(model, kind, of_form, fixed, plan.views, plan.max_lamps, plan.base);
+    const forms::Shader shader = form->write(model, of_form, setting);
     // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
     // What is fitted exists for these parameters only.
-    const ParamValues whole_fixed = forms::is_fit(kind) ? fixed : ParamValues{};
-    const bool cut = !plan.views.all() || (!forms::is_fit(kind) && !plan.fixed.empty());
-    const Shader whole =
-        cut && !twin ? write_shader(model, kind, measure::fold(whole_table, model, whole_fixed), whole_fixed) : shader;
-    const forms::RepresentationError error = forms::measure_error(model, kind, fixed, plan.views);
-    // Costs were measured with the base that a model declares.
-    const bool measured = kind != RepresentationKind::Aimed || plan.base == forms::AimedBase::Declared;
-    const std::optional<double> cost = measured ? costs.of(model, kind) : std::nullopt;
-    const std::string file = twin ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
+    const ParamValues whole_fixed = form->made_of_fit() ? fixed : ParamValues{};
+    const bool cut = !plan.views.all() || (!form->made_of_fit() && !plan.fixed.empty());
+    const forms::Shader whole = cut && !form->native()
+                                    ? form->write(model, measure::fold(whole_table, model, whole_fixed), {whole_fixed})
+                                    : shader;
+    const forms::FormError error = form->error(model, setting);
+    const std::optional<double> cost = form->cost_is_measured(setting) ? costs.of(model, *form) : std::nullopt;
+    const std::string file = form->native() ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     const std::string albedo_file = "shaders/" + shader.name + "_albedo.osl";
     if (!shader.albedo.empty()) built.files[albedo_file] = shader.albedo;
-    built.lines.push_back({info.name, name_of(kind), shader.closures, shader.slots, shader.operations,
-                           shader.statements, error, of_form.size() + of_fit, table.error, shader.source.size(),
-                           shader.albedo.size(), whole.closures, whole.operations, whole.statements,
-                           whole_table.size() + of_whole_fit, whole.source.size() + whole.albedo.size()});
-    j["representations"][name_of(kind)] = {
-        {twin ? "nodes" : "shader", file},
-        {"only", values_json(forms::form_values(model, kind, plan.fixed))},
+    built.lines.push_back({info.name, form->name(), shader.closures, shader.slots, shader.operations, shader.statements,
+                           error, of_form.size() + of_fit, table.error, shader.source.size(), shader.albedo.size(),
+                           whole.closures, whole.operations, whole.statements, whole_table.size() + of_whole_fit,
+                           whole.source.size() + whole.albedo.size()});
+    j["representations"][form->name()] = {
+        {form->native() ? "nodes" : "shader", file},
+        {"only", values_json(form->values(model, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
         {"closure_bytes", shader.closure_bytes},
@@ -194,9 +170,9 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
         {"lamps", shader.lamps},
-        {"warnings", warnings(kind, model.has_mirror(), shader)},
-        {"axis", axis_json(forms::is_fit(kind) ? fit : nullptr)},
-        {"highlight", highlight_json(model, kind, shader, fixed)},
+        {"warnings", form->warnings(model, shader)},
+        {"axis", axis_json(form->made_of_fit() ? fit : nullptr)},
+        {"highlight", highlight_json(model, *form, shader, fixed)},
         {"sha256", sha256(shader.source)},
         {"albedo_shader", shader.albedo.empty() ? Json() : Json(albedo_file)},
         {"albedo_sha256", shader.albedo.empty() ? Json() : Json(sha256(shader.albedo))}};
@@ -230,9 +206,7 @@ Result build_pack(const Options& options) {
   // Fits that are not stored are made one at a time, by all cores; then models side by side, so that what one does in
   // line keeps no core waiting.
   for (const plan::PlannedModel& plan : chosen)
-    for (const RepresentationKind kind : plan.forms)
-      if (forms::is_fit(kind) || (kind == RepresentationKind::Aimed && plan.base == forms::AimedBase::Fitted))
-        prepare_fit(plan, kind);
+    for (const forms::Form* form : plan.forms) form->prepare(*plan.model, setting_of(plan, *form));
   tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   Result result;

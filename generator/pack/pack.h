@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "plan/costs.h"
 #include "plan/plan.h"
 
@@ -27,7 +27,7 @@ struct Options {
 struct Line {
   std::string model, representation;
   int closures = 0, slots = 0, operations = 0, statements = 0;
-  forms::RepresentationError error;
+  forms::FormError error;
   std::size_t table_floats = 0;
   double table_error = 0;
   std::size_t bytes = 0;         ///< of the shader's text

@@ -5,11 +5,10 @@
 #include <cctype>
 #include <functional>
 
-#include "forms/representation.h"
+#include "forms/choice_switch.h"
+#include "forms/form.h"
 #include "measure/stored_albedo.h"
 #include "model/choices.h"
-#include "pack/choice_switch.h"
-#include "pack/shader.h"
 #include "print/osl_library.h"
 #include "print/osl_program.h"
 #include "print/osl_text.h"
@@ -18,8 +17,6 @@
 
 namespace brdfc::pack {
 namespace {
-
-using forms::RepresentationKind;
 
 /// Names of the functions' other arguments and of what they return.
 constexpr const char* kOwnNames[] = {"wi", "wo", "numbers", "distance", "value", "pdf"};
@@ -44,7 +41,7 @@ std::string statements(const Model& model, const Outputs& outputs) {
   std::vector<std::string> taken(std::begin(kOwnNames), std::end(kOwnNames));
   for (const ParamInfo& p : model.info().params) taken.push_back(p.name);
   const ParamValues none;
-  ChoiceSwitch by_choice(model.info(), none);
+  forms::ChoiceSwitch by_choice(model.info(), none);
   for (const Choices& choices : choice_combinations(model.info())) {
     Recorder recorder;
     const std::unique_ptr<Brdf<Expr>> brdf = model.record(with_choices(model.info(), choices));
@@ -90,13 +87,13 @@ std::string choices_doc(const ModelInfo& info) {
 
 /// Exact closures where they equal the model for all choices, else the aimed form without lamps.
 std::string shader_of(const Model& model) {
-  const std::vector<RepresentationKind> forms = forms::representations(model);
+  const std::vector<const forms::Form*> forms = forms::forms_of(model);
   // Preferred first; an exact form that exists for some choices alone would take the others away.
   const auto whole = std::find_if(forms.begin(), forms.end(),
-                                  [&](RepresentationKind kind) { return forms::form_values(model, kind).empty(); });
+                                  [&](const forms::Form* form) { return form->values(model, {}).empty(); });
   const measure::AlbedoTable table =
       measure::has_albedo_table(model) ? measure::albedo_table_of(model) : measure::AlbedoTable();
-  return write_shader(model, *whole, table, {}, {}, 0).source;
+  return (*whole)->write(model, table, {{}, {}, 0}).source;
 }
 
 std::vector<Function> functions_of(const Model& model) {

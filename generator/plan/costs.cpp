@@ -11,8 +11,6 @@
 namespace brdfc::plan {
 namespace {
 
-using forms::RepresentationKind;
-
 /// The unit of cost has a row of its own beside the forms of a model.
 constexpr const char* kUnit = "glossy";
 
@@ -34,7 +32,7 @@ Costs::Costs(const std::filesystem::path& path) {
     const std::string where = fmt::format("{}: line {}", path.string(), number);
     if (model.empty()) input_error("{}: model: expected a name, got none", where);
     try {
-      if (form != kUnit) forms::representation_named(form);
+      if (form != kUnit) forms::form(form);
     } catch (const InputError& e) {
       input_error("{}: form: {}", where, e.what());
     }
@@ -47,8 +45,8 @@ Costs::Costs(const std::filesystem::path& path) {
   if (!in.eof()) input_error("{}: cannot be read", path.string());
 }
 
-std::optional<double> Costs::of(const Model& model, RepresentationKind kind) const {
-  const auto it = costs_.find({model.info().name, name_of(kind)});
+std::optional<double> Costs::of(const Model& model, const forms::Form& form) const {
+  const auto it = costs_.find({model.info().name, form.name()});
   return it == costs_.end() ? std::nullopt : std::optional(it->second);
 }
 

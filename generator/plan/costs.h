@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "model/model.h"
 
 namespace brdfc::plan {
@@ -24,7 +24,7 @@ class Costs {
   explicit Costs(const std::filesystem::path&);
 
   /// Of a form of a model; nothing where it was not measured.
-  std::optional<double> of(const Model&, forms::RepresentationKind) const;
+  std::optional<double> of(const Model&, const forms::Form&) const;
 
  private:
   std::map<std::pair<std::string, std::string>, double> costs_;  // by model and form

@@ -7,12 +7,12 @@
 
 #include "core/error.h"
 #include "fit/fit.h"
-#include "fit/terms.h"
+#include "fit/roles.h"
 
 namespace brdfc::plan {
 namespace {
 
-using forms::RepresentationKind;
+using forms::Form;
 
 std::string value_text(const ModelInfo& info, const std::string& name, const ParamValue& value) {
   return format_values(info, {{name, value}});
@@ -41,23 +41,24 @@ std::string how_it_varies(const std::string& name, const Needs& needs) {
   throw std::logic_error(name + " does not vary");
 }
 
-/// Why the materials of a model have no common form made of a fit; nothing if they have one. A fit takes one number
-/// that varies along its slider and what it has terms by; a twin takes neither.
-std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
+/// Why the materials of a model have no common form of this kind; nothing if they have one. One made of a fit takes
+/// what varies by its role.
+std::optional<std::string> unfit(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
   // What it lacks at any values comes before what the values are.
-  if (!model.has_scatter()) return fit::unfit(model, fixed);
+  if (!model.has_scatter() || !form.made_of_fit()) return form.why_not(model, fixed);
   std::optional<std::string> axis;
-  const std::set<std::string> may_vary = fit::factors(model, fixed);
-  const fit::Terms terms = kind == RepresentationKind::Twin ? fit::Terms{} : fit::terms_of(model, fixed);
+  const fit::Roles& roles = fit::roles_of(model, fixed);
   for (const ParamInfo& p : model.info().params) {
-    if (fixed.count(p.name) || may_vary.count(p.name) || terms.has(p.name)) continue;
+    const fit::Role role = roles.of(p.name);
+    const bool along = p.kind == ParamKind::Number && form.serves(fit::Role::Axis);
+    if (role == fit::Role::Constant || (form.serves(role) && role != fit::Role::Axis)) continue;
     const std::string how = how_it_varies(p.name, needs);
-    if (p.kind != ParamKind::Number || kind == RepresentationKind::Twin) return how;
+    if (!along) return how;
     if (axis) return fmt::format("{}; {}", *axis, how);
     axis = how;
-    const fit::FitAxis range = fit::fit_axis(p);
+    const ScaledRange range = p.slider();
     for (const MaterialNeed* need : needs) {
       const double value = std::get<double>(need->values.at(p.name));
       if (!need->textured.count(p.name) && (value < range.low || value > range.high))
@@ -65,7 +66,7 @@ std::optional<std::string> unfit(const Needs& needs, RepresentationKind kind) {
                            range.high);
     }
   }
-  return fit::unfit(model, fit::without_factors(model, fixed));
+  return form.why_not(model, fixed);
 }
 
 /// What one of the materials can be seen from.
@@ -75,168 +76,163 @@ Cosines views_of(const Needs& needs) {
   return views;
 }
 
-/// Of the material that is off by most. The mean along an axis says little of a material at one end of it.
-double fitted_error(const Needs& needs) {
+/// Of the material that is off by most; 0 for a form that does not say. The mean along an axis says little of a
+/// material at one end of it.
+double off_by(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
-  const fit::Fit fit = fit::fit_of(model, fit::without_factors(model, constants(needs)), views_of(needs));
+  const forms::Setting setting{constants(needs), views_of(needs)};
+  const ParamInfo* axis = fit::roles_of(model, setting.fixed).axis();
   double worst = 0;
   for (const MaterialNeed* need : needs) {
     std::optional<double> number;
-    if (fit.axis() && !need->textured.count(fit.axis()->parameter))
-      number = std::get<double>(need->values.at(fit.axis()->parameter));
-    worst = std::max(worst, fit.mean_l1(number));
+    if (axis && !need->textured.count(axis->name)) number = std::get<double>(need->values.at(axis->name));
+    worst = std::max(worst, form.off_by(model, setting, number).value_or(0));
   }
   return worst;
 }
 
-bool fits(const Needs& needs, const Budget& budget) {
-  return budget.error && !unfit(needs, RepresentationKind::Fitted) && fitted_error(needs) <= *budget.error;
+bool keeps_error(const Needs& needs, const Form& form, const Budget& budget) {
+  return budget.error && !unfit(needs, form) && off_by(needs, form) <= *budget.error;
 }
 
 /// A form may exist for some choices only: the one that a material would need; empty if it has all.
-std::string lacking(const MaterialNeed& need, RepresentationKind kind) {
-  for (const auto& [name, value] : forms::form_values(*need.model, kind))
+std::string lacking(const MaterialNeed& need, const Form& form) {
+  for (const auto& [name, value] : form.values(*need.model, {}))
     if (need.values.at(name) != value) return value_text(need.model->info(), name, value);
   return {};
 }
 
 /// One cost for all materials of a model: the extension has one preferred form of it.
-std::optional<double> cost_of(const Needs& needs, RepresentationKind kind, const Budget& budget) {
-  return budget.costs.of(*needs.front()->model, kind);
+std::optional<double> cost_of(const Needs& needs, const Form& form, const Budget& budget) {
+  return budget.costs.of(*needs.front()->model, form);
 }
 
 /// What keeps a form from a time that it may take; empty if it keeps it.
-std::string over_time(const Needs& needs, RepresentationKind kind, const Budget& budget) {
+std::string over_time(const Needs& needs, const Form& form, const Budget& budget) {
   if (!budget.time) return {};
-  const auto cost = cost_of(needs, kind, budget);
+  const auto cost = cost_of(needs, form, budget);
   if (cost) return *cost <= *budget.time ? "" : fmt::format("costs {:.3g}x, and {:g}x is allowed", *cost, *budget.time);
   return "its cost was not measured";
 }
 
 struct Chosen {
-  RepresentationKind form;
+  const Form* form;
   std::string why;
 };
 
 /// The first of these forms that keeps the time, else the cheapest.
-Chosen within_time(const Needs& needs, const std::vector<RepresentationKind>& order, const Budget& budget) {
-  std::optional<RepresentationKind> cheapest;
-  for (const RepresentationKind kind : order) {
-    if (over_time(needs, kind, budget).empty()) return {kind, "the form is left open"};
-    const auto cost = cost_of(needs, kind, budget);
-    if (cost && (!cheapest || *cost < *cost_of(needs, *cheapest, budget))) cheapest = kind;
+Chosen within_time(const Needs& needs, const std::vector<const Form*>& order, const Budget& budget) {
+  const Form* cheapest = nullptr;
+  for (const Form* form : order) {
+    if (over_time(needs, *form, budget).empty()) return {form, "the form is left open"};
+    const auto cost = cost_of(needs, *form, budget);
+    if (cost && (!cheapest || *cost < *cost_of(needs, *cheapest, budget))) cheapest = form;
   }
   if (!cheapest) return {order.front(), "the form is left open, and no cost is known"};
-  return {*cheapest, fmt::format("no form is known to keep {:g}x, this is the cheapest", *budget.time)};
+  return {cheapest, fmt::format("no form is known to keep {:g}x, this is the cheapest", *budget.time)};
 }
 
-/// In place of an aimed form: that one, and where the budget allows it the fitted one.
-std::vector<RepresentationKind> aimed_or_fitted(const Needs& needs, const Budget& budget) {
-  const bool allowed =
-      fits(needs, budget) || (budget.time && !budget.error && !unfit(needs, RepresentationKind::Fitted));
-  if (!allowed) return {RepresentationKind::Aimed};
-  if (budget.error) return {RepresentationKind::Fitted, RepresentationKind::Aimed};
-  return {RepresentationKind::Aimed, RepresentationKind::Fitted};
+/// The forms that a budget allows besides those that are always: before that which aims where it has an error, and
+/// after it where it has a time alone.
+std::vector<const Form*> allowed(const Needs& needs, const Budget& budget) {
+  std::vector<const Form*> out;
+  for (const Form* form : forms::forms())
+    if (form->when() == Form::When::WithinBudget &&
+        (keeps_error(needs, *form, budget) || (budget.time && !budget.error && !unfit(needs, *form))))
+      out.push_back(form);
+  return out;
+}
+
+/// In place of a form that aims: that one, and where the budget allows them others.
+std::vector<const Form*> aimed_or_allowed(const Form& aimed, const Needs& needs, const Budget& budget) {
+  std::vector<const Form*> out = allowed(needs, budget);
+  out.insert(budget.error ? out.end() : out.begin(), &aimed);
+  return out;
+}
+
+const Form& aiming_form() {
+  for (const Form* form : forms::forms())
+    if (form->aims()) return *form;
+  throw std::logic_error("no form aims at lamps");
 }
 
 /// That an aimed form has for the lamps there are.
 int lamp_slots(const Budget& budget) { return std::min(budget.lamps.value_or(forms::kMaxLamps), forms::kMaxLamps); }
 
-/// What lamps without a size make of an aimed form.
-std::string under_aimed(const Budget& budget) {
-  const int lamps = std::max(budget.lamps.value_or(0), int(budget.sizeless.size())), slots = lamp_slots(budget);
-  if (lamps <= slots) return "as on Blender's own nodes";
-  const char* left_out = "as rare bright dots";
-  if (slots == 0) return left_out;
-  return fmt::format("as on Blender's own nodes while among the {} of up to {} lamps that are aimed at, else {}", slots,
-                     lamps, left_out);
-}
-
-/// What lamps without a size make of a form, as script/conditions measured it; empty where they do nothing to it.
-std::string under_lamps(RepresentationKind kind, const Budget& budget) {
-  const std::string shine = kind == RepresentationKind::Aimed     ? under_aimed(budget)
-                            : kind == RepresentationKind::Sampled ? "as rare bright dots"
-                            : kind == RepresentationKind::Fitted
-                                ? "as on Blender's own nodes, on drawn directions as rare bright dots"
-                                : "";
+/// What lamps without a size make of a form; empty where they do nothing to it.
+std::string under_lamps(const Form& form, const Budget& budget) {
+  const int lamps = std::max(budget.lamps.value_or(0), int(budget.sizeless.size()));
+  const std::string shine = form.under_sizeless_lamps(lamps, lamp_slots(budget));
   if (shine.empty() || budget.sizeless.empty()) return {};
   return fmt::format("; {} without a size shines {}", fmt::join(budget.sizeless, ", "), shine);
 }
 
 Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& budget) {
-  const std::vector<RepresentationKind> known = forms::representations(*need.model);
+  const std::vector<const Form*> known = forms::forms_of(*need.model);
   if (need.representation == "auto") {
-    std::vector<RepresentationKind> order;
-    for (RepresentationKind kind : known) {
-      if (forms::is_fit(kind) || !lacking(need, kind).empty()) continue;
+    std::vector<const Form*> order;
+    for (const Form* form : known) {
+      if (form->when() != Form::When::Always || !lacking(need, *form).empty()) continue;
       // Nothing has to be fitted for a material that has what comes first.
-      if (!order.empty() && over_time(needs, order.front(), budget).empty()) break;
-      if (kind == RepresentationKind::Aimed)
-        for (const RepresentationKind k : aimed_or_fitted(needs, budget)) order.push_back(k);
+      if (!order.empty() && over_time(needs, *order.front(), budget).empty()) break;
+      if (form->aims())
+        for (const Form* f : aimed_or_allowed(*form, needs, budget)) order.push_back(f);
       else
-        order.push_back(kind);
+        order.push_back(form);
     }
     return within_time(needs, order, budget);
   }
-  const RepresentationKind kind = forms::representation_named(need.representation);
-  if (forms::is_fit(kind)) {
-    if (const auto reason = unfit(needs, kind))
+  const Form* form = forms::form(need.representation);
+  if (form->made_of_fit()) {
+    if (const auto reason = unfit(needs, *form))
       input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
                   *reason);
-    return {kind, "asked for"};
+    return {form, "asked for"};
   }
-  if (std::find(known.begin(), known.end(), kind) == known.end())
+  if (std::find(known.begin(), known.end(), form) == known.end())
     input_error("material {}: {} has no form '{}'", need.id, need.model->info().name, need.representation);
-  if (const std::string choice = lacking(need, kind); !choice.empty())
+  if (const std::string choice = lacking(need, *form); !choice.empty())
     input_error("material {}: {} has the form '{}' only for {}", need.id, need.model->info().name, need.representation,
                 choice);
-  return {kind, "asked for"};
+  return {form, "asked for"};
 }
 
 /// Why no material has a form that exists for some: `chosen` by the others.
-std::string why_not(RepresentationKind kind, const Needs& needs, const std::vector<Chosen>& chosen,
-                    const Budget& budget) {
-  const bool fitted = kind == RepresentationKind::Fitted;
-  if (forms::is_fit(kind) && !fitted) return "only where it is asked for";
-  if (fitted && !budget.error && !budget.time) return "nothing is fitted unasked";
+std::string why_not(const Form& form, const Needs& needs, const std::vector<Chosen>& chosen, const Budget& budget) {
+  const bool within_budget = form.when() == Form::When::WithinBudget;
+  if (form.when() == Form::When::Asked) return "only where it is asked for";
+  if (within_budget && !budget.error && !budget.time) return "nothing is fitted unasked";
   // A fit is of whatever choices the materials have.
   const auto open = std::find_if(needs.begin(), needs.end(), [&](const MaterialNeed* need) {
-    return need->representation == "auto" && (fitted || lacking(*need, kind).empty());
+    return need->representation == "auto" && (within_budget || lacking(*need, form).empty());
   });
-  if (open == needs.end() && !(fitted && budget.offer)) return "the materials ask for another";
-  // Of what comes after a form that keeps the budget nothing has to be known.
-  const auto rank = [&](RepresentationKind k) {
-    switch (k) {
-      case RepresentationKind::Exact:
-        return 0;
-      case RepresentationKind::Aimed:
-        return 2;
-      case RepresentationKind::Sampled:
-        return 4;
-      default:
-        return budget.error ? 1 : 3;
-    }
+  if (open == needs.end() && !(within_budget && budget.offer)) return "the materials ask for another";
+  // Of what comes after a form that keeps the budget nothing has to be known. Places among forms(), those within the
+  // budget just before that which aims, or just after it.
+  const auto place = [&](const Form& f) {
+    const auto& all = forms::forms();
+    const auto of = [&](const Form& g) { return 2 * (std::find(all.begin(), all.end(), &g) - all.begin()); };
+    return f.when() == Form::When::Always ? of(f) : of(aiming_form()) + (budget.error ? -1 : 1);
   };
-  const RepresentationKind first =
-      open == needs.end() ? RepresentationKind::Aimed : chosen[std::size_t(open - needs.begin())].form;
-  if (rank(kind) < rank(first) || !over_time(needs, first, budget).empty()) {
-    if (fitted && budget.error && !fits(needs, budget))
-      return fmt::format("off by {:.2g} of the light, and {:g} is allowed", fitted_error(needs), *budget.error);
-    if (const std::string over = over_time(needs, kind, budget); !over.empty()) return over;
+  const Form& first = open == needs.end() ? aiming_form() : *chosen[std::size_t(open - needs.begin())].form;
+  if (place(form) < place(first) || !over_time(needs, first, budget).empty()) {
+    if (within_budget && budget.error && !keeps_error(needs, form, budget))
+      return fmt::format("off by {:.2g} of the light, and {:g} is allowed", off_by(needs, form), *budget.error);
+    if (const std::string over = over_time(needs, form, budget); !over.empty()) return over;
   }
   if (open == needs.end()) return "the materials ask for another";
-  return fmt::format("{} comes first", name_of(first));
+  return fmt::format("{} comes first", first.name());
 }
 
 /// Every form, and why it is taken or not.
 std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chosen>& chosen, const Budget& budget) {
   const Model& model = *needs.front()->model;
   std::vector<FormChoice> choices;
-  const auto consider = [&](RepresentationKind kind, const std::optional<std::string>& missing, bool beside) {
-    FormChoice choice{kind, false, true, budget.costs.of(model, kind), "", {}};
+  const auto consider = [&](const Form& form, const std::optional<std::string>& missing, bool beside) {
+    FormChoice choice{&form, false, true, budget.costs.of(model, form), "", {}};
     std::map<std::string, std::vector<std::string>> users;  // by their reason
     for (std::size_t i = 0; i < needs.size(); ++i)
-      if (chosen[i].form == kind) users[chosen[i].why].push_back(needs[i]->id);
+      if (chosen[i].form == &form) users[chosen[i].why].push_back(needs[i]->id);
     for (const auto& [reason, ids] : users)
       choice.why += fmt::format("{}{}: {}", choice.why.empty() ? "" : "; ", fmt::join(ids, ", "), reason);
     choice.taken = !users.empty();
@@ -247,28 +243,28 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
       choice.taken = true;
       choice.why = "beside the others";
     } else if (!choice.taken) {
-      choice.why = why_not(kind, needs, chosen, budget);
+      choice.why = why_not(form, needs, chosen, budget);
     }
-    if (kind == RepresentationKind::Fitted && choice.exists && (choice.taken || budget.error || budget.time))
-      choice.error = fitted_error(needs);
-    if (choice.taken) choice.why += under_lamps(kind, budget);
+    if (form.when() == Form::When::WithinBudget && choice.exists && (choice.taken || budget.error || budget.time))
+      choice.error = off_by(needs, form);
+    if (choice.taken) choice.why += under_lamps(form, budget);
     choices.push_back(std::move(choice));
   };
-  for (const RepresentationKind kind : forms::representations(model)) {
-    if (forms::is_fit(kind)) continue;
-    std::optional<std::string> missing;
-    if (std::all_of(needs.begin(), needs.end(), [&](const auto* need) { return !lacking(*need, kind).empty(); }))
-      missing = "only for " + lacking(*needs.front(), kind);
-    consider(kind, missing, false);
+  const std::vector<const Form*> known = forms::forms_of(model);
+  const bool drawn = std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) { return c.form->draws(); });
+  for (const Form* form : forms::forms()) {
+    if (form->when() == Form::When::Always) {
+      if (std::find(known.begin(), known.end(), form) == known.end()) continue;
+      std::optional<std::string> missing;
+      if (std::all_of(needs.begin(), needs.end(), [&](const auto* need) { return !lacking(*need, *form).empty(); }))
+        missing = "only for " + lacking(*needs.front(), *form);
+      consider(*form, missing, false);
+      continue;
+    }
+    const bool offered = form->when() == Form::When::WithinBudget && budget.offer && drawn &&
+                         within_time(needs, aimed_or_allowed(aiming_form(), needs, budget), budget).form == form;
+    consider(*form, unfit(needs, *form), offered || (form->native() && budget.twin));
   }
-  const std::optional<std::string> missing = unfit(needs, RepresentationKind::Fitted);
-  const bool drawn = std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) {
-    return c.form == RepresentationKind::Aimed || c.form == RepresentationKind::Sampled;
-  });
-  consider(RepresentationKind::Fitted, missing,
-           budget.offer && drawn &&
-               within_time(needs, aimed_or_fitted(needs, budget), budget).form == RepresentationKind::Fitted);
-  consider(RepresentationKind::Twin, unfit(needs, RepresentationKind::Twin), budget.twin);
   return choices;
 }
 
@@ -280,25 +276,25 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   for (const MaterialNeed* need : needs) {
     plan.materials.push_back(need->id);
     chosen.push_back(chosen_form(*need, needs, budget));
-    const RepresentationKind before = chosen_form(*need, needs, {}).form, after = chosen.back().form;
+    const Form *before = chosen_form(*need, needs, {}).form, *after = chosen.back().form;
     plan.material_forms.push_back(
-        {need->id, before, after, cost_of({need}, before, budget), cost_of({need}, after, budget)});
+        {need->id, before, after, cost_of({need}, *before, budget), cost_of({need}, *after, budget)});
   }
   plan.choices = choose_forms(needs, chosen, budget);
   for (const FormChoice& choice : plan.choices)
     if (choice.taken) plan.forms.push_back(choice.form);
   // What "auto" is in Blender, too.
-  std::stable_partition(plan.forms.begin(), plan.forms.end(), [&](RepresentationKind kind) {
+  std::stable_partition(plan.forms.begin(), plan.forms.end(), [&](const Form* form) {
     for (std::size_t i = 0; i < needs.size(); ++i)
-      if (needs[i]->representation == "auto" && chosen[i].form == kind) return true;
+      if (needs[i]->representation == "auto" && chosen[i].form == form) return true;
     return false;
   });
   // A fit that an error was asked about is there anyway. Its costs were not measured, so that a time leaves it out.
-  const bool aimed = std::find(plan.forms.begin(), plan.forms.end(), RepresentationKind::Aimed) != plan.forms.end();
-  if (aimed && (budget.fit_bases || budget.error) && !budget.time && !unfit(needs, RepresentationKind::Fitted))
+  const bool aimed = std::any_of(plan.forms.begin(), plan.forms.end(), [](const Form* form) { return form->aims(); });
+  if (aimed && (budget.fit_bases || budget.error) && !budget.time && !unfit(needs, *forms::form("fitted")))
     plan.base = forms::AimedBase::Fitted;
   for (FormChoice& choice : plan.choices)
-    if (choice.form == RepresentationKind::Aimed && plan.base == forms::AimedBase::Fitted) {
+    if (choice.form->aims() && plan.base == forms::AimedBase::Fitted) {
       choice.why += "; closures fitted to it are its base";
       choice.cost = std::nullopt;
     }
@@ -330,7 +326,7 @@ std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
   const auto add_model = [&](const Model& m) {
     PlannedModel p;
     p.model = &m;
-    p.forms = forms::representations(m);
+    p.forms = forms::forms_of(m);
     plan.push_back(p);
   };
   if (names.empty())

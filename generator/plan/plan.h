@@ -9,7 +9,7 @@
 
 #include "core/cosines.h"
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "model/model.h"
 #include "plan/costs.h"
 
@@ -28,7 +28,7 @@ struct MaterialNeed {
 
 /// Why a form of a model is in a pack, or is not.
 struct FormChoice {
-  forms::RepresentationKind form;
+  const forms::Form* form;
   bool taken = false;          ///< the pack has it
   bool exists = true;          ///< the model has it for the materials' parameters
   std::optional<double> cost;  ///< as Costs has it: CPU time, in units of Blender's Glossy node; none if not measured
@@ -40,8 +40,8 @@ struct FormChoice {
 
 /// What a budget makes of the form of a material.
 struct FormChange {
-  std::string id;                           ///< of the material
-  forms::RepresentationKind before, after;  ///< without a budget, as in a pack of everything; and with it
+  std::string id;                     ///< of the material
+  const forms::Form *before, *after;  ///< without a budget, as in a pack of everything; and with it
   /// Of each, in units of Blender's Glossy node; none where they were not measured.
   std::optional<double> cost_before, cost_after;
 };
@@ -51,7 +51,7 @@ struct PlannedModel {
   const Model* model = nullptr;                        ///< registered
   std::vector<std::string> materials;                  ///< ids of those that need it; none in a pack of everything
   ParamValues fixed;                                   ///< folded into shaders and tables: they have no sockets
-  std::vector<forms::RepresentationKind> forms;        ///< that the pack has, preferred first
+  std::vector<const forms::Form*> forms;               ///< that the pack has, preferred first
   int max_lamps = forms::kMaxLamps;                    ///< how many lamps aimed forms can be told of
   forms::AimedBase base = forms::AimedBase::Declared;  ///< what aimed forms draw beside the lobes towards lamps
   /// Cosines at which one of the materials can be seen: tables and fits have no others.

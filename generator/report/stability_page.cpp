@@ -176,7 +176,7 @@ Figure figure_of(const Model& model) {
   for (const ParamInfo& p : info.params)
     if (!number && p.kind == ParamKind::Number) number = &p;
   const double low = number ? std::max(number->min, std::min(1e-3, number->max)) : 0;
-  const bool factors = number && low > 0 && number->max / low > 100;
+  const bool factors = number && number->by_factors;
   const auto value = [=](double y) {
     return factors ? by_factors(low, number->max, y) : number->min + y * (number->max - number->min);
   };

@@ -26,11 +26,7 @@ ParamValues any_parameters(const ModelInfo& info) {
   for (const ParamInfo& p : info.params) {
     const auto fraction = [] { return *rc::gen::inRange(0, kSteps + 1) / double(kSteps); };
     if (p.kind == ParamKind::Number) {
-      const double t = fraction();
-      // By factors where the range is wide.
-      values[p.name] = p.soft_min >= 0 && p.soft_max > 100
-                           ? std::clamp(p.soft_min + std::expm1(t * std::log1p(p.soft_max - p.soft_min)), p.min, p.max)
-                           : p.soft_min + t * (p.soft_max - p.soft_min);
+      values[p.name] = p.slider().at(fraction());
     } else if (p.kind == ParamKind::Color) {
       const double r = fraction(), g = fraction(), b = fraction();
       values[p.name] = std::array<double, 3>{r, g, b};

@@ -15,21 +15,18 @@
 #include "closures/lobe.h"
 #include "core/hash.h"
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
 #include "measure/probes.h"
 #include "measure/stored_albedo.h"
-#include "pack/shader.h"
 #include "plan/plan.h"
 #include "support.h"
 #include "tables/table_file.h"
 
 namespace brdfc::fit {
 namespace {
-
-using forms::RepresentationKind;
 
 using testing::HasSubstr;
 
@@ -180,7 +177,7 @@ TEST(Fit, SaysWhyThereIsNone) {
 TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   const auto of = [](const char* name, const std::vector<std::string>& text = {}) {
     const Model& m = find_model(name);
-    return factors(m, values_of(m, text));
+    return roles_of(m, values_of(m, text)).proportional();
   };
   using testing::ElementsAre;
   EXPECT_THAT(of("phong"), ElementsAre("ks"));
@@ -195,9 +192,9 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   const Model& m = find_model("phong");
   ParamValues fixed = values_of(m, {"e=20"});
   fixed.erase("ks");
-  for (const RepresentationKind kind : {RepresentationKind::Fitted, RepresentationKind::Aimed}) {
-    const pack::Shader s = pack::write_shader(m, kind, measure::fold(measure::albedo_table_of(m), m, fixed), fixed, {},
-                                              forms::kMaxLamps, forms::AimedBase::Fitted);
+  for (const forms::Form* kind : {forms::form("fitted"), forms::form("aimed")}) {
+    const forms::Shader s = kind->write(m, measure::fold(measure::albedo_table_of(m), m, fixed),
+                                        {fixed, {}, forms::kMaxLamps, forms::AimedBase::Fitted});
     EXPECT_THAT(s.source, HasSubstr("color ks = color("));
     const std::size_t factor = s.source.find("weight_0 *= ks;"), rest = s.source.find("excess");
     ASSERT_NE(factor, std::string::npos);
@@ -236,7 +233,7 @@ TEST(Fit, RunsAlongANumber) {
   EXPECT_LE(l1[l1.size() / 2], 0.007);
   EXPECT_LE(l1.back(), 0.03);
   for (const double sigma : {0.0, 0.013, 0.35, 0.66}) {
-    const auto brdf = m.make_double(with_number(m, values, sigma));
+    const auto brdf = m.make_double(roles_of(m, values).fitted_at(sigma));
     measure::Random random(5);
     double off = 0, sum = 0;
     for (const auto& [wi, wo] : measure::direction_pairs(*brdf, 400, random, false)) {
@@ -253,12 +250,12 @@ TEST(Fit, RunsAlongANumber) {
 
   ParamValues fixed = values;
   fixed.erase("rho");
-  const pack::Shader s =
-      pack::write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, fixed), fixed);
+  const forms::Shader s =
+      forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, fixed), {fixed});
   EXPECT_THAT(s.source, HasSubstr("float sigma = "));
   EXPECT_THAT(s.source, HasSubstr("color rho = color("));
   EXPECT_LE(s.operations, 600);
-  EXPECT_LE(forms::measure_error(m, RepresentationKind::Fitted, fixed).relative_l1.value_or(1), 0.02);
+  EXPECT_LE(forms::form("fitted")->error(m, {fixed}).relative_l1.value_or(1), 0.02);
 
   const Model& lafortune = find_model("lafortune");
   ParamValues two = values_of(lafortune, {});
@@ -345,8 +342,8 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
 
     ParamValues fixed = values_of(m, {});
     fixed.erase(open);
-    const pack::Shader s =
-        pack::write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, fixed), fixed);
+    const forms::Shader s =
+        forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, fixed), {fixed});
     EXPECT_THAT(s.source, HasSubstr(fmt::format("color {} = color(", open)));
     EXPECT_THAT(s.source, HasSubstr("ramp_0[entry] /= weight_0;"));
     EXPECT_LE(s.operations, 600) << model;
@@ -370,8 +367,8 @@ TEST(StoredFits, ServeColoursThatAreKnown) {
   EXPECT_EQ(a.r, b.r);
   EXPECT_EQ(a.b, b.b);
   EXPECT_GT(a.r, 2 * a.b);
-  const pack::Shader s =
-      pack::write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, known), known);
+  const forms::Shader s =
+      forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, known), {known});
   EXPECT_THAT(s.source, testing::Not(HasSubstr("f0")));
 }
 
@@ -395,7 +392,7 @@ std::vector<std::pair<const Model*, ParamValues>> stored() {
     if (model->info().properties.fit_axis.empty()) continue;
     ParamValues values = complete(model->info(), {});
     values.erase(model->info().properties.fit_axis);
-    out.emplace_back(model.get(), along_axis(*model, values));
+    out.emplace_back(model.get(), along_axis(*model, values).values);
   }
   return out;
 }
@@ -466,7 +463,7 @@ TEST(StoredFits, StateTheirErrors) {
                          [&](const ViewError& e) { return e.number == number; });
     std::vector<double> l1(stated.size()), albedo(stated.size());
     for (const Terms::Term& term : fit.terms().terms) {
-      ParamValues whole = with_number(*model, values, number);
+      ParamValues whole = roles_of(*model, values).fitted_at(number);
       for (const auto& [name, value] : term.judged) whole[name] = value;
       whole = complete(model->info(), whole);
       const Varied<double> varied = fit.varied(whole);
@@ -509,7 +506,8 @@ TEST(StoredFits, HaveNoStepsAlongTheSlider) {
       for (std::size_t i = 0; i <= kSteps; ++i) {
         varied.number = fit.axis()->at(double(i) / kSteps);
         const ClosureSum<double> sum = fit.closures(wo, varied);
-        const auto brdf = model->make_double(complete(model->info(), with_number(*model, values, varied.number)));
+        const auto brdf =
+            model->make_double(complete(model->info(), roles_of(*model, values).fitted_at(varied.number)));
         for (std::size_t j = 0; j < lit.size(); ++j) {
           f[j].push_back(max_component(evaluate(sum, lit[j], wo)));
           truth[j].push_back(max_component(brdf->eval(lit[j], wo) * lit[j].z));
@@ -568,7 +566,7 @@ TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
   const Fit& fit = fit_of(*model, values);
   const double x = fit.knots()[random / all.size() % fit.knots().size()], number = fit.axis()->at(x);
   const Fit cell = fit.knot(*model, values, x);
-  const ParamValues whole = complete(model->info(), with_number(*model, values, number));
+  const ParamValues whole = complete(model->info(), roles_of(*model, values).fitted_at(number));
   const measure::BoundModel bound = measure::bind_model(*model, whole);
   const auto l1 = [&](const Fit& of) {
     const Varied<double> varied = of.varied(whole);
@@ -586,7 +584,7 @@ TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
 TEST(StoredFits, ServeFactorsThatAreKnown) {
   const auto [model, values] = stored().front();
   ParamValues half = values;
-  const std::string name = *factors(*model, values).begin();
+  const std::string name = *roles_of(*model, values).proportional().begin();
   half[name] = std::array<double, 3>{0.5, 0.25, 0.1};
   const Fit &white = fit_of(*model, values), &coloured = fit_of(*model, half);
   const Vec3<double> wo = direction(0.7, 0), wi = direction(0.6, 3);
@@ -636,8 +634,8 @@ TEST(Fit, ShadersStayWithinBounds) {
   for (const auto& [name, text] : {std::pair{"phong", "e=20"}, {"cook_torrance", "f0=0.9,0.5,0.05"}}) {
     const Model& m = find_model(name);
     const ParamValues values = values_of(m, {text});
-    const pack::Shader s = pack::write_shader(m, RepresentationKind::Fitted,
-                                              measure::fold(measure::albedo_table_of(m), m, values), values);
+    const forms::Shader s =
+        forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, values), {values});
     EXPECT_LE(s.operations, 600) << name;
     EXPECT_LE(s.closures, 9) << name;
     EXPECT_THAT(s.source, HasSubstr("phong_ramp(normal_0, exponent_0, ramp_0)"));

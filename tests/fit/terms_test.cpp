@@ -18,7 +18,7 @@ Terms terms_by(const char* model, const std::vector<std::string>& names, const s
   const Model& m = find_model(model);
   ParamValues known = complete(m.info(), parse_values(m.info(), values));
   for (const std::string& name : names) known.erase(name);
-  return terms_of(m, known);
+  return roles_of(m, known).terms();
 }
 
 TEST(Terms, AreFoundByEvaluatingTheModel) {
@@ -50,7 +50,7 @@ TEST(Terms, AddUpToTheModel) {
   int models_with_terms = 0;
   measure::Random random(8);
   for (const auto& [name, model] : models()) {
-    const Terms terms = terms_of(*model, {});
+    const Terms terms = roles_of(*model, {}).terms();
     if (terms.parameters.empty()) continue;
     ++models_with_terms;
     for (int round = 0; round < 8; ++round) {

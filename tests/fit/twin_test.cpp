@@ -9,7 +9,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "pack/nodes.h"
+#include "forms/form.h"
 #include "support.h"
 
 namespace brdfc::fit {
@@ -68,7 +68,7 @@ TEST(Twin, StatesItsError) {
 TEST(Twin, TakesWhatNodesAccept) {
   for (const Row& row : kRows) {
     const Model& m = find_model(row.model);
-    const auto j = nlohmann::json::parse(pack::write_nodes(m, values_of(m, row.values)).source);
+    const auto j = nlohmann::json::parse(forms::form("twin")->write(m, {}, {values_of(m, row.values)}).source);
     for (const auto& closure : j.at("closures")) {
       for (const auto& channel : closure.at("weight")) {
         ASSERT_EQ(channel.size(), std::size_t(kTwinKnots));

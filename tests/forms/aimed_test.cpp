@@ -7,7 +7,7 @@
 #include "core/parallel.h"
 #include "core/sequence.h"
 #include "fit/fit.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/probes.h"
 #include "support.h"
 

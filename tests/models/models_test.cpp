@@ -13,7 +13,7 @@
 
 #include "check/check.h"
 #include "check/chi_square.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"

@@ -11,13 +11,13 @@
 
 #include "closures/closure_pool.h"
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/fold.h"
 #include "measure/stored_albedo.h"
 #include "measure/tabulate_albedo.h"
+#include "model/choices.h"
 #include "model/sampling.h"
 #include "pack/addon.h"
-#include "pack/shader.h"
 #include "plan/costs.h"
 #include "plan/plan.h"
 #include "print/osl_library.h"
@@ -26,8 +26,6 @@
 
 namespace brdfc::pack {
 namespace {
-
-using forms::RepresentationKind;
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
@@ -117,7 +115,7 @@ TEST(Shader, SumIsABalancedTree) {
 TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
   const detail::ModelOf<pack_test::Greedy> greedy;
   try {
-    write_shader(greedy, RepresentationKind::Exact, empty_table(greedy));
+    forms::form("exact")->write(greedy, empty_table(greedy));
     FAIL() << "not refused";
   } catch (const InputError& e) {
     EXPECT_THAT(e.what(), HasSubstr("66 closure slots"));
@@ -127,12 +125,12 @@ TEST(Shader, MoreClosuresThanCyclesKeepsAreRefused) {
 
 TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
   for (const auto& [name, model] : models())
-    for (RepresentationKind kind : forms::representations(*model)) {
-      const Shader s = write_shader(*model, kind, empty_table(*model));
+    for (const forms::Form* kind : forms::forms_of(*model)) {
+      const forms::Shader s = kind->write(*model, empty_table(*model));
       EXPECT_LE(s.slots, kMaxClosures) << s.name;
       // Aimed forms hold what is done with lamps, a base and the model's value beside its sampling; lossless' value is
       // a long sum.
-      const bool aimed = kind == RepresentationKind::Aimed;
+      const bool aimed = kind == forms::form("aimed");
       EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2300 : 1300) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
@@ -140,59 +138,59 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
 
 /// Sizes by hand from Cycles' structs: see pool_bytes().
 TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
-  const auto bytes = [](const char* name, RepresentationKind kind, int lamps = forms::kMaxLamps) {
+  const auto bytes = [](const char* name, const forms::Form* kind, int lamps = forms::kMaxLamps) {
     const Model& m = find_model(name);
-    const Shader s = write_shader(m, kind, empty_table(m), {}, {}, lamps);
+    const forms::Shader s = kind->write(m, empty_table(m), {{}, {}, lamps});
     return std::pair(s.closure_bytes, s.lamp_bytes);
   };
   constexpr int kLobe = 16 + 120, kFacets = 16 + 56, kMirror = 16 + 24, kDiffuse = 16 + 24, kNode = 24;
   // burley_diffuse_bsdf, diffuse_ramp and a mirror
-  EXPECT_EQ(bytes("coupled", RepresentationKind::Exact), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
-  EXPECT_EQ(bytes("lambert", RepresentationKind::Exact), std::pair(kDiffuse, 0));
-  EXPECT_EQ(bytes("glass", RepresentationKind::Exact), std::pair(kMirror + 16 + 24 + kNode, 0));
+  EXPECT_EQ(bytes("coupled", forms::form("exact")), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
+  EXPECT_EQ(bytes("lambert", forms::form("exact")), std::pair(kDiffuse, 0));
+  EXPECT_EQ(bytes("glass", forms::form("exact")), std::pair(kMirror + 16 + 24 + kNode, 0));
   // A lamp's lobe is one of the sum. A direction through the surface is one of three closures, times a weight.
-  EXPECT_EQ(bytes("lambert", RepresentationKind::Sampled), std::pair(kLobe, 0));
-  EXPECT_EQ(bytes("phong", RepresentationKind::Aimed), std::pair(kLobe, kLobe + kNode));
-  EXPECT_EQ(bytes("phong", RepresentationKind::Aimed, 0), std::pair(kLobe, 0));
-  EXPECT_EQ(bytes("ward", RepresentationKind::Aimed), std::pair(kFacets + kLobe + kNode, kLobe + kNode));
-  EXPECT_EQ(bytes("schlick_double", RepresentationKind::Aimed),
+  EXPECT_EQ(bytes("lambert", forms::form("sampled")), std::pair(kLobe, 0));
+  EXPECT_EQ(bytes("phong", forms::form("aimed")), std::pair(kLobe, kLobe + kNode));
+  EXPECT_EQ(bytes("phong", forms::form("aimed"), 0), std::pair(kLobe, 0));
+  EXPECT_EQ(bytes("ward", forms::form("aimed")), std::pair(kFacets + kLobe + kNode, kLobe + kNode));
+  EXPECT_EQ(bytes("schlick_double", forms::form("aimed")),
             std::pair(kDiffuse + kMirror + kLobe + 2 * kNode, kLobe + kNode));
-  EXPECT_EQ(bytes("radziszewski_alda", RepresentationKind::Aimed), std::pair(kLobe + kNode, kLobe + kNode));
+  EXPECT_EQ(bytes("radziszewski_alda", forms::form("aimed")), std::pair(kLobe + kNode, kLobe + kNode));
 }
 
 TEST(Shader, AnAimedFormHasAtLeastALampInAGpusPool) {
   for (const auto& [name, model] : models())
-    for (const RepresentationKind kind : forms::representations(*model)) {
-      if (forms::is_fit(kind)) continue;  // eight closures, most of them ramps
-      const Shader s = write_shader(*model, kind, empty_table(*model));
+    for (const forms::Form* kind : forms::forms_of(*model)) {
+      if (kind->made_of_fit()) continue;  // eight closures, most of them ramps
+      const forms::Shader s = kind->write(*model, empty_table(*model));
       EXPECT_LE(s.closure_bytes + s.lamp_bytes, kPoolBytes) << s.name;
     }
 }
 
 TEST(Shader, AnAimedFormWithoutABaseHasNoEmptyBlock) {
   const Model& m = find_model("phong");
-  const std::string source = write_shader(m, RepresentationKind::Aimed, empty_table(m)).source;
+  const std::string source = forms::form("aimed")->write(m, empty_table(m)).source;
   EXPECT_THAT(source, Not(testing::ContainsRegex("[{][ \n]*[}]")));
 }
 
 TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
   const detail::ModelOf<pack_test::MirrorOnly> model;
   EXPECT_FALSE(model.has_scatter());
-  EXPECT_EQ(forms::representations(model), std::vector{RepresentationKind::Exact});
-  const Shader s = write_shader(model, RepresentationKind::Exact, empty_table(model));
+  EXPECT_EQ(forms::forms_of(model), std::vector{forms::form("exact")});
+  const forms::Shader s = forms::form("exact")->write(model, empty_table(model));
   EXPECT_THAT(s.source, HasSubstr("BSDF = weight_0 * reflection(frame_n);"));
   const std::string body = s.source.substr(s.source.find("\n{\n", s.source.find("\nshader ")));
   EXPECT_EQ(s.statements, std::count(body.begin(), body.end(), ';')) << "there is no loop";
-  EXPECT_LT(forms::measure_error(model, RepresentationKind::Exact).albedo, 1e-6);
+  EXPECT_LT(forms::form("exact")->error(model, {}).albedo, 1e-6);
   const measure::AlbedoTable table = measure::tabulate_albedo(model);
   EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
 }
 
 TEST(Shader, AFixedParameterLeavesTheText) {
   const Model& m = find_model("ashikhmin_shirley");
-  const Shader all = write_shader(m, RepresentationKind::Sampled, empty_table(m));
-  const Shader specular = write_shader(m, RepresentationKind::Sampled, empty_table(m),
-                                       {{"part", std::string("specular")}, {"rotation", 0.0}});
+  const forms::Shader all = forms::form("sampled")->write(m, empty_table(m));
+  const forms::Shader specular =
+      forms::form("sampled")->write(m, empty_table(m), {{{"part", std::string("specular")}, {"rotation", 0.0}}});
   EXPECT_THAT(all.source, HasSubstr("color rd ="));
   EXPECT_THAT(all.source, HasSubstr("int part ="));
   EXPECT_THAT(specular.source, Not(HasSubstr("int part")));
@@ -210,7 +208,7 @@ std::size_t count(const std::string& text, const std::string& part) {
 
 TEST(Shader, TablesThatChoicesShareStandThereOnce) {
   const Model& m = find_model("ashikhmin_shirley");
-  const Shader s = write_shader(m, RepresentationKind::Sampled, empty_table(m));
+  const forms::Shader s = forms::form("sampled")->write(m, empty_table(m));
   for (const char* table : {"specular_loss", "specular_softness", "mean_loss", "mean_matte"})
     EXPECT_EQ(count(s.source, fmt::format("float {}[", table)), 1u) << table;
   EXPECT_GT(count(s.source, "specular_loss, "), 1u) << "more than one look-up reads it";
@@ -220,7 +218,7 @@ TEST(Shader, TablesThatChoicesShareStandThereOnce) {
 TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
   const Model& m = find_model("ward");
   const measure::AlbedoTable table = measure::albedo_table_of(m);
-  const Shader apart = write_shader(m, RepresentationKind::Sampled, table);
+  const forms::Shader apart = forms::form("sampled")->write(m, table);
   EXPECT_THAT(apart.source, Not(HasSubstr("Albedo")));
   EXPECT_THAT(apart.source, Not(HasSubstr("knots_")));
   EXPECT_LT(apart.source.size(), 10000u);
@@ -229,17 +227,16 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
   EXPECT_THAT(apart.albedo, HasSubstr("float ax = "));
   EXPECT_THAT(apart.albedo, Not(HasSubstr("BSDF")));
   const ParamValues known = {{"ax", 0.2}, {"ay", 0.2}, {"normalisation", std::string("bounded")}};
-  const Shader small = write_shader(m, RepresentationKind::Sampled, measure::fold(table, m, known), known);
+  const forms::Shader small = forms::form("sampled")->write(m, measure::fold(table, m, known), {known});
   EXPECT_EQ(small.albedo, "");
   EXPECT_THAT(small.source, HasSubstr("output color Albedo = 0)"));
   for (const auto& [name, model] : models())
-    for (const RepresentationKind kind : forms::representations(*model)) {
-      if (forms::is_fit(kind)) continue;  // holds tables of its own
-      const std::string text = write_shader(*model, kind, measure::albedo_table_of(*model)).source;
+    for (const forms::Form* kind : forms::forms_of(*model)) {
+      if (kind->made_of_fit()) continue;  // holds tables of its own
+      const std::string text = kind->write(*model, measure::albedo_table_of(*model)).source;
       // What two aimed forms hold for each of their many choices is more than it should be.
-      const bool longer =
-          kind == RepresentationKind::Aimed && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
-      EXPECT_LE(text.size(), longer ? 175000u : 100000u) << name << " " << name_of(kind);
+      const bool longer = kind == forms::form("aimed") && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
+      EXPECT_LE(text.size(), longer ? 175000u : 100000u) << name << " " << kind->name();
     }
 }
 
@@ -248,8 +245,8 @@ TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
   const ParamValues both = {{"part", std::string("both")}};
   ParamValues black = both;
   black["rd"] = 0.0;
-  const forms::Recording with = forms::record(m, RepresentationKind::Sampled, both, 0);
-  const forms::Recording without = forms::record(m, RepresentationKind::Sampled, black, 0);
+  const forms::Recording with = forms::form("sampled")->recordings(m, both)[0];
+  const forms::Recording without = forms::form("sampled")->recordings(m, black)[0];
   EXPECT_LT(without.operations, with.operations);
   EXPECT_EQ(std::count(without.inputs.begin(), without.inputs.end(), "rd"), 0);
 }
@@ -272,20 +269,20 @@ TEST(Pack, ABadValueStopsTheBuildAndNamesWhere) {
     EXPECT_THAT(e.what(), HasSubstr("wi"));
     EXPECT_THAT(e.what(), HasSubstr("nan"));
   }
-  EXPECT_THROW(forms::measure_error(broken, RepresentationKind::Sampled), ValueError);
+  EXPECT_THROW(forms::form("sampled")->error(broken, {}), ValueError);
 }
 
 TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
   const Model& m = find_model("coupled");
-  const ParamValues only = forms::form_values(m, RepresentationKind::Exact);
+  const ParamValues only = forms::form("exact")->values(m, {});
   ASSERT_EQ(only.size(), 1u);
   EXPECT_EQ(std::get<std::string>(only.at("fresnel")), "schlick");
-  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Sampled).empty());
+  EXPECT_TRUE(forms::form("sampled")->values(m, {}).empty());
   const measure::AlbedoTable t = empty_table(m);
-  EXPECT_THAT(write_shader(m, RepresentationKind::Exact, t).source, Not(HasSubstr("int fresnel")));
-  EXPECT_THAT(write_shader(m, RepresentationKind::Sampled, t).source, HasSubstr("int fresnel"));
+  EXPECT_THAT(forms::form("exact")->write(m, t).source, Not(HasSubstr("int fresnel")));
+  EXPECT_THAT(forms::form("sampled")->write(m, t).source, HasSubstr("int fresnel"));
   try {
-    write_shader(m, RepresentationKind::Exact, t, {{"fresnel", std::string("dielectric")}});
+    forms::form("exact")->write(m, t, {{{"fresnel", std::string("dielectric")}}});
     FAIL() << "expected a refusal";
   } catch (const InputError& e) {
     EXPECT_STREQ(e.what(), "coupled: the exact form exists only for fresnel=schlick");
@@ -294,17 +291,17 @@ TEST(Shader, AnExactFormThatHoldsForOneChoiceLacksTheParameter) {
 
 TEST(Shader, AFitThatTheExtensionHoldsIsForDefaultsButForItsNumberAndFactors) {
   const Model& m = find_model("lafortune");
-  const ParamValues only = forms::form_values(m, RepresentationKind::Fitted);
+  const ParamValues only = forms::form("fitted")->values(m, {});
   EXPECT_EQ(only, (ParamValues{{"cxy", -1.0}, {"cz", 0.8}}));
   ParamValues others = complete(m.info(), {});
   others.erase("e");
-  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Fitted, others).empty()) << "one number is open, any may be";
+  EXPECT_TRUE(forms::form("fitted")->values(m, others).empty()) << "one number is open, any may be";
   others["e"] = 4.0;
   others.erase("cz");
-  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Fitted, others).empty());
-  EXPECT_TRUE(forms::form_values(m, RepresentationKind::Sampled).empty());
+  EXPECT_TRUE(forms::form("fitted")->values(m, others).empty());
+  EXPECT_TRUE(forms::form("sampled")->values(m, {}).empty());
   const std::string source =
-      write_shader(m, RepresentationKind::Fitted, measure::fold(measure::albedo_table_of(m), m, only), {}).source;
+      forms::form("fitted")->write(m, measure::fold(measure::albedo_table_of(m), m, only)).source;
   for (const char* socket : {"  float e = ", "  color ks = "}) EXPECT_THAT(source, HasSubstr(socket));
   for (const char* gone : {"float cxy", "float cz"}) EXPECT_THAT(source, Not(HasSubstr(gone)));
 }
@@ -381,8 +378,7 @@ TEST_F(PackFiles, ManifestHasTheCostsThatAreKnown) {
 
 TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
   const fs::path table = temp.path() / "costs.csv";
-  EXPECT_EQ(plan::Costs(table).of(find_model("lambert"), RepresentationKind::Exact), std::nullopt)
-      << "there is no file";
+  EXPECT_EQ(plan::Costs(table).of(find_model("lambert"), *forms::form("exact")), std::nullopt) << "there is no file";
   const auto refusal = [&](const std::string& text) -> std::string {
     std::ofstream(table) << text;
     try {
@@ -407,11 +403,11 @@ TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
 TEST(Costs, ThoseOfTheExtensionAreMeasured) {
   const plan::Costs costs(BRDFC_SOURCE_DIR "/blender_addon/costs.csv");
   for (const auto& [model, kind] :
-       {std::pair("coupled", RepresentationKind::Exact), std::pair("ward", RepresentationKind::Sampled),
-        std::pair("phong", RepresentationKind::Fitted), std::pair("ward", RepresentationKind::Aimed),
-        std::pair("phong", RepresentationKind::Twin)}) {
-    const std::optional<double> cost = costs.of(find_model(model), kind);
-    ASSERT_TRUE(cost) << model << " " << name_of(kind);
+       {std::pair("coupled", forms::form("exact")), std::pair("ward", forms::form("sampled")),
+        std::pair("phong", forms::form("fitted")), std::pair("ward", forms::form("aimed")),
+        std::pair("phong", forms::form("twin"))}) {
+    const std::optional<double> cost = costs.of(find_model(model), *kind);
+    ASSERT_TRUE(cost) << model << " " << kind->name();
     EXPECT_GT(*cost, 0.2);
     EXPECT_LT(*cost, 10);
   }

@@ -9,15 +9,12 @@
 #include <fstream>
 
 #include "forms/aimed.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/fold.h"
 #include "measure/stored_albedo.h"
-#include "pack/shader.h"
 
 namespace brdfc::plan {
 namespace {
-
-using forms::RepresentationKind;
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -35,7 +32,7 @@ Costs costs(const std::string& rows) {
   return Costs(file);
 }
 
-std::string why(const PlannedModel& plan, RepresentationKind form) {
+std::string why(const PlannedModel& plan, const forms::Form* form) {
   for (const FormChoice& c : plan.choices)
     if (c.form == form) return c.why;
   return "not considered";
@@ -45,7 +42,7 @@ TEST(Plan, EverythingIsEveryModelInEveryForm) {
   const auto plan = plan_models({});
   EXPECT_EQ(plan.size(), models().size());
   for (const PlannedModel& p : plan) {
-    EXPECT_EQ(p.forms, forms::representations(*p.model));
+    EXPECT_EQ(p.forms, forms::forms_of(*p.model));
     EXPECT_TRUE(p.fixed.empty() && p.reasons.empty());
   }
   EXPECT_THROW(plan_models({"nonesuch"}), InputError);
@@ -55,18 +52,18 @@ TEST(Plan, SaysWhatLampsWithoutASizeMakeOfAForm) {
   Budget budget;
   const std::vector<MaterialNeed> open = {need("a", "phong", {"e=20"})}, drawn = {need("a", "phong", {}, "sampled")},
                                   exact = {need("a", "lambert", {})};
-  EXPECT_EQ(why(plan_scene(open, budget)[0], RepresentationKind::Aimed), "a: the form is left open");
+  EXPECT_EQ(why(plan_scene(open, budget)[0], forms::form("aimed")), "a: the form is left open");
   budget.sizeless = {"lights[1]", "lights[4]"};
-  EXPECT_EQ(why(plan_scene(open, budget)[0], RepresentationKind::Aimed),
+  EXPECT_EQ(why(plan_scene(open, budget)[0], forms::form("aimed")),
             "a: the form is left open; lights[1], lights[4] without a size shines as on Blender's own nodes");
   budget.lamps = 12;
   EXPECT_THAT(
-      why(plan_scene(open, budget)[0], RepresentationKind::Aimed),
+      why(plan_scene(open, budget)[0], forms::form("aimed")),
       HasSubstr("shines as on Blender's own nodes while among the 8 of up to 12 lamps that are aimed at, else as "
                 "rare bright dots"));
   budget.lamps = 0;
-  EXPECT_THAT(why(plan_scene(open, budget)[0], RepresentationKind::Aimed), HasSubstr("shines as rare bright dots"));
-  EXPECT_THAT(why(plan_scene(drawn, budget)[0], RepresentationKind::Sampled),
+  EXPECT_THAT(why(plan_scene(open, budget)[0], forms::form("aimed")), HasSubstr("shines as rare bright dots"));
+  EXPECT_THAT(why(plan_scene(drawn, budget)[0], forms::form("sampled")),
               HasSubstr("lights[1], lights[4] without a size shines as rare bright dots"));
   const PlannedModel matte = plan_scene(exact, budget)[0];
   for (const FormChoice& c : matte.choices) EXPECT_THAT(c.why, Not(HasSubstr("without a size")));
@@ -88,7 +85,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
 
   const Model& m = find_model("phong");
   const measure::AlbedoTable table = measure::albedo_table_of(m);
-  const auto shader = [&](int lamps) { return pack::write_shader(m, RepresentationKind::Aimed, table, {}, {}, lamps); };
+  const auto shader = [&](int lamps) { return forms::form("aimed")->write(m, table, {{}, {}, lamps}); };
   for (const char* part : {"Lamp", "lamp_", "lobe_weight", "covered"})
     EXPECT_THAT(shader(0).source, Not(HasSubstr(part))) << "nothing is left of what lamps take";
   EXPECT_EQ(shader(0).slots, slots(ClosureKind::PhongRamp));
@@ -106,12 +103,12 @@ TEST(Plan, FixesWhatIsConstantInAllMaterialsOfAModel) {
   EXPECT_THAT(plan[0].materials, ElementsAre("b", "c"));
   EXPECT_EQ(plan[0].fixed.count("r0"), 1u);
   EXPECT_EQ(plan[0].fixed.count("rm"), 0u) << "it varies over a surface";
-  EXPECT_THAT(plan[0].forms, ElementsAre(RepresentationKind::Exact));
+  EXPECT_THAT(plan[0].forms, ElementsAre(forms::form("exact")));
   EXPECT_EQ(plan[1].fixed.count("rho"), 1u);
 
   const auto two = plan_scene({need("a", "lambert", {"rho=1"}), need("b", "lambert", {"rho=0.5"}, "sampled")});
   EXPECT_TRUE(two[0].fixed.empty()) << "two values";
-  EXPECT_THAT(two[0].forms, ElementsAre(RepresentationKind::Exact, RepresentationKind::Sampled));
+  EXPECT_THAT(two[0].forms, ElementsAre(forms::form("exact"), forms::form("sampled")));
 }
 
 TEST(Plan, NamesTheMaterialWhoseFormDoesNotExist) {
@@ -127,18 +124,18 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   const auto forms = [](const std::vector<MaterialNeed>& needs, double error) {
     return plan_scene(needs, {error, false})[0].forms;
   };
-  const auto fitted = ElementsAre(RepresentationKind::Fitted), sampled = ElementsAre(RepresentationKind::Sampled),
-             aimed = ElementsAre(RepresentationKind::Aimed);
+  const auto fitted = ElementsAre(forms::form("fitted")), sampled = ElementsAre(forms::form("sampled")),
+             aimed = ElementsAre(forms::form("aimed"));
   EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.03), fitted);
   EXPECT_THAT(forms({need("a", "phong", {"e=20"})}, 0.001), aimed);
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})})[0].forms, aimed) << "not unasked";
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "fitted")})[0].forms, fitted);
-  EXPECT_THAT(forms({need("a", "coupled", {})}, 0.5), ElementsAre(RepresentationKind::Exact));
+  EXPECT_THAT(forms({need("a", "coupled", {})}, 0.5), ElementsAre(forms::form("exact")));
 
   const std::vector<MaterialNeed> two = {need("a", "lafortune", {"cz=0.5", "e=20"}),
                                          need("b", "lafortune", {"cz=0.6", "e=30"})};
   EXPECT_THAT(forms(two, 0.5), aimed);
-  EXPECT_EQ(why(plan_scene(two, {0.5, false})[0], RepresentationKind::Fitted),
+  EXPECT_EQ(why(plan_scene(two, {0.5, false})[0], forms::form("fitted")),
             "a and b have other values of cz; a and b have other values of e");
   try {
     plan_scene({two[0], need("b", "lafortune", {"cz=0.6", "e=30"}, "fitted")});
@@ -155,11 +152,11 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   }
   EXPECT_THAT(forms({need("a", "phong", {"e=20"}, "sampled")}, 0.5), sampled);
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"}, "sampled")}, {0.5, true})[0].forms,
-              ElementsAre(RepresentationKind::Sampled, RepresentationKind::Fitted));
+              ElementsAre(forms::form("sampled"), forms::form("fitted")));
   auto textured = need("c", "phong", {"e=20", "ks=0.1"});
   textured.textured.insert("ks");
   const auto plan = plan_scene({need("a", "phong", {"e=20"}), textured}, {0.03, false, true});
-  EXPECT_THAT(plan[0].forms, ElementsAre(RepresentationKind::Fitted, RepresentationKind::Twin)) << "ks multiplies f";
+  EXPECT_THAT(plan[0].forms, ElementsAre(forms::form("fitted"), forms::form("twin"))) << "ks multiplies f";
   EXPECT_EQ(plan[0].fixed.count("ks"), 0u);
 }
 
@@ -169,9 +166,9 @@ TEST(Plan, FitsAlongANumber) {
   textured.textured.insert("sigma");
   const std::vector<MaterialNeed> needs = {need("a", "oren_nayar", {"sigma=0.05"}, "fitted"), textured};
   const PlannedModel plan = plan_scene(needs, {{}, false, true})[0];
-  EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
+  EXPECT_THAT(plan.forms, ElementsAre(forms::form("fitted")));
   EXPECT_EQ(plan.fixed.count("sigma"), 0u);
-  EXPECT_EQ(why(plan, RepresentationKind::Twin), "sigma varies over b");
+  EXPECT_EQ(why(plan, forms::form("twin")), "sigma varies over b");
   EXPECT_THROW(plan_scene({need("a", "oren_nayar", {"sigma=0.05"}, "twin"), textured}), InputError);
   textured.textured = {"form"};
   EXPECT_THROW(plan_scene({textured}), InputError) << "a choice is no axis";
@@ -183,20 +180,19 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
   textured.textured.insert("f0");
   const std::vector<MaterialNeed> needs = {need("a", "cook_torrance", {"f0=0.04", "m=0.2"}), textured};
   const PlannedModel plan = plan_scene(needs, {0.2, false, true})[0];
-  EXPECT_THAT(plan.forms, ElementsAre(RepresentationKind::Fitted));
+  EXPECT_THAT(plan.forms, ElementsAre(forms::form("fitted")));
   EXPECT_TRUE(plan.fixed.empty());
-  EXPECT_EQ(why(plan, RepresentationKind::Twin), "f0 varies over b");
-  EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(RepresentationKind::Aimed));
+  EXPECT_EQ(why(plan, forms::form("twin")), "f0 varies over b");
+  EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(forms::form("aimed")));
 
   // Its shares add up, whatever they are; its exponents are two numbers.
   const auto phong = [](const char* id, const char* value) { return need(id, "phong_material", {value}, "fitted"); };
-  EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms,
-              ElementsAre(RepresentationKind::Fitted));
+  EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms, ElementsAre(forms::form("fitted")));
   EXPECT_THROW(plan_scene({phong("a", "es=10"), phong("b", "e=20")}), InputError);
 }
 
-constexpr RepresentationKind kExact = RepresentationKind::Exact, kAimed = RepresentationKind::Aimed,
-                             kSampled = RepresentationKind::Sampled, kFitted = RepresentationKind::Fitted;
+const forms::Form *const kExact = forms::form("exact"), *const kAimed = forms::form("aimed"),
+                         *const kSampled = forms::form("sampled"), *const kFitted = forms::form("fitted");
 
 TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   const std::vector<MaterialNeed> phong = {need("a", "phong", {"e=20"})}, coupled = {need("a", "coupled", {})};
@@ -215,7 +211,7 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   EXPECT_THAT(plan(phong, 1.1).forms, ElementsAre(kAimed));
   EXPECT_THAT(plan(phong, 1).forms, ElementsAre(kFitted));
   EXPECT_EQ(why(plan(phong, 1), kAimed), "costs 1.1x, and 1x is allowed");
-  EXPECT_EQ(why(plan(phong, 1), RepresentationKind::Twin), "only where it is asked for");
+  EXPECT_EQ(why(plan(phong, 1), forms::form("twin")), "only where it is asked for");
   EXPECT_THAT(plan(coupled, 1.25).forms, ElementsAre(kExact));
   EXPECT_THAT(plan(coupled, 1.1).forms, ElementsAre(kFitted));
 
@@ -262,7 +258,7 @@ TEST(Plan, SaysThatAFitOfAnotherChoiceIsTooFarOff) {
 TEST(Plan, SaysWhatAModelLacksBeforeWhatItsMaterialsDifferIn) {
   const std::vector<MaterialNeed> two = {need("a", "fresnel_conductor", {"metal=cu"}),
                                          need("b", "fresnel_conductor", {"metal=au"})};
-  for (const RepresentationKind kind : {kFitted, RepresentationKind::Twin})
+  for (const forms::Form* kind : {kFitted, forms::form("twin")})
     EXPECT_EQ(why(plan_scene(two, {})[0], kind), "it only reflects and refracts ideally");
 }
 

@@ -8,18 +8,15 @@
 #include <regex>
 
 #include "fit/terms.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/albedo_table.h"
 #include "measure/fold.h"
 #include "model/choices.h"
 #include "model/sampling.h"
 #include "pack/probe.h"
-#include "pack/shader.h"
 #include "plan/plan.h"
 
 namespace brdfc {
-
-using forms::RepresentationKind;
 
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace osl_words_test {
@@ -108,7 +105,7 @@ std::vector<std::string> declared_in(const std::string& statements) {
 }
 
 /// What a model's statements declare, for all choices.
-std::set<std::string> declared_by(const Model& model, RepresentationKind kind, const ParamValues& fixed) {
+std::set<std::string> declared_by(const Model& model, const forms::Form* kind, const ParamValues& fixed) {
   std::set<std::string> names;
   const auto add = [&](const forms::Recording& r) {
     for (const std::string& name : declared_in(r.statements)) names.insert(name);
@@ -117,14 +114,7 @@ std::set<std::string> declared_by(const Model& model, RepresentationKind kind, c
   for (const Choices& c : choice_combinations(model.info())) {
     if (!admits(model.info(), c, fixed)) continue;
     const ParamValues values = with_choices(model.info(), c, fixed);
-    if (kind == RepresentationKind::Aimed) {
-      const forms::AimedRecording r = forms::record_aimed(model, values, 4);
-      for (const forms::Recording* part : {&r.base, &r.draw, &r.value}) add(*part);
-      const forms::AimedSteps& s = forms::aimed_steps(4);
-      for (const forms::Recording* part : {&s.room, &s.aim, &s.less, &s.send, &s.rest}) add(*part);
-    } else {
-      add(forms::record(model, kind, values, 4));
-    }
+    for (const forms::Recording& r : kind->recordings(model, values)) add(r);
     if (model.has_mirror()) add(forms::record_mirror(model, values, 4));
   }
   return names;
@@ -132,10 +122,9 @@ std::set<std::string> declared_by(const Model& model, RepresentationKind kind, c
 
 TEST(OslWords, AreAllThatShadersUseBesideTheirModelsNames) {
   for (const auto& [name, model] : models())
-    for (const RepresentationKind kind : forms::representations(*model)) {
-      const ParamValues fixed = forms::form_values(*model, kind);
-      const pack::Shader shader =
-          pack::write_shader(*model, kind, measure::fold(table_of(*model), *model, fixed), fixed);
+    for (const forms::Form* kind : forms::forms_of(*model)) {
+      const ParamValues fixed = kind->values(*model, {});
+      const forms::Shader shader = kind->write(*model, measure::fold(table_of(*model), *model, fixed), {fixed});
       std::set<std::string> own = declared_by(*model, kind, fixed);
       for (const ParamInfo& p : model->info().params) own.insert(p.name);
       const std::string text = without_comments_and_strings(shader.source);
@@ -150,8 +139,8 @@ TEST(OslWords, AreAllThatShadersUseBesideTheirModelsNames) {
 
 TEST(OslWords, AStatementOfAModelMayHaveAnyForAName) {
   const detail::ModelOf<Hinted> model;
-  for (const RepresentationKind kind : {RepresentationKind::Exact, RepresentationKind::Sampled}) {
-    const forms::Recording r = forms::record(model, kind, {}, 4);
+  for (const forms::Form* kind : {forms::form("exact"), forms::form("sampled")}) {
+    const forms::Recording r = kind->recordings(model, {}).at(0);
     const std::vector<std::string> names = declared_in(r.statements);
     EXPECT_GE(names.size(), all_words().size() + 4) << "each has its own";
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size()) << "twice the same";
@@ -160,7 +149,7 @@ TEST(OslWords, AStatementOfAModelMayHaveAnyForAName) {
       EXPECT_EQ(model.info().param(name), nullptr) << name << ": a parameter, also where statements do not read it";
     }
     EXPECT_THAT(r.statements, HasSubstr("float count_1 = sin("));
-    EXPECT_NO_THROW(pack::write_shader(model, kind, table_of(model)));
+    EXPECT_NO_THROW(kind->write(model, table_of(model)));
   }
   EXPECT_THAT(pack::probe_source(model, {}), HasSubstr("float shown_f_1 = sin("));
 }
@@ -170,11 +159,11 @@ TEST(OslWords, AParameterMayHaveNoneForAName) {
     name_of_parameter = word;
     const detail::ModelOf<OfName> model;
     if (print::numbered_osl_words().count(word) && !print::osl_words().count(word)) {
-      EXPECT_NO_THROW(pack::write_shader(model, RepresentationKind::Sampled, table_of(model))) << word;
+      EXPECT_NO_THROW(forms::form("sampled")->write(model, table_of(model))) << word;
       continue;
     }
     try {
-      pack::write_shader(model, RepresentationKind::Sampled, table_of(model));
+      forms::form("sampled")->write(model, table_of(model));
       ADD_FAILURE() << word << " was not refused";
     } catch (const InputError& e) {
       EXPECT_EQ(e.what(),

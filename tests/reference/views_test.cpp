@@ -9,11 +9,10 @@
 #include <random>
 
 #include "fit/fit.h"
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "measure/fold.h"
 #include "measure/stored_albedo.h"
 #include "model/horizon.h"
-#include "pack/shader.h"
 #include "plan/plan.h"
 #include "reference/shapes.h"
 
@@ -182,7 +181,7 @@ TEST(Views, CutFitsHoldTheSameNumbers) {
     const Model& m = find_model("phong");
     ParamValues known = complete(m.info(), {{"e", 20.0}});
     if (axis) known.erase("e");
-    const ParamValues values = fit::without_factors(m, known);
+    const ParamValues values = fit::roles_of(m, known).fitted();
     const fit::Fit& whole = fit::fit_of(m, values);
     const fit::Varied<double> varied(20);
     // Also less than what lies between two knots, and what ends at the last.
@@ -231,13 +230,13 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
   // What is off at views that nobody has does not count.
   plan::Budget budget;
   budget.error = 0.006;
-  EXPECT_EQ(plan::plan_scene({need("a", {})}, budget)[0].forms[0], forms::RepresentationKind::Aimed);
-  EXPECT_EQ(plan::plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], forms::RepresentationKind::Fitted);
+  EXPECT_EQ(plan::plan_scene({need("a", {})}, budget)[0].forms[0], forms::form("aimed"));
+  EXPECT_EQ(plan::plan_scene({need("a", {0.7, 0.9})}, budget)[0].forms[0], forms::form("fitted"));
 
   const measure::AlbedoTable table = measure::fold(measure::albedo_table_of(m), m, values, kSome);
-  for (const forms::RepresentationKind kind : {forms::RepresentationKind::Fitted, forms::RepresentationKind::Aimed}) {
-    const pack::Shader whole = pack::write_shader(m, kind, table, values, {}, 0, forms::AimedBase::Fitted),
-                       cut = pack::write_shader(m, kind, table, values, kSome, 0, forms::AimedBase::Fitted);
+  for (const forms::Form* kind : {forms::form("fitted"), forms::form("aimed")}) {
+    const forms::Shader whole = kind->write(m, table, {values, {}, 0, forms::AimedBase::Fitted}),
+                        cut = kind->write(m, table, {values, kSome, 0, forms::AimedBase::Fitted});
     EXPECT_LT(cut.source.size(), whole.source.size());
     EXPECT_EQ(cut.operations, whole.operations);
   }

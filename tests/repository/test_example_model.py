@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Following docs/add-a-model.md adds a model: its example, dropped into a copy of the sources,
-builds, equals its formula, and renders in Blender as it does in the reference renderer."""
+builds, equals its formula, and renders in Blender as it does in the reference renderer. Following
+docs/add-a-form.md adds a form, in the same copy."""
 
 import csv
 import json
@@ -28,20 +29,37 @@ def run(*command, text=None):
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def tool(tmp_path_factory):
-    """The tool, built from a copy of the sources with the example of the docs as a new model."""
-    page = (ROOT / "docs" / "add-a-model.md").read_text(encoding="utf-8")
+def example_of(page):
+    """Path and text of the source that a page shows."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     found = re.findall(
-        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", page, re.S
+        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", text, re.S
     )
     assert len(found) == 1
-    path, text = found[0]
+    return found[0]
+
+
+@pytest.fixture(scope="module")
+def tool(tmp_path_factory):
+    """The tool, built from a copy of the sources with the examples of the docs as a new model and
+    a new form."""
     source = tmp_path_factory.mktemp("example") / "source"
     skip = shutil.ignore_patterns("build", ".env", ".git", "__pycache__", ".*_cache")
     shutil.copytree(ROOT, source, ignore=skip)
-    assert not (source / path).exists()
-    (source / path).write_text(text, encoding="utf-8")
+    for path, text in (example_of("add-a-model.md"), example_of("add-a-form.md")):
+        assert not (source / path).exists()
+        (source / path).write_text(text, encoding="utf-8")
+    # The form's page says to declare it and to list it.
+    registry = source / "generator" / "forms" / "registry.cpp"
+    page = (ROOT / "docs" / "add-a-form.md").read_text(encoding="utf-8")
+    declared, listed = re.findall(
+        r"\n```cpp\n(const Form& \w+\(\);|  static const .*?;)\n```", page
+    )
+    before = registry.read_text(encoding="utf-8")
+    after = re.sub(r"  static const std::vector<const Form\*> all = .*?;", listed, before)
+    after = after.replace("\nconst std::vector", f"{declared}\n\nconst std::vector", 1)
+    assert after.count("flat()") == 2
+    registry.write_text(after, encoding="utf-8")
     build = source / "build"
     run("cmake", "-S", source, "-B", build, "-G", "Ninja", "-DBUILD_TESTING=OFF")
     run("cmake", "--build", build, "--target", "brdfc")
@@ -161,3 +179,34 @@ def test_structured_light_agrees_with_the_reference(renderers):
     assert against_truth["bias"] / against_truth["mean_b"] == pytest.approx(0, abs=0.01)
     # Two pictures with independent noise are twice as far apart as one is from the truth.
     assert against_truth["relmse"] < 0.75 * compare(one, two)["relmse"]
+
+
+def test_a_new_form_is_listed_built_and_measured(tool, tmp_path):
+    models = {m["name"]: m for m in json.loads(run(tool, "list", "--json"))}
+    assert "flat" in models["lambert"]["representations"]
+    assert "flat" not in models["glass"]["representations"]
+    content = scene(
+        {"color": [1, 1, 1]},
+        {"type": "perspective", "position": [0, -4, 1], "look_at": [0, 0, 0], "fov_y_degrees": 25},
+        {"type": "sphere", "radius": 1},
+    )
+    content["materials"] = {
+        "a": {"model": "lambert", "representation": "flat"},
+        "b": {"model": "phong", "representation": "flat"},
+    }
+    content["objects"] = [
+        {**content["objects"][0], "name": name, "material": name} for name in ("a", "b")
+    ]
+    source = tmp_path / "flat.json"
+    source.write_text(json.dumps(content), encoding="utf-8")
+    run(tool, "build", "--scene", source, "--out", tmp_path)
+    pack = tmp_path / "brdfc_shaders"
+    manifest = json.loads((pack / "manifest.json").read_text(encoding="utf-8"))
+    forms = {name: m["representations"]["flat"] for name, m in manifest["models"].items()}
+    assert set(forms) == {"lambert", "phong"}
+    # A Diffuse BSDF is Lambert's model, and far from a highlight.
+    assert forms["lambert"]["error"]["relative_l1"] < 1e-6
+    assert forms["phong"]["error"]["relative_l1"] > 0.1
+    assert forms["phong"]["warnings"] == ["bump_correction"]
+    shader = (pack / forms["phong"]["shader"]).read_text(encoding="utf-8")
+    assert "weight_0 * brdfc_diffuse(frame_n)" in shader

@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "forms/representation.h"
+#include "forms/form.h"
 #include "model/choices.h"
 #include "print/osl_program.h"
 #include "support.h"

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements that differ by combination of choices, as one text of branches.
+// Statements of OSL for all combinations of a model's choices.
 #pragma once
 
-#include <cstddef>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "forms/recording.h"
 #include "model/choices.h"
 
-namespace brdfc::pack {
+namespace brdfc::forms {
 
 /// Statements that differ by combination of choices: equal ones are written once.
 class ChoiceSwitch {
@@ -17,18 +18,26 @@ class ChoiceSwitch {
   /// Both must outlive it. Choices among `fixed` are tested nowhere.
   ChoiceSwitch(const ModelInfo& info, const ParamValues& fixed) : info_(info), fixed_(fixed) {}
 
-  void add(const Choices& choices, const std::string& statements);
+  void add(const Choices&, const std::string& statements);
   /// Branches on the parameters' names, or the statements alone where all are equal; `indent` is that of the branches.
   std::string print(int indent) const;
 
  private:
   std::string condition(const std::vector<Choices>& combinations) const;
-  /// Whether every value of choice k stands in the combinations with the others as in c.
-  static bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size);
-
   const ModelInfo& info_;
   const ParamValues& fixed_;
   std::vector<std::pair<std::string, std::vector<Choices>>> cases_;
 };
 
-}  // namespace brdfc::pack
+/// The arrays of all statements of a shader, each once: combinations of choices share their tables.
+class SharedArrays {
+ public:
+  /// The statements, before which stand the arrays whose names other ones have taken.
+  std::string without_shared(const Recording&);
+  std::string print() const;
+
+ private:
+  std::map<std::string, std::string> known_;
+};
+
+}  // namespace brdfc::forms

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pack/choice_switch.h"
+#include "forms/choice_switch.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,19 @@
 
 #include "print/osl_text.h"
 
-namespace brdfc::pack {
+namespace brdfc::forms {
+namespace {
 
-using print::indented;
+/// Whether every value of choice k stands in the combinations with the others as in c.
+bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size) {
+  for (int i = 0; i < size; ++i) {
+    c[k] = i;
+    if (std::find(combinations.begin(), combinations.end(), c) == combinations.end()) return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 void ChoiceSwitch::add(const Choices& choices, const std::string& statements) {
   for (auto& [text, combinations] : cases_)
@@ -30,7 +40,7 @@ std::string ChoiceSwitch::print(int indent) const {
                        i == 0 ? "if (" + condition(cases_[i].second) + ") "
                        : last ? std::string("else ")
                               : "else if (" + condition(cases_[i].second) + ") ");
-    out += indented(cases_[i].first);
+    out += print::indented(cases_[i].first);
     out += fmt::format("{:{}}}}\n", "", indent);
   }
   return out;
@@ -57,12 +67,19 @@ std::string ChoiceSwitch::condition(const std::vector<Choices>& combinations) co
   return text;
 }
 
-bool ChoiceSwitch::covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size) {
-  for (int i = 0; i < size; ++i) {
-    c[k] = i;
-    if (std::find(combinations.begin(), combinations.end(), c) == combinations.end()) return false;
+std::string SharedArrays::without_shared(const Recording& r) {
+  std::string own;
+  for (const std::string& array : r.arrays) {
+    const std::string name = array.substr(0, array.find('['));
+    if (known_.emplace(name, array).first->second != array) own += array;
   }
-  return true;
+  return own + r.statements;
 }
 
-}  // namespace brdfc::pack
+std::string SharedArrays::print() const {
+  std::string out;
+  for (const auto& [name, array] : known_) out += array;
+  return out;
+}
+
+}  // namespace brdfc::forms

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "forms/aimed_steps.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <mutex>
+
+#include "forms/aimed.h"
+
+namespace brdfc::forms {
+namespace {
+
+/// An OSL vector.
+Vec3<Expr> input_vector(const std::string& name) {
+  return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
+}
+
+}  // namespace
+
+const AimedSteps& aimed_steps(int indent) {
+  static std::mutex mutex;
+  static std::map<int, AimedSteps> made;
+  const std::lock_guard lock(mutex);
+  if (const auto it = made.find(indent); it != made.end()) return it->second;
+  Recorder recorder;
+  AimedSteps steps;
+  const auto record_step = [&](const auto& outputs) {
+    Program program;
+    outputs(program);
+    return recording_of(program, indent, {});
+  };
+  const auto kept_lobe = [](const std::string& index) {
+    const auto of = [&](const char* what) { return fmt::format("lobe_{}[{}]", what, index); };
+    AimedLobe<Expr> lobe;
+    lobe.towards = input_vector(of("towards"));
+    lobe.half = input_vector(of("half"));
+    lobe.exponent = Expr::input(of("exponent"));
+    lobe.sinRadius = Expr::input(of("radius"));
+    lobe.cosEnd = Expr::input(of("end"));
+    lobe.extent = Expr::input(of("extent"));
+    return lobe;
+  };
+  const auto kept_patch = [](const std::string& index) {
+    const auto of = [&](const char* what) { return fmt::format("lamp_{}[{}]", what, index); };
+    return LampPatch<Expr>{input_vector(of("centre")), input_vector(of("across")), input_vector(of("along")),
+                           Expr::input(of("disk"))};
+  };
+  const AimedLobe<Expr> earlier = kept_lobe("earlier");
+  const LampPatch<Expr> patch = kept_patch("lobes");
+  const Expr lobes = Expr::input("lobes");
+  steps.above = record_step([&](Program& p) { p.output("lamp_above", highest(patch)); });
+  steps.room = record_step([&](Program& p) {
+    p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(patch.centre, earlier)));
+  });
+  steps.aim = record_step([&](Program& p) {
+    const AimedLamp<Expr> lamp =
+        aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
+    p.output("wi", lamp.wi);
+    p.output("to_lamp", lamp.lobe.towards);
+    p.output("to_half", lamp.lobe.half);
+    p.output("lobe_exponent[lobes]", lamp.lobe.exponent);
+    p.output("lobe_radius[lobes]", lamp.lobe.sinRadius);
+    p.output("lobe_end[lobes]", lamp.lobe.cosEnd);
+    p.output("lobe_extent[lobes]", lamp.lobe.extent);
+    p.output("lobe_height", lamp.height);
+    p.output("lamp_emphasis", lamp.emphasis);
+    p.output("lamp_solid_angle[lobes]", lamp.solid_angle);
+  });
+  const Rgb<Expr> value = Rgb<Expr>::input("excess");
+  const Expr density = Expr::input("drawn_density");
+  steps.less = record_step([&](Program& p) {
+    p.output("excess", value - Rgb<Expr>::input("lobe_value[earlier]") * evaluate(earlier, input3("wi")));
+  });
+  steps.send = record_step([&](Program& p) {
+    AimedLamp<Expr> lamp;
+    lamp.height = Expr::input("lobe_height");
+    lamp.lobe.extent = Expr::input("lobe_extent[lobes]");
+    lamp.emphasis = Expr::input("lamp_emphasis");
+    lamp.solid_angle = Expr::input("lamp_solid_angle[lobes]");
+    const Sent<Expr> sent = send(lamp, value, density);
+    p.output("lobe_value[lobes]", sent.value);
+    p.output("lobe_weight[lobes]", sent.weight);
+    p.output("lobe_colour[lobes]", sent.colour);
+  });
+  steps.toss = record_step([&](Program& p) {
+    const Toss<Expr> tossed = toss(Expr::input("u_0"), lobes);
+    p.output("tossed", tossed.lobe);
+    p.output("u_0", tossed.u);
+  });
+  steps.under = record_step([&](Program& p) {
+    p.output("drawn", sample_under(kept_lobe("chosen"), Expr::input("u_1"), Expr::input("u_2")));
+  });
+  const Met<Expr> before{Rgb<Expr>::input("covered"), Rgb<Expr>::input("covered_before"), Expr::input("lamp_met"),
+                         Expr::input("density_under")};
+  steps.meet = record_step([&](Program& p) {
+    const LampPatch<Expr> of_earlier = kept_patch("earlier");
+    const Met<Expr> met = meet(before, of_earlier, earlier, Expr::input("lamp_solid_angle[earlier]"),
+                               Rgb<Expr>::input("lobe_value[earlier]"), input3("drawn"));
+    p.output("covered_before", met.before);  // from what was covered before this one is added
+    p.output("covered", met.covered);
+    p.output("lamp_met", met.solid_angle);
+    p.output("density_under", met.density);
+    p.output("ray", beside(of_earlier, input3("ray")));
+  });
+  const auto record_rest = [&](const Expr& count, const Met<Expr>& met) {
+    return record_step([&](Program& p) {
+      const Rest<Expr> left = rest(value, density, count, met);
+      p.output("rest_weight", left.weight);
+      p.output("rest_colour", left.colour);
+    });
+  };
+  steps.rest = record_rest(lobes, before);
+  steps.alone = record_rest(Expr(0), Met<Expr>());
+  return made.emplace(indent, std::move(steps)).first->second;
+}
+
+}  // namespace brdfc::forms

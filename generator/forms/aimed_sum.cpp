@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "forms/aimed.h"
+
+namespace brdfc::forms {
+
+AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
+                   const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
+                   const std::vector<std::array<double, 2>>& v) {
+  const auto excess_at = [&](const Vec3<double>& wi) {
+    return excess(brdf, !base.empty(), evaluate(base, wi, wo), wi, wo);
+  };
+  AimedSum out;
+  std::vector<const LampPatch<double>*> of;
+  std::vector<double> solid_angles;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!brdf.scatters_through() && highest(patches[i]) <= 0) continue;
+    double room = 1;
+    for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patches[i].centre, earlier));
+    const AimedLamp<double> lamp = aim_at(patches[i], room, v[i][0], v[i][1], wo);
+    if (lamp.emphasis == 0) continue;
+    Excess<double> there = excess_at(lamp.wi);
+    for (std::size_t k = 0; k < out.lobes.size(); ++k)
+      there.value = there.value - out.values[k] * evaluate(out.lobes[k], lamp.wi);
+    of.push_back(&patches[i]);
+    solid_angles.push_back(lamp.solid_angle);
+    out.lobes.push_back(lamp.lobe);
+    out.values.push_back(send(lamp, there.value, there.density).value);
+  }
+  const auto count = double(out.lobes.size());
+  const Toss<double> tossed = toss(u.x, count);
+  out.drawn = tossed.lobe < 0 ? draw(brdf, !base.empty(), wo, {tossed.u, u.y, u.z})
+                              : sample_under(out.lobes[std::size_t(tossed.lobe)], u.y, u.z);
+  out.wi = out.drawn;
+  Met<double> met;
+  for (std::size_t k = 0; k < out.lobes.size(); ++k) {
+    met = meet(met, *of[k], out.lobes[k], solid_angles[k], out.values[k], out.drawn);
+    out.wi = beside(*of[k], out.wi);
+  }
+  if (met.solid_angle > 0) out.wi = out.drawn;
+  const Excess<double> drawn = excess_at(out.drawn);
+  const Rest<double> left = rest(drawn.value, drawn.density, count, met);
+  out.rest = left.colour * left.weight;
+  out.density = density_of_drawn(drawn.density, count, met);
+  return out;
+}
+
+}  // namespace brdfc::forms

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What all forms that are shaders share: the shader around what one of them makes of the model.
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "forms/choice_switch.h"
+#include "forms/form.h"
+#include "forms/recording.h"
+
+namespace brdfc::forms {
+
+/// A shader as it is being written.
+struct ShaderText {
+  const Model& model;
+  const Setting& setting;  ///< with the form's own values among what is fixed
+  Shader shader = {};
+  SharedArrays arrays = {};
+  std::string statements = {};          ///< after the frame is known, before BSDF is assigned
+  std::vector<std::string> terms = {};  ///< closures, the sum of which is BSDF
+
+  /// Records once for each combination of choices that what is fixed admits, together with what is fixed. Returns the
+  /// closures, which are the same for all, and counts the operations of the longest.
+  std::vector<RecordedClosure> record(ChoiceSwitch&,
+                                      const std::function<Recording(const Choices&, const ParamValues&)>& recording);
+  /// Declares what recorded statements assign of the closures, makes them terms and counts what they take.
+  void declare(const std::vector<RecordedClosure>&);
+  /// Divides colours of ramps as they ask for; then weights are multiplied by the `factors`, that of a mirror is not.
+  void scale(const std::vector<RecordedClosure>&, const std::set<std::string>& factors);
+  /// Brings normals and tangents of their own from the model's frame into the shader's.
+  void turn(const std::vector<RecordedClosure>&);
+};
+
+class OslForm : public Form {
+ public:
+  using Form::Form;
+  Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const final;
+
+ protected:
+  /// Writes statements and terms of all but the mirror of a form that draws(). Here of the closures that recordings()
+  /// assign, its first.
+  virtual void write_closures(ShaderText&) const;
+  /// The lowest view, as a cosine, that its closures are for: of a lower one the normal is turned; 0: any.
+  virtual double lowest_view() const { return 0; }
+};
+
+/// Only ramps take more slots than closures.
+inline bool has_ramps(const Shader& shader) { return shader.slots > shader.closures; }
+
+/// Three numbers in [0, 1) that draw a direction.
+inline constexpr const char* kDraws =
+    "    vector u_all = brdfc_random(0, path_length);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";
+
+/// What a drawn direction, which is a lobe, takes of a GPU's pool. Where it may be another closure, OSL makes a product
+/// of that and its weight.
+int ray_bytes(const Model&);
+
+}  // namespace brdfc::forms

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "forms/recording.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "measure/probes.h"
+#include "model/horizon.h"
+#include "model/inputs.h"
+#include "print/osl_program.h"
+
+namespace brdfc::forms {
+namespace {
+
+/// What a shader has for parameters: statements may not declare them, not even those that they do not read.
+std::vector<std::string> parameter_names(const Model& model) {
+  std::vector<std::string> names;
+  for (const ParamInfo& p : model.info().params) names.push_back(p.name);
+  return names;
+}
+
+/// What the closures of a fit vary by: inputs, but for what is fixed.
+fit::Varied<Expr> recorded_varied(const Model& model, const fit::Fit& fit, const ParamValues& fixed) {
+  fit::Varied<Expr> out;
+  if (fit.axis()) out.number = Expr::input(fit.axis()->parameter);
+  for (const std::string& name : fit.terms().parameters) {
+    const auto it = fixed.find(name);
+    if (it == fixed.end()) {
+      const bool grey = model.info().param(name)->kind == ParamKind::Number;
+      out.parameters[name] = grey ? Rgb<Expr>(Expr::input(name)) : Rgb<Expr>::input(name);
+    } else {
+      const Rgb<double> c = fit::as_rgb(it->second);
+      out.parameters[name] = {c.r, c.g, c.b};
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Recording recording_of(const Program& program, int indent, const std::vector<std::string>& taken,
+                       std::vector<RecordedClosure> closures) {
+  Recording r{"", std::move(closures), program.operations(), program.inputs(), {}};
+  r.statements = print::osl_program(program, indent, taken, &r.arrays);
+  return r;
+}
+
+Recording recording_of(const Model& model, const Program& program, int indent, std::vector<RecordedClosure> closures) {
+  return recording_of(program, indent, parameter_names(model), std::move(closures));
+}
+
+Vec3<Expr> turned_to_side(const Model& model, const Brdf<Expr>& brdf, Vec3<Expr> w) {
+  if (measure::two_sided(model, brdf)) w.z = w.z * Expr::input("side");
+  return w;
+}
+
+Vec3<Expr> recorded_wo(const Model& model, const Brdf<Expr>& brdf) {
+  return turned_to_side(model, brdf, raise_to_horizon(input3("wo")));
+}
+
+Vec3<Expr> recorded_u() { return {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")}; }
+
+std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format("ramp_{}[{}]", closure, i); }
+
+std::vector<RecordedClosure> output_closures(const ClosureSum<Expr>& sum, Program& program, Division division) {
+  std::vector<RecordedClosure> recorded;
+  for (std::size_t c = 0; c < sum.size(); ++c) {
+    recorded.push_back(
+        {sum[c].kind, sum[c].turned, sum[c].stretched, has_ramp(sum[c].kind) ? division : Division::Done});
+    program.output(fmt::format("weight_{}", c), sum[c].weight);
+    if (has_ramp(sum[c].kind))
+      for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
+    if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
+    if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
+    if (sum[c].stretched != Tangent::None) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
+    if (sum[c].stretched == Tangent::Surface) program.output(fmt::format("tangent_{}", c), sum[c].tangent);
+    if (sum[c].turned) program.output(fmt::format("normal_{}", c), sum[c].normal);
+    if (sum[c].kind == ClosureKind::Refraction) program.output(fmt::format("ior_{}", c), sum[c].ior);
+  }
+  return recorded;
+}
+
+ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
+  for (std::size_t c = 0; c < sum.size(); ++c) {
+    sum[c].weight = Rgb<Expr>::input(fmt::format("weight_{}", c));
+    if (has_ramp(sum[c].kind))
+      for (std::size_t i = 0; i < kRampSize; ++i) sum[c].ramp[i] = Rgb<Expr>::input(ramp_entry(c, i));
+    if (sum[c].kind == ClosureKind::PhongRamp) sum[c].exponent = Expr::input(fmt::format("exponent_{}", c));
+    if (has_facets(sum[c].kind)) sum[c].alpha = Expr::input(fmt::format("alpha_{}", c));
+    if (sum[c].stretched != Tangent::None) sum[c].alpha_across = Expr::input(fmt::format("alpha_across_{}", c));
+    if (sum[c].stretched == Tangent::Surface) sum[c].tangent = input3(fmt::format("tangent_{}", c));
+    if (sum[c].turned) sum[c].normal = input3(fmt::format("normal_{}", c));
+  }
+  return sum;
+}
+
+ClosureSum<Expr> recorded_fit(const Model& model, const fit::Fit& fit, const ParamValues& fixed, const Vec3<Expr>& wo) {
+  return fit.closures(wo, recorded_varied(model, fit, fixed), Expr(1), false);
+}
+
+Division division_of(const fit::Fit& fit) {
+  return fit.terms().parameters.empty() ? Division::ByLargest : Division::ByChannel;
+}
+
+void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program) {
+  const Vec3<Expr> wo = recorded_wo(model, brdf);
+  Sample<Expr> s = brdf.sample(wo, recorded_u());
+  if (brdf.scatters_through()) s.wi.z = s.wi.z * Expr::input("side");
+  program.output("wi", s.wi);
+  program.output("weight", s.weight);
+}
+
+Recording record_closures(const Model& model, const ParamValues& fixed, int indent, const RecordClosures& closures,
+                          Division division) {
+  Recorder recorder;
+  Program program;
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  const std::vector<RecordedClosure> recorded = output_closures(closures(*brdf), program, division);
+  return recording_of(model, program, indent, recorded);
+}
+
+Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
+  Recorder recorder;
+  Program program;
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+  program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
+  return recording_of(model, program, indent, {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
+}
+
+}  // namespace brdfc::forms
