@@ -20,6 +20,7 @@ usage or input.
 
 import argparse
 import contextlib
+import importlib
 import json
 import os
 import resource
@@ -27,6 +28,8 @@ import statistics
 import sys
 import tempfile
 import time
+import tomllib
+import zipfile
 from pathlib import Path
 
 
@@ -66,9 +69,13 @@ def start_blender(extension, resources):
             filepath=str(extension), repo="user_default", enable_on_install=True
         )
     try:
-        from bl_ext.user_default.brdfc_shaders import scene_loader
-    except ImportError as error:
-        raise UsageError(f"{extension}: not the brdfc_shaders extension: {error}") from error
+        # A pack cut to a scene has an id of its own.
+        with zipfile.ZipFile(extension) as archive:
+            about = tomllib.loads(archive.read("blender_manifest.toml").decode())
+        loader = f"bl_ext.user_default.{about['id']}.scene_loader"
+        scene_loader = importlib.import_module(loader)
+    except (KeyError, ImportError, zipfile.BadZipFile) as error:
+        raise UsageError(f"{extension}: not an extension of brdfc: {error}") from error
     return bpy, scene_loader
 
 
