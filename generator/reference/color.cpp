@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <regex>
@@ -28,6 +29,14 @@ std::string stated_version(const fs::path& file) {
   for (std::string line; std::getline(in, line);)
     if (std::regex_search(line, found, line_of_version)) return found[1];
   return {};
+}
+
+/// Whether a configuration says that it is of a later version than this library reads.
+bool is_later(const fs::path& file) {
+  int major = 0, minor = 0, own_major = 0, own_minor = 0;
+  std::sscanf(stated_version(file).c_str(), "%d.%d", &major, &minor);
+  std::sscanf(ocio::GetVersion(), "%d.%d", &own_major, &own_minor);
+  return std::pair(major, minor) > std::pair(own_major, own_minor);
 }
 
 /// The processor's exact formulas: the default ones approximate powers to 1e-4.
@@ -64,8 +73,16 @@ ColorConfig::~ColorConfig() = default;
 
 const ColorConfig& ColorConfig::current() {
   static const ColorConfig config = [] {
+    const fs::path own = data_dir() / "data" / "color" / "config.ocio";
     const char* given = std::getenv("OCIO");
-    return ColorConfig(given && *given ? fs::path(given) : data_dir() / "data" / "color" / "config.ocio");
+    if (!given || !*given) return ColorConfig(own);
+    // Blender sets it for what it starts.
+    if (is_later(given)) {
+      fmt::print(stderr, "brdfc: {} is of version {}, later than OpenColorIO {} reads: taking {}\n", given,
+                 stated_version(given), ocio::GetVersion(), own.string());
+      return ColorConfig(own);
+    }
+    return ColorConfig(given);
   }();
   return config;
 }

@@ -19,7 +19,8 @@ class ColorConfig {
   ~ColorConfig();
 
   /// The one that the environment variable OCIO names, as for every program that uses OpenColorIO, Blender's own among
-  /// them; without it data/color/config.ocio. Loaded once. Throws as the constructor.
+  /// them; data/color/config.ocio without it, and, said on stderr, in place of one of a later version. Loaded once.
+  /// Throws as the constructor.
   static const ColorConfig& current();
 
   const std::filesystem::path& file() const { return file_; }
