@@ -65,15 +65,16 @@ def test_a_page_a_paper(tmp_path, monkeypatch):
     scenes = [scene(name, name != "lamps") for name in names]
     (tmp_path / "report.json").write_text(json.dumps({"scenes": scenes}))
     pages = tmp_path / "pages"
-    monkeypatch.setattr("sys.argv", ["gallery_pages.py", str(tmp_path), str(pages)])
+    monkeypatch.setattr("sys.argv", ["gallery_pages.py", str(tmp_path), str(pages), "make it"])
     gallery_pages.main()
 
-    index = (pages / "index.md").read_text()
+    index = (pages / "overview.md").read_text()
     assert "(suffern.md) | 1 | 1 |" in index and "(more.md) | 1 | 0 |" in index
     assert "shirley.md" not in index, "no page without scenes"
     page = (pages / "more.md").read_text()
+    assert "`make it` made this page" in page
     assert "**differs**: 99.87 % of pixels accepted, 2 of 30 tiles rejected" in page
-    assert "exact, 64 samples, 3.5 s CPU" in page and "What lamps shows." in page
+    assert "exact, 32 samples, 3.5 s CPU" in page and "What lamps shows." in page
     strip = oiio.ImageBuf(str(pages / "gl-fig5.jpg"))
     gap = gallery_pages.GAP
     assert (strip.spec().width, strip.spec().height) == (60 + 2 * gap, 10)
