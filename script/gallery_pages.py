@@ -114,9 +114,7 @@ def main():
         for scene in scenes:
             text += section(folder, pages, scene)
         made = scenes[0]["provenance"]
-        text += [
-            f"*{made['Blender']}; {made['Processor']}; times are of {made['Tool'].split(',')[0]}.*"
-        ]
+        text += [f"*{made['Blender']}; {made['Processor']}.*"]
         (pages / f"{file}.md").write_text("\n".join(text) + "\n", encoding="utf-8")
         same = sum(s["forms"][0]["test"]["passed"] for s in scenes)
         index.append(line(f"[{title}]({file}.md)", len(scenes), same))

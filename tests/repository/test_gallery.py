@@ -48,7 +48,7 @@ def scene(name, passed):
         "description": f"What {name} shows.",
         "forms": [form],
         "reference": {"spp": 256, "wall_seconds": 9.0},
-        "provenance": {"Blender": "4.5.15", "Processor": "one", "Tool": "brdfc 1.2.3, sha256 0"},
+        "provenance": {"Blender": "4.5.15", "Processor": "one"},
     }
 
 
