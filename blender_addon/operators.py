@@ -103,6 +103,12 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         return {"FINISHED"}
 
 
+class _OfActiveMaterial:
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+
 class BRDFC_OT_enable_osl(Operator):
     """Turn on Open Shading Language, which these shaders need, and Cycles with it"""
 
@@ -121,16 +127,12 @@ class BRDFC_OT_enable_osl(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_fix_material(Operator):
+class BRDFC_OT_fix_material(_OfActiveMaterial, Operator):
     """Give the active material the settings that its models need"""
 
     bl_idname = "brdfc.fix_material"
     bl_label = "Set Up Material"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def execute(self, context):
         changes = api.prepare_material(context.object.active_material)
@@ -158,7 +160,7 @@ def _model_node(material, name):
     raise ValueError(f"material {material.name} has no model node {name!r}")
 
 
-class BRDFC_OT_switch(Operator):
+class BRDFC_OT_switch(_OfActiveMaterial, Operator):
     """Use another form of the same model; values and links stay"""
 
     bl_idname = "brdfc.switch"
@@ -172,10 +174,6 @@ class BRDFC_OT_switch(Operator):
         description="Also in every other material that has this model and form",
         default=False,
     )
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def execute(self, context):
         material = context.object.active_material
@@ -259,17 +257,13 @@ class BRDFC_OT_convert(Operator):
         return {"FINISHED"} if count else {"CANCELLED"}
 
 
-class BRDFC_OT_convert_back(Operator):
+class BRDFC_OT_convert_back(_OfActiveMaterial, Operator):
     """Put Blender's own nodes back into the active material; where they were deleted, the model's
     twin"""
 
     bl_idname = "brdfc.convert_back"
     bl_label = "Back to Blender's Nodes"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def execute(self, context):
         try:
@@ -281,7 +275,7 @@ class BRDFC_OT_convert_back(Operator):
         return {"FINISHED"} if count else {"CANCELLED"}
 
 
-class BRDFC_OT_details(Operator):
+class BRDFC_OT_details(_OfActiveMaterial, Operator):
     """The error is the part of the reflected light that a form sends in other directions than its
     model, on average over views; 1 % is hard to see. More figures are behind this button"""
 
@@ -290,10 +284,6 @@ class BRDFC_OT_details(Operator):
     bl_options = {"INTERNAL"}
 
     node: StringProperty(name="Node", description="Name of the group node")
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def invoke(self, context, event):
         return context.window_manager.invoke_popup(self, width=500)
@@ -340,7 +330,7 @@ class BRDFC_OT_update(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_add_albedo(Operator):
+class BRDFC_OT_add_albedo(_OfActiveMaterial, Operator):
     """Give the model's node an output for its albedo, whose tables make the file larger"""
 
     bl_idname = "brdfc.add_albedo"
@@ -348,10 +338,6 @@ class BRDFC_OT_add_albedo(Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     node: StringProperty(name="Node", description="Name of the group node")
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def execute(self, context):
         material = context.object.active_material
@@ -363,16 +349,12 @@ class BRDFC_OT_add_albedo(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_add_twin(Operator):
+class BRDFC_OT_add_twin(_OfActiveMaterial, Operator):
     """Give the active material an output for EEVEE, made of Blender's own nodes"""
 
     bl_idname = "brdfc.add_twin"
     bl_label = "Add Twin for EEVEE"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def execute(self, context):
         try:
@@ -383,7 +365,7 @@ class BRDFC_OT_add_twin(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_kernel(Operator):
+class BRDFC_OT_kernel(_OfActiveMaterial, Operator):
     """Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"""
 
     bl_idname = "brdfc.kernel"
@@ -393,10 +375,6 @@ class BRDFC_OT_kernel(Operator):
     node: StringProperty(
         name="Node", description="Name of the group node; empty for the active one"
     )
-
-    @classmethod
-    def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
 
     def execute(self, context):
         material = context.object.active_material

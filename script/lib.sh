@@ -28,6 +28,7 @@ usage_error() {
 print_help() { sed -n '3,/^[^#]/{/^#/!d;s/^# \{0,1\}//;p}' "$0"; }
 
 version() { sed -n 's/^project(brdfc VERSION \([0-9.]*\).*/\1/p' "$ROOT/CMakeLists.txt"; }
+all_scenes() { find "$ROOT/scenes" -name '*.json' ! -name schema.json | LC_ALL=C sort; }
 extension_zip() { printf '%s/brdfc_shaders-%s.zip' "$BUILD" "$(version)"; }
 
 # ---- Debian packages -------------------------------------------------------------------------------------

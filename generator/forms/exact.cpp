@@ -23,11 +23,7 @@ class Exact final : public OslForm {
   }
 
   std::vector<std::string> warnings(const Model& model, const Shader& shader) const override {
-    const bool mirror = model.has_mirror();
-    std::vector<std::string> codes = {"bump_correction"};
-    if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
-    if (shader.facets) codes.push_back("caustics");
-    if (mirror || shader.facets) codes.push_back("filter_glossy");
+    std::vector<std::string> codes = warnings_of_closures(model, shader);
     // Ramps here are signed: what they take away the passes do not see.
     if (has_ramps(shader)) codes.push_back("albedo_passes");
     return codes;

@@ -40,12 +40,7 @@ class Fitted final : public OslForm {
   }
 
   std::vector<std::string> warnings(const Model& model, const Shader& shader) const override {
-    const bool mirror = model.has_mirror();
-    std::vector<std::string> codes = {"bump_correction"};
-    if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
-    if (shader.facets) codes.push_back("caustics");
-    if (mirror || shader.facets) codes.push_back("filter_glossy");
-    return codes;
+    return warnings_of_closures(model, shader);
   }
   bool highlights(const Model& model, const Shader& shader) const override {
     return !model.has_mirror() && has_ramps(shader);

@@ -241,4 +241,13 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   return shader;
 }
 
+std::vector<std::string> warnings_of_closures(const Model& model, const Shader& shader) {
+  const bool mirror = model.has_mirror();
+  std::vector<std::string> codes = {"bump_correction"};
+  if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
+  if (shader.facets) codes.push_back("caustics");
+  if (mirror || shader.facets) codes.push_back("filter_glossy");
+  return codes;
+}
+
 }  // namespace brdfc::forms

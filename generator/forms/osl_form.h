@@ -50,6 +50,9 @@ class OslForm : public Form {
 /// Only ramps take more slots than closures.
 inline bool has_ramps(const Shader& shader) { return shader.slots > shader.closures; }
 
+/// Codes of what changes the light of Cycles' own closures and of a mirror beside them.
+std::vector<std::string> warnings_of_closures(const Model&, const Shader&);
+
 /// Three numbers in [0, 1) that draw a direction.
 inline constexpr const char* kDraws =
     "    vector u_all = brdfc_random(0, path_length);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";

@@ -6,13 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <numeric>
 #include <set>
 
 #include "reference/color.h"
 #include "reference/json_view.h"
 #include "reference/procedural.h"
-#include "reference/shapes.h"
+#include "reference/shape_reader.h"
 
 namespace brdfc::reference {
 
@@ -21,9 +20,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr double kFar = 1e6;     // largest coordinate or length
 constexpr double kBright = 1e9;  // largest power, irradiance or radiance
-constexpr double kSmall = 1e-6;  // smallest length that is not zero
 
 using Vector = Vec3<double>;
 
@@ -265,52 +262,12 @@ class Loader {
   }
 
   std::shared_ptr<const Mesh> read_shape(const JsonView& j, json& resolved) {
-    const std::string type =
-        j.at("type").choice({"sphere", "quad", "disk", "box", "cylinder", "knot", "tiles", "mesh"});
+    std::vector<std::string> types = shape_types();
+    types.push_back("mesh");
+    const std::string type = j.at("type").choice(types);
     Mesh mesh;
-    if (type == "sphere") {
-      j.only({"type", "radius", "segments", "rings", "smooth"});
-      const auto radius = j.find("radius"), segments = j.find("segments"), rings = j.find("rings"),
-                 smooth = j.find("smooth");
-      const int n = segments ? segments->integer(3, 8192) : 256;
-      mesh = make_sphere(radius ? radius->number(kSmall, kFar) : 1, n,
-                         rings ? rings->integer(2, 4096) : std::max(2, n / 2), smooth ? smooth->boolean() : true);
-    } else if (type == "quad") {
-      j.only({"type", "size"});
-      const auto size = j.find("size");
-      const auto s = size ? size->numbers<2>(kSmall, kFar) : std::array<double, 2>{1, 1};
-      mesh = make_quad(s[0], s[1]);
-    } else if (type == "disk") {
-      j.only({"type", "radius", "segments"});
-      const auto radius = j.find("radius"), segments = j.find("segments");
-      mesh = make_disk(radius ? radius->number(kSmall, kFar) : 1, segments ? segments->integer(3, 8192) : 128);
-    } else if (type == "box") {
-      j.only({"type", "size"});
-      const auto size = j.find("size");
-      mesh = make_box(size ? size->numbers<3>(kSmall, kFar) : std::array<double, 3>{1, 1, 1});
-    } else if (type == "cylinder") {
-      j.only({"type", "radius", "height", "segments", "smooth"});
-      const auto radius = j.find("radius"), height = j.find("height"), segments = j.find("segments"),
-                 smooth = j.find("smooth");
-      mesh = make_cylinder(radius ? radius->number(kSmall, kFar) : 1, height ? height->number(kSmall, kFar) : 2,
-                           segments ? segments->integer(3, 8192) : 256, smooth ? smooth->boolean() : true);
-    } else if (type == "knot") {
-      j.only({"type", "turns", "tube", "ripples", "segments", "sides"});
-      const auto turns = j.find("turns"), tube = j.find("tube"), ripples = j.find("ripples"),
-                 segments = j.find("segments"), sides = j.find("sides");
-      const auto n = turns ? turns->numbers<2>(1, 64) : std::array<double, 2>{2, 3};
-      if (n[0] != std::floor(n[0]) || n[1] != std::floor(n[1]) || std::gcd(int(n[0]), int(n[1])) != 1)
-        turns->fail("two whole numbers without a common divisor");
-      mesh = make_knot(int(n[0]), int(n[1]), tube ? tube->number(kSmall, 0.4) : 0.2,
-                       ripples ? ripples->integer(0, 512) : 48, segments ? segments->integer(3, 16384) : 4096,
-                       sides ? sides->integer(3, 1024) : 64);
-    } else if (type == "tiles") {
-      j.only({"type", "count", "relief", "joint", "resolution", "seed"});
-      const auto count = j.find("count"), relief = j.find("relief"), joint = j.find("joint"),
-                 resolution = j.find("resolution"), seed = j.find("seed");
-      mesh = make_tiles(count ? count->integer(1, 64) : 6, relief ? relief->number(0, 0.1) : 0.002,
-                        joint ? joint->number(0.001, 0.5) : 0.02, resolution ? resolution->integer(2, 512) : 96,
-                        seed ? seed->integer(0, 2147483647) : 0);
+    if (type != "mesh") {
+      mesh = read_shape_of_numbers(j, type);
     } else if (j.has("file")) {
       j.only({"type", "file", "smooth"});
       const auto smooth = j.find("smooth");

@@ -28,17 +28,19 @@ Image picture(const Scene& s, int width, int spp) {
 
 using Point = std::array<double, 2>;
 
-/// Mean luminance of the pixels whose middle, in units of the picture's height from its middle, x to the right and y
-/// upwards, is wanted.
+/// A pixel's middle in units of the picture's height from its middle, x to the right and y upwards.
+Point place(const Image& image, int x, int y) {
+  return {(x + 0.5 - image.width / 2.0) / image.height, (image.height / 2.0 - y - 0.5) / image.height};
+}
+
+/// Mean luminance of the pixels whose place is wanted.
 double mean(const Image& image, const std::function<bool(const Point&)>& wanted) {
   double sum = 0;
   int count = 0;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
-      const Point p{(x + 0.5 - image.width / 2.0) / image.height, (image.height / 2.0 - y - 0.5) / image.height};
-      if (!wanted(p)) continue;
-      const float* rgb = image.pixel(x, y);
-      sum += 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+      if (!wanted(place(image, x, y))) continue;
+      sum += luminance(image.color(x, y));
       ++count;
     }
   EXPECT_GT(count, 0);
@@ -104,14 +106,14 @@ TEST(Figures, TheLargestExponentIsAMirror) {
     m.values = complete(model.info(), {{"rd", std::array<double, 3>{0, 0, 0}}, {"rs", 0.9}});
   }
   const Image a = picture(glossy, 180, 64), b = picture(mirror, 180, 64);
-  // Luminance of 0.9 (1, 1, 0.3) against that of 0.9, for the grey mirror's colour is that of the room. The spheres
-  // stand 2.2 apart in a picture 4.4 high; e = 1 is on the upper left, e = 100000 on the lower right.
+  // Red and green alone: the colour of the reflection is (1, 1, 0.3), that of the mirror grey. The spheres stand 2.2
+  // apart in a picture 4.4 high; e = 1 is on the upper left, e = 100000 on the lower right.
   const auto difference = [&](double x, double y) {
     double sum = 0, squares = 0;
     const auto wanted = ring({x / 4.4, y / 4.4}, 1 / 4.4, 0, 0.9);
     for (int j = 0; j < a.height; ++j)
       for (int i = 0; i < a.width; ++i)
-        if (wanted({(i + 0.5 - a.width / 2.0) / a.height, (a.height / 2.0 - j - 0.5) / a.height})) {
+        if (wanted(place(a, i, j))) {
           const float *p = a.pixel(i, j), *q = b.pixel(i, j);
           sum += (p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]);
           squares += q[0] * q[0] + q[1] * q[1];
