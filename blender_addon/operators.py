@@ -446,7 +446,12 @@ class _Long:
         self.timer = manager.event_timer_add(0.1, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
+        self.tell(context, 0)  # before the first step: a user may want to cancel at once
         return {"RUNNING_MODAL"}
+
+    def tell(self, context, share):
+        context.window_manager.progress_update(100 * share)
+        context.workspace.status_text_set(f"{self.bl_label}: {share:.0%}   Esc: cancel")
 
     def modal(self, context, event):
         if event.type == "ESC":
@@ -464,8 +469,7 @@ class _Long:
         if share is None:
             self.end(context)
             return self.finish(context, self.job.result)
-        context.window_manager.progress_update(100 * share)
-        context.workspace.status_text_set(f"{self.bl_label}: {share:.0%}   Esc: cancel")
+        self.tell(context, share)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
