@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <set>
 
 #include "report/html.h"
 #include "report/page_style.h"
@@ -70,33 +72,211 @@ bool on_front(const SceneReport& s, const FormReport& f) {
   });
 }
 
-void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
-  out += R"(<div class="wide"><table>
-<thead><tr><th class="left">Scene</th><th class="left">Form</th><th>relMSE</th><th>of which<br>noise</th>
-<th>Mean, against<br>the reference</th><th>Pixels<br>accepted</th><th>FLIP</th><th>CPU time /<br>Glossy node</th><th>Samples<br>a pixel</th><th>Closures</th>
-<th>Form's own<br>error (L1)</th><th>CPU time to equal error<br>at 16, 256, 1024 samples</th></tr></thead>
-)";
+/// The form that materials have by default: what a report of one scene is mainly about.
+const FormReport* by_default(const SceneReport& s) {
+  for (const char* name : {"auto", "exact", "aimed"})
+    for (const FormReport& f : s.forms)
+      if (f.form == name) return &f;
+  return nullptr;
+}
+
+/// Whether something but noise sets the picture apart from the reference.
+bool differs(const FormReport& f) { return f.test ? !f.test->passed() : biased(f.difference); }
+
+std::string count(std::size_t n, const char* one, const char* many) {
+  return fmt::format("{} {}", n, n == 1 ? one : many);
+}
+
+/// Models of all forms of a scene, as a list of words for the filter.
+std::set<std::string> models_of(const SceneReport& s) {
+  std::set<std::string> out;
+  for (const FormReport& f : s.forms)
+    for (const MaterialForm& m : f.materials)
+      if (m.model.find(' ') == std::string::npos) out.insert(m.model);  // not "Blender's Metallic"
+  return out;
+}
+
+/// The attribute that the filter looks at.
+std::string marked(const SceneReport& s) {
+  return fmt::format("data-models=\"{}\"", escaped(fmt::format("{}", fmt::join(models_of(s), " "))));
+}
+
+/// What the page finds, in three sentences: is it right, what does it cost, what is worst.
+void put_verdict(std::string& out, const std::vector<SceneReport>& scenes) {
+  std::size_t judged = 0, same = 0;
+  std::vector<double> costs;
+  const SceneReport* worst_scene = nullptr;
+  const FormReport* worst = nullptr;
   for (const SceneReport& s : scenes) {
-    put(out, "<tbody class=\"scene\">\n");
-    for (std::size_t i = 0; i < s.forms.size(); ++i) {
-      const FormReport& f = s.forms[i];
-      put(out, "<tr{}>", is_native(f) ? " class=\"native\"" : "");
-      if (i == 0)
-        put(out, "<td class=\"left\" rowspan=\"{}\"><a href=\"#{}\">{}</a></td>", s.forms.size(), escaped(s.scene),
-            escaped(s.scene));
-      put(out, "<td class=\"left\" title=\"{}\">{}</td><td>{}</td><td>{}</td><td{}>{}</td>", escaped(models_of(f)),
-          escaped(label(f)), scientific(f.difference.rel_mse), scientific(f.difference.noise),
-          biased(f.difference) ? " class=\"bad\"" : "", bias(f.difference));
-      put(out, "<td{}>{}</td><td>{}</td>", f.test && !f.test->passed() ? " class=\"bad\"" : "", accepted(f),
-          or_dash(f.flip, fmt::format("{:.4f}", f.flip.value_or(0))));
-      put(out, "<td>{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cost(f),
-          on_front(s, f) ? " <b title=\"no form has less error for less time\">\xe2\x97\x86</b>" : "", f.spp,
-          or_dash(f.closures(), fmt::format("{}", f.closures().value_or(0))),
-          or_dash(f.relative_l1(), scientific(f.relative_l1().value_or(0))), equal_error(f));
+    if (const FormReport* f = by_default(s)) {
+      ++judged;
+      same += !differs(*f);
+      if (f->cost) costs.push_back(*f->cost);
     }
-    out += "</tbody>\n";
+    for (const FormReport& f : s.forms)
+      if (!is_native(f) && biased(f.difference) &&
+          (!worst || std::abs(f.difference.bias) > std::abs(worst->difference.bias)))
+        worst_scene = &s, worst = &f;
   }
-  out += "</table></div>\n";
+  out += "<p class=\"verdict\">";
+  if (judged > 0)
+    put(out, "In {} of {}, what materials get by default can't be told from the models themselves but by noise. ", same,
+        count(judged, "scene", "scenes"));
+  if (!costs.empty()) {
+    std::sort(costs.begin(), costs.end());
+    put(out, "It takes {:.2f} times the CPU time of Blender's own Glossy node", costs[costs.size() / 2]);
+    if (costs.size() > 1)
+      put(out, " in the middle of the scenes, {:.2f} to {:.2f} in all", costs.front(), costs.back());
+    out += ". ";
+  }
+  if (worst)
+    put(out, "Of all forms, {} in <a href=\"#{}\">{}</a> is farthest off: all its light is {} of what it should be.",
+        escaped(label(*worst)), escaped(worst_scene->scene), escaped(worst_scene->scene),
+        fmt::format("{:.2f} % \xc2\xb1 {:.2f}", 100 * (1 + worst->difference.bias),
+                    100 * worst->difference.bias_error));
+  else
+    out += "In no form and scene is the light as a whole off by more than noise explains.";
+  out += "</p>\n";
+}
+
+/// The forms that any scene has, Blender's own nodes first, then in the order of their first scene.
+std::vector<std::string> all_forms(const std::vector<SceneReport>& scenes) {
+  std::vector<std::string> out;
+  for (const bool native : {true, false})
+    for (const SceneReport& s : scenes)
+      for (const FormReport& f : s.forms)
+        if (is_native(f) == native && std::ranges::find(out, f.form) == out.end()) out.push_back(f.form);
+  return out;
+}
+
+/// A row a scene, a column a form: the error, whether it is noise alone, and the time.
+void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
+  const std::vector<std::string> forms = all_forms(scenes);
+  out += "<table class=\"summary\"><thead><tr><th class=\"left\">Scene</th>";
+  for (const std::string& name : forms) {
+    FormReport f;
+    f.form = name;
+    put(out, "<th>{}</th>", escaped(label(f)));
+  }
+  out += "</tr></thead><tbody>\n";
+  for (const SceneReport& s : scenes) {
+    put(out, "<tr {}><td class=\"left\"><a href=\"#{}\">{}</a></td>", marked(s), escaped(s.scene), escaped(s.scene));
+    for (const std::string& name : forms) {
+      const auto f = std::ranges::find(s.forms, name, &FormReport::form);
+      if (f == s.forms.end()) {
+        put(out, "<td class=\"soft\">{}</td>", kDash);
+        continue;
+      }
+      const bool off = !is_native(*f) && differs(*f);
+      put(out, "<td{} title=\"{}\"><b>{}</b><br>{}<br><span class=\"soft\">{}</span></td>", off ? " class=\"bad\"" : "",
+          escaped(models_of(*f)), scientific(f->difference.rel_mse),
+          is_native(*f) ? ""
+          : off         ? "differs"
+                        : "noise alone",
+          or_dash(f->cost, cost(*f) + "\xc3\x97" + (on_front(s, *f) ? " \xe2\x97\x86" : "")));
+    }
+    out += "</tr>\n";
+  }
+  out +=
+      "</tbody></table>\n<p class=\"soft\">In each cell: relMSE, whether it is more than noise, and CPU time in units "
+      "of "
+      "the Glossy node; \xe2\x97\x86 no form of the scene has less error for less time.</p>\n";
+}
+
+/// All figures of one scene.
+void put_figures(std::string& out, const SceneReport& s) {
+  out += R"(<details><summary>All figures</summary><div class="wide"><table>
+<thead><tr><th class="left">Form</th><th>relMSE</th><th>noise<br>in it</th><th>Mean, against<br>the reference</th>
+<th>Pixels<br>accepted</th><th>FLIP</th><th>CPU time /<br>Glossy</th><th>Samples<br>a pixel</th><th>Closures</th>
+<th>Form's own<br>error (L1)</th><th>CPU time to<br>equal error</th></tr></thead><tbody>
+)";
+  for (const FormReport& f : s.forms) {
+    put(out, "<tr{}><td class=\"left\">{}</td><td>{}</td><td>{}</td><td{}>{}</td>",
+        is_native(f) ? " class=\"native\"" : "", escaped(label(f)), scientific(f.difference.rel_mse),
+        scientific(f.difference.noise), biased(f.difference) ? " class=\"bad\"" : "", bias(f.difference));
+    put(out, "<td{}>{}</td><td>{}</td>", f.test && !f.test->passed() ? " class=\"bad\"" : "", accepted(f),
+        or_dash(f.flip, fmt::format("{:.4f}", f.flip.value_or(0))));
+    put(out, "<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cost(f), f.spp,
+        or_dash(f.closures(), fmt::format("{}", f.closures().value_or(0))),
+        or_dash(f.relative_l1(), scientific(f.relative_l1().value_or(0))), equal_error(f));
+  }
+  out += "</tbody></table></div></details>\n";
+}
+
+/// All scenes at once: error (logarithmic) over cost (logarithmic), a colour a form. Pointing at a dot says what it is.
+void put_overview(std::string& out, const std::vector<SceneReport>& scenes) {
+  constexpr const char* kGreys[] = {"#8a8f98", "#b9bec6", "#5f646c"};
+  constexpr const char* kColors[] = {"#2a6f97", "#2e9e5b", "#e07a1f", "#c0392b", "#a63d8f", "#8c6d31"};
+  constexpr double kWidth = 860, kHeight = 300, kLeft = 70, kRight = 20, kTop = 34, kBottom = 42;
+  double cheap = 1, dear = 1, low = 1e300, high = 0;
+  std::size_t points = 0;
+  for (const SceneReport& s : scenes)
+    for (const FormReport& f : s.forms)
+      if (f.cost && f.difference.rel_mse > 0) {
+        ++points;
+        cheap = std::min(cheap, *f.cost), dear = std::max(dear, *f.cost);
+        low = std::min(low, f.difference.rel_mse), high = std::max(high, f.difference.rel_mse);
+      }
+  if (points < 2) return;
+  cheap /= 1.15, dear *= 1.15;
+  const double bottom = std::floor(std::log10(low)), top = std::max(bottom + 1, std::ceil(std::log10(high)));
+  const auto x = [&](double c) {
+    return kLeft + std::log(c / cheap) / std::log(dear / cheap) * (kWidth - kLeft - kRight);
+  };
+  const auto y = [&](double e) { return kTop + (top - std::log10(e)) / (top - bottom) * (kHeight - kTop - kBottom); };
+  put(out, "<svg id=\"overview\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"relMSE over CPU time, all scenes\">\n",
+      kWidth, kHeight);
+  for (double decade = bottom; decade <= top; ++decade) {
+    const double at = y(std::pow(10, decade));
+    put(out, "<line class=\"axis\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", kLeft, kWidth - kRight, at, at);
+    put(out, "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">10<tspan dy=\"-5\">{}</tspan></text>\n", kLeft - 8,
+        at + 5, with_minus(fmt::format("{:.0f}", decade)));
+  }
+  for (const double tick : {0.125, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0, 32.0, 64.0})
+    if (tick > cheap && tick < dear)
+      put(out, "<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:g}</text>\n", x(tick), kHeight - kBottom + 18,
+          tick);
+  put(out, "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">CPU time / Glossy node</text>\n",
+      (kLeft + kWidth - kRight) / 2, kHeight - 6);
+  put(out, "<text x=\"14\" y=\"{}\" transform=\"rotate(-90 14 {})\" text-anchor=\"middle\">relMSE</text>\n",
+      kHeight / 2, kHeight / 2);
+  const std::vector<std::string> forms = all_forms(scenes);
+  double legend = kLeft;
+  std::size_t greys = 0, colors = 0;
+  for (std::size_t i = 0; i < forms.size(); ++i) {
+    FormReport named;
+    named.form = forms[i];
+    const char* color = is_native(named) ? kGreys[greys++ % std::size(kGreys)] : kColors[colors++ % std::size(kColors)];
+    put(out, "<circle style=\"fill:{}\" cx=\"{:.0f}\" cy=\"14\" r=\"4\"/><text x=\"{:.0f}\" y=\"18\">{}</text>\n",
+        color, legend, legend + 8, escaped(label(named)));
+    legend += 24 + 6.4 * double(label(named).size());
+    for (const SceneReport& s : scenes)
+      for (const FormReport& f : s.forms)
+        if (f.form == forms[i] && f.cost && f.difference.rel_mse > 0)
+          put(out,
+              "<a href=\"#{}\" {}><circle style=\"fill:{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"><title>{}, {}: relMSE "
+              "{:.2g}, of it noise {:.2g}; CPU {:.2f} of the Glossy node</title></circle></a>\n",
+              escaped(s.scene), marked(s), color, x(*f.cost), y(f.difference.rel_mse), escaped(s.scene),
+              escaped(label(f)), f.difference.rel_mse, f.difference.noise, *f.cost);
+  }
+  out += "</svg>\n";
+}
+
+/// A list of models that shows the scenes with one of them alone. Without scripts it shows all.
+void put_filter(std::string& out, const std::vector<SceneReport>& scenes) {
+  std::set<std::string> models;
+  for (const SceneReport& s : scenes) models.merge(models_of(s));
+  if (models.size() < 2 || scenes.size() < 2) return;
+  out += "<p><label>Scenes with <select id=\"model\"><option value=\"\">any model</option>";
+  for (const std::string& m : models) put(out, "<option>{}</option>", escaped(m));
+  out += "</select></label></p>\n";
+  out += R"(<script>
+document.getElementById("model").addEventListener("change", event => {
+  for (const part of document.querySelectorAll("[data-models]"))
+    part.style.display = !event.target.value || part.dataset.models.split(" ").includes(event.target.value) ? "" : "none";
+});
+</script>
+)";
 }
 
 /// Error (logarithmic) over cost: one point a form, the expected noise as a dashed line each.
@@ -150,8 +330,11 @@ void put_chart(std::string& out, const SceneReport& s) {
       name.base = other->base - kLine;
     names.push_back(name);
     put(out,
-        "<circle{} cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-        on_front(s, *f) ? "" : " class=\"behind\"", at_x, at_y, name.left, name.base, escaped(label(*f)));
+        "<circle{} cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"><title>relMSE {:.2g}, of it noise {:.2g}; CPU {:.2f} of the "
+        "Glossy "
+        "node</title></circle><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
+        on_front(s, *f) ? "" : " class=\"behind\"", at_x, at_y, f->difference.rel_mse, f->difference.noise, *f->cost,
+        name.left, name.base, escaped(label(*f)));
   }
   out += "</svg>\n";
 }
@@ -166,8 +349,10 @@ void put_scale(std::string& out, double at) {
       kMinus, number(at), number(at));
 }
 
-void put_scene(std::string& out, const SceneReport& s, const Previews& p) {
-  put(out, "<section id=\"{}\"><h2>{}</h2>\n<p>{}</p>\n", escaped(s.scene), escaped(s.scene), escaped(s.description));
+/// `alone`: the only scene, whose chart stands on top.
+void put_scene(std::string& out, const SceneReport& s, const Previews& p, bool alone) {
+  put(out, "<section id=\"{}\" {}><h2>{}</h2>\n<p>{}</p>\n", escaped(s.scene), marked(s), escaped(s.scene),
+      escaped(s.description));
   put(out,
       "<p class=\"soft\">{} \xc3\x97 {} pixels, at most {} bounces; pictures are sRGB{}. Point at a picture to see "
       "the reference in its place.</p>\n",
@@ -200,7 +385,8 @@ void put_scene(std::string& out, const SceneReport& s, const Previews& p) {
   out += "</div>\n";
   put_scale(out, p.difference_at);
   out += "<p></p>\n";
-  put_chart(out, s);
+  if (!alone) put_chart(out, s);
+  put_figures(out, s);
   out += "</section>\n";
 }
 
@@ -289,13 +475,20 @@ std::string report_html(const std::vector<SceneReport>& scenes, const std::vecto
       kPageStyle);
   std::size_t forms = 0;
   for (const SceneReport& s : scenes) forms += s.forms.size();
+  out += "<h1>Error against run time</h1>\n";
+  put_verdict(out, scenes);
+  if (scenes.size() == 1)
+    put_chart(out, scenes.front());
+  else
+    put_overview(out, scenes);
   put(out,
-      "<h1>Error against run time</h1>\n<p>Every form of every model, rendered in Blender's Cycles and compared "
-      "with an independent path tracer that evaluates the model itself in double precision. {} scenes, {} pictures. "
-      "<span class=\"soft\">What the columns mean is <a href=\"#method\">explained below</a>.</span></p>\n",
-      scenes.size(), forms);
+      "<p>Every form of every model, rendered in Blender's Cycles and compared "
+      "with an independent path tracer that evaluates the model itself in double precision. {}, {}. "
+      "<span class=\"soft\">What the figures mean is <a href=\"#method\">explained below</a>.</span></p>\n",
+      count(scenes.size(), "scene", "scenes"), count(forms, "picture", "pictures"));
+  put_filter(out, scenes);
   put_summary(out, scenes);
-  for (std::size_t i = 0; i < scenes.size(); ++i) put_scene(out, scenes[i], previews[i]);
+  for (std::size_t i = 0; i < scenes.size(); ++i) put_scene(out, scenes[i], previews[i], scenes.size() == 1);
   put_conformance(out, closures);
   out += "<div id=\"method\"></div>\n";
   put_method(out);

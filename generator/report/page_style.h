@@ -15,6 +15,7 @@ body { margin: 0 auto; padding: 2rem 1.5rem 4rem; max-width: 78rem; background: 
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .4rem; }
 h2 { font-size: 1.25rem; margin: 3rem 0 .2rem; }
 p { max-width: 48rem; margin: .4rem 0; }
+.verdict { font-size: 1.15rem; max-width: 60rem; }
 .soft { color: var(--soft); }
 a { color: var(--accent); }
 .wide { overflow-x: auto; margin: 1.2rem 0; }
@@ -23,7 +24,13 @@ th, td { padding: .4rem .6rem; text-align: right; border-bottom: 1px solid var(-
   font-variant-numeric: tabular-nums; }
 th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
 th.left, td.left { text-align: left; }
-tbody.scene { border-top: 2px solid var(--line); }
+table.summary { table-layout: fixed; margin: 1.2rem 0; }
+table.summary td, table.summary th { white-space: normal; overflow-wrap: anywhere; line-height: 1.3; }
+table.summary td { vertical-align: top; }
+summary { cursor: pointer; color: var(--accent); margin: .8rem 0; }
+.wide th, .wide td { padding: .35rem .45rem; }
+#overview { display: block; width: 100%; margin: 1rem 0; }
+#overview circle:hover { stroke: var(--ink); stroke-width: 2; }
 td.bad { color: var(--warn); font-weight: 600; }
 tr.native td { color: var(--soft); }
 tr.native td.bad { color: var(--warn); }
