@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import lamps, operators, plot_panel, ui, update
+from . import i18n, lamps, operators, plot_panel, ui, update
 
 
 def _refuse_beside_another():
@@ -20,6 +20,7 @@ def _refuse_beside_another():
 
 def register():
     _refuse_beside_another()
+    i18n.register()
     operators.register()
     ui.register()
     plot_panel.register()
@@ -33,3 +34,4 @@ def unregister():
     plot_panel.unregister()
     ui.unregister()
     operators.unregister()
+    i18n.unregister()

@@ -9,6 +9,7 @@ Names and values are those of the models' schema: numbers, colours as (r, g, b) 
 number, choices by identifier.
 """
 
+import contextlib
 import json
 import os
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 
 from . import checks, convert, lamps, lean, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
+from .i18n import Sentence, say
 from .lamps import Lamp
 from .lean import PlanError
 from .nodes import CompileError, has_twin
@@ -56,7 +58,7 @@ __all__ = [
 ]
 
 
-_NO_MATERIAL = "no material of this file has a reflection model of brdfc"
+_NO_MATERIAL = say("No material of this file has a reflection model of brdfc")
 
 
 def models():
@@ -82,7 +84,7 @@ def prepare_material(material):
             declared |= set(entry[0].get("warnings", []))
     if "bump_correction" in declared and material.cycles.use_bump_map_correction:
         material.cycles.use_bump_map_correction = False
-        return ["Bump Map Correction turned off for this material"]
+        return [say("Bump Map Correction turned off for this material")]
     return []
 
 
@@ -120,7 +122,11 @@ def _the_node(material):
     ours = [n for n in nodes.group_nodes(material) if not _for_eevee(n)]
     if len(ours) != 1:
         raise ValueError(
-            f"material {material.name!r} has {len(ours)} nodes of this extension, expected one"
+            say(
+                "Material {material!r} has {count} reflection models, expected one",
+                material=material.name,
+                count=len(ours),
+            )
         )
     return ours[0]
 
@@ -130,7 +136,7 @@ def set_parameters(material, **parameters):
 
     Raises ValueError as new_material does, and for a parameter that a link controls.
     """
-    _set(_the_node(material), f"material {material.name!r}", parameters)
+    _set(_the_node(material), say("material {name!r}", name=material.name), parameters)
 
 
 def _set(node, what, parameters):
@@ -145,7 +151,9 @@ def _set(node, what, parameters):
                 f"material; switch_representation() brings the others back; got {value!r}"
             )
         if name in present and present[name].is_linked:
-            raise ValueError(f"{name!r} of {what} is controlled by a link")
+            raise ValueError(
+                say("{parameter!r} of {what} is controlled by a link", parameter=name, what=what)
+            )
     for name, value in values.items():
         nodes.set_value(node, name, value)
 
@@ -163,26 +171,49 @@ def set_kernel(group, curve):
     largest; nothing is changed then.
     """
     if not nodes.is_ours(group) or nodes.identity(group)[0] != KERNEL_MODEL:
-        raise ValueError(f"node {group.name!r}: expected a node of the model {KERNEL_MODEL!r}")
+        raise ValueError(
+            say(
+                "Node {node!r}: expected a node of the model {model!r}",
+                node=group.name,
+                model=KERNEL_MODEL,
+            )
+        )
     if curve.bl_idname != "ShaderNodeFloatCurve":
-        raise ValueError(f"node {curve.name!r}: expected a Float Curve, got {curve.bl_label}")
+        raise ValueError(
+            say(
+                "Node {node!r}: expected a Float Curve, got {kind}",
+                node=curve.name,
+                kind=Sentence(curve.bl_label),
+            )
+        )
     mapping = curve.mapping
     mapping.initialize()  # a new curve can't be evaluated before
     places = [i / (len(_HEIGHTS) - 1) for i in range(len(_HEIGHTS))]
     heights = [mapping.evaluate(mapping.curves[0], x) for x in places]
     lowest = pack.parameters(KERNEL_MODEL).get("h0", {"min": 0})["min"]
     for x, height in zip(places, heights, strict=True):
-        where = f"curve {curve.name!r} at x = {x:.3g}"
+        where = {"curve": curve.name, "x": f"{x:.3g}"}
         if not height > 0:
-            raise ValueError(f"{where}: expected a height above 0, got {height:.3g}")
+            raise ValueError(
+                say(
+                    "Curve {curve!r} at x = {x}: expected a height above 0, got {height}",
+                    **where,
+                    height=f"{height:.3g}",
+                )
+            )
         if height < lowest * max(heights):
             raise ValueError(
-                f"{where}: expected at least {lowest:g} of the largest height, "
-                f"got {height / max(heights):.3g} of it"
+                say(
+                    "Curve {curve!r} at x = {x}: expected at least {lowest} of the largest "
+                    "height, got {height} of it",
+                    **where,
+                    lowest=f"{lowest:g}",
+                    height=f"{height / max(heights):.3g}",
+                )
             )
     relative = [height / max(heights) for height in heights]
     values = dict(zip(_HEIGHTS, relative, strict=True))
-    _set(group, f"node {group.name!r}", {"kernel": "table", **values})
+    _set(group, say("node {name!r}", name=group.name), {"kernel": "table", **values})
 
 
 def get_parameters(material):
@@ -262,9 +293,13 @@ def add_twin(material):
     node = _the_node(material)
     tree = material.node_tree
     if node.id_data != tree:
-        raise ValueError(f"material {material.name!r}: its model is inside another node group")
+        raise ValueError(
+            say("Material {material!r}: its model is inside a node group", material=material.name)
+        )
     if has_twin(material):
-        raise ValueError(f"material {material.name!r} has an output for EEVEE already")
+        raise ValueError(
+            say("Material {material!r} has an output for EEVEE already", material=material.name)
+        )
     twin = nodes.add_group_node(tree, nodes.identity(node)[0], TWIN)
     twin.location = (node.location.x, node.location.y - 400)
     normal = nodes.sockets(node)[pack.NORMAL]
@@ -322,23 +357,39 @@ def used_materials():
     return {name: entry for name, _, _, entry in _used()}
 
 
+def _beside(path):
+    """Where a file is written that then takes the place of `path`."""
+    return path.with_name(f".{path.name}.{os.getpid()}")
+
+
 def write_materials(path):
     """Writes used_materials(), and which lamps have no size, for `brdfc build --materials`, which
     makes a pack of just that.
 
     Returns how many there are. Raises ValueError if there is none, OSError if the file can't be
-    written; an older file is then as it was.
+    written, as one that another program has open on Windows; an older file is then as it was.
     """
     materials = used_materials()
     if not materials:
         raise ValueError(_NO_MATERIAL)
     path = Path(path)
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    beside = _beside(path)
     try:
         beside.write_text(json.dumps(lean.needs(materials), indent=1) + "\n", encoding="utf-8")
         os.replace(beside, path)
+    except PermissionError as failed:
+        said = say(
+            "{file} can't be written: it may be open in another program, or write-protected",
+            more=str(failed),
+            file=path,
+        )
+        raise PermissionError(said) from failed
+    except OSError as failed:
+        raise OSError(say("{file} can't be written", more=str(failed), file=path)) from failed
     finally:
-        beside.unlink(missing_ok=True)
+        # What is in the way of writing is so of removing, and nothing to be told twice.
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
     return len(materials)
 
 

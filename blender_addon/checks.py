@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import closure_pool, nodes, pack, update
+from . import closure_pool, i18n, nodes, pack, update
+from .i18n import say
 
 BLENDER_MIN = (4, 5, 0)
 #: Devices other than the CPU whose kernels can run OSL.
@@ -28,7 +29,8 @@ CLAMP_OF_HIGHLIGHT = 5
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding: a stable code, "ERROR" (the picture is wrong) or "WARNING", and a sentence."""
+    """A finding: a stable code, "ERROR" (the picture is wrong) or "WARNING", and a sentence, which
+    may be an i18n.Sentence: English here, in the user's language where it is shown."""
 
     code: str
     severity: str
@@ -73,9 +75,10 @@ def device_refusal(model_name, form, scene):
     """Why a form of a model can't run on a scene's device; None where it can."""
     size, room = pack.representation(model_name, form)["closure_bytes"], closure_pool.capacity()
     if size > room and runs_on_optix(scene):
-        return (
-            f"{form} takes {size} bytes of closures, and OptiX has room for {room}: it is for the "
-            "CPU"
+        return say(
+            "{form} takes more memory than OptiX has: it is for the CPU",
+            more=f"{size} bytes of closures, and there is room for {room}",
+            form=i18n.form_name(form),
         )
     return None
 
@@ -89,16 +92,21 @@ def _pool_findings(material, scene):
         yield Finding(
             "closure_pool",
             "ERROR",
-            f"The models of this material take {use.size} bytes of closures, and OptiX has room "
-            f"for {room}: what it renders is undefined; use smaller forms, fewer models in one "
-            "material, or the CPU",
+            say(
+                "The models of this material take more memory than OptiX has, and its picture is "
+                "wrong: use other forms, fewer models in one material, or the CPU",
+                more=f"{use.size} bytes of closures, and there is room for {room}",
+            ),
         )
     elif use.shared:
         yield Finding(
             "closure_pool_shared",
             "WARNING",
-            f"OptiX has room for {room} bytes of closures, of which the models of this material "
-            f"take {use.size}, and {use.per_lamp} a lamp; its other shaders share the rest",
+            say(
+                "On OptiX the other shaders of this material share what memory its models leave",
+                more=f"there is room for {room} bytes of closures, of which the models take "
+                f"{use.size}, and {use.per_lamp} a lamp",
+            ),
         )
 
 
@@ -153,14 +161,16 @@ def _bump_correction(material, scene):
     if material.cycles.use_bump_map_correction:
         return (
             "ERROR",
-            "Bump Map Correction is on in the material's settings: where a normal is bent it turns "
-            "the directions of this form",
+            say(
+                "Bump Map Correction is on in the material's settings: where a normal map or bump "
+                "bends the surface this form sends light the wrong way"
+            ),
         )
 
 
 def _path_guiding(material, scene):
     if scene.cycles.use_guiding:
-        return "ERROR", "Path Guiding is on: it samples this form wrongly; turn it off"
+        return "ERROR", say("Path Guiding is on: this form comes out wrong with it")
 
 
 def _clamp_indirect(material, scene):
@@ -168,7 +178,11 @@ def _clamp_indirect(material, scene):
     if clamp > 0:
         return (
             "WARNING",
-            f"Clamp Indirect is {clamp:g}: it darkens bright reflections of this form; 0 is exact",
+            say(
+                "Indirect Light is clamped to {clamp}: it darkens bright reflections of this form; "
+                "0 is exact",
+                clamp=f"{clamp:g}",
+            ),
         )
 
 
@@ -177,28 +191,37 @@ def _clamp_mirror(material, scene):
     if clamp > 0:
         return (
             "WARNING",
-            f"Clamp Indirect is {clamp:g}: it darkens bright lights in this mirror; 0 is exact",
+            say(
+                "Indirect Light is clamped to {clamp}: it darkens bright lights in this mirror; "
+                "0 is exact",
+                clamp=f"{clamp:g}",
+            ),
         )
 
 
 def _clamp_direct(material, scene):
     clamp = scene.cycles.sample_clamp_direct
     if clamp > 0:
-        return "WARNING", f"Clamp Direct is {clamp:g}: it darkens highlights of this form"
-
-
-def _too_small(scene, form, consequence):
-    if tiny := _tiny_lights(scene):
-        names = ", ".join(tiny[:3])
-        return "WARNING", f"Lamps too small for a {form} form ({names}): {consequence}"
+        return (
+            "WARNING",
+            say(
+                "Direct Light is clamped to {clamp}: it darkens highlights of this form; 0 is "
+                "exact",
+                clamp=f"{clamp:g}",
+            ),
+        )
 
 
 def _zero_size_lights(material, scene):
-    return _too_small(
-        scene,
-        "sampled",
-        "their highlights are noisy or missing; enlarge the lamp or use another representation",
-    )
+    if tiny := _tiny_lights(scene):
+        return (
+            "WARNING",
+            say(
+                "Lamps too small for a sampled form ({lamps}): their highlights are noisy or "
+                "missing; enlarge the lamps or use another form",
+                lamps=", ".join(tiny[:3]),
+            ),
+        )
 
 
 def _multiple_importance(material, scene):
@@ -212,8 +235,10 @@ def _multiple_importance(material, scene):
     if alone:
         return (
             "WARNING",
-            f"Multiple Importance is off for lamps ({', '.join(alone[:3])}): the mirror and the "
-            "directions that this form draws do not meet them, and it is too dark",
+            say(
+                "Multiple Importance is off for lamps ({lamps}): this form is too dark under them",
+                lamps=", ".join(alone[:3]),
+            ),
         )
 
 
@@ -221,8 +246,10 @@ def _far_camera(material, scene):
     if _far_orthographic(scene):
         return (
             "WARNING",
-            "The orthographic camera is far away for its pixel size: the random numbers of a "
-            "sampled form repeat; move it closer",
+            say(
+                "The orthographic camera is so far away that the noise of this form shows "
+                "patterns: move it closer"
+            ),
         )
 
 
@@ -230,8 +257,10 @@ def _caustics(material, scene):
     if not scene.cycles.caustics_reflective:
         return (
             "WARNING",
-            "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
-            "is lost",
+            say(
+                "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
+                "is lost"
+            ),
         )
 
 
@@ -239,24 +268,34 @@ def _filter_glossy(material, scene):
     if scene.cycles.blur_glossy > 0:
         return (
             "WARNING",
-            f"Filter Glossy is {scene.cycles.blur_glossy:g}: it darkens repeated reflections of "
-            "this form; 0 is exact",
+            say(
+                "Filter Glossy is {value}: it darkens repeated reflections of this form; "
+                "0 is exact",
+                value=f"{scene.cycles.blur_glossy:g}",
+            ),
         )
 
 
 def _albedo_passes(material, scene):
     cycles = scene.cycles
-    uses = []
-    if cycles.use_denoising and cycles.denoising_input_passes != "RGB":
-        uses.append("the denoiser")
+    denoised = cycles.use_denoising and cycles.denoising_input_passes != "RGB"
     layers = scene.view_layers
-    if any(v.use_pass_diffuse_color or v.cycles.denoising_store_passes for v in layers):
-        uses.append("a colour or denoising pass")
-    if uses:
+    passes = any(v.use_pass_diffuse_color or v.cycles.denoising_store_passes for v in layers)
+    if denoised:
         return (
             "WARNING",
-            f"{' and '.join(uses).capitalize()} sees too high an albedo of this form: details may "
-            "blur; the picture itself is right",
+            say(
+                "The denoiser is given too bright a colour of this form: it may blur details; "
+                "the picture itself is right"
+            ),
+        )
+    if passes:
+        return (
+            "WARNING",
+            say(
+                "Colour and denoising passes show this form too bright: denoising may blur "
+                "details; the picture itself is right"
+            ),
         )
 
 
@@ -271,8 +310,10 @@ def _normal_pass(material, scene):
     if denoised or any(v.cycles.denoising_store_passes for v in scene.view_layers):
         return (
             "WARNING",
-            "The denoiser's normals of this form are noisy, as its directions are: details may "
-            "blur; let the denoiser use Albedo alone",
+            say(
+                "The normals that the denoiser has of this form are noisy: details may blur; let "
+                "it use Albedo alone"
+            ),
         )
 
 
@@ -281,12 +322,14 @@ def _leaning_facets(material, scene):
     if bpy.app.version < (5, 0, 0) and scene.render.engine == "CYCLES":
         return (
             "WARNING",
-            "Cycles in Blender 4.5 lets facets that lean reflect too much: seen from the side a "
-            "twin is up to 7 % too bright; 5.0 is right",
+            say(
+                "In Blender 4.5 a twin is up to 7 % too bright where it is seen from the side; "
+                "Blender 5.0 is right"
+            ),
         )
 
 
-#: What a representation may declare itself sensitive to in the manifest. A rule returns
+#: What a form may declare itself sensitive to in the manifest. A rule returns
 #: (severity, message), or None where nothing is wrong.
 DECLARED = {
     "bump_correction": _bump_correction,
@@ -341,29 +384,32 @@ def scene_warnings(scene):
             Finding(
                 "blender_version",
                 "ERROR",
-                f"Blender {'.'.join(map(str, bpy.app.version[:2]))} is too old: "
-                f"{'.'.join(map(str, BLENDER_MIN[:2]))} is needed",
+                say(
+                    "Blender {version} is too old: {needed} is needed",
+                    version=".".join(map(str, bpy.app.version[:2])),
+                    needed=".".join(map(str, BLENDER_MIN[:2])),
+                ),
             )
         )
     if not osl_available():
-        found.append(Finding("no_osl", "ERROR", "This Blender lacks Open Shading Language"))
+        found.append(Finding("no_osl", "ERROR", say("This Blender lacks Open Shading Language")))
     if scene.render.engine != "CYCLES":
         found.append(
             Finding(
                 "engine",
                 "ERROR",
-                f"{engine_name(scene)} can't run these shaders",
+                say("{engine} can't run these shaders", engine=engine_name(scene)),
             )
         )
         return found
     if not scene.cycles.shading_system:
-        found.append(Finding("osl_off", "ERROR", "Open Shading Language is off"))
+        found.append(Finding("osl_off", "ERROR", say("Open Shading Language is off")))
     if backend := device_without_osl(scene):
         found.append(
             Finding(
                 "device",
                 "ERROR",
-                f"{backend} devices can't run these shaders",
+                say("{backend} devices can't run these shaders", backend=backend),
             )
         )
     if OPTIX_RUN is None and runs_on_optix(scene):
@@ -371,7 +417,7 @@ def scene_warnings(scene):
             Finding(
                 "optix_untested",
                 "ERROR",
-                "These shaders are untested on OptiX devices",
+                say("These shaders are untested on OptiX devices"),
             )
         )
     return found
@@ -386,23 +432,37 @@ def _clamp_highlight(node, form, scene):
         if value is not None:
             bright = np.interp(value, highlight["values"], highlight["f_cos"])
     if 0 < clamp < max(LOW_CLAMP, CLAMP_OF_HIGHLIGHT * bright):
-        return "WARNING", f"Clamp Indirect is {clamp:g}: it darkens highlights; 0 is exact"
+        return (
+            "WARNING",
+            say(
+                "Indirect Light is clamped to {clamp}: it darkens highlights; 0 is exact",
+                clamp=f"{clamp:g}",
+            ),
+        )
 
 
 def _of_another_version(material, node, label):
     if nodes.is_newer(node):
-        return Finding("newer", "WARNING", f"{label}made by a later version, {nodes.made_by(node)}")
+        said = say("made by a later version, {version}", version=nodes.made_by(node))
+        return Finding("newer", "WARNING", _of(label, said))
     if why := update.refusal(material, node):
-        return Finding("kept", "WARNING", f"{label}stays as another version made it: {why}")
-    return Finding("outdated", "WARNING", f"{label}made by another version")
+        said = say("stays as another version made it: {why}", why=why)
+        return Finding("kept", "WARNING", _of(label, said))
+    return Finding("outdated", "WARNING", _of(label, say("made by another version")))
+
+
+def _of(label, sentence):
+    """A sentence about one node."""
+    return say("{node}: {what}", node=label, what=sentence)
 
 
 def node_warnings(node, material, scene):
     """What is wrong with one group node of a material."""
-    label = f"{node.label or node.name}: "
+    label = node.label or node.name
     found = []
     if problem := nodes.script_problem(node.node_tree):
-        found.append(Finding("script_failed", "ERROR", f"{label}the shader {problem}"))
+        said = say("its shader is damaged: choose its form again to make it anew", more=problem)
+        found.append(Finding("script_failed", "ERROR", _of(label, said)))
     form, schema = nodes.manifest_entry(node) or ({}, {})
     if not form:
         found.append(_of_another_version(material, node, label))
@@ -416,40 +476,36 @@ def node_warnings(node, material, scene):
         low, high = parameter["min"] - slack, parameter["max"] + slack
         for number in value if parameter["kind"] == "color" else (value,):
             if not low <= number <= high:
-                found.append(
-                    Finding(
-                        "out_of_range",
-                        "ERROR",
-                        f"{label}{parameter['label']} is {number:g}, "
-                        f"expected {parameter['min']:g} to {parameter['max']:g}",
-                    )
+                said = say(
+                    "{parameter} is {value}, expected {low} to {high}",
+                    parameter=parameter["label"],
+                    value=f"{number:g}",
+                    low=f"{parameter['min']:g}",
+                    high=f"{parameter['max']:g}",
                 )
+                found.append(Finding("out_of_range", "ERROR", _of(label, said)))
     if axis := form.get("axis"):
         value = nodes.get_value(node, axis["name"])
         slack = 1e-6 * axis["max"]
         if value is not None and not axis["min"] - slack <= value <= axis["max"] + slack:
-            found.append(
-                Finding(
-                    "out_of_fit",
-                    "WARNING",
-                    f"{label}{schema[axis['name']]['label']} is {value:g}; this form was fitted "
-                    f"from {axis['min']:g} to {axis['max']:g} and shows the nearer end of that",
-                )
+            said = say(
+                "{parameter} is {value}; this form was fitted from {low} to {high} and shows the "
+                "nearer end of that",
+                parameter=schema[axis["name"]]["label"],
+                value=f"{value:g}",
+                low=f"{axis['min']:g}",
+                high=f"{axis['max']:g}",
             )
+            found.append(Finding("out_of_fit", "WARNING", _of(label, said)))
     # Measured: a sampled form comes out right, no less noisy, and half as slow again.
     if nodes.identity(node)[1] == "sampled" and scene.cycles.use_guiding:
-        found.append(
-            Finding(
-                "path_guiding",
-                "WARNING",
-                f"{label}Path Guiding is on: it can't guide a sampled form and only costs time",
-            )
-        )
+        said = say("Path Guiding is on: it only costs time with a sampled form")
+        found.append(Finding("path_guiding", "WARNING", _of(label, said)))
     if form.get("highlight") and (result := _clamp_highlight(node, form, scene)):
-        found.append(Finding("clamp_low", result[0], label + result[1]))
+        found.append(Finding("clamp_low", result[0], _of(label, result[1])))
     for code in declared:
         if code in DECLARED and (result := DECLARED[code](material, scene)):
-            found.append(Finding(code, result[0], label + result[1]))
+            found.append(Finding(code, result[0], _of(label, result[1])))
     return found
 
 
@@ -478,15 +534,15 @@ def enable_osl(scene):
     Raises RuntimeError when this Blender has no OSL.
     """
     if not osl_available():
-        raise RuntimeError("this Blender was built without Open Shading Language")
+        raise RuntimeError(say("This Blender was built without Open Shading Language"))
     done = []
     if scene.render.engine != "CYCLES":
-        done.append(f"render engine changed from {scene.render.engine} to Cycles")
+        done.append(say("Render engine changed from {engine} to Cycles", engine=engine_name(scene)))
         scene.render.engine = "CYCLES"
     if backend := device_without_osl(scene):
-        done.append(f"device changed from {backend} to CPU")
+        done.append(say("Device changed from {backend} to the CPU", backend=backend))
         scene.cycles.device = "CPU"
     if not scene.cycles.shading_system:
-        done.append("Open Shading Language turned on")
+        done.append(say("Open Shading Language turned on"))
         scene.cycles.shading_system = True
     return done

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from . import native_bsdf, nodes, pack
+from .i18n import Sentence, say
 from .native_bsdf import Native
 
 #: Views at which models are compared, as cosines, and directions of light for each.
@@ -268,7 +269,7 @@ def _value(node, name, default=0.0):
     if socket is None:
         return default
     if socket.is_linked:
-        raise Refused(f"{name} is linked")
+        raise Refused(say("{socket} is linked", socket=Sentence(name)))
     value = socket.default_value
     return tuple(value)[:3] if hasattr(value, "__len__") else float(value)
 
@@ -285,16 +286,17 @@ def natives(node):
     given = {"kind": kind, "color": tuple(min(max(c, 0.0), 1.0) for c in _color(node, color))}
     if kind in ("glossy", "principled"):
         if node.distribution not in ("GGX", "MULTI_GGX", "BECKMANN"):
-            raise Refused(f"its distribution is {node.distribution.replace('_', '-').title()}")
+            kind = node.bl_rna.properties["distribution"].enum_items[node.distribution].name
+            raise Refused(say("its distribution is {kind}", kind=Sentence(kind)))
         given["beckmann"] = node.distribution == "BECKMANN"
         given["multiscatter"] = node.distribution == "MULTI_GGX"
         given["stretch"] = _stretch(node, kind)
     if kind == "principled":
         for name, (off, what) in _OFF.items():
             if name in node.inputs and (_value(node, name) != off):
-                raise Refused(f"it has {what}")
+                raise Refused(say("it has {what}", what=Sentence(what)))
         if _value(node, "Specular Tint", (1, 1, 1)) != (1, 1, 1):
-            raise Refused("it has a Specular Tint")
+            raise Refused(say("it has a Specular Tint"))
         level, ior = _value(node, "Specular IOR Level"), _value(node, "IOR")
         given["f0"] = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.9)
         given["metallic"] = min(max(_value(node, "Metallic"), 0.0), 1.0)
@@ -311,7 +313,7 @@ def _stretch(node, kind):
         return 1.0
     turn = _value(node, "Anisotropic Rotation" if kind == "principled" else "Rotation")
     if turn != 0 or not node.inputs["Tangent"].is_linked:
-        raise Refused("it is anisotropic without a Tangent that is linked, or turned")
+        raise Refused(say("it is anisotropic without a Tangent that is linked, or turned"))
     if kind == "principled":
         return 1 / (1 - 0.9 * min(max(a, 0.0), 1.0))
     return (1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2
@@ -337,21 +339,28 @@ class Plan:
     refusal: str = ""
 
     def line(self):
-        what = f"{self.material.name}, {self.node.bl_label}"
+        """What becomes of the node, in words."""
+        of = {"material": self.material.name, "node": Sentence(self.node.bl_label)}
+        if self.node.bl_idname == "ShaderNodeGroup":
+            of["node"] = self.node.node_tree.name
         if self.refusal:
-            return f"{what}: stays, {self.refusal}"
-        label = pack.model(self.model)["label"]
+            return say("{material}, {node}: stays, {why}", **of, why=self.refusal)
+        of["model"] = pack.model(self.model)["label"]
         if self.error < 1e-6:
-            return f"{what}: {label}, the same"
-        return f"{what}: {label}, off by {100 * self.error:.2g} % of the light"
+            return say("{material}, {node}: {model}, the same", **of)
+        return say(
+            "{material}, {node}: {model}, off by {percent} % of the light",
+            **of,
+            percent=f"{100 * self.error:.2g}",
+        )
 
 
 def _plan_glass(material, node):
     color, roughness = _value(node, "Color"), _value(node, "Roughness")
     if roughness > 1e-3:
-        raise Refused("no model is of rough glass")
+        raise Refused(say("no model is of rough glass"))
     if _value(node, "Thin Film Thickness") != 0:
-        raise Refused("it has Thin Film")
+        raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints what it reflects and what it lets through.
     error = sum(abs(1 - c) for c in color) / max(sum(color), 1e-6)
     ior = node.inputs["IOR"]
@@ -373,12 +382,17 @@ def _plan_node(material, node):
         factor, error = nearest_factor(candidate, targets)
         found.append((error, factor, candidate))
     if not found:
-        raise Refused("this extension has no model that is near")
+        raise Refused(say("this extension has no model that is near"))
     error, factor, candidate = min(found, key=lambda f: f[0])
     native, width = targets[0].native, candidate.width
     color = "Base Color" if native.kind == "principled" else "Color"
     if node.inputs[color].is_linked and "Color" not in candidate.links.values():
-        raise Refused(f"{color} is linked, which its nearest model has no one colour for")
+        raise Refused(
+            say(
+                "{socket} is linked, and its nearest model has more than one colour",
+                socket=Sentence(color),
+            )
+        )
     links = {name: color if s == "Color" else s for name, s in candidate.links.items()}
     values, widths = _with_width(candidate, native, factor), ()
     if width and node.inputs["Roughness"].is_linked:
@@ -388,21 +402,33 @@ def _plan_node(material, node):
     return Plan(material, node, candidate.model, values, error, links, widths)
 
 
+def _holds_a_kind(group):
+    """Whether a node is a group, not one of ours, with a node inside that could be converted."""
+    trees = nodes.trees_within(group)
+    return any(n.bl_idname in KINDS and n.outputs[0].is_linked for t in trees for n in t.nodes)
+
+
 def plan(materials):
-    """A Plan for each node of these materials that is Diffuse, Glossy, Principled or Glass."""
+    """A Plan for each node of these materials that is Diffuse, Glossy, Principled or Glass, and for
+    each group that has such a node inside, which is refused: other materials may share it."""
     plans = []
     for material in materials:
         if material.node_tree is None:
             continue
         for node in material.node_tree.nodes:
-            if node.bl_idname not in KINDS or not node.outputs[0].is_linked:
+            grouped = _holds_a_kind(node)
+            if node.bl_idname not in KINDS and not grouped:
+                continue
+            if not any(socket.is_linked for socket in node.outputs):
                 continue
             try:
                 if material.library is not None or not material.is_editable:
-                    raise Refused("it is linked from another file")
+                    raise Refused(say("it is linked from another file"))
+                if grouped:
+                    raise Refused(say("its shader is inside this node group: ungroup it first"))
                 plans.append(_plan_node(material, node))
             except Refused as why:
-                plans.append(Plan(material, node, refusal=str(why)))
+                plans.append(Plan(material, node, refusal=why.args[0]))
     return plans
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import bpy
 
 from . import checks, lamps, nodes, pack
+from .i18n import say
 
 #: Forms that a budget does not choose: they are for who asks for them.
 ASKED_FOR = ("twin",)
@@ -31,20 +32,29 @@ def program():
     addon = bpy.context.preferences.addons.get(__package__)
     named = getattr(addon.preferences, "program", "") if addon and addon.preferences else ""
     for what, path in (
-        ("the extension's preferences", bpy.path.abspath(named)),
-        ("BRDFC_TOOL", os.environ.get("BRDFC_TOOL", "")),
+        (say("the extension's preferences name it"), bpy.path.abspath(named)),
+        (say("BRDFC_TOOL names it"), os.environ.get("BRDFC_TOOL", "")),
     ):
         if not path:
             continue
-        if shutil.which(path) is None:
-            raise PlanError(f"{path}: expected the program brdfc, which {what} name here")
-        return path
+        # By name in a folder: so "brdfc" finds brdfc.exe on Windows with every version of Python.
+        folder, name = os.path.split(path)
+        if found := shutil.which(name, path=folder or None):
+            return found
+        raise PlanError(say("{path} is not the program brdfc; {who}", path=path, who=what))
     if found := shutil.which("brdfc"):
         return found
     raise PlanError(
-        "the program brdfc was not found: give its path in the extension's preferences, or put it "
-        "on the PATH"
+        say(
+            "The program brdfc was not found: give its path in the extension's preferences, or put "
+            "it on the PATH"
+        )
     )
+
+
+def _no_window():
+    """How Windows is told to open no console beside Blender; 0 elsewhere."""
+    return getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
 
 def needs(materials):
@@ -95,20 +105,36 @@ class Planning(Job):
         options += [] if time is None else ["--time", f"{time:.17g}x"]
         options += ["--fit"] if fit else []
         materials = {name: entry for (name, _, _), (_, entry) in zip(used, self._used, strict=True)}
-        self._folder = tempfile.TemporaryDirectory(prefix="brdfc-lean-")
-        folder = Path(self._folder.name)
-        file = folder / "materials.json"
-        file.write_text(json.dumps(needs(materials)), encoding="utf-8")
-        command = [program(), "build", "--materials", file, "--explain", *options, "--out", folder]
-        self._program = command[0]
+        self._program = program()
+        content = json.dumps(needs(materials))
+        try:
+            # On Windows a scanner may still read what is to be removed.
+            self._folder = tempfile.TemporaryDirectory(
+                prefix="brdfc-lean-", ignore_cleanup_errors=True
+            )
+            folder = Path(self._folder.name)
+            file = folder / "materials.json"
+            file.write_text(content, encoding="utf-8")
+        except OSError as failed:
+            more = str(failed)
+            raise PlanError(
+                say("The folder for temporary files can't be written", more=more)
+            ) from failed
+        command = [self._program, "build", "--materials", file, "--explain", *options]
+        command += ["--out", folder]
         self._said, self._log = folder / "said.json", folder / "log.txt"
         try:
             with self._said.open("wb") as said, self._log.open("wb") as log:
                 self._process = subprocess.Popen(
-                    [str(c) for c in command], stdin=subprocess.DEVNULL, stdout=said, stderr=log
+                    [str(c) for c in command],
+                    stdin=subprocess.DEVNULL,
+                    stdout=said,
+                    stderr=log,
+                    creationflags=_no_window(),
                 )
         except OSError as failed:
-            raise PlanError(f"{command[0]}: {failed}") from failed
+            more = f"{command[0]}: {failed}"
+            raise PlanError(say("The program brdfc does not start", more=more)) from failed
 
     def step(self):
         if self.result is not None:
@@ -120,11 +146,12 @@ class Planning(Job):
         log = self._log.read_text(encoding="utf-8", errors="replace")
         if status != 0:
             said = log.strip().splitlines() or [f"exit status {status}"]
-            raise PlanError(said[-1])
+            raise PlanError(say("The program brdfc made no plan", more=said[-1]))
         try:
             explanation = json.loads(self._said.read_text(encoding="utf-8"))
         except ValueError as bad:
-            raise PlanError(f"{self._program}: expected an explanation: {bad}") from bad
+            more = f"{self._program}: expected an explanation: {bad}"
+            raise PlanError(say("The program brdfc made no plan", more=more)) from bad
         self.result = Plan(self._used, explanation, self._folder)
         return None
 
@@ -158,25 +185,38 @@ class Plan:
         """What is taken and left out, and what that saves, in words."""
         out = []
         for model in self.explanation["models"]:
-            out.append(f"{model['model']}, for {', '.join(model['materials'])}")
+            names = ", ".join(model["materials"])
+            out.append(say("{model}, for {materials}", model=model["model"], materials=names))
             for choice in model["choices"]:
-                cost = "cost not measured" if choice["cost"] is None else f"{choice['cost']:.2f} x"
-                taken = "taken" if choice["taken"] else "not taken"
-                out.append(f"    {choice['form']}, {cost}: {taken}, {choice['why']}")
-            out += [f"    without {reason}" for reason in model["left_out"]]
-            for form in model["forms"]:
-                parts = [
-                    f"{form['before'][key]} to {form['after'][key]} {words}"
-                    for key, words in (
-                        ("bytes", "bytes"),
-                        ("operations", "operations"),
-                        ("closures", "closures"),
-                        ("table_floats", "numbers in tables"),
+                known = choice["cost"] is not None
+                cost = f"{choice['cost']:.2f} x" if known else say("cost not measured")
+                taken = say("taken") if choice["taken"] else say("not taken")
+                # Why, and what is left out, are the program's words, which are English.
+                out.append(
+                    say(
+                        "    {form}, {cost}: {taken}, {why}",
+                        form=choice["form"],
+                        cost=cost,
+                        taken=taken,
+                        why=choice["why"],
                     )
-                ]
-                out.append(f"    {form['form']}: {', '.join(parts)}")
+                )
+            out += [say("    without {part}", part=reason) for reason in model["left_out"]]
+            out += [
+                say(
+                    "    {form}: {bytes} bytes, {operations} operations, {closures} closures, "
+                    "{table_floats} numbers in tables",
+                    form=form["form"],
+                    **{
+                        key: say("{before} to {after}", before=before, after=form["after"][key])
+                        for key, before in form["before"].items()
+                    },
+                )
+                for form in model["forms"]
+            ]
         if unused := self.explanation["unused_models"]:
-            out.append(f"without the models that no material uses: {', '.join(unused)}")
+            names = ", ".join(unused)
+            out.append(say("without the models that no material uses: {models}", models=names))
         return out
 
 
@@ -223,8 +263,12 @@ class Baking(Job):
     def _group(self, node, entry, before):
         if pack.manifest()["generator"] != before["generator"]:
             raise PlanError(
-                f"{program()} is {pack.manifest()['generator']}, the extension was made by "
-                f"{before['generator']}"
+                say(
+                    "{program} is {version}, the extension was made by {own}",
+                    program=program(),
+                    version=pack.manifest()["generator"],
+                    own=before["generator"],
+                )
             )
         # A linked value is None to pack.refusal().
         given = {k: None if isinstance(v, dict) else v for k, v in entry["parameters"].items()}

@@ -15,6 +15,8 @@ from pathlib import Path
 import bpy
 
 from . import lamps, pack, twin
+from .i18n import say
+from .pack import choice_label
 
 TAG = pack.TAG
 OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
@@ -47,15 +49,20 @@ def _find_oslquery():
     except ImportError:
         pass
     root = Path(bpy.utils.resource_path("LOCAL"))
-    added = [str(p) for p in root.glob("python/lib/python3.*/site-packages")]
+    # On Windows without a folder of the version.
+    layouts = ("python/lib/python3.*/site-packages", "python/lib/site-packages")
+    added = [str(p) for layout in layouts for p in root.glob(layout)]
     # At the end, so that what the interpreter already has keeps its priority.
     sys.path.extend(p for p in added if p not in sys.path)
     try:
         import oslquery  # noqa: F401
     except ImportError as error:
         raise CompileError(
-            f"the module oslquery, which compiles script nodes, can't be loaded: {error}. "
-            "A separately installed OpenImageIO in the same Python gets in its way"
+            say(
+                "Blender's compiler of shaders can't be loaded",
+                more=f"the module oslquery: {error}. A separately installed OpenImageIO in the "
+                "same Python gets in its way",
+            )
         ) from error
 
 
@@ -105,7 +112,8 @@ def _lamp_inputs(model_name, representation):
     slots = pack.representation(model_name, representation).get("lamps") or 0
     if slots > lamps.SLOTS:
         raise pack.PackError(
-            f"{model_name} ({representation}): expected at most {lamps.SLOTS} lamps, got {slots}"
+            f"manifest.json: {model_name} ({representation}): expected at most {lamps.SLOTS} "
+            f"lamps, got {slots}"
         )
     return lamps.part_names(slots)
 
@@ -170,7 +178,12 @@ def _compile(script_node, text, what):
     lines = [line.strip() for line in console if "error" in line.lower()]
     lines += [message for kind, message in reports if "ERROR" in kind]
     detail = "; ".join(dict.fromkeys(lines[:4])) or "the compiler gave no reason"
-    raise CompileError(f"{what}: the shader failed to compile: {detail}")
+    raise CompileError(
+        say(
+            "Blender could not compile the shader of a model",
+            more=f"{what}: the shader failed to compile: {detail}",
+        )
+    )
 
 
 def _socket(group, name, kind, description, **settings):
@@ -202,11 +215,6 @@ def tooltip(parameter):
 def has_menus():
     """Whether shader groups can have menu sockets (from 5.0); a choice is a number before that."""
     return bpy.app.version >= (5, 0, 0)
-
-
-def choice_label(identifier):
-    """An identifier as people read it."""
-    return identifier.replace("_", " ").capitalize()
 
 
 def _add_choice(group, group_input, script_input, parameter):
@@ -331,7 +339,12 @@ def _fill_group(group, model_name, representation, texts):
         }
         from_scripts |= {s.identifier: s for s in albedo.outputs}
     if problem := script_problem(group):
-        raise CompileError(f"{what}: the compiled shader {problem}")
+        raise CompileError(
+            say(
+                "Blender could not compile the shader of a model",
+                more=f"{what}: the compiled shader {problem}",
+            )
+        )
 
     inputs = {s.identifier: s for s in script.inputs}
     sockets = {}
@@ -548,6 +561,14 @@ def _trees(tree, seen):
             _trees(node.node_tree, seen)
 
 
+def trees_within(node):
+    """The trees of a group node, nested groups included; those of this extension have none."""
+    trees = []
+    if not is_ours(node):
+        _trees(getattr(node, "node_tree", None), trees)
+    return trees
+
+
 def group_nodes(material):
     """Every group node of this extension in a material, nested groups included."""
     trees = []
@@ -604,10 +625,13 @@ def add_albedo(node):
     if ALBEDO in node.outputs:
         return
     if is_baked(node) or manifest_entry(node) is None:
-        state = "made lean" if is_baked(node) else "of another version of the extension"
+        name = node.label or node.name
+        if is_baked(node):
+            raise ValueError(
+                say("{node} is lean: choose a form of the whole model first", node=name)
+            )
         raise ValueError(
-            f"node {node.name!r} is {state}: expected a form of the installed one, which Switch "
-            "Form or Update brings, to add an Albedo output to"
+            say("{node} is of another version of the extension: update it first", node=name)
         )
     without = node.node_tree
     replace_group(node, ensure_group(*identity(node), albedo=True))

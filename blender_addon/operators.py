@@ -6,6 +6,7 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 from bpy.types import AddonPreferences, Operator
 
 from . import api, checks, nodes, pack
+from .i18n import Sentence, iface, of_error, rpt, say
 
 _ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
 
@@ -20,7 +21,7 @@ def _doc(properties):
 class _ModelOperator:
     model: StringProperty(name="Model", description="Identifier of the model")
     representation: StringProperty(
-        name="Representation",
+        name="Form",
         description="Form of the model: auto, or one that the model has",
         default="auto",
     )
@@ -30,9 +31,18 @@ class _ModelOperator:
         return _doc(properties)
 
 
+def _refused(operator, error):
+    """Reports an error in a sentence; what is behind it goes into the Info editor before it."""
+    said, more = of_error(error)
+    if more:
+        operator.report({"INFO"}, more)
+    operator.report({"ERROR"}, rpt(said))
+    return {"CANCELLED"}
+
+
 def _report_osl(operator, scene):
     for finding in checks.scene_warnings(scene):
-        operator.report({"WARNING"}, finding.message)
+        operator.report({"WARNING"}, rpt(finding.message))
 
 
 class BRDFC_OT_add_node(_ModelOperator, Operator):
@@ -56,8 +66,7 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
         try:
             node = nodes.add_group_node(space.edit_tree, self.model, self.representation)
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         for other in space.edit_tree.nodes:
             other.select = False
         node.select = True
@@ -65,7 +74,7 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
         node.location = space.cursor_location
         if isinstance(space.id, bpy.types.Material):
             for change in api.prepare_material(space.id):
-                self.report({"INFO"}, change)
+                self.report({"INFO"}, rpt(change))
         _report_osl(self, context.scene)
         return {"FINISHED"}
 
@@ -91,14 +100,14 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         try:
             material = api.new_material(self.model, self.representation)
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         target = context.object
         if not target.material_slots:
             target.data.materials.append(material)
         else:
             target.active_material = material
-        self.report({"INFO"}, f"{material.name} assigned to {target.name}")
+        said = say("{material} assigned to {object}", material=material.name, object=target.name)
+        self.report({"INFO"}, rpt(said))
         _report_osl(self, context.scene)
         return {"FINISHED"}
 
@@ -110,41 +119,38 @@ class _OfActiveMaterial:
 
 
 class BRDFC_OT_enable_osl(Operator):
-    """Turn on Open Shading Language, which these shaders need, and Cycles with it"""
-
     bl_idname = "brdfc.enable_osl"
     bl_label = "Turn On OSL"
+    bl_description = "Turn on Open Shading Language, which these shaders need, and Cycles with it"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         try:
             done = checks.enable_osl(context.scene)
         except RuntimeError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        text = "; ".join(done) if done else "Open Shading Language is on already"
-        self.report({"INFO"}, text[0].upper() + text[1:])
+            return _refused(self, error)
+        for change in done or [say("Open Shading Language is on already")]:
+            self.report({"INFO"}, rpt(change))
         return {"FINISHED"}
 
 
 class BRDFC_OT_fix_material(_OfActiveMaterial, Operator):
-    """Give the active material the settings that its models need"""
-
     bl_idname = "brdfc.fix_material"
     bl_label = "Set Up Material"
+    bl_description = "Give the active material the settings that its models need"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         changes = api.prepare_material(context.object.active_material)
-        self.report({"INFO"}, "; ".join(changes) if changes else "Nothing to change")
+        for change in changes or [say("Nothing to change")]:
+            self.report({"INFO"}, rpt(change))
         return {"FINISHED"}
 
 
 class BRDFC_OT_no_guiding(Operator):
-    """Turn path guiding off, which the forms of this extension can't follow"""
-
     bl_idname = "brdfc.no_guiding"
     bl_label = "Turn Off Path Guiding"
+    bl_description = "Turn path guiding off, which the forms of this extension can't follow"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
@@ -157,18 +163,23 @@ def _model_node(material, name):
     for node in nodes.group_nodes(material):
         if node.name == name:
             return node
-    raise ValueError(f"material {material.name} has no model node {name!r}")
+    raise ValueError(
+        say("Material {material!r} has no model node {node!r}", material=material.name, node=name)
+    )
 
 
 class BRDFC_OT_switch(_OfActiveMaterial, Operator):
-    """Use another form of the same model; values and links stay"""
-
     bl_idname = "brdfc.switch"
     bl_label = "Switch Form"
+    bl_description = "Use another form of the same model; values and links stay"
     bl_options = {"REGISTER", "UNDO"}
 
     node: StringProperty(name="Node", description="Name of the group node")
-    representation: StringProperty(name="Representation", default="auto")
+    representation: StringProperty(
+        name="Form",
+        description="Form of the model: auto, or one that the model has",
+        default="auto",
+    )
     all_users: BoolProperty(
         name="All Materials",
         description="Also in every other material that has this model and form",
@@ -187,22 +198,22 @@ class BRDFC_OT_switch(_OfActiveMaterial, Operator):
                         nodes.switch(other, self.representation)
                 api.prepare_material(user)
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         return {"FINISHED"}
 
 
 class BRDFC_OT_find_lamps(Operator):
-    """Look again for the lamps that materials aim at, the brightest first"""
-
     bl_idname = "brdfc.find_lamps"
     bl_label = "Find Lamps"
+    bl_description = "Look again for the lamps that materials aim at, the brightest first"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         found = api.see_lamps(context.scene)
         taken = sum(lamp.slot is not None for lamp in found)
-        self.report({"INFO"}, f"Lamps aimed at: {taken} of {len(found)}")
+        self.report(
+            {"INFO"}, rpt(say("Lamps aimed at: {taken} of {all}", taken=taken, all=len(found)))
+        )
         return {"FINISHED"}
 
 
@@ -213,11 +224,12 @@ def _selected_materials(context):
 
 
 class BRDFC_OT_convert(Operator):
-    """Put the nearest model in place of each Principled, Glossy, Diffuse or Glass node of the
-    selected objects' materials; links stay, and it can be taken back"""
-
     bl_idname = "brdfc.convert"
     bl_label = "Convert to Reflection Models"
+    bl_description = (
+        "Put the nearest model in place of each Principled, Glossy, Diffuse or Glass node "
+        "of the selected objects' materials; links stay, and it can be taken back"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -228,19 +240,17 @@ class BRDFC_OT_convert(Operator):
         try:
             self._plans = api.plan_conversion(_selected_materials(context))
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         if not self._plans:
-            self.report(
-                {"ERROR"}, "No selected material has a Principled, Glossy, Diffuse or Glass"
-            )
-            return {"CANCELLED"}
+            none = say("No selected material shows a Principled, Glossy, Diffuse or Glass node")
+            return _refused(self, ValueError(none))
         return context.window_manager.invoke_props_dialog(self, width=600)
 
     def draw(self, context):
         column = self.layout.column(align=True)
         for made in self._plans:
-            column.label(text=made.line(), icon="ERROR" if made.refusal else "CHECKMARK")
+            icon = "ERROR" if made.refusal else "CHECKMARK"
+            column.label(text=iface(made.line()), icon=icon, translate=False)
 
     def execute(self, context):
         try:
@@ -249,38 +259,39 @@ class BRDFC_OT_convert(Operator):
                 plans = api.plan_conversion(_selected_materials(context))
             count = api.convert_materials(plans)
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         for made in plans:
-            self.report({"WARNING" if made.refusal else "INFO"}, made.line())
+            self.report({"WARNING" if made.refusal else "INFO"}, rpt(made.line()))
         _report_osl(self, context.scene)
         return {"FINISHED"} if count else {"CANCELLED"}
 
 
 class BRDFC_OT_convert_back(_OfActiveMaterial, Operator):
-    """Put Blender's own nodes back into the active material; where they were deleted, the model's
-    twin"""
-
     bl_idname = "brdfc.convert_back"
     bl_label = "Back to Blender's Nodes"
+    bl_description = (
+        "Put Blender's own nodes back into the active material; where they were deleted, "
+        "the model's twin"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         try:
             count = api.convert_back(context.object.active_material)
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"Nodes put back: {count}")
+            return _refused(self, error)
+        self.report({"INFO"}, rpt(say("Nodes put back: {count}", count=count)))
         return {"FINISHED"} if count else {"CANCELLED"}
 
 
 class BRDFC_OT_details(_OfActiveMaterial, Operator):
-    """The error is the part of the reflected light that a form sends in other directions than its
-    model, on average over views; 1 % is hard to see. More figures are behind this button"""
-
     bl_idname = "brdfc.details"
     bl_label = "What This Means"
+    bl_description = (
+        "The part of the reflected light that this form sends in other directions than its "
+        "model, on average over views: of an error of 1.2 % that is 1.2 of 100 parts, and 1 % is "
+        "hard to see. Click for more figures"
+    )
     bl_options = {"INTERNAL"}
 
     node: StringProperty(name="Node", description="Name of the group node")
@@ -290,11 +301,11 @@ class BRDFC_OT_details(_OfActiveMaterial, Operator):
 
     def draw(self, context):
         for line in self.lines(context):
-            self.layout.label(text=line)
+            self.layout.label(text=iface(line), translate=False)
 
     def execute(self, context):
         for line in self.lines(context):
-            self.report({"INFO"}, line)
+            self.report({"INFO"}, rpt(line))
         return {"FINISHED"}
 
     def lines(self, context):
@@ -304,37 +315,59 @@ class BRDFC_OT_details(_OfActiveMaterial, Operator):
             node = _model_node(context.object.active_material, self.node)
             made = nodes.manifest_entry(node)
         except _ERRORS as error:
-            return [str(error)]
-        return (
-            ui.details(node, made[0]) if made else ["Another version made this: nothing is known"]
-        )
+            said, more = of_error(error)
+            return [said, more] if more else [said]
+        return ui.details(node, made[0]) if made else [say("Made by another version")]
+
+
+class BRDFC_OT_more(Operator):
+    bl_idname = "brdfc.more"
+    bl_label = "More"
+    bl_description = "Show what is behind this sentence"
+    bl_options = {"INTERNAL"}
+
+    text: StringProperty(name="Text", description="What is shown")
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_popup(self, width=500)
+
+    def draw(self, context):
+        from . import ui
+
+        for line in ui.lines_of(self.text):
+            self.layout.label(text=line, translate=False)
+
+    def execute(self, context):
+        self.report({"INFO"}, self.text)
+        return {"FINISHED"}
 
 
 class BRDFC_OT_update(Operator):
-    """Give the models that another version of the extension made the shaders of this one, where all
-    that they are set to can stay"""
-
     bl_idname = "brdfc.update"
     bl_label = "Update Materials"
+    bl_description = (
+        "Give the models that another version of the extension made the shaders of this "
+        "one, where all that they are set to can stay"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         try:
             result = api.update_materials()
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         for sentence in (*result.refusals, *result.notes):
-            self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"Models updated: {result.count}")
+            self.report({"WARNING"}, rpt(sentence))
+        self.report({"INFO"}, rpt(say("Models updated: {count}", count=result.count)))
         return {"FINISHED"}
 
 
 class BRDFC_OT_add_albedo(_OfActiveMaterial, Operator):
-    """Give the model's node an output for its albedo, whose tables make the file larger"""
-
     bl_idname = "brdfc.add_albedo"
     bl_label = "Add Albedo Output"
+    bl_description = (
+        "Give the model's node an output for its albedo, whose tables make the file larger"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     node: StringProperty(name="Node", description="Name of the group node")
@@ -344,32 +377,32 @@ class BRDFC_OT_add_albedo(_OfActiveMaterial, Operator):
         try:
             nodes.add_albedo(_model_node(material, self.node))
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         return {"FINISHED"}
 
 
 class BRDFC_OT_add_twin(_OfActiveMaterial, Operator):
-    """Give the active material an output for EEVEE, made of Blender's own nodes"""
-
     bl_idname = "brdfc.add_twin"
     bl_label = "Add Twin for EEVEE"
+    bl_description = (
+        "Give the active material a second output, for EEVEE, made of Blender's own nodes"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         try:
             api.add_twin(context.object.active_material)
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         return {"FINISHED"}
 
 
 class BRDFC_OT_kernel(_OfActiveMaterial, Operator):
-    """Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"""
-
     bl_idname = "brdfc.kernel"
     bl_label = "Kernel from Float Curve"
+    bl_description = (
+        "Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     node: StringProperty(
@@ -382,8 +415,7 @@ class BRDFC_OT_kernel(_OfActiveMaterial, Operator):
             node = self._group(material)
             api.set_kernel(node, self._curve(node.id_data))
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         return {"FINISHED"}
 
     def _group(self, material):
@@ -392,8 +424,11 @@ class BRDFC_OT_kernel(_OfActiveMaterial, Operator):
         active = [n for n in wanted if n == n.id_data.nodes.active]
         if not wanted or (len(wanted) > 1 and not active):
             raise ValueError(
-                f"material {material.name!r}: expected an active node of the model "
-                f"{api.KERNEL_MODEL!r}"
+                say(
+                    "Material {material!r}: expected an active node of the model {model!r}",
+                    material=material.name,
+                    model=api.KERNEL_MODEL,
+                )
             )
         return (active or wanted)[0]
 
@@ -402,22 +437,29 @@ class BRDFC_OT_kernel(_OfActiveMaterial, Operator):
         chosen = curves if len(curves) == 1 else [n for n in curves if n.select]
         if len(chosen) != 1:
             raise ValueError(
-                f"expected one Float Curve node beside the model's, or one that is selected; "
-                f"there are {len(curves)}, {len(chosen)} selected"
+                say(
+                    "Expected one Float Curve node beside the model's, or one that is selected; "
+                    "there are {count}, {selected} selected",
+                    count=len(curves),
+                    selected=len(chosen),
+                )
                 if curves
-                else "expected a Float Curve node beside the model's; there is none"
+                else say("Expected a Float Curve node beside the model's; there is none")
             )
         return chosen[0]
 
 
 class BRDFC_OT_write_materials(Operator):
-    """List what this file uses, for `brdfc build --materials` to make an extension of it alone"""
-
     bl_idname = "brdfc.write_materials"
     bl_label = "Write Materials"
+    bl_description = (
+        "List what this file uses, for `brdfc build --materials` to make an extension of it alone"
+    )
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", subtype="FILE_PATH", default="materials.json")
+    filepath: StringProperty(
+        name="File", description="What is written", subtype="FILE_PATH", default="materials.json"
+    )
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
 
@@ -430,9 +472,8 @@ class BRDFC_OT_write_materials(Operator):
         try:
             count = api.write_materials(path)
         except (*_ERRORS, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"{path}: {count} materials")
+            return _refused(self, error)
+        self.report({"INFO"}, rpt(say("{count} materials in {file}", count=count, file=path)))
         return {"FINISHED"}
 
 
@@ -451,12 +492,17 @@ class _Long:
 
     def tell(self, context, share):
         context.window_manager.progress_update(100 * share)
-        context.workspace.status_text_set(f"{self.bl_label}: {share:.0%}   Esc: cancel")
+        said = say("{work}: {share}   Esc: cancel", work=self.work(), share=f"{share:.0%}")
+        context.workspace.status_text_set(iface(said))
+
+    def work(self):
+        return Sentence(self.bl_label)
 
     def modal(self, context, event):
         if event.type == "ESC":
             self.cancel(context)
-            self.report({"INFO"}, f"{self.bl_label}: cancelled, nothing is changed")
+            said = say("{work}: cancelled, nothing is changed", work=self.work())
+            self.report({"INFO"}, rpt(said))
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
@@ -464,8 +510,7 @@ class _Long:
             share = self.job.step()
         except _ERRORS as error:
             self.cancel(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
         if share is None:
             self.end(context)
             return self.finish(context, self.job.result)
@@ -495,8 +540,8 @@ class _Budget:
 
     fit: BoolProperty(
         name="Fit Closures",
-        description="Fit closures to the materials that take drawn directions, which then only set "
-        "these right: less noise under skies and images. Takes seconds to minutes a material",
+        description="Less noise of aimed and sampled forms under skies and images, for seconds to "
+        "minutes of work a material",
         default=False,
     )
 
@@ -505,18 +550,19 @@ class _Budget:
 
 
 class BRDFC_OT_bake(_Long, _Budget, Operator):
-    """Give the materials shaders that hold no more than this file needs; brdfc makes them"""
-
     bl_idname = "brdfc.bake"
     bl_label = "Bake Lean Materials"
+    bl_description = (
+        "Give the materials shaders that hold no more than this file needs; the program brdfc "
+        "makes them"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def invoke(self, context, event):
         try:
             return self.begin(context, api.start_plan(**self.budget()))
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return _refused(self, error)
 
     def finish(self, context, plan):
         BRDFC_OT_bake_plan.plan, BRDFC_OT_bake_plan.planned_with = plan, self.budget()
@@ -527,17 +573,15 @@ class BRDFC_OT_bake(_Long, _Budget, Operator):
         try:
             count = api.bake(api.plan(**self.budget()))
         except _ERRORS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"Nodes that are lean now: {count}")
+            return _refused(self, error)
+        self.report({"INFO"}, rpt(say("Nodes that are lean now: {count}", count=count)))
         return {"FINISHED"}
 
 
 class BRDFC_OT_bake_plan(_Budget, Operator):
-    """Show what lean materials would hold, and bake them"""
-
     bl_idname = "brdfc.bake_plan"
     bl_label = "Bake Lean Materials"
+    bl_description = "Show what lean materials would hold, and bake them"
     bl_options = {"INTERNAL"}
 
     plan, planned_with = None, None  # of the class: brdfc.bake leaves them here
@@ -554,7 +598,7 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
         self.layout.prop(self, "fit")
         column = self.layout.column(align=True)
         for line in self.plan.lines():
-            column.label(text=line)
+            column.label(text=iface(line), translate=False)
 
     def execute(self, context):
         if self.budget() == self.planned_with:
@@ -565,10 +609,9 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
 
 
 class BRDFC_OT_bake_apply(_Long, Operator):
-    """Put the lean shaders of a plan into the materials"""
-
     bl_idname = "brdfc.bake_apply"
     bl_label = "Bake Lean Materials"
+    bl_description = "Put the lean shaders of a plan into the materials"
     bl_options = {"INTERNAL", "UNDO"}
 
     @classmethod
@@ -580,7 +623,7 @@ class BRDFC_OT_bake_apply(_Long, Operator):
         return self.begin(context, api.start_bake(plan))
 
     def finish(self, context, count):
-        self.report({"INFO"}, f"Nodes that are lean now: {count}")
+        self.report({"INFO"}, rpt(say("Nodes that are lean now: {count}", count=count)))
         return {"FINISHED"}
 
 
@@ -589,7 +632,7 @@ class BrdfcPreferences(AddonPreferences):
 
     program: StringProperty(
         name="Program brdfc",
-        description="The generator, which Bake Lean Materials runs; empty: found on the PATH",
+        description="What Bake Lean Materials runs; empty: it is looked for on the PATH",
         subtype="FILE_PATH",
     )
     update_on_load: BoolProperty(
@@ -614,6 +657,7 @@ _CLASSES = (
     BRDFC_OT_convert,
     BRDFC_OT_convert_back,
     BRDFC_OT_details,
+    BRDFC_OT_more,
     BRDFC_OT_update,
     BRDFC_OT_find_lamps,
     BRDFC_OT_write_materials,

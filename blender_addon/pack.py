@@ -9,6 +9,8 @@ from functools import cache, lru_cache
 from numbers import Real
 from pathlib import Path
 
+from .i18n import form_name, say
+
 _INSTALLED = Path(__file__).parent
 #: Where models are read from; see use().
 root = _INSTALLED
@@ -24,6 +26,9 @@ TANGENT = "Tangent"
 
 class PackError(RuntimeError):
     """The extension's own files are missing or damaged."""
+
+    def __init__(self, more):
+        super().__init__(say("A file of this extension is damaged: install it again", more=more))
 
 
 def use(folder=None):
@@ -42,9 +47,9 @@ def manifest():
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise PackError(f"{path}: {error}; reinstall the extension") from error
+        raise PackError(f"{path}: {error}") from error
     if not isinstance(data, dict) or not isinstance(data.get("models"), dict):
-        raise PackError(f"{path}: expected an object with models; reinstall the extension")
+        raise PackError(f"{path}: expected an object with models")
     if data.get("format") != FORMAT:
         raise PackError(f"{path}: format {data.get('format')!r}, expected {FORMAT}")
     return data
@@ -80,12 +85,33 @@ def refusal(model_name, name, values):
     """Why these values exclude a form, which may exist for some values only; None if not."""
     for key, only in form_values(model_name, name).items():
         if key in values and not same(values[key], only):
-            got = "a linked value" if values[key] is None else repr(values[key])
-            return (
-                f"model {model_name!r} has the representation {name!r} only for {key}={only!r}, "
-                f"not for {got}"
+            got = values[key]
+            shown = say("a linked value") if got is None else value_text(got)
+            given = "a linked value" if got is None else repr(got)
+            return say(
+                "{form} is only for {parameter} = {only}, not for {got}",
+                more=f"model {model_name!r} has the form {name!r} only for {key}={only!r}, not "
+                f"for {given}",
+                form=form_name(name),
+                parameter=parameters(model_name).get(key, {}).get("label", key),
+                only=value_text(only),
+                got=shown,
             )
     return None
+
+
+def choice_label(identifier):
+    """An identifier as people read it."""
+    return identifier.replace("_", " ").capitalize()
+
+
+def value_text(value):
+    """A value of a parameter as people read it."""
+    if isinstance(value, str):
+        return choice_label(value)
+    if isinstance(value, tuple):
+        return f"({', '.join(f'{v:g}' for v in value)})"
+    return f"{value:g}"
 
 
 def resolve(model_name, representation, values=None):
@@ -103,8 +129,12 @@ def resolve(model_name, representation, values=None):
     if name not in entry["representations"]:
         known = ", ".join(["auto", *sorted(entry["representations"])])
         raise ValueError(
-            f"model {model_name!r} has no representation {representation!r}; "
-            f"expected one of {known}"
+            say(
+                "{model} has no form {form!r}",
+                more=f"expected one of {known}",
+                model=entry["label"],
+                form=representation,
+            )
         )
     if problem := refusal(model_name, name, values):
         raise ValueError(problem)
@@ -165,7 +195,7 @@ def has_aimed():
 def _file(relative):
     path = root / relative
     if not path.is_file():
-        raise PackError(f"{path} is missing; reinstall the extension")
+        raise PackError(f"{path} is missing")
     return path
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from bpy.types import Panel
 
 from . import nodes, pack
+from .i18n import iface, of_error, say
 
 #: Pictures that are kept; the oldest gives its place away.
 _KEPT = 16
@@ -50,22 +51,25 @@ def picture(node):
 def draw_plots(layout, material):
     for node in nodes.group_nodes(material):
         column = layout.column(align=True)
-        column.label(text=node.label or node.name, icon="MATERIAL")
+        column.label(text=node.label or node.name, icon="MATERIAL", translate=False)
         try:
             preview, roughness = picture(node)
         except ValueError as error:
-            column.label(text=str(error), icon="ERROR")
+            said = say("This extension does not have this model", more=str(error))
+            column.label(text=iface(said), icon="ERROR", translate=False)
             continue
         column.template_icon(icon_value=preview.icon_id, scale=12.0)
         column.label(text="Above: light from 45\u00b0, and where it goes")
         if roughness is not None:
-            column.label(text=f"Grey: Glossy, roughness {roughness:.2f}, the nearest")
+            said = say("Grey: the nearest Glossy, roughness {value}", value=f"{roughness:.2f}")
+            column.label(text=iface(said), translate=False)
         column.label(text="Below: under a lamp; reflected share, 0\u00b0 to 90\u00b0")
         _, linked = _values(node)
         if linked:
             labels = pack.parameters(nodes.identity(node)[0])
             names = ", ".join(labels[name]["label"] for name in linked)
-            column.label(text=f"At the default of {names}", icon="INFO")
+            said = say("At the default of {parameters}", parameters=names)
+            column.label(text=iface(said), icon="INFO", translate=False)
 
 
 def _material(context):
@@ -84,7 +88,7 @@ class _Plots:
         try:
             draw_plots(self.layout, _material(context))
         except pack.PackError as error:
-            self.layout.label(text=str(error), icon="ERROR")
+            self.layout.label(text=iface(of_error(error)[0]), icon="ERROR", translate=False)
 
 
 class MATERIAL_PT_brdfc_plots(_Plots, Panel):

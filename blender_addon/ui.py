@@ -2,31 +2,63 @@
 """Menus and panels."""
 
 import math
+import unicodedata
 
 import bpy
 from bpy.types import Menu, Panel
 
 from . import api, checks, convert, energy, lamps, nodes, pack
+from .i18n import button, form_name, iface, of_error, say
 
-_WRAP = 46  # characters of a panel's line; Blender does not wrap labels
+_WRAP = 46  # widths of a letter in a panel's line; Blender does not wrap labels
+#: What no line of Japanese begins with.
+_CLOSING = "、。，．・：；）」』】"
+
+
+def _width(text):
+    """In widths of a Latin letter; what is of East Asian width takes two."""
+    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+
+
+def _pieces(text):
+    """The parts between which a line may be broken: words, and characters of East Asian width."""
+    for word in text.split():
+        piece = " "
+        for c in word:
+            wide = unicodedata.east_asian_width(c) in "WF"
+            if piece.strip() and wide and c not in _CLOSING:
+                yield piece
+                piece = ""
+            piece += c
+            after = piece.strip()
+        if after:
+            yield piece
+
+
+def lines_of(text):
+    """A text in lines that a panel has room for."""
+    lines, line = [], ""
+    for piece in _pieces(text):
+        if line and _width(line) + _width(piece) > _WRAP:
+            lines.append(line)
+            line = ""
+        line += piece if line else piece.strip()
+    return [*lines, line]
 
 
 def _wrapped(layout, text, icon="NONE"):
-    """A label over several lines."""
-    line = ""
-    for word in text.split():
-        if line and len(line) + len(word) + 1 > _WRAP:
-            layout.label(text=line, icon=icon)
-            line, icon = "", "BLANK1" if icon != "NONE" else "NONE"
-        line = f"{line} {word}".strip()
-    layout.label(text=line, icon=icon)
+    """A label over several lines, of a Sentence or of a text that is not translated."""
+    for line in lines_of(iface(text)):
+        layout.label(text=line, icon=icon, translate=False)
+        icon = "BLANK1" if icon != "NONE" else "NONE"
 
 
 def _draw_models(layout, operator):
     for name in pack.model_names():
-        button = layout.operator(operator, text=pack.model(name)["label"])
-        button.model = name
-        button.representation = "auto"
+        # The names are those of the papers, in every language.
+        item = layout.operator(operator, text=pack.model(name)["label"], translate=False)
+        item.model = name
+        item.representation = "auto"
 
 
 class NODE_MT_brdfc(Menu):
@@ -56,43 +88,57 @@ def draw_material_menu(self, context):
 
 
 def error_text(entry):
-    """The measured error of a representation in a few words."""
+    """The measured error of a form in a few words."""
     error = entry["error"]
-    parts = []
-    if error.get("relative_l1") is not None:
-        parts.append(f"{100 * error['relative_l1']:.2g} % of the light")
-    if error.get("note"):
-        parts.append(error["note"])
-    return ", ".join(parts) or "not measured"
+    if (off := error.get("relative_l1")) is not None:
+        return percent(off)
+    # Drawn directions: what is measured is that nothing is lost.
+    if error.get("albedo") is not None:
+        return say("none, only noise")
+    return say("not measured")
+
+
+def percent(part):
+    """A part of the light in percent; rounding is not told from 0."""
+    if part < ROUNDING:
+        return say("none")
+    return say("{percent} %", percent=f"{100 * part:.2g}")
+
+
+#: Errors below this are rounding of single precision.
+ROUNDING = 1e-5
 
 
 def details(node, form):
     """What the panel leaves out of a node's form, a sentence a line."""
     error = form["error"]
     out = [
-        f"{what}: {100 * error[key]:.2g} %"
+        say("{what}: {error}", what=what, error=percent(error[key]))
         for key, what in (
-            ("relative_l1", "Light that leaves in other directions than the model's"),
-            ("relative_l2", "The same by squares, to which bright spots count more"),
-            ("albedo", "Largest error of how much is reflected, of a white surface"),
+            ("relative_l1", say("Light that leaves in other directions than the model's")),
+            ("relative_l2", say("The same by squares, to which bright spots count more")),
+            ("albedo", say("Largest error of how much is reflected, of a white surface")),
         )
         if error.get(key) is not None
     ]
-    if error.get("note"):
+    if error.get("note"):  # the tool's words, with the place where the form is worst
         out.append(error["note"].capitalize())
-    out.append(f"Run time at equal samples: {cost_text(node, form)}")
+    out.append(say("Render time at equal samples: {cost}", cost=cost_text(node, form)))
     if form.get("closures"):
-        out.append(f"Closures of Cycles: {form['closures']}")
+        out.append(say("Closures of Cycles: {count}", count=form["closures"]))
     return out
 
 
 def cost_text(node, form):
     """Render time of a node's form in units of Blender's Glossy node."""
     if form["cost"] is None:
-        return "not measured"
+        return say("not measured")
     # A form of other parameters, which a pack cut to a scene holds, has another one.
     cut = nodes.is_baked(node) or pack.fixed(nodes.identity(node)[0])
-    return f"{form['cost']:.2f} x Glossy{', at default parameters' if cut else ''}"
+    times = f"{form['cost']:.2f}"
+    if cut:
+        return say("{times} x Glossy, at default parameters", times=times)
+    return say("{times} x Glossy", times=times)
 
 
 #: View angles in degrees at which the panel shows energy.
@@ -107,7 +153,7 @@ def energy_text(node):
     for name, parameter in pack.parameters(model_name).items():
         value = nodes.get_value(node, name)
         if value is None:
-            return f"depends on what is linked to {parameter['label']}"
+            return say("depends on what is linked to {socket}", socket=parameter["label"])
         values[name] = value
     low, high = energy.views(model_name)
     numbers = []
@@ -118,13 +164,13 @@ def energy_text(node):
         rgb = energy.albedo(model_name, values, cosine)
         luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
         numbers.append(f"{angle}\u00b0 {luminance:.3f}")
-    return "   ".join(numbers) or "not at a view angle of this scene"
+    return "   ".join(numbers) or say("not at a view angle of this scene")
 
 
 def _draw_form(layout, node, form, scene, editable):
     model_name, representation = nodes.identity(node)
     if lean := nodes.is_baked(node):
-        _wrapped(layout, "Lean: only what this file needs. A form brings the whole one back")
+        _wrapped(layout, say("Lean: only what this file needs. A form brings the whole one back"))
     entry = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = editable
@@ -135,22 +181,28 @@ def _draw_form(layout, node, form, scene, editable):
         if refusal := refusal or checks.device_refusal(model_name, name, scene):
             refusals.append(refusal)
             continue
-        button = row.operator(
+        item = row.operator(
             "brdfc.switch",
-            text=name.capitalize(),
+            text=form_name(name).template,
             depress=name == representation and not lean,
         )
-        button.node, button.representation = node.name, name
+        item.node, item.representation = node.name, name
     column = layout.column(align=True)
     for refusal in refusals:
-        _wrapped(column, refusal[0].upper() + refusal[1:])
-    _wrapped(column, f"Error: {error_text(form)}")
-    column.operator("brdfc.details", icon="QUESTION", emboss=False).node = node.name
-    _wrapped(column, f"Cost: {cost_text(node, form)}")
-    if form.get("closures"):
-        _wrapped(column, f"Closures: {form['closures']}")
+        _wrapped(column, refusal)
+    # A button, for labels have no tooltip that could say what the number means.
+    line = column.row()
+    line.alignment = "LEFT"
+    line.operator(
+        "brdfc.details",
+        text=iface(say("Error: {error}", error=error_text(form))),
+        translate=False,
+        icon="QUESTION",
+        emboss=False,
+    ).node = node.name
+    _wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
     if entry.get("albedo"):
-        _wrapped(column, f"Albedo: {energy_text(node)}")
+        _wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
 
 
 def _draw_values(layout, node):
@@ -160,13 +212,13 @@ def _draw_values(layout, node):
         if socket.type != "VECTOR":
             row = column.row()
             row.enabled = not socket.is_linked
-            row.prop(socket, "default_value", text=socket.name)
+            row.prop(socket, "default_value", text=socket.name, translate=False)
 
 
 def draw_node(layout, node, material, scene, editable=True):
     """Model, form, error, cost, energy and values of one group node."""
     model_name, representation = nodes.identity(node)
-    layout.label(text=node.label or node.name, icon="MATERIAL")
+    layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
     entry = {"representations": {}}
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
@@ -191,36 +243,49 @@ def draw_lamps(layout, material, scene):
         return
     box = layout.box()
     found = lamps.seen(scene)
-    taken = [lamp.name for lamp in found if lamp.slot is not None and lamp.slot <= slots]
+    taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > slots]
-    _wrapped(box, f"Free of noise under {', '.join(taken) or 'no lamp yet'}", "LIGHT")
+    if taken:
+        _wrapped(box, say("Free of noise under {lamps}", lamps=", ".join(taken)), "LIGHT")
+    else:
+        _wrapped(box, say("Free of noise under no lamp yet"), "LIGHT")
     room = checks.lamps_that_fit(scene)
     if room is not None and room < slots:
         _wrapped(
             box,
-            f"OptiX: {room} lamps at most are aimed at, for its memory for closures holds no more "
-            "beside this file's models; all that a Mix Shader mixes shares that memory",
+            say(
+                "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
+                "Shader mixes shares it",
+                count=room,
+            ),
             "ERROR",
         )
     for lamp in left_out:
-        _wrapped(box, f"{lamp.name} may be noisy: {lamp.why or lamps.too_many(slots)}")
+        why = lamp.why or lamps.too_many(slots)
+        _wrapped(box, say("{lamp} may be noisy: {why}", lamp=lamp.name, why=why))
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
 
 
-_DOWNLOAD = ("wm.url_open", "Get Blender", {"url": "https://www.blender.org/download/"})
+_DOWNLOAD = ("wm.url_open", button("Get Blender"), {"url": "https://www.blender.org/download/"})
 #: The button under a finding of each code: operator, text, properties.
 BUTTONS = {
     "blender_version": _DOWNLOAD,
     "no_osl": _DOWNLOAD,
-    "engine": ("brdfc.enable_osl", "Use Cycles", {}),
-    "eevee_twin": ("brdfc.add_twin", "Add Twin for EEVEE", {}),
-    "osl_off": ("brdfc.enable_osl", "Turn On OSL", {}),
-    "device": ("brdfc.enable_osl", "Use the CPU", {}),
-    "outdated": ("brdfc.update", "Update Materials", {}),
-    "newer": ("screen.userpref_show", "Look for Updates", {"section": "EXTENSIONS"}),
-    "bump_correction": ("brdfc.fix_material", "Set Up Material", {}),
-    "path_guiding": ("brdfc.no_guiding", "Turn Off Path Guiding", {}),
+    "engine": ("brdfc.enable_osl", button("Use Cycles"), {}),
+    "eevee_twin": ("brdfc.add_twin", button("Add Twin for EEVEE"), {}),
+    "osl_off": ("brdfc.enable_osl", button("Turn On OSL"), {}),
+    "device": ("brdfc.enable_osl", button("Use the CPU"), {}),
+    "outdated": ("brdfc.update", button("Update Materials"), {}),
+    "newer": ("screen.userpref_show", button("Look for Updates"), {"section": "EXTENSIONS"}),
+    "bump_correction": ("brdfc.fix_material", button("Set Up Material"), {}),
+    "path_guiding": ("brdfc.no_guiding", button("Turn Off Path Guiding"), {}),
 }
+
+
+def _more(layout, said):
+    """A button for what is behind a sentence, where there is something."""
+    if more := getattr(said, "more", ""):
+        layout.operator("brdfc.more", icon="QUESTION", emboss=False).text = more
 
 
 def draw_warnings(layout, material, scene):
@@ -234,9 +299,10 @@ def draw_warnings(layout, material, scene):
         if finding.code in BUTTONS and finding.code not in offered:
             offered.add(finding.code)
             operator, text, settings = BUTTONS[finding.code]
-            button = layout.operator(operator, text=text, icon="CHECKMARK")
+            item = layout.operator(operator, text=text, icon="CHECKMARK")
             for key, value in settings.items():
-                setattr(button, key, value)
+                setattr(item, key, value)
+        _more(layout, finding.message)
     return found
 
 
@@ -259,7 +325,9 @@ class _BrdfcPanel:
         try:
             draw_material(self.layout, context.object.active_material, context.scene)
         except pack.PackError as error:
-            _wrapped(self.layout, str(error), "ERROR")
+            said, _ = of_error(error)
+            _wrapped(self.layout, said, "ERROR")
+            _more(self.layout, said)
 
 
 def _has_ours(context):

@@ -7,6 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import nodes, pack
+from .i18n import form_name, of_error, say
 
 
 @dataclass(frozen=True)
@@ -59,20 +60,32 @@ def refusal(material, node):
     model_name, _ = nodes.identity(node)
     for block in (material, node.id_data):
         if block.library is not None:
-            return f"it is linked from {block.library.filepath}; update it there"
+            return say("it is linked from {file}; update it there", file=block.library.filepath)
     if nodes.is_newer(node):
-        return f"{nodes.made_by(node)} made it, and this is {pack.manifest()['generator']}"
+        return say(
+            "{later} made it, and this is {own}",
+            later=nodes.made_by(node),
+            own=pack.manifest()["generator"],
+        )
     if model_name not in pack.model_names():
-        return f"this version has no model {model_name!r}"
+        return say("this version has no model {model!r}", model=model_name)
     known = pack.parameters(model_name)
     for name, value in nodes.all_values(node).items():
         if name in pack.fixed(model_name) or name in nodes.VECTORS:
             continue
         if name not in known:
-            return f"this version's {model_name} has no parameter {name!r}"
+            return say(
+                "this version's {model} has no parameter {parameter!r}",
+                model=model_name,
+                parameter=name,
+            )
         choices = known[name].get("choices")
         if choices and value is not None and value not in choices:
-            return f"{model_name}.{name} is {value!r} there, and no longer a choice"
+            return say(
+                "{parameter} is {value!r} there, and no longer a choice",
+                parameter=known[name]["label"],
+                value=value,
+            )
     return None
 
 
@@ -86,7 +99,7 @@ def update():
     for material, node in others():
         what = f"{material.name}, {node.label or node.name}"
         if why := refusal(material, node):
-            refusals.append(f"{what}: {why}")
+            refusals.append(say("{node}: {what}", node=what, what=why))
             continue
         model_name, form = nodes.identity(node)
         try:
@@ -94,9 +107,14 @@ def update():
                 nodes.switch(node, form)
             except ValueError:
                 nodes.switch(node, "auto")
-                notes.append(f"{what}: {form} is now {nodes.identity(node)[1]}")
+                said = say(
+                    "{before} is now {after}",
+                    before=form_name(form),
+                    after=form_name(nodes.identity(node)[1]),
+                )
+                notes.append(say("{node}: {what}", node=what, what=said))
         except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors
-            refusals.append(f"{what}: {error}")
+            refusals.append(say("{node}: {what}", node=what, what=of_error(error)[0]))
             continue
         count += 1
     nodes.remove_unused_groups()

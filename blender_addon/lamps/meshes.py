@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from mathutils import Vector
 
+from ..i18n import say
 from . import slots
 
 #: A lobe covers the whole ball around a mesh, and within it the model and what is seen of the lamp
@@ -81,6 +82,6 @@ def judge(candidate, points):
     distance = np.sqrt(((points - ball.place) ** 2).sum(-1)).min()
     angle = ball.radius / max(distance, 1e-9)
     if angle > _LOOKS_WIDE:
-        candidate.why = "so large or near that it needs no aiming"
+        candidate.why = say("so large or near that it needs no aiming")
     elif angle > _LOOKS_SMALL and not ball.fills:
-        candidate.why = "a mesh that is neither round nor small"
+        candidate.why = say("a mesh that is neither round nor small")

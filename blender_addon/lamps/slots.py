@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Matrix, Vector
 
+from ..i18n import say
+
 #: How many lamps the shared group holds.
 SLOTS = 8
 #: Vectors of a slot, each followed by the slot's number from 1.
@@ -21,7 +23,9 @@ def part_names(count):
 
 def too_many(slots):
     """Why a lamp is left out that others outshine."""
-    return f"fainter than the {slots} that a material can aim at" if slots else "no room for it"
+    if not slots:
+        return say("no room for it")
+    return say("fainter than the {count} that a material can aim at", count=slots)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 from .. import shader_trees
+from ..i18n import say
 from . import bright_spots, emission, slots
 
 #: Types of Sky Texture that show a sun; NISHITA became two in 5.0.
@@ -84,7 +85,7 @@ def _image_spots(image):
 def _sky(node, strength):
     """The sun of a Sky Texture. The dependency graph knows sockets of nodes and no other
     properties: a driver would print errors and miss changes, so handlers keep it current."""
-    name = f"sun of {node.label or node.name}"
+    name = say("sun of {node}", node=node.label or node.name)
     power = _SKY_SUN_IRRADIANCE * strength * node.sun_intensity
     turn = (node.sun_elevation, node.sun_rotation, 0.0)
     values = slots.numbers(slots.SKY_SUN, turn=turn, sizes=(node.sun_size, 0.0))
@@ -98,14 +99,14 @@ def _environment(node, strength):
     name = node.image.name
     turn = _turn_of(node) if node.projection == "EQUIRECTANGULAR" else None
     for index, (direction, angle, irradiance) in enumerate(_image_spots(node.image)):
-        which = f"{name}, bright spot {index + 1}"
+        which = say("{image}, bright spot {number}", image=name, number=index + 1)
         power = irradiance * strength
         candidate = slots.Candidate(which, None, lambda p, power=power: np.full(len(p), power))
         back = None
         if turn is not None and abs(turn.determinant()) > 1e-9:
             back = turn.inverted() @ Vector(direction)
         if back is None or back.length < 1e-9:
-            candidate.why = "its vector or projection is not one that can be followed"
+            candidate.why = say("its vector or projection is not one that can be followed")
         else:
             quaternion, w = slots.turned(back)
             candidate.values = slots.numbers(

@@ -15,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kManifest = "blender_manifest.toml";
+constexpr const char* kTranslations = "translations";
 constexpr const char *kId = "brdfc_shaders", *kName = "brdfc Shaders";
 
 /// Small letters, digits and single underscores between them.
@@ -61,7 +62,8 @@ std::map<std::string, std::string> addon_files(const fs::path& folder, const std
   std::map<std::string, std::string> files;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
     const std::string name = entry.path().lexically_relative(folder).generic_string();
-    if (entry.path().extension() == ".py") files[name] = read_text(entry.path());
+    const bool words = entry.path().parent_path().filename() == kTranslations && entry.path().extension() == ".json";
+    if (words || entry.path().extension() == ".py") files[name] = read_text(entry.path());
   }
   std::string& manifest = files[kManifest] = read_text(folder / kManifest);
   const fs::path path = folder / kManifest;

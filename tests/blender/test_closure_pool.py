@@ -84,7 +84,7 @@ def test_lamps_are_as_many_as_the_largest_material_has_room_for(extension, optix
     assert [lamp.slot for lamp in found] == [1, 2, 3, 4, 5, None, None]
     assert found[5].why == "fainter than the 5 that a material can aim at"
     text = panel(extension, phong.active_material, optix)
-    assert "OptiX: 5 lamps at most" in text and "Mix Shader" in text
+    assert "OptiX has memory for 5 lamps" in text and "Mix Shader" in text
     # By themselves: another material, which needs more; its end; another device.
     ward = put(optix, extension.api.new_material("ward"))  # (1016 - 232) / 160
     assert filled() == 4
@@ -134,7 +134,7 @@ def test_a_form_that_does_not_fit_is_refused(extension, optix):
     api = extension.api
     material = api.new_material("phong")
     text = panel(extension, material, optix)
-    assert "Fitted takes 1256 bytes of closures, and OptiX has room for 1016" in text
+    assert "Fitted takes more memory than OptiX has: it is for the CPU" in text
     assert "operator brdfc.switch Fitted" not in text and "brdfc.switch Sampled" in text
     # A material may have it already.
     api.switch_representation(material, "fitted")

@@ -237,6 +237,31 @@ def test_what_no_model_has_stays_and_is_said(extension, convert, kind, inputs, w
     assert node.outputs[0].is_linked
 
 
+def test_a_shader_inside_a_group_stays_and_is_said(extension, convert):
+    inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    inner.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+    glossy, end = inner.nodes.new("ShaderNodeBsdfGlossy"), inner.nodes.new("NodeGroupOutput")
+    inner.links.new(glossy.outputs[0], end.inputs[0])
+    outer = bpy.data.node_groups.new("Lack außen", "ShaderNodeTree")
+    outer.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+    nested, end = outer.nodes.new("ShaderNodeGroup"), outer.nodes.new("NodeGroupOutput")
+    nested.node_tree = inner
+    outer.links.new(nested.outputs[0], end.inputs[0])
+    material = bpy.data.materials.new("Grouped")
+    tree = extension.nodes.empty_tree(material)
+    group, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
+    group.node_tree = outer
+    assert convert.plan([material]) == [], "nothing shows it"
+    tree.links.new(group.outputs[0], output.inputs["Surface"])
+    plan = only(convert.plan([material]))
+    assert plan.line() == (
+        "Grouped, Lack außen: stays, its shader is inside this node group: ungroup it first"
+    )
+    assert convert.apply([plan]) == 0 and group.outputs[0].is_linked
+    # A model of this extension is a group as well, which holds nothing to convert.
+    assert convert.plan([extension.api.new_material("lambert")]) == []
+
+
 def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkeypatch):
     materials = [material_of("diffuse", Color=GOLD)[0], material_of("principled")[0]]
     before = helpers.counts()
@@ -310,7 +335,7 @@ def test_back_where_the_node_of_before_is_gone_is_the_twin(extension, convert, u
     material, node = material_of("diffuse", Color=(0.5, 0.5, 0.5))
     assert convert.apply(convert.plan([material])) == 1
     material.node_tree.nodes.remove(node)
-    with pytest.raises(ValueError, match="no representation 'twin'"):
+    with pytest.raises(ValueError, match="has no form 'twin'"):
         convert.restore(material)
     use_pack({"m": {"model": "lambert", "parameters": {"rho": 0.5}}}, "--twin")
     assert convert.restore(material) == 1

@@ -326,7 +326,7 @@ def test_values_round_trip(extension, empty, subtests):
     ("arguments", "message"),
     [
         ((["gloss"], {}), r"unknown model 'gloss'; expected one of .*lambert"),
-        ((["coupled", "fitted"], {}), r"'coupled' has no representation 'fitted'.*auto, aimed"),
+        ((["coupled", "fitted"], {}), r"has no form 'fitted'.*auto, aimed"),
         ((["coupled"], {"r1": 0.1}), r"'coupled' has no parameter 'r1'; expected one of r0, rm"),
         ((["coupled"], {"r0": 1.5}), r"coupled\.r0: expected a number from 0 to 1, got 1\.5"),
         ((["coupled"], {"r0": -0.1}), r"coupled\.r0: expected a number from 0 to 1"),
@@ -363,7 +363,7 @@ def test_set_parameters_is_all_or_nothing(extension, empty):
     tree.links.new(number.outputs[0], extension.nodes.sockets(node)["r0"])
     with pytest.raises(ValueError, match="'r0'.*controlled by a link"):
         extension.api.set_parameters(material, r0=0.3)
-    with pytest.raises(ValueError, match="has 0 nodes"):
+    with pytest.raises(ValueError, match="has 0 reflection models"):
         extension.api.set_parameters(bpy.data.materials.new("other"), r0=0.3)
 
 
@@ -541,7 +541,7 @@ def test_switch_keeps_values_and_links(extension, empty):
         assert sockets["Normal"].links[0].from_node == bump
         assert output.inputs["Surface"].links[0].from_node == node
     assert material.cycles.use_bump_map_correction is False
-    with pytest.raises(ValueError, match="no representation"):
+    with pytest.raises(ValueError, match="has no form"):
         extension.api.switch_representation(material, "twin")
     assert extension.nodes.identity(node) == (model, "sampled")
 
@@ -905,7 +905,7 @@ def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
             text = "\n".join(layout.log)
             entry = extension.pack.model(model)
             assert entry["label"] in text
-            for part in ("Error:", "Cost:", "Closures:"):
+            for part in ("Error:", "Cost:"):
                 assert part in text
             assert ("Albedo: 0\u00b0" in text) == bool(entry.get("albedo"))
             for form in entry["representations"]:
@@ -931,7 +931,7 @@ def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, empty, monk
     for material in made:
         layout = helpers.Layout()
         extension.ui.draw_material(layout, material, empty)
-        assert any(line.startswith("Error:") for line in layout.log), "the group is not known"
+        assert any("Error:" in line for line in layout.log), "the group is not known"
 
 
 def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):

@@ -180,7 +180,7 @@ def test_a_form_that_is_no_more_becomes_another(extension, empty, phong):
     node = aged(extension, phong)
     node.node_tree[extension.nodes.TAG]["representation"] = "perfect"
     result = extension.api.update_materials()
-    assert result.count == 1 and "perfect is now aimed" in result.notes[0]
+    assert result.count == 1 and "Perfect is now Aimed" in result.notes[0]
     assert extension.nodes.identity(node) == ("phong", "aimed")
     assert extension.api.get_parameters(phong)["e"] == pytest.approx(20)
 

@@ -120,7 +120,7 @@ def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
     layout = Layout()
     extension.ui.draw_material(layout, material, empty)
     text = "\n".join(layout.log)
-    for part in ("Lean:", "Error:", "Cost:", "Closures:", "Albedo: 0", "operator brdfc.switch"):
+    for part in ("Lean:", "Error:", "Cost:", "Albedo: 0", "operator brdfc.switch"):
         assert part in text
     with pytest.raises(ValueError, match="'r0' of .* the only value of a lean material"):
         api.set_parameters(material, r0=0.2)
@@ -202,20 +202,25 @@ def test_without_the_program_nothing_changes(extension, used, tmp_path, monkeypa
     material = used["coupled"]
     monkeypatch.delenv("BRDFC_TOOL")
     monkeypatch.setenv("PATH", str(tmp_path))
-    refused_and_unchanged(extension, material, "the program brdfc was not found: give its path")
+    refused_and_unchanged(extension, material, "The program brdfc was not found: give its path")
     monkeypatch.setenv("BRDFC_TOOL", str(tmp_path / "absent"))
-    refused_and_unchanged(extension, material, "absent: expected the program brdfc, which BRDFC_T")
+    refused_and_unchanged(
+        extension, material, "absent is not the program brdfc; BRDFC_TOOL names it"
+    )
     fake = tmp_path / "brdfc"
-    for script, match in (
-        ("echo 'brdfc: no such thing' >&2; exit 2", "no such thing"),
-        ("exit 3", "exit status 3"),
-        ("echo no explanation", "expected an explanation"),
-        ('echo \'{"models": [], "unused_models": []}\'', "manifest.json"),
+    no_plan = "The program brdfc made no plan"
+    for script, said, behind in (
+        ("echo 'brdfc: no such thing' >&2; exit 2", no_plan, "no such thing"),
+        ("exit 3", no_plan, "exit status 3"),
+        ("echo no explanation", no_plan, "expected an explanation"),
+        ('echo \'{"models": [], "unused_models": []}\'', "is damaged", "manifest.json"),
     ):
         fake.write_text(f"#!/bin/sh\n{script}\n")
         fake.chmod(0o755)
         monkeypatch.setenv("BRDFC_TOOL", str(fake))
-        refused_and_unchanged(extension, material, match)
+        refused_and_unchanged(extension, material, said)
+        with pytest.raises(RuntimeError, match=f"{said}.*{behind}"):
+            extension.api.bake(extension.api.plan())
 
 
 def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeypatch):
@@ -234,7 +239,7 @@ def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeyp
 
 
 def test_a_file_without_models_has_nothing_to_bake(extension, empty):
-    with pytest.raises(RuntimeError, match="no material of this file has a reflection model"):
+    with pytest.raises(RuntimeError, match="No material of this file has a reflection model"):
         bpy.ops.brdfc.bake()
 
 
@@ -359,7 +364,7 @@ def test_a_failure_beside_the_interface_is_said_and_changes_nothing(
     stand = Stand(extension.operators.BRDFC_OT_bake)
     job = extension.api.start_plan()
     assert run_through(stand, manager.context, job) == {"CANCELLED"}
-    assert stand.reports == ["brdfc: no such thing"]
+    assert stand.reports == ["brdfc: no such thing", "The program brdfc made no plan"]
     assert counts() == before
     assert manager.told[-3:] == ["no timer", "end", None]
 

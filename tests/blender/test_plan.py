@@ -216,7 +216,7 @@ def test_what_a_blend_file_uses_is_all_that_a_pack_holds(extension, empty, tool,
 
 def test_a_list_of_materials_that_cannot_be_written(extension, empty, tmp_path):
     bpy = extension.api.bpy
-    with pytest.raises(RuntimeError, match="no material of this file"):
+    with pytest.raises(RuntimeError, match="No material of this file"):
         bpy.ops.brdfc.write_materials(filepath=str(tmp_path / "none.json"))
     assert not (tmp_path / "none.json").exists()
     extension.api.new_material("lambert")

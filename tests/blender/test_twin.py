@@ -161,6 +161,6 @@ def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
 
 def test_no_twin_in_the_whole_extension(extension, empty):
     material = extension.api.new_material("phong")
-    with pytest.raises(ValueError, match="no representation 'twin'"):
+    with pytest.raises(ValueError, match="has no form 'twin'"):
         extension.api.add_twin(material)
     assert len(material.node_tree.nodes) == 2

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension reads its own pack, or refuses it in words, whatever is in the file."""
 
-import importlib.util
+import importlib
 import random
 import subprocess
+import sys
+import types
 
 import pytest
 from support import ROOT, TOOL
@@ -18,11 +20,13 @@ def manifest(tmp_path_factory):
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(tmp_path, monkeypatch):
     """Reads bytes as a manifest."""
-    spec = importlib.util.spec_from_file_location("pack", ROOT / "blender_addon" / "pack.py")
-    pack = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(pack)
+    # Without the package's own __init__, which needs Blender.
+    package = types.ModuleType("extension_without_blender")
+    package.__path__ = [str(ROOT / "blender_addon")]
+    monkeypatch.setitem(sys.modules, package.__name__, package)
+    pack = importlib.import_module(f"{package.__name__}.pack")
 
     def reader(data):
         (tmp_path / "manifest.json").write_bytes(data)

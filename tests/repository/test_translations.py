@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every catalogue has every text of the extension, and nothing else; every text that people see is
+one that can be translated."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+import texts
+
+TOOL = Path(os.environ.get("BRDFC_TOOL", texts.ROOT / "build" / "brdfc")).resolve()
+FOLDER = texts.ADDON / "translations"
+LOCALES = sorted(path.stem for path in FOLDER.glob("*.json"))
+#: The form that Blender's own nodes are, which packs have where it was asked for.
+ASKED_FOR = {"twin"}
+
+
+@pytest.fixture(scope="module")
+def english():
+    models = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
+    return texts.texts({f for m in models for f in m["representations"]} | ASKED_FOR)
+
+
+def catalogue(locale):
+    return json.loads((FOLDER / f"{locale}.json").read_text(encoding="utf-8"))
+
+
+def test_the_first_languages_are_there():
+    assert {"de_DE", "ja_JP"} <= set(LOCALES)
+
+
+def test_texts_are_found_where_they_stand(english):
+    for text in ("Turn On OSL", "{engine} can't run these shaders", "Fitted", "Use Cycles"):
+        assert text in english
+
+
+@pytest.mark.parametrize("locale", LOCALES)
+def test_nothing_is_missing_or_stale(locale, english):
+    known = catalogue(locale)
+    missing = {text: english[text] for text in english.keys() - known.keys()}
+    assert not missing, f"{locale}.json lacks these texts"
+    assert not known.keys() - english.keys(), f"{locale}.json has texts that nothing says"
+
+
+@pytest.mark.parametrize("locale", LOCALES)
+def test_a_translation_fits_its_text(locale):
+    for text, translation in catalogue(locale).items():
+        assert translation.strip(), text
+        assert texts.placeholders(text) == texts.placeholders(translation), text
+        indent = len(text) - len(text.lstrip())
+        assert len(translation) - len(translation.lstrip()) == indent, text
+
+
+@pytest.mark.parametrize("locale", LOCALES)
+def test_a_catalogue_is_sorted(locale):
+    assert list(catalogue(locale)) == sorted(catalogue(locale))
+
+
+def test_nothing_is_shown_that_is_not_looked_up():
+    assert not texts.unsaid()
+
+
+def test_no_text_has_the_terms_of_the_code(english):
+    for text, place in english.items():
+        assert "representation" not in text.lower() and "L1" not in text, place
+
+
+@pytest.mark.parametrize(
+    ("source", "finding"),
+    [
+        ('report({"INFO"}, f"{n} nodes")', "report"),
+        ('report({"ERROR"}, str(error))', "report"),
+        ('layout.label(text=f"{n} nodes")', "label"),
+        ('Finding("code", "ERROR", "bare")', "Finding"),
+        ("say(text)", "expected a literal"),
+        ('class A(Operator):\n    """Text"""\n    bl_label = "A"', "bl_description"),
+    ],
+)
+def test_what_is_not_looked_up_is_found(tmp_path, monkeypatch, source, finding):
+    (tmp_path / "module.py").write_text(source, encoding="utf-8")
+    monkeypatch.setattr(texts, "ADDON", tmp_path)
+    monkeypatch.setattr(texts, "ROOT", tmp_path)
+    (found,) = texts.unsaid()
+    assert finding in found

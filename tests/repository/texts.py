@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the extension says to people, as its sources have it: every text that is translated, and
+every place where a text would be shown that is not."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+ADDON = ROOT / "blender_addon"
+#: Functions whose first argument is a text, and keywords that are texts, by the function's name.
+SAYING = {"say", "button"}
+SHOWN = {"label": {"text"}, "operator": {"text"}, "menu": {"text"}}
+OF_PROPERTIES = {"name", "description"}
+OF_CLASSES = {"bl_label", "bl_description"}
+#: Calls that show an argument of that place to people: it must have come from one of the above.
+MUST_BE_SAID = {"Finding": 2, "Refused": 0, "PlanError": 0, "CompileError": 0, "report": 1}
+#: Names, which are the same in every language.
+NAMES = {"brdfc", "Text", ""}
+
+
+def _name(call):
+    function = call.func
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+
+
+def _literal(node):
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+def _of_call(call):
+    name, keywords = _name(call), {k.arg: k.value for k in call.keywords}
+    if name in SAYING and call.args:
+        yield call.args[0]
+    for key in SHOWN.get(name, ()):
+        if key in keywords:
+            yield keywords[key]
+    hidden = "options" in keywords and "HIDDEN" in ast.dump(keywords["options"])
+    if name.endswith("Property") and not hidden:
+        yield from (keywords[key] for key in OF_PROPERTIES & keywords.keys())
+
+
+def sources():
+    """[(file, tree)] of the extension's modules."""
+    files = sorted(ADDON.rglob("*.py"))
+    return [(p.relative_to(ROOT), ast.parse(p.read_text(encoding="utf-8"))) for p in files]
+
+
+def texts(forms):
+    """{text: place} of all that is translated; `forms`: names of the models' forms."""
+    found = {form.capitalize(): "a form" for form in forms}
+    for file, tree in sources():
+        for node in ast.walk(tree):
+            given = list(_of_call(node)) if isinstance(node, ast.Call) else []
+            if isinstance(node, ast.ClassDef):
+                given = [
+                    s.value
+                    for s in node.body
+                    if isinstance(s, ast.Assign) and getattr(s.targets[0], "id", "") in OF_CLASSES
+                ]
+            for text in map(_literal, given):
+                if text is not None and text not in NAMES:
+                    found[text] = f"{file}:{node.lineno}"
+    return found
+
+
+def _is_bare(node):
+    """A text that no catalogue can have, or that none is asked for."""
+    if isinstance(node, ast.JoinedStr) or _literal(node) is not None:
+        return True
+    return isinstance(node, ast.Call) and _name(node) == "str"
+
+
+def unsaid():
+    """Places where a text is shown that is not looked up."""
+    found = []
+    for file, tree in sources():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                found += [f"{file}:{node.lineno} {node.name}: {w}" for w in _of_class(node)]
+            if not isinstance(node, ast.Call):
+                continue
+            place = MUST_BE_SAID.get(_name(node))
+            shown = [node.args[place]] if place is not None and len(node.args) > place else []
+            shown += [k.value for k in node.keywords if k.arg in SHOWN.get(_name(node), ())]
+            if any(isinstance(n, ast.JoinedStr) or _is_bare(n) for n in shown if not _looked_up(n)):
+                if _name(node) in SHOWN and not any(isinstance(n, ast.JoinedStr) for n in shown):
+                    continue  # a literal that Blender looks up
+                found.append(f"{file}:{node.lineno} {_name(node)}")
+            if _name(node) in SAYING and _literal(node.args[0]) is None:
+                found.append(f"{file}:{node.lineno} {_name(node)}: expected a literal")
+    return found
+
+
+def _looked_up(node):
+    return isinstance(node, ast.Call) and _name(node) in {"rpt", "iface", "say"}
+
+
+def _of_class(node):
+    """A tooltip of a docstring has its line breaks and indents."""
+    bases = {getattr(b, "id", getattr(b, "attr", "")) for b in node.bases}
+    has = {getattr(s.targets[0], "id", "") for s in node.body if isinstance(s, ast.Assign)}
+    if "Operator" not in bases:
+        return
+    if "bl_description" not in has and not any("ModelOperator" in b for b in bases):
+        yield "expected a bl_description"
+
+
+def placeholders(text):
+    """The names in braces, with conversions, sorted."""
+    return sorted(re.findall(r"\{([^{}]*)\}", text))
