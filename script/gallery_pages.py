@@ -5,7 +5,8 @@ measured: of each scene Blender's picture, the reference and their difference si
 
     python script/gallery_pages.py REPORT-FOLDER PAGES-FOLDER COMMAND
 
-COMMAND is what a reader types for the same pages.
+COMMAND is what a reader types for the same pages, of all scenes. Sections of scenes that were
+not rendered this time stay as they are.
 """
 
 import json
@@ -25,10 +26,21 @@ PAGES = (
 )
 #: Pixels between pictures, quality of JPEG.
 GAP, QUALITY = 6, 90
+SCENES = Path(__file__).resolve().parent.parent / "scenes"
+#: What the pixel test says of two pictures that it can't tell apart.
+SAME = "the same within noise"
 
 
-def strip(files, out):
-    """Pictures of one size side by side on white."""
+def page_of(scene):
+    """The page that a scene is on."""
+    return next(file for file, _, prefixes in PAGES if scene.startswith(prefixes))
+
+
+def strip(folder, scene, out):
+    """Blender's picture, the reference and their difference side by side on white."""
+    form = scene["forms"][0]["form"]
+    names = (f"{form}.png", "reference.png", f"{form}-difference.png")
+    files = [folder / scene["scene"] / name for name in names]
     pictures = [oiio.ImageBuf(str(f)) for f in files]
     width, height = pictures[0].spec().width, pictures[0].spec().height
     total = width * len(pictures) + GAP * (len(pictures) - 1)
@@ -45,28 +57,17 @@ def strip(files, out):
 def verdict(form):
     """What the pixel test says, as a cell."""
     test = form["test"]
-    passed = "the same within noise" if test["passed"] else "**differs**"
+    passed = SAME if test["passed"] else "**differs**"
     tiles = f"{test['rejected_tiles']} of {test['tiles']} tiles rejected"
     return f"{passed}: {100 * test['accepted']:.2f} % of pixels accepted, {tiles}"
 
 
-def section(folder, pages, scene):
+def measured(scene):
+    """A scene's figures as a table."""
     form = scene["forms"][0]
-    name = scene["scene"]
-    parts = [
-        folder / name / f
-        for f in (f"{form['form']}.png", "reference.png", f"{form['form']}-difference.png")
-    ]
-    strip(parts, pages / f"{name}.jpg")
     names = sorted({m["representation"] for m in form["materials"]})
     cpu = sum(form["cpu_seconds"])
     return [
-        f"## {name}",
-        "",
-        f"![{name}: Blender, reference, difference]({name}.jpg)",
-        "",
-        scene["description"],
-        "",
         *heading("Blender", "Reference", "Pixel test", "relMSE", "of it noise", "bias"),
         line(
             f"{' and '.join(names)}, {form['spp']} samples, {cpu:.1f} s CPU",
@@ -76,8 +77,32 @@ def section(folder, pages, scene):
             f"{form['noise_floor']:.2g}",
             f"{100 * form['bias']:.2g} ± {100 * form['bias_standard_error']:.2g} %",
         ),
-        "",
     ]
+
+
+def section(folder, pages, scene):
+    name = scene["scene"]
+    strip(folder, scene, pages / f"{name}.jpg")
+    return [
+        f"![{name}: Blender, reference, difference]({name}.jpg)",
+        "",
+        scene["description"],
+        "",
+        *measured(scene),
+    ]
+
+
+def kept(page):
+    """Sections of a page that was made before, by scene, without scenes that are gone."""
+    if not page.is_file():
+        return {}
+    parts = page.read_text(encoding="utf-8").rsplit("\n*", 1)[0].split("\n## ")[1:]
+    sections = {}
+    for part in parts:
+        name, text = part.split("\n", 1)
+        if (SCENES / f"{name}.json").is_file():
+            sections[name] = text.strip().split("\n")
+    return sections
 
 
 def main():
@@ -87,7 +112,6 @@ def main():
     command = sys.argv[3]
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     pages.mkdir(parents=True, exist_ok=True)
-    left = {s["scene"]: s for s in report["scenes"]}
     index = ["# Gallery", ""]
     index += [
         "Scenes of the papers, and a few of ours: on the left in Blender, in the form that *auto*",
@@ -101,23 +125,22 @@ def main():
         "",
         *heading("Page", "Scenes", "same within noise"),
     ]
-    for file, title, prefixes in PAGES:
-        scenes = [left.pop(n) for n in sorted(left) if n.startswith(prefixes)]
-        if not scenes:
+    for file, title, _ in PAGES:
+        new = [s for s in report["scenes"] if page_of(s["scene"]) == file]
+        sections = kept(pages / f"{file}.md")
+        sections |= {s["scene"]: section(folder, pages, s) for s in new}
+        if not sections:
             continue
-        text = [
-            f"# {title}",
-            "",
-            f"`{command}` made this page; [how to read it](overview.md).",
-            "",
-        ]
-        for scene in scenes:
-            text += section(folder, pages, scene)
-        made = scenes[0]["provenance"]
-        text += [f"*{made['Blender']}; {made['Processor']}.*"]
-        (pages / f"{file}.md").write_text("\n".join(text) + "\n", encoding="utf-8")
-        same = sum(s["forms"][0]["test"]["passed"] for s in scenes)
-        index.append(line(f"[{title}]({file}.md)", len(scenes), same))
+        if new:
+            text = [f"# {title}", ""]
+            text += [f"`{command}` made this page; [how to read it](overview.md).", ""]
+            for name in sorted(sections):
+                text += [f"## {name}", "", *sections[name], ""]
+            made = new[0]["provenance"]
+            text += [f"*{made['Blender']}; {made['Processor']}.*"]
+            (pages / f"{file}.md").write_text("\n".join(text) + "\n", encoding="utf-8")
+        same = sum(any(SAME in row for row in rows) for rows in sections.values())
+        index.append(line(f"[{title}]({file}.md)", len(sections), same))
     (pages / "overview.md").write_text("\n".join(index) + "\n", encoding="utf-8")
     print(f"{len(report['scenes'])} scenes in {pages / 'overview.md'}")
 

@@ -9,11 +9,12 @@ whose repetitions take turns so that their run times can be compared:
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
-"repeat": ..., "native": ..., "pack": ..., "timed": ...}, ...]; all but scene and out are optional
-and default to the options of the command line. "native" names a file with a scene's materials of
-script/native_nodes.py; "pack" a folder that `brdfc build` wrote, whose models the extension takes
-instead of its own; "timed" false leaves out the render with one sample that tells sampling from
-compiling.
+"repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ...}, ...]; all but
+scene and out are optional and default to the options of the command line. "native" names a file
+with a scene's materials of script/native_nodes.py; "pack" a folder that `brdfc build` wrote, whose
+models the extension takes instead of its own; "timed" false leaves out the render with one sample
+that tells sampling from compiling. "out" may also be a .png or .jpg, as "view", a view transform of
+Blender's, shows it.
 Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
 usage or input.
 """
@@ -31,6 +32,9 @@ import time
 import tomllib
 import zipfile
 from pathlib import Path
+
+#: Files to look at, and what Blender calls their format.
+PICTURES = {".png": "PNG", ".jpg": "JPEG"}
 
 
 class UsageError(Exception):
@@ -107,6 +111,17 @@ def timed_render(bpy, samples, path=None):
         return cpu_seconds() - cpu, time.perf_counter() - wall
 
 
+def for_eyes(scene, path, view):
+    """A picture to look at in place of an EXR to measure: bytes, through Blender's own view."""
+    images = scene.render.image_settings
+    images.file_format = PICTURES[path.suffix]
+    images.color_mode, images.color_depth, images.quality = "RGB", "8", 92
+    try:
+        scene.view_settings.view_transform = view
+    except TypeError as error:
+        raise UsageError(f"view: {error}") from error
+
+
 def render_once(bpy, loader, job, repetition):
     """Loads and renders one job. Returns its times and, from the first repetition, a description.
 
@@ -125,7 +140,10 @@ def render_once(bpy, loader, job, repetition):
         scene.cycles.seed = job["seed"]
     one_cpu, one_wall = timed_render(bpy, 1) if job["timed"] else (None, None)
     out = Path(job["out"]).resolve()
-    partial = out.with_name(f".{out.stem}.partial.exr")
+    partial = out.with_name(f".{out.stem}.partial{out.suffix}")
+    scene.cycles.use_denoising = job["denoise"]
+    if out.suffix in PICTURES:
+        for_eyes(scene, out, job["view"])
     out.parent.mkdir(parents=True, exist_ok=True)
     cpu, wall = timed_render(bpy, samples, partial if repetition == 0 else None)
     factor = samples / max(samples - 1, 1)
@@ -196,6 +214,8 @@ def read_jobs(options):
         "native": None,
         "pack": None,
         "timed": True,
+        "denoise": options.denoise,
+        "view": options.view,
     }
     if options.jobs:
         try:
@@ -222,8 +242,13 @@ def read_jobs(options):
                 raise UsageError(
                     f"job {index}: {key}: expected a whole number from {least}, got {value!r}"
                 )
-        if not isinstance(merged["timed"], bool):
-            raise UsageError(f"job {index}: timed: expected true or false, got {merged['timed']!r}")
+        for key in ("timed", "denoise"):
+            if not isinstance(merged[key], bool):
+                got = repr(merged[key])
+                raise UsageError(f"job {index}: {key}: expected true or false, got {got}")
+        if (suffix := Path(merged["out"]).suffix) not in (".exr", *PICTURES):
+            expected = ", ".join((".exr", *PICTURES))
+            raise UsageError(f"job {index}: out: expected a name in {expected}, got '{suffix}'")
         if merged["representation"] == "scene":
             merged["representation"] = None
         complete.append(merged)
@@ -270,7 +295,12 @@ def main():
     )
     parser.add_argument("--extension", required=True, help="brdfc_shaders-<version>.zip")
     parser.add_argument("--scene", help="resolved scene.json")
-    parser.add_argument("--out", help="EXR to write, 32-bit float, scene linear")
+    parser.add_argument(
+        "--out",
+        help="EXR to write, 32-bit float, scene linear; or a .png or .jpg, as --view shows it",
+    )
+    parser.add_argument("--view", default="Standard", help="Blender's view transform (Standard)")
+    parser.add_argument("--denoise", action="store_true", help="by Blender's denoiser")
     parser.add_argument("--jobs", help="JSON file with a list of jobs")
     parser.add_argument(
         "--representation",

@@ -39,6 +39,7 @@ Json describe(const Model& m) {
         j["default"] = p.value;
       else
         j["default"] = p.value[0];
+      if (p.kind == ParamKind::Number) j["by_factors"] = p.by_factors;
     }
     j["doc"] = p.doc;
     params.push_back(std::move(j));

@@ -195,5 +195,19 @@ TEST(Figures, OnlyTheLosslessModelKeepsItsRim) {
   for (const int other : {1, 3}) EXPECT_LT(rim(other), 0.95) << other;
 }
 
+/// All white balls of the scene furnace but three fail visibly: the rivals lose light at the rim or, Schlick's double
+/// term, gain it.
+TEST(Figures, RivalsFailVisiblyInAFurnace) {
+  const Image image = picture(scene("furnace"), 250, 64);
+  // Balls of radius 1, 2.2 apart in a picture 4.4 high.
+  const auto rim = [&](int column, int row) {
+    const Point at{(column - 2) * 2.2 / 4.4, (row == 0 ? 1.1 : -1.1) / 4.4};
+    return mean(image, ring(at, 1 / 4.4, 0.9, 0.98)) / 0.45;
+  };
+  for (const int kept : {0, 1, 2}) EXPECT_NEAR(rim(kept, 0), 1, 0.01) << kept;
+  EXPECT_GT(rim(3, 0), 1.1) << "Schlick's double term";
+  for (int lost = 0; lost < 5; ++lost) EXPECT_LT(rim(lost, 1), 0.95) << lost;
+}
+
 }  // namespace
 }  // namespace brdfc::reference

@@ -4,6 +4,7 @@
 import json
 
 import demo_render
+import gallery_models
 import gallery_pages
 import OpenImageIO as oiio
 import pytest
@@ -75,9 +76,55 @@ def test_a_page_a_paper(tmp_path, monkeypatch):
     assert "`make it` made this page" in page
     assert "**differs**: 99.87 % of pixels accepted, 2 of 30 tiles rejected" in page
     assert "exact, 32 samples, 3.5 s CPU" in page and "What lamps shows." in page
+
+    # A second run with other scenes keeps what the first made.
+    report = {"scenes": [scene("gl-fig5", False)]}
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    gallery_pages.main()
+    again = (pages / "overview.md").read_text()
+    assert "(suffern.md) | 1 | 0 |" in again and "(more.md) | 1 | 0 |" in again
+    assert (pages / "more.md").read_text() == page
     strip = oiio.ImageBuf(str(pages / "gl-fig5.jpg"))
     gap = gallery_pages.GAP
     assert (strip.spec().width, strip.spec().height) == (60 + 2 * gap, 10)
     for i in range(3):
         colour = strip.getpixel(i * (20 + gap) + 10, 5)
         assert max(range(3), key=lambda c: colour[c]) == i, "Blender, reference, difference"
+
+
+NUMBER = {"kind": "number", "label": "Sharpness", "doc": "Of the lobe"}
+MODEL = {
+    "name": "shiny",
+    "label": "Shiny",
+    "doc": "A lobe.",
+    "properties": {
+        "fit_axis": "",
+        "reciprocal": True,
+        "lossless": False,
+        "conserving": False,
+        "isotropic": True,
+    },
+    "parameters": [
+        {"name": "tint", "kind": "color", "default": [1, 1, 1]},
+        NUMBER | {"name": "k", "soft_min": 0, "soft_max": 1, "default": 0.5, "by_factors": False},
+        NUMBER | {"name": "e", "soft_min": 1, "soft_max": 1e4, "default": 100, "by_factors": True},
+    ],
+}
+
+
+def test_a_ball_a_value_of_the_schema():
+    assert gallery_models.shown(MODEL) == [{"e": 10}, {"e": 100}, {"e": 1000}]
+    of_k = MODEL | {"properties": MODEL["properties"] | {"fit_axis": "k"}}
+    assert gallery_models.shown(of_k) == [{"k": 0.25}, {"k": 0.5}, {"k": 0.75}]
+    made = gallery_models.ball_scene(MODEL)
+    assert made["materials"]["ball_2"] == {"model": "shiny", "parameters": {"e": 1000}}
+    plain = MODEL | {"parameters": MODEL["parameters"][:1]}
+    assert gallery_models.ball_scene(plain)["materials"]["ball_0"]["parameters"] == {
+        "tint": [0.2, 0.2, 0.2]
+    }
+
+
+def test_a_model_s_page_says_what_its_schema_claims():
+    assert gallery_models.claims(MODEL) == (
+        "Light and view may be exchanged and some parameters and views gain light."
+    )
