@@ -76,7 +76,7 @@ void print_text(const Model& m) {
     if (const ParamValues only = form->values(m, {}); !only.empty())
       names += fmt::format(" (only {})", format_values(info, only));
   }
-  fmt::print("  representations: {}\n", names);
+  fmt::print("  forms: {}\n", names);
   for (const ParamInfo& p : info.params) {
     std::string range, value;
     if (p.kind == ParamKind::Choice) {
@@ -96,7 +96,7 @@ void print_text(const Model& m) {
 
 void add_list_command(CLI::App& app) {
   auto json = std::make_shared<bool>(false);
-  CLI::App* cmd = app.add_subcommand("list", "The models, their parameters and representations.");
+  CLI::App* cmd = app.add_subcommand("list", "The models, their parameters and forms.");
   cmd->add_flag("--json", *json, "As JSON: an array of objects");
   cmd->callback([json] {
     if (*json) {

@@ -40,7 +40,7 @@ class Exact final : public OslForm {
   /// As the shader has to weigh them.
   static ClosureSum<Expr> closures(const Model& model, const Brdf<Expr>& brdf) {
     std::optional<ClosureSum<Expr>> sum = brdf.exact(recorded_wo(model, brdf));
-    if (!sum) input_error("{}: has no exact representation", model.info().name);
+    if (!sum) input_error("{}: has no exact form", model.info().name);
     if (model.has_medium()) {
       const Rgb<Expr> left = named("medium", medium(brdf, Expr::input("side"), Expr::input("path_length")));
       for (Closure<Expr>& c : *sum) c.weight = c.weight * left;

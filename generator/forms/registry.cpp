@@ -24,7 +24,7 @@ const Form* form(const std::string& name) {
     if (f->name() == name) return f;
     names.push_back(f->name());
   }
-  input_error("unknown representation '{}': expected one of {}", name, fmt::join(names, ", "));
+  input_error("unknown form '{}': expected one of {}", name, fmt::join(names, ", "));
 }
 
 std::vector<const Form*> forms_of(const Model& model) {

@@ -292,16 +292,15 @@ print("RESULT", json.dumps({
 def test_a_profile_with_spaces_and_letters_of_other_scripts_and_read_only(
     extension_zip, program, tmp_path
 ):
-    """A Blender of its own, in the C locale, where text must not count on an encoding. After
-    the installation the profile can't be written."""
+    """A Blender of its own, whose Python warns of text in the system's encoding. After the
+    installation the profile can't be written."""
     profile = tmp_path / "Jörg Müller" / "Профиль 日本 X"
     out, temporary = tmp_path / "Ausgäbe Ordner", tmp_path / "Témp Files"
     for folder in (profile, out, temporary):
         folder.mkdir(parents=True)
     script = tmp_path / "profile.py"
     script.write_text(PROFILE, encoding="utf-8")
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("LC_", "LANG"))}
-    environment |= {
+    environment = os.environ | {
         "BLENDER_USER_RESOURCES": str(profile),
         "TMPDIR": str(temporary),
         "BRDFC_TOOL": str(program),

@@ -3,6 +3,7 @@
 bpy.app.build_options.international is False: what Blender would look up is read from the classes
 that are registered, and what the extension looks up itself comes from the catalogues instead."""
 
+import copy
 import inspect
 from importlib import import_module
 
@@ -122,6 +123,7 @@ def test_sentences_within_sentences(i18n, speak):
     inner = i18n.say("{socket} is linked", socket=i18n.Sentence("IOR"))
     outer = i18n.say("{material}, {node}: stays, {why}", material="M", node="Glass", why=inner)
     assert outer == "M, Glass: stays, IOR is linked"
+    assert i18n.iface(copy.deepcopy(outer)) == outer
     speak("de_DE")
     assert i18n.iface(outer) == "M, Glass: bleibt, IOR ist verbunden"
     assert i18n.iface("another text") == "another text"

@@ -395,7 +395,7 @@ TEST_F(PackFiles, ATableOfCostsThatIsWrongIsRefused) {
               HasSubstr("line 3: cost: expected a positive number, got 'fast'"));
   for (const char* cost : {"", "0", "-1", "nan", "inf", "1x"})
     EXPECT_THAT(refusal(head + "lambert,exact," + cost), HasSubstr("line 2: cost: expected")) << cost;
-  EXPECT_THAT(refusal(head + "lambert,excat,1\n"), HasSubstr("line 2: form: unknown representation 'excat'"));
+  EXPECT_THAT(refusal(head + "lambert,excat,1\n"), HasSubstr("line 2: form: unknown form 'excat'"));
   EXPECT_THAT(refusal(head + ",exact,1\n"), HasSubstr("line 2: model: expected a name"));
   EXPECT_THAT(refusal(head + "lambert,exact,1\nlambert,exact,2\n"), HasSubstr("line 3: form: expected one row"));
 }
