@@ -50,6 +50,8 @@ __all__ = [
     "see_lamps",
     "set_kernel",
     "set_parameters",
+    "set_substance",
+    "substances",
     "switch_representation",
     "update_materials",
     "used_materials",
@@ -214,6 +216,30 @@ def set_kernel(group, curve):
     relative = [height / max(heights) for height in heights]
     values = dict(zip(_HEIGHTS, relative, strict=True))
     _set(group, say("node {name!r}", name=group.name), {"kernel": "table", **values})
+
+
+def set_substance(material, substance, node=None):
+    """Gives a material of one model, or one node of it, the parameters of a metal, glass or liquid
+    of measured refractive index, in the working space of the file: n and k by channel, or the
+    colour that it reflects from above, as the model has them. The others stay.
+
+    `substance`: one of substances(), or a file NAME.csv as refractiveindex.info exports it. Returns
+    the parameters that were set. Raises ValueError for another name, a file that can't be read,
+    naming line and what was expected, and a model without such parameters; nothing is changed then.
+    """
+    from . import optical
+
+    node = node or _the_node(material)
+    values = optical.parameters(nodes.identity(node)[0], optical.find(substance))
+    _set(node, f"material {material.name!r}", values)
+    return values
+
+
+def substances():
+    """What set_substance() knows, by name: label, source, n and k."""
+    from .brdfc import optics
+
+    return optics.substances()
 
 
 def get_parameters(material):

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators: add a group, make a material, turn OSL on, switch the form, mend settings."""
 
+import functools
+
 import bpy
-from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import AddonPreferences, Operator
 
-from . import api, checks, nodes, pack
-from .i18n import Sentence, iface, of_error, rpt, say
+from . import api, checks, color, nodes, pack
+from .i18n import Sentence, iface, of_error, rpt, say, tip
 
 _ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
 
@@ -449,6 +451,65 @@ class BRDFC_OT_kernel(_OfActiveMaterial, Operator):
         return chosen[0]
 
 
+#: No name of a substance.
+_FILE = "FILE"
+
+
+@functools.cache
+def _substances(locale):
+    """Items of a menu in a language; Blender needs somebody to keep their texts."""
+    known = api.substances().values()
+    metals, others = ([s for s in known if s.conductor is kind] for kind in (True, False))
+    rows = [(s.name, s.label, s.source) for s in (*metals, *others)]
+    about = tip(say("Measurements as refractiveindex.info exports them: wl,n and wl,k"))
+    return [*rows, (_FILE, iface(say("From File\u2026")), about)]
+
+
+class BRDFC_OT_substance(_OfActiveMaterial, Operator):
+    bl_idname = "brdfc.substance"
+    bl_label = "Metal or Glass from n, k"
+    bl_description = (
+        "Give the model the colours of a metal, glass or liquid of measured refractive index, in "
+        "the working space of the file"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(name="Node", description="Name of the group node", options={"HIDDEN"})
+    substance: EnumProperty(
+        name="Substance",
+        description="What the surface is made of",
+        items=lambda self, context: _substances(bpy.app.translations.locale),
+    )
+    filepath: StringProperty(
+        name="File",
+        description="Measurements as refractiveindex.info exports them: wl,n and wl,k",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        if self.substance != _FILE:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        material = context.object.active_material
+        name = bpy.path.abspath(self.filepath) if self.substance == _FILE else self.substance
+        try:
+            if self.substance == _FILE and not name.endswith(".csv"):
+                raise ValueError(say("{file}: expected a file NAME.csv", file=repr(name)))
+            node = _model_node(material, self.node) if self.node else None
+            values = api.set_substance(material, name, node)
+        except _ERRORS as error:
+            return _refused(self, error)
+        space = color.working_space()
+        said = say("Set in {space}: {names}", space=space, names=", ".join(values))
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}
+
+
 class BRDFC_OT_write_materials(Operator):
     bl_idname = "brdfc.write_materials"
     bl_label = "Write Materials"
@@ -666,6 +727,7 @@ _CLASSES = (
     BRDFC_OT_enable_osl,
     BRDFC_OT_fix_material,
     BRDFC_OT_no_guiding,
+    BRDFC_OT_substance,
     BRDFC_OT_switch,
     BRDFC_OT_kernel,
 )

@@ -6,7 +6,7 @@ import bpy.utils.previews
 import numpy as np
 from bpy.types import Panel
 
-from . import nodes, pack
+from . import color, nodes, pack
 from .i18n import iface, of_error, say
 
 #: Pictures that are kept; the oldest gives its place away.
@@ -30,7 +30,11 @@ def picture(node):
 
     model_name, _ = nodes.identity(node)
     values, _ = _values(node)
-    key = (model_name, *((n, tuple(np.ravel(v))) for n, v in values.items() if v is not None))
+    key = (
+        model_name,
+        color.working_space(),
+        *((n, tuple(np.ravel(v))) for n, v in values.items() if v is not None),
+    )
     if key not in _places:
         pixels, roughness = plots.draw(model_name, values)
         if len(_previews) < _KEPT:

@@ -3,14 +3,15 @@
 
 A square of three: above, the light that leaves in the plane of incidence, half of a circle; below
 a ball under a lamp, and the share of the light that is reflected over the angle of the view. Red,
-green and blue are drawn apart, and add up to white. Nothing here knows of Blender.
+green and blue are drawn apart, and add up to white. Of Blender nothing is known here but what its
+screen shows of a colour.
 """
 
 import functools
 
 import numpy as np
 
-from . import brdfc
+from . import brdfc, color
 
 #: Pixels of a side.
 SIZE = 320
@@ -172,8 +173,7 @@ def ball_light(model, values):
 
 def displayed(linear):
     """Linear light as a screen has it; 1 becomes 0.8, what is brighter never quite white."""
-    toned = 1 - np.exp(-linear)
-    return np.where(toned < 0.0031308, 12.92 * toned, 1.055 * toned ** (1 / 2.4) - 0.055)
+    return color.to_screen(1 - np.exp(-linear))
 
 
 def _lit_ball(model, values):

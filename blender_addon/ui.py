@@ -5,9 +5,10 @@ import math
 import unicodedata
 
 import bpy
+import numpy as np
 from bpy.types import Menu, Panel
 
-from . import api, checks, convert, energy, lamps, nodes, pack
+from . import api, checks, color, convert, energy, lamps, nodes, optical, pack
 from .i18n import button, form_name, iface, of_error, say
 
 _WRAP = 46  # widths of a letter in a panel's line; Blender does not wrap labels
@@ -162,7 +163,7 @@ def energy_text(node):
         if not low <= cosine <= high:
             continue
         rgb = energy.albedo(model_name, values, cosine)
-        luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+        luminance = color.luminance(np.array(rgb))
         numbers.append(f"{angle}\u00b0 {luminance:.3f}")
     return "   ".join(numbers) or say("not at a view angle of this scene")
 
@@ -225,6 +226,11 @@ def draw_node(layout, node, material, scene, editable=True):
         _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
         _draw_form(layout, node, made[0], scene, editable)
     _draw_values(layout, node)
+    if made and optical.can_have(model_name):
+        row = layout.row()
+        row.enabled = editable
+        button = row.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
+        button.node = node.name
     if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
     if api.TWIN in entry["representations"] and representation != api.TWIN:

@@ -3,10 +3,7 @@
 
 import numpy as np
 
-from .. import shader_trees
-
-#: Of linear Rec.709 channels.
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+from .. import color, shader_trees
 
 
 def animated(owner):
@@ -15,13 +12,14 @@ def animated(owner):
     return data is not None and bool(data.action or data.drivers or data.nla_tracks)
 
 
-def _luminance(color):
-    return float(np.dot(LUMINANCE, list(color)[:3]))
+def _luminance(rgb):
+    return float(color.luminance(np.array(rgb[:3])))
 
 
-def _strength(node, color, strength):
-    """Luminance that a node emits; what a link controls counts as 1."""
-    parts = [node.inputs[name] for name in (color, strength)]
+def _strength(node, *names):
+    """Luminance that a node emits, by its sockets of colour and strength; what a link controls
+    counts as 1."""
+    parts = [node.inputs[name] for name in names]
     shade = 1.0 if parts[0].is_linked else _luminance(parts[0].default_value)
     return shade * (1.0 if parts[1].is_linked else parts[1].default_value)
 

@@ -4,7 +4,7 @@
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from .. import shader_trees
+from .. import color, shader_trees
 from ..i18n import say
 from . import bright_spots, emission, slots
 
@@ -72,12 +72,13 @@ def _image_spots(image):
             return []
         image.pixels.foreach_get(pixels)
         pixels = pixels.reshape(height, width, image.channels)
-        luminance = pixels[..., 0]
-        if image.channels >= 3:
-            luminance = pixels[..., :3] @ emission.LUMINANCE.astype(np.float32)
-        luminance = np.nan_to_num(np.maximum(luminance, 0), posinf=0.0)
-        if not image.is_float:  # near enough to sRGB to find what is bright
-            luminance = luminance**2.2
+        if image.channels < 3:
+            pixels = pixels[..., :1].repeat(3, axis=-1)
+        pixels = pixels[..., :3]
+        # Floats are in the working space already.
+        if not image.is_float and image.colorspace_settings.name:
+            pixels = color.to_scene_linear(pixels, image.colorspace_settings.name)
+        luminance = np.nan_to_num(np.maximum(color.luminance(pixels), 0), posinf=0.0)
         _spots[key] = bright_spots.find(luminance)
     return _spots[key]
 

@@ -21,6 +21,7 @@ void add_probe_command(CLI::App&);
 void add_sample_command(CLI::App&);
 void add_albedo_command(CLI::App&);
 void add_kernel_command(CLI::App&);
+void add_optical_command(CLI::App&);
 void add_check_command(CLI::App&);
 void add_stability_command(CLI::App&);
 void add_fit_command(CLI::App&);

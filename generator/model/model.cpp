@@ -42,6 +42,32 @@ ScaledRange range(const ParamInfo& p, double low, double high) {
 
 }  // namespace
 
+const char* name_of(Optical what) {
+  switch (what) {
+    case Optical::None:
+      return "";
+    case Optical::Index:
+      return "index";
+    case Optical::IndexRed:
+      return "index_r";
+    case Optical::IndexGreen:
+      return "index_g";
+    case Optical::IndexBlue:
+      return "index_b";
+    case Optical::ExtinctionRed:
+      return "extinction_r";
+    case Optical::ExtinctionGreen:
+      return "extinction_g";
+    case Optical::ExtinctionBlue:
+      return "extinction_b";
+    case Optical::Reflectance:
+      return "reflectance";
+    case Optical::Tint:
+      return "tint";
+  }
+  return "";
+}
+
 ScaledRange ParamInfo::slider() const { return range(*this, soft_min, soft_max); }
 ScaledRange ParamInfo::accepted() const { return range(*this, min, max); }
 

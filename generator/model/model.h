@@ -38,6 +38,22 @@ namespace brdfc::inline model {
 
 enum class ParamKind { Number, Color, Choice };
 
+/// What a parameter says of the substance a surface is made of (model/optical.h).
+enum class Optical {
+  None,
+  Index,  ///< n at the line d, of what lets light through
+  IndexRed,
+  IndexGreen,
+  IndexBlue,
+  ExtinctionRed,
+  ExtinctionGreen,
+  ExtinctionBlue,
+  Reflectance,  ///< at normal incidence: a colour, or a number for what is no metal
+  Tint,         ///< the same where only a metal has one: glass is told by its index
+};
+/// "index_r"; "" for None.
+const char* name_of(Optical);
+
 /// One parameter: the single source for the command line, manifest, sockets, tests and documentation.
 struct ParamInfo {
   std::string name;                      ///< identifier, as in `name=value`
@@ -51,6 +67,7 @@ struct ParamInfo {
   ParamKind kind = ParamKind::Number;
   /// Its effect changes by factors of the number rather than by differences.
   bool by_factors = false;
+  Optical optical = Optical::None;
 
   /// What it is stepped through by, from one end to the other: of the slider, and of all that is accepted.
   ScaledRange slider() const;
@@ -195,11 +212,18 @@ struct NumberSpec {
   const char* doc;
   const char* unit = "";
   bool factors = false;
+  Optical optical = Optical::None;
 
   /// The same, declared as ParamInfo::by_factors.
   NumberSpec by_factors() const {
     NumberSpec out = *this;
     out.factors = true;
+    return out;
+  }
+  /// Declares ParamInfo::optical.
+  NumberSpec as(Optical what) const {
+    NumberSpec out = *this;
+    out.optical = what;
     return out;
   }
 };
@@ -208,6 +232,13 @@ struct ColorSpec {
   const char* label;
   std::array<double, 3> value;
   const char* doc;
+  Optical optical = Optical::None;
+
+  ColorSpec as(Optical what) const {
+    ColorSpec out = *this;
+    out.optical = what;
+    return out;
+  }
 };
 struct ChoiceSpec {
   const char* name;
@@ -232,10 +263,11 @@ struct SchemaVisitor {
                    {s.value, 0, 0},
                    {},
                    ParamKind::Number,
-                   s.factors});
+                   s.factors,
+                   s.optical});
   }
   template <class T> void operator()(Rgb<T>&, const ColorSpec& s) const {
-    out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color});
+    out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color, false, s.optical});
   }
   void operator()(Choice&, const ChoiceSpec& s) const {
     out.push_back({s.name,

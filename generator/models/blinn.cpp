@@ -31,7 +31,7 @@ template <class T> struct Blinn {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of a facet, k_s"});
+    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of a facet, k_s"}.as(Optical::Reflectance));
     v(e, NumberSpec{"e", "Exponent", 50, 0, 1e8, 0, 1000, "Exponent of the facets' distribution: larger is smoother"}
              .by_factors());
   }

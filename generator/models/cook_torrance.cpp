@@ -34,7 +34,8 @@ template <class T> struct CookTorrance {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"});
+    v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"}.as(
+              Optical::Reflectance));
     v(m, NumberSpec{"m", "Slope", 0.3, 1e-4, 1, 0.05, 1, "Root mean square slope of the facets, m"}.by_factors());
   }
 

@@ -96,7 +96,8 @@ template <class T> struct Coupled {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(r0,
-      NumberSpec{"r0", "Normal Reflectance", 0.05, 0, 1, 0, 0.2, "Reflectance of the coat at normal incidence, R_0"});
+      NumberSpec{"r0", "Normal Reflectance", 0.05, 0, 1, 0, 0.2, "Reflectance of the coat at normal incidence, R_0"}.as(
+          Optical::Reflectance));
     v(rm, ColorSpec{"rm", "Matte Reflectance", {0.8, 0.8, 0.8}, "Reflectance of the matte base, R_m"});
     v(fresnel, ChoiceSpec{"fresnel",
                           "Fresnel",

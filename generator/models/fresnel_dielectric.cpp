@@ -24,7 +24,8 @@ template <class T> struct FresnelDielectric {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"});
+    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"}.as(
+                 Optical::Index));
   }
 
   T ior() const { return index; }

@@ -27,7 +27,8 @@ template <class T> struct Glass {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"});
+    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"}.as(
+                 Optical::Index));
     v(attenuation, ColorSpec{"attenuation",
                              "Attenuation",
                              {0.5, 0.9, 0.7},

@@ -36,7 +36,7 @@ template <class T> struct GlossyReflector {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(kr, NumberSpec{"kr", "Reflection", 0.9, 0, 1, 0, 1, "Share of the light that is reflected, k_r"});
-    v(cr, ColorSpec{"cr", "Reflection Color", {1, 1, 1}, "Color of the reflection, c_r"});
+    v(cr, ColorSpec{"cr", "Reflection Color", {1, 1, 1}, "Color of the reflection, c_r"}.as(Optical::Tint));
     v(e, NumberSpec{"e", "Exponent", 100, 1, 1e7, 1, 100000, "1 is matte about the mirror direction; larger sharper"}
              .by_factors());
     v(below, ChoiceSpec{"below",

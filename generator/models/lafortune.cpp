@@ -43,7 +43,8 @@ template <class T> struct Lafortune {
     v(e, NumberSpec{"e", "Exponent", 10, 0, 300, 1, 100, "Exponent of the lobe: larger is narrower"}.by_factors());
     v(ks,
       ColorSpec{
-          "ks", "Specular", {0.5, 0.5, 0.5}, "Share of the light that is reflected, seen from above, with C_z = 1"});
+          "ks", "Specular", {0.5, 0.5, 0.5}, "Share of the light that is reflected, seen from above, with C_z = 1"}
+          .as(Optical::Reflectance));
   }
 
   /// Axis of the lobe, and |w|^e.

@@ -26,7 +26,8 @@ template <class T> struct LambertianSpecular {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(rd, ColorSpec{"rd", "Matte Reflectance", {0.8, 0.8, 0.8}, "Reflectance of the matte term, R_d"});
-    v(rs, NumberSpec{"rs", "Mirror Reflectance", 0.05, 0, 1, 0, 1, "Reflectance of the mirror term, R_s"});
+    v(rs, NumberSpec{"rs", "Mirror Reflectance", 0.05, 0, 1, 0, 1, "Reflectance of the mirror term, R_s"}.as(
+              Optical::Reflectance));
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), rd / pi<T>(), Rgb<T>(T(0))); }

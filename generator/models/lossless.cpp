@@ -35,7 +35,7 @@ template <class T> struct Lossless : KernelLobe<T, EvenKnots<T, 4>> {
         NumberSpec{kNames[i], kLabels[i], kDrawn[i], 1e-3, 1, 1e-3, 1,
                    "Height of the drawn kernel at the distance of this number, over 1 / n"}
             .by_factors());
-    v(this->tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
+    v(this->tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"}.as(Optical::Tint));
   }
 };
 

@@ -33,7 +33,8 @@ template <class T> struct MaxPhong {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of the mirror it tends to, k_s"});
+    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of the mirror it tends to, k_s"}.as(
+              Optical::Reflectance));
     v(e, NumberSpec{"e", "Exponent", 20, 0, 1e8, 1, 1000, "Phong exponent: larger is narrower"}.by_factors());
   }
 

@@ -30,7 +30,8 @@ template <class T> struct ModifiedPhong {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Share of the light that is reflected, seen from above, k_s"});
+    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Share of the light that is reflected, seen from above, k_s"}.as(
+              Optical::Reflectance));
     v(e, NumberSpec{"e", "Exponent", 20, 0, 1e8, 1, 1000, "Phong exponent: larger is narrower"}.by_factors());
   }
 

@@ -64,8 +64,9 @@ template <class T> struct RadziszewskiAlda {
                  "Around",
                  {"reflection", "refraction", "retro"},
                  "Direction the lobe is centred on: of ideal reflection, ideal refraction, or back to the viewer"});
-    v(index, NumberSpec{"ior", "IOR", 1.5, 1, 10, 1, 2.5, "Refractive index inside over outside, for refraction"});
-    v(tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"});
+    v(index, NumberSpec{"ior", "IOR", 1.5, 1, 10, 1, 2.5, "Refractive index inside over outside, for refraction"}.as(
+                 Optical::Index));
+    v(tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"}.as(Optical::Tint));
   }
 
   T latitudinal_n() const { return proportion == Custom ? n_theta : n; }

@@ -45,7 +45,7 @@ template <class T> struct Schlick {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(r, ColorSpec{"r", "Reflectance", {0.8, 0.8, 0.8}, "Reflectance at normal incidence, r"});
+    v(r, ColorSpec{"r", "Reflectance", {0.8, 0.8, 0.8}, "Reflectance at normal incidence, r"}.as(Optical::Reflectance));
     v(p, NumberSpec{"p", "Isotropy", 1, 0.01, 1, 0.05, 1,
                     "1 is isotropic; smaller stretches the highlight across the tangent"});
     v(rough,

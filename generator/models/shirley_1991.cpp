@@ -32,7 +32,8 @@ template <class T> struct Shirley1991 {
 
   template <class Visitor> void parameters(const Visitor& v) {
     v(r0,
-      NumberSpec{"r0", "Normal Reflectance", 0.05, 0, 1, 0, 0.2, "Reflectance of the polish at normal incidence, R_0"});
+      NumberSpec{"r0", "Normal Reflectance", 0.05, 0, 1, 0, 0.2, "Reflectance of the polish at normal incidence, R_0"}
+          .as(Optical::Reflectance));
     v(rd, ColorSpec{"rd", "Matte Reflectance", {0.8, 0.8, 0.8}, "Reflectance of the matte base, R_d"});
   }
 

@@ -37,7 +37,7 @@ template <class T> struct Ward {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of the lobe, k_s"});
+    v(ks, ColorSpec{"ks", "Specular", {0.5, 0.5, 0.5}, "Reflectance of the lobe, k_s"}.as(Optical::Reflectance));
     v(ax, NumberSpec{"ax", "Roughness X", 0.15, 1e-4, 1, 0.02, 0.5, "Standard deviation of the slope along the tangent"}
               .by_factors());
     v(ay,

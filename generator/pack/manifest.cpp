@@ -37,6 +37,7 @@ Json parameter_json(const ParamInfo& p) {
     j["default"] = p.kind == ParamKind::Color ? Json(p.value) : Json(p.value[0]);
   }
   j["doc"] = p.doc;
+  if (p.optical != Optical::None) j["optical"] = name_of(p.optical);
   return j;
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "model/choices.h"
+#include "model/optical.h"
 #include "pack/addon.h"
 #include "print/numpy.h"
 
@@ -168,6 +169,58 @@ std::string module_of(const Model& model) {
   return out + fmt::format("\n\nMODEL = {}()\n", name);
 }
 
+std::string tuple_of(const std::vector<double>& numbers) {
+  std::string out = "(";
+  for (const double x : numbers) out += python_number(x) + ", ";
+  return out + ")";
+}
+
+/// What optics.py works with: the observer, the substances, and the formulas.
+std::string optics_module() {
+  std::string out = std::string(kHead) + print::python_docstring({"Optical constants, and formulas over them."}, 0);
+  out += "\nimport numpy as np\n\nfrom ._formula import table\n\n";
+  out += fmt::format("GRAZING = {}\nNEEDED = ({}, {})\nCONDUCTOR = {}\nMAX_INDEX = {}\n", python_number(kGrazing),
+                     python_number(kNeededMin), python_number(kNeededMax), python_number(kConductor),
+                     python_number(kMaxIndex));
+  out += fmt::format("LINE_C, LINE_D, LINE_F = {}, {}, {}\n", python_number(kLineC), python_number(kLineD),
+                     python_number(kLineF));
+  out +=
+      fmt::format("WAVELENGTHS = np.arange({}.0, {}.0, {}.0)\n", kWavelengthMin, kWavelengthMax + 1, kWavelengthStep);
+  out += fmt::format("WEIGHTS = table(\n    ({}, 3),\n    \"\"\"\n", kWavelengths);
+  for (const Xyz& w : xyz_weights())
+    out += fmt::format("{} {} {}\n", python_number(w[0]), python_number(w[1]), python_number(w[2]));
+  out += "\"\"\",\n)\n#: Label, source, wavelengths in nm of n, n, those of k, k.\nSUBSTANCES = {\n";
+  for (const Substance& s : substances())
+    out +=
+        fmt::format("    {}: (\n        {},\n        {},\n        {},\n        {},\n        {},\n        {},\n    ),\n",
+                    python_string(s.name), python_string(s.label), python_string(s.source), tuple_of(s.n.nm),
+                    tuple_of(s.n.values), tuple_of(s.k.nm), tuple_of(s.k.values));
+  out += "}\n";
+  print::NumpyTables none;
+  const auto function = [&](const char* name, const std::vector<std::string>& arguments, const auto& record) {
+    Recorder recorder(Precision::Double);
+    std::vector<Expr> inputs;
+    for (const std::string& a : arguments) inputs.push_back(Expr::input(a));
+    Program program;
+    record(program, inputs);
+    out += "\n\n" + print::numpy_function(program, name, arguments, none);
+  };
+  function("reflectance", {"cosine", "n", "k"}, [](Program& p, const std::vector<Expr>& x) {
+    p.output("R", fresnel_conductor(x[0], (Expr(1) - x[0]) * (Expr(1) + x[0]), x[1], x[2]));
+  });
+  function("normal_amplitude", {"n", "k"}, [](Program& p, const std::vector<Expr>& x) {
+    const Amplitude<Expr> r = normal_amplitude(x[0], x[1]);
+    p.output("real", r.real);
+    p.output("imaginary", r.imaginary);
+  });
+  function("nearest_index", {"R_0", "real", "imaginary", "grazing"}, [](Program& p, const std::vector<Expr>& x) {
+    const Index<Expr> i = nearest_index(x[0], {x[1], x[2]}, x[3]);
+    p.output("n", i.n);
+    p.output("k", i.k);
+  });
+  return out;
+}
+
 }  // namespace
 
 std::map<std::string, std::string> python_package(const std::vector<const Model*>& models, const fs::path& source) {
@@ -178,6 +231,7 @@ std::map<std::string, std::string> python_package(const std::vector<const Model*
     if (entry.path().extension() == ".py" || entry.path().extension() == ".typed")
       files[entry.path().filename().string()] = read_text(entry.path());
   files["_version.py"] = std::string(kHead) + "__version__ = " + python_string(BRDFC_VERSION) + "\n";
+  files["_optics.py"] = optics_module();
   std::string names;
   for (const Model* model : models) {
     files["models/" + model->info().name + ".py"] = module_of(*model);

@@ -39,6 +39,14 @@ bool is_later(const fs::path& file) {
   return std::pair(major, minor) > std::pair(own_major, own_minor);
 }
 
+/// From CIE XYZ, white D65, to the space of the role aces_interchange, or back.
+ocio::ConstTransformRcPtr xyz_of_aces(ocio::TransformDirection direction) {
+  const auto transform = ocio::BuiltinTransform::Create();
+  transform->setStyle("UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD");
+  transform->setDirection(direction);
+  return transform;
+}
+
 /// The processor's exact formulas: the default ones approximate powers to 1e-4.
 void convert(const ocio::ConstProcessorRcPtr& processor, Image& image) {
   const auto cpu =
@@ -108,6 +116,21 @@ void ColorConfig::to_scene_linear(Image& image, const std::string& space) const 
     input_error("{} has no colour space '{}', expected one of {}", file_.string(), space, fmt::join(spaces(), ", "));
   if (found->isData()) return;
   convert(impl_->config->getProcessor(found->getName(), ocio::ROLE_SCENE_LINEAR), image);
+}
+
+std::array<double, 3> ColorConfig::from_xyz(const Xyz& xyz) const {
+  constexpr const char* kInterchange = "aces_interchange";
+  if (!impl_->config->hasRole(kInterchange))
+    input_error("{}: expected the role {}, which relates spaces to CIE XYZ", file_.string(), kInterchange);
+  Image pixel;  // first the white
+  pixel.width = pixel.height = 1;
+  pixel.rgb = {1, 1, 1};
+  convert(impl_->config->getProcessor(ocio::ROLE_SCENE_LINEAR, kInterchange), pixel);
+  convert(impl_->config->getProcessor(xyz_of_aces(ocio::TRANSFORM_DIR_FORWARD)), pixel);
+  for (std::size_t c = 0; c < 3; ++c) pixel.rgb[c] = float(pixel.rgb[c] * xyz[c]);
+  convert(impl_->config->getProcessor(xyz_of_aces(ocio::TRANSFORM_DIR_INVERSE)), pixel);
+  convert(impl_->config->getProcessor(kInterchange, ocio::ROLE_SCENE_LINEAR), pixel);
+  return {pixel.rgb[0], pixel.rgb[1], pixel.rgb[2]};
 }
 
 void ColorConfig::to_display(Image& image, const std::string& view) const {

@@ -2,11 +2,13 @@
 // Colour spaces and view transforms, by OpenColorIO.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "model/spectrum.h"
 #include "reference/image.h"
 
 namespace brdfc::reference {
@@ -31,6 +33,9 @@ class ColorConfig {
   /// Pixels of that colour space, by name, alias or role, become scene-linear. Spaces that hold data stay as they are.
   /// Throws InputError that lists the spaces if there is none of that name.
   void to_scene_linear(Image& image, const std::string& space) const;
+  /// Scene-linear colour of X, Y and Z over those of a perfect reflector, which becomes 1, 1, 1. Throws InputError if
+  /// the configuration has no role aces_interchange, which relates its spaces to what can be measured.
+  std::array<double, 3> from_xyz(const Xyz&) const;
   /// Scene-linear pixels as the default display shows them, in [0, 1]. Throws InputError that lists the views.
   void to_display(Image& image, const std::string& view) const;
 

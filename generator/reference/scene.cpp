@@ -8,6 +8,7 @@
 #include <fstream>
 #include <set>
 
+#include "model/optical.h"
 #include "reference/color.h"
 #include "reference/json_view.h"
 #include "reference/procedural.h"
@@ -198,10 +199,20 @@ class Loader {
     return j.numbers<3>(info.min, info.max);
   }
 
+  /// Those that a substance sets, in the working space.
+  ParamValues optical_parameters(const JsonView& j, const ModelInfo& info) const {
+    try {
+      const Substance substance = find_substance(j.text(), path_.parent_path());
+      return parameters_of(info, substance, [](const Xyz& xyz) { return ColorConfig::current().from_xyz(xyz); });
+    } catch (const InputError& e) {
+      j.error(e.what());
+    }
+  }
+
   void read_materials(const JsonView& j) {
     json& out = scene_.resolved["materials"] = json::object();
     for (const auto& [id, m] : j.members()) {
-      m.only({"model", "parameters", "representation"});
+      m.only({"model", "optical", "parameters", "representation"});
       Material material;
       material.id = id;
       std::vector<std::string> names;
@@ -209,6 +220,12 @@ class Loader {
       material.model = &find_model(m.at("model").choice(names));
       const ModelInfo& info = material.model->info();
       json& resolved = out[id] = {{"model", info.name}, {"parameters", json::object()}};
+      if (const auto optical = m.find("optical")) {
+        material.values = optical_parameters(*optical, info);
+        for (const auto& [name, value] : material.values)
+          resolved["parameters"][name] = std::visit([](const auto& v) { return json(v); }, value);
+      }
+      const ParamValues of_substance = material.values;
       if (const auto parameters = m.find("parameters"))
         for (const auto& [name, value] : parameters->members()) {
           const ParamInfo* p = info.param(name);
@@ -217,6 +234,7 @@ class Loader {
             for (const ParamInfo& each : info.params) known.push_back(each.name);
             value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
           }
+          if (of_substance.count(name)) value.error("\"optical\" says what it is, expected one of the two");
           if (materials_alone_ && value.json().is_object()) {
             value.only({"varies"});
             if (!value.at("varies").boolean()) value.at("varies").fail("true, or the parameter's value");

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Previews through Blender's own OpenColorIO configuration, against what Blender saves."""
+"""Previews through Blender's own OpenColorIO configuration, against what Blender saves; metals and
+glass of measured n and k in the working space of the file."""
 
+import importlib
 import json
 import os
 import re
@@ -10,10 +12,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from helpers import open_image_io
+from helpers import add_camera, add_world, open_image_io, render_passes
 
 CONFIG = Path(bpy.utils.resource_path("LOCAL")) / "datafiles" / "colormanagement" / "config.ocio"
 ROOM = Path(__file__).parents[2] / "scenes" / "room-coupled.json"
+#: Where a file has no choice, Blender's own.
+SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
+SPACES = SPACES if hasattr(bpy.data, "colorspace") else SPACES[:1]
 VERSION = re.search(r"ocio_profile_version: ([\d.]+)", CONFIG.read_text())[1]
 
 
@@ -62,3 +67,105 @@ def test_view_is_blenders(empty, tmp_path, view):
     tool, blender = eight_bits(tmp_path / "tool.png"), eight_bits(tmp_path / "blender.png")
     assert np.ptp(tool) > 100
     assert np.abs(tool - blender).max() <= 1
+
+
+def use_working_space(name):
+    if hasattr(bpy.data, "colorspace"):
+        bpy.ops.wm.set_working_color_space(working_space=name, convert_colors=False)
+        assert bpy.data.colorspace.working_space == name
+
+
+@pytest.fixture
+def color(extension):
+    return importlib.import_module(f"{extension.package}.color")
+
+
+def of_index(values):
+    """What n and k by channel reflect from above."""
+    n, k = (np.array([values[f"{q}_{c}"] for c in "rgb"]) for q in "nk")
+    return ((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2)
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_a_metal_has_one_colour_in_every_working_space(extension, empty, color, space):
+    """1e-3 of the white; 4.5 writes the matrix of its interchange space with four digits."""
+    use_working_space(space)
+    assert color.working_space() == space
+    white = color.to_xyz([1, 1, 1])
+    np.testing.assert_allclose(white, [0.9504, 1, 1.089], atol=3e-4)
+    material = extension.api.new_material("fresnel_conductor")
+    for name, substance in extension.api.substances().items():
+        values = extension.api.set_substance(material, name)
+        got = extension.api.get_parameters(material)
+        assert all(got[k] == pytest.approx(v, rel=1e-6) for k, v in values.items())
+        off = np.abs(color.to_xyz(of_index(values)) - substance.xyz() * white).max()
+        if name == "gold" and space == SPACES[0]:
+            assert color.from_xyz(substance.xyz())[0] > 1.03 and off > 0.01
+        else:
+            assert off < 1e-3, (name, off)
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_a_rendered_patch_has_one_colour(extension, empty, color, space):
+    """A mirror of copper under a white sky, seen from above; and the tool's figures for it."""
+    use_working_space(space)
+    material = extension.api.new_material("fresnel_conductor")
+    extension.api.set_substance(material, "copper")
+    bpy.ops.mesh.primitive_plane_add(size=10)
+    bpy.context.object.data.materials.append(material)
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, samples=1, max_bounces=1)
+    add_world(scene)
+    add_camera(scene, location=(0, 0, 5), rotation=(0, 0, 0), orthographic=1)
+    scene.render.resolution_x = scene.render.resolution_y = 4
+    pixel = render_passes(scene)["Combined"][2, 2, :3]
+    expected = extension.api.substances()["copper"].xyz() * color.to_xyz([1, 1, 1])
+    np.testing.assert_allclose(color.to_xyz(pixel), expected, atol=1e-3)
+
+
+def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
+    glass, file = extension.api.new_material("glass"), tmp_path / "own.csv"
+    file.write_text("wl,n\n0.35,1.54\n0.9,1.51\n", encoding="utf-8")
+    assert extension.api.set_substance(glass, str(file)) == {"ior": pytest.approx(1.527, abs=1e-3)}
+    before = extension.api.get_parameters(glass)
+    for name, expected in (
+        ("gold", "glass has no parameter that says which metal"),
+        ("mithril", "expected one of aluminium, "),
+        (str(tmp_path / "none.csv"), "none.csv: No such file"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(expected)):
+            extension.api.set_substance(glass, name)
+    file.write_text("wl,n\n0.3,glass\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="own.csv line 2: expected 2 numbers, a wavelength in µm"):
+        extension.api.set_substance(glass, str(file))
+    assert extension.api.get_parameters(glass) == before
+
+
+def test_the_button_sets_a_metal(extension, empty, tmp_path):
+    material = extension.api.new_material("ward")
+    bpy.ops.mesh.primitive_plane_add()
+    bpy.context.object.data.materials.append(material)
+    assert bpy.ops.brdfc.substance(substance="silver") == {"FINISHED"}
+    red, _, blue = extension.api.get_parameters(material)["ks"]
+    assert red > blue > 0.97
+    file = tmp_path / "own.csv"
+    file.write_text("wl,n,k\n0.3,0.5,3\n0.8,0.5,3\n", encoding="utf-8")
+    assert bpy.ops.brdfc.substance(substance="FILE", filepath=str(file)) == {"FINISHED"}
+    grey = (0.25 + 9) / (2.25 + 9)
+    assert extension.api.get_parameters(material)["ks"] == pytest.approx([grey] * 3, abs=2e-4)
+    with pytest.raises(RuntimeError, match="expected a file NAME.csv"):
+        bpy.ops.brdfc.substance(substance="FILE", filepath=str(tmp_path / "own.txt"))
+
+
+def test_the_screens_curve_is_srgb_and_luminance_is_that_of_the_space(extension, empty, color):
+    x = np.linspace(0, 1, 33)
+    srgb = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(color.to_screen(np.stack([x, x, x], -1))[:, 1], srgb, atol=2e-4)
+    np.testing.assert_allclose(color.luminance(np.eye(3)), [0.2126, 0.7152, 0.0722], atol=1e-4)
+    for space in SPACES[1:]:
+        use_working_space(space)
+        weights = color.luminance(np.eye(3))
+        assert weights.sum() == pytest.approx(1, abs=1e-5) and weights[0] > 0.26
+    np.testing.assert_allclose(
+        color.to_scene_linear([[0.5] * 3], "sRGB"), [[0.21404] * 3], atol=1e-4
+    )

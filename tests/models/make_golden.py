@@ -1135,21 +1135,12 @@ MODELS = {
     ),
     "fresnel_conductor": dict(
         albedo=conductor_albedo,
-        defaults={"metal": "custom"}
-        | {f"n_{c}": n for c, n in zip("rgb", (0.2, 0.9, 1.1), strict=True)}
+        defaults={f"n_{c}": n for c, n in zip("rgb", (0.2, 0.9, 1.1), strict=True)}
         | {f"k_{c}": k for c, k in zip("rgb", (3.9, 2.4, 2.2), strict=True)},
         cases=[
-            {"metal": "custom"},
-            {
-                "metal": "custom",
-                "n_r": 1.5,
-                "k_r": 0,
-                "n_g": 0.001,
-                "k_g": 100,
-                "n_b": 100,
-                "k_b": 0,
-            },
-            {"metal": "custom", "n_r": 0.5, "k_r": 1e-9, "n_g": 1.0001, "k_g": 0, "k_b": 1e-4},
+            {},
+            {"n_r": 1.5, "k_r": 0, "n_g": 0.001, "k_g": 100, "n_b": 100, "k_b": 0},
+            {"n_r": 0.5, "k_r": 1e-9, "n_g": 1.0001, "k_g": 0, "k_b": 1e-4},
         ],
         cosines=[1, 0.5, 0.1, 0.001],
     ),

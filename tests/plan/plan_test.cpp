@@ -256,8 +256,8 @@ TEST(Plan, SaysThatAFitOfAnotherChoiceIsTooFarOff) {
 }
 
 TEST(Plan, SaysWhatAModelLacksBeforeWhatItsMaterialsDifferIn) {
-  const std::vector<MaterialNeed> two = {need("a", "fresnel_conductor", {"metal=cu"}),
-                                         need("b", "fresnel_conductor", {"metal=au"})};
+  const std::vector<MaterialNeed> two = {need("a", "fresnel_conductor", {"n_r=0.3"}),
+                                         need("b", "fresnel_conductor", {"n_r=0.5"})};
   for (const forms::Form* kind : {kFitted, forms::form("twin")})
     EXPECT_EQ(why(plan_scene(two, {})[0], kind), "it only reflects and refracts ideally");
 }

@@ -58,6 +58,7 @@ TEST(Color, MatricesAreThoseOfThePrimaries) {
   const Eigen::Matrix3d rec709 = to_xyz(xyz(0.64, 0.33), xyz(0.30, 0.60), xyz(0.15, 0.06), d65);
   const Eigen::Matrix3d rec2020 = to_xyz(xyz(0.708, 0.292), xyz(0.170, 0.797), xyz(0.131, 0.046), d65);
   const Eigen::Matrix3d ap1 = to_xyz(xyz(0.713, 0.293), xyz(0.165, 0.830), xyz(0.128, 0.044), aces_white);
+  const Eigen::Matrix3d ap0 = to_xyz(xyz(0.7347, 0.2653), xyz(0, 1), xyz(0.0001, -0.077), aces_white);
   Eigen::Matrix3d bradford;
   bradford << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
   const Eigen::Vector3d gain = (bradford * d65).cwiseQuotient(bradford * aces_white);
@@ -65,6 +66,7 @@ TEST(Color, MatricesAreThoseOfThePrimaries) {
   const std::pair<const char*, Eigen::Matrix3d> spaces[] = {{"Linear Rec.709", Eigen::Matrix3d::Identity()},
                                                             {"Linear Rec.2020", rec709.inverse() * rec2020},
                                                             {"ACEScg", rec709.inverse() * adaptation * ap1},
+                                                            {"ACES2065-1", rec709.inverse() * adaptation * ap0},
                                                             {"Linear CIE-XYZ D65", rec709.inverse()}};
   const ColorConfig config = ours();
   for (const auto& [name, matrix] : spaces) {

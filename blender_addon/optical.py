@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Metals and glass of measured refractive index as parameters of a model, in the working space."""
+
+from . import color, pack
+from .i18n import say
+
+#: Roles of parameters in the manifest, and the values of a substance that they take, for what kind:
+#: True, conductors alone; False, all others alone.
+_ROLES = {
+    "index": (lambda s, v: s.index_d, False),
+    "reflectance": (lambda s, v: tuple(v.reflectance), None),
+    "tint": (lambda s, v: tuple(v.reflectance), True),
+}
+for _channel, _letter in enumerate("rgb"):
+    _ROLES[f"index_{_letter}"] = (lambda s, v, c=_channel: v.n[c], None)
+    _ROLES[f"extinction_{_letter}"] = (lambda s, v, c=_channel: v.k[c], None)
+
+
+def can_have(model_name):
+    """Whether a model has parameters that say what its surface is made of."""
+    return any("optical" in p for p in pack.parameters(model_name).values())
+
+
+def find(name):
+    """A substance of the extension, or of a file NAME.csv as refractiveindex.info exports it.
+
+    Raises ValueError that names file, line and what was expected."""
+    from .brdfc import optics  # NumPy's formulas, when they are first needed
+
+    if not name.endswith(".csv"):
+        return optics.substance(name)
+    try:
+        return optics.read(name)
+    except OSError as error:
+        raise ValueError(f"{name}: {error.strerror}") from error
+
+
+def parameters(model_name, substance):
+    """The values of those parameters, by name. Raises ValueError where the model has none for such
+    a substance."""
+    values = substance.values(color.from_xyz)
+    found = {}
+    for name, p in pack.parameters(model_name).items():
+        if "optical" not in p:
+            continue
+        value_of, conductors = _ROLES[p["optical"]]
+        if p["optical"] == "reflectance" and p["kind"] == "number":
+            value_of, conductors = (lambda s, v: v.luminance), False
+        if conductors in (None, substance.conductor):
+            value = value_of(substance, values)
+            single = not isinstance(value, tuple)
+            found[name] = (
+                min(max(float(value), p["min"]), p["max"]) if single else tuple(map(float, value))
+            )
+    if not found:
+        if substance.conductor:
+            text = say(
+                "{model} has no parameter that says which metal it is made of", model=model_name
+            )
+        else:
+            text = say(
+                "{model} has no parameter that says which glass or liquid it is made of",
+                model=model_name,
+            )
+        raise ValueError(text)
+    return found

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc optical: what a metal or glass of measured n and k is in the working space.
+#include <nlohmann/json.hpp>
+
+#include "app/commands.h"
+#include "model/optical.h"
+#include "reference/color.h"
+
+namespace brdfc::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json describe(const Substance& s) {
+  const reference::ColorConfig& config = reference::ColorConfig::current();
+  const OpticalValues v = optical_values(s, [&](const Xyz& xyz) { return config.from_xyz(xyz); });
+  Json j{{"name", s.name},    {"label", s.label}, {"source", s.source},      {"conductor", s.conductor()},
+         {"n", v.n},          {"k", v.k},         {"xyz", s.reflectance(1)}, {"reflectance", v.unclipped},
+         {"n_d", s.index_d()}};
+  const double abbe = s.abbe();
+  j["abbe"] = std::isfinite(abbe) && !s.conductor() ? Json(abbe) : Json();
+  return j;
+}
+
+std::string three(const Json& j) {
+  return fmt::format("{:.4f} {:.4f} {:.4f}", j[0].get<double>(), j[1].get<double>(), j[2].get<double>());
+}
+
+void print_text(const Json& j) {
+  fmt::print("{}  {}, {}\n", j["name"].get<std::string>(), j["label"].get<std::string>(),
+             j["conductor"].get<bool>() ? "conductor" : "dielectric");
+  if (const auto source = j["source"].get<std::string>(); !source.empty()) fmt::print("  {}\n", source);
+  fmt::print("  reflects from above, r g b  {}\n", three(j["reflectance"]));
+  fmt::print("  n, r g b                    {}\n  k, r g b                    {}\n", three(j["n"]), three(j["k"]));
+  if (!j["conductor"].get<bool>()) {
+    fmt::print("  n_d                         {:.5f}\n", j["n_d"].get<double>());
+    if (!j["abbe"].is_null()) fmt::print("  Abbe's number               {:.2f}\n", j["abbe"].get<double>());
+  }
+}
+
+}  // namespace
+
+void add_optical_command(CLI::App& app) {
+  struct Options {
+    std::string name;
+    bool json = false;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "optical",
+      "What metals, glass and liquids of measured refractive index n + i k are in the working space:\n"
+      "reflectance seen from above, n and k by channel; of what lets light through n_d and Abbe's number.\n"
+      "The working space is the role scene_linear of the configuration that OCIO names, else Rec.709.");
+  cmd->add_option("name", o->name, "One of them, or a file NAME.csv as refractiveindex.info exports it; without: all");
+  cmd->add_flag("--json", o->json, "JSON, also with X, Y, Z over a perfect reflector's under D65");
+  cmd->callback([o] {
+    Json all = Json::array();
+    if (o->name.empty())
+      for (const Substance& s : substances()) all.push_back(describe(s));
+    else
+      all.push_back(describe(find_substance(o->name, "")));
+    if (o->json) {
+      fmt::print("{}\n", (o->name.empty() ? all : all[0]).dump(1));
+      return;
+    }
+    for (const Json& j : all) print_text(j);
+  });
+}
+
+}  // namespace brdfc::app

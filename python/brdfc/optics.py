@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Metals, glass and liquids by their measured refractive index n + i k over the wavelength, and
+what stands for them in three channels.
+
+    import PyOpenColorIO
+    from brdfc import optics
+
+    gold = optics.substance("gold")           # or optics.read("FILE.csv")
+    gold.xyz()                                # seen from above, under D65
+    values = gold.values(to_rgb)              # n, k and reflectance by channel
+
+Spectra are seen by the CIE's standard observer of 1931 under D65. X, Y and Z are those over a
+perfect reflector's, which are 1, 1, 1. `to_rgb` makes linear RGB of arrays (3,) of them, with
+OpenColorIO for instance. Data and formulas are printed from those of the reference renderer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _optics
+
+Array = NDArray[np.float64]
+ToRgb = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Numbers over increasing wavelengths in nm."""
+
+    nm: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def at(self, nm) -> Array:
+        """Linear in between, constant beyond the ends; 0 of an empty one."""
+        if not self.nm:
+            return np.zeros_like(np.asarray(nm, float))
+        return np.interp(nm, self.nm, self.values)
+
+
+@dataclass(frozen=True)
+class Values:
+    """What a substance is in a working space: by channel n, k and the reflectance from above."""
+
+    n: Array
+    k: Array
+    reflectance: Array  #: in [0, 1]
+    unclipped: Array  #: the same where the colour lies outside of the working space
+    luminance: float  #: Y of it
+
+
+@dataclass(frozen=True)
+class Substance:
+    """A metal, a glass, a liquid."""
+
+    name: str
+    label: str
+    source: str  #: who measured it; may be empty
+    n: Curve
+    k: Curve  #: empty where none is given
+
+    def _mean(self, formula):
+        nm = _optics.WAVELENGTHS
+        shape = nm.shape
+        found = formula(self.n.at(nm), self.k.at(nm))
+        several = isinstance(found, tuple)
+        means = [
+            np.broadcast_to(f, shape) @ _optics.WEIGHTS for f in (found if several else (found,))
+        ]
+        return means if several else means[0]
+
+    def xyz(self, cosine: float = 1.0) -> Array:
+        """X, Y and Z of what is reflected, unpolarised, at an angle of that cosine in (0, 1]."""
+        return self._mean(lambda n, k: _optics.reflectance(cosine, n, k))
+
+    @property
+    def conductor(self) -> bool:
+        """Whether its mean k, as the eye weighs it, is that of a metal."""
+        return bool(self._mean(lambda n, k: k)[1] >= _optics.CONDUCTOR)
+
+    @property
+    def index_d(self) -> float:
+        """n at the Fraunhofer line d, 587.56 nm."""
+        return float(self.n.at(_optics.LINE_D))
+
+    @property
+    def abbe(self) -> float:
+        """Abbe's number (n_d - 1) / (n_F - n_C); infinite without dispersion."""
+        spread = float(self.n.at(_optics.LINE_F) - self.n.at(_optics.LINE_C))
+        return (self.index_d - 1) / spread if spread else math.inf
+
+    def values(self, to_rgb: ToRgb) -> Values:
+        """What stands for it in three channels; see generator/model/optical.h."""
+        xyz = self.xyz()
+        means = (xyz, *self._mean(_optics.normal_amplitude), self.xyz(_optics.GRAZING))
+        rgb = [np.asarray(to_rgb(m), float) for m in means]
+        n, k = _optics.nearest_index(*rgb)
+        return Values(n, k, np.clip(rgb[0], 0, 1), rgb[0], float(xyz[1]))
+
+
+def substances() -> dict[str, Substance]:
+    """Those whose measurements are in the package, by name."""
+    found = {}
+    for name, (label, source, *curves) in _optics.SUBSTANCES.items():
+        n_nm, n, k_nm, k = curves
+        found[name] = Substance(name, label, source, Curve(n_nm, n), Curve(k_nm, k))
+    return found
+
+
+def substance(name: str) -> Substance:
+    """One of them. ValueError, listing the names, if there is none."""
+    known = substances()
+    if name not in known:
+        raise ValueError(f"expected one of {', '.join(known)}, got {name!r}")
+    return known[name]
+
+
+def _number(text):
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _check_row(letter, micrometres, value, last, where):
+    if last is not None and not micrometres * 1000 > last:
+        got = f"{micrometres:g} after {last / 1000:g}"
+        raise ValueError(f"{where}: expected wavelengths that increase, got {got}")
+    good = value > 0 if letter == "n" else value >= 0
+    if not good or value > _optics.MAX_INDEX:
+        low = "(0" if letter == "n" else "[0"
+        raise ValueError(
+            f"{where}: expected {letter} in {low}, {_optics.MAX_INDEX:g}], got {value:g}"
+        )
+
+
+def _header(fields, found, where):
+    """The columns beside wl, none if that is no header."""
+    block = fields[1:]
+    if not block or any(f not in found for f in block):
+        return []
+    for at, letter in enumerate(block):
+        if found[letter] or letter in block[:at]:
+            raise ValueError(f"{where}: expected {letter} once")
+    return block
+
+
+def read(path: str | PathLike[str]) -> Substance:
+    """Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in
+    micrometres and n, then the same of wl,k, which may be missing; or wl,n,k. Lines that start with
+    # are skipped; the first is the label, the second the source.
+
+    Raises OSError, and ValueError naming file, line and what was expected.
+    """
+    path = Path(path)
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    comments, block = [], []
+    found: dict[str, list[tuple[float, float]]] = {"n": [], "k": []}
+    for number, line in enumerate(text.split("\n"), 1):
+        line, where = line.strip(" \t\r"), f"{path} line {number}"
+        if not line:
+            continue
+        if line.startswith("#"):
+            comments.append(line[1:].strip(" \t\r"))
+            continue
+        fields = [f.strip(" \t\r") for f in line.split(",")]
+        if fields[0] == "wl":
+            block = _header(fields, found, where)
+        if not block:
+            raise ValueError(f"{where}: expected the header wl,n or wl,k, got '{line}'")
+        if fields[0] == "wl":
+            continue
+        row = [_number(f) for f in fields]
+        if None in row or len(row) != len(block) + 1:
+            raise ValueError(
+                f"{where}: expected {len(block) + 1} numbers, a wavelength in µm and "
+                f"{' and '.join(block)}, got '{line}'"
+            )
+        for letter, value in zip(block, row[1:], strict=True):
+            rows = found[letter]
+            _check_row(letter, row[0], value, rows[-1][0] if rows else None, where)
+            rows.append((row[0] * 1000, value))
+    if not found["n"]:
+        raise ValueError(f"{path}: expected a line wl,n and rows below it, found no n")
+    low, high = _optics.NEEDED
+    for letter, rows in found.items():
+        if rows and (rows[0][0] > low or rows[-1][0] < high):
+            raise ValueError(
+                f"{path}: expected {letter} from {low / 1000:g} to {high / 1000:g} µm, "
+                f"got {rows[0][0] / 1000:g} to {rows[-1][0] / 1000:g}"
+            )
+    label, source = [*comments, "", ""][:2]
+    curves = [
+        Curve(*(tuple(c) for c in zip(*rows, strict=True))) if rows else Curve((), ())
+        for rows in found.values()
+    ]
+    return Substance(str(path), label or path.stem, source, *curves)

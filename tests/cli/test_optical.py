@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Metals and glass of measured n and k: the tool, the Python package and an independent source say
+the same, in every working space; what is wrong in a file is said by both alike."""
+
+import importlib
+import json
+import os
+import re
+import subprocess
+import sys
+
+import numpy as np
+import PyOpenColorIO as ocio
+import pytest
+from support import ROOT, TOOL, scene
+
+CONFIG = ROOT / "data" / "color" / "config.ocio"
+SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
+#: X, Y, Z of the normal reflectance under D65 for the observer of 1931, over those of a perfect
+#: reflector, by colour-science 0.4.7 of the same tables: from 360 to 830 nm, every 1 nm.
+COLOUR_SCIENCE = {
+    "aluminium": (0.9134, 0.9145, 0.9214),
+    "copper": (0.7377, 0.6811, 0.5406),
+    "gold": (0.7935, 0.7679, 0.4164),
+    "silver": (0.9851, 0.9847, 0.9787),
+    "iron": (0.5168, 0.5154, 0.4969),
+    "titanium": (0.5894, 0.5850, 0.5479),
+    "diamond": (0.1727, 0.1728, 0.1758),
+    "water": (0.0204, 0.0204, 0.0208),
+}
+
+
+@pytest.fixture(scope="module")
+def optics(tmp_path_factory):
+    """The module of what `brdfc python` writes, and of no earlier one."""
+    out = tmp_path_factory.mktemp("python")
+    done = subprocess.run([TOOL, "python", "--out", out], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    earlier = {n: sys.modules.pop(n) for n in list(sys.modules) if re.match(r"brdfc(\.|$)", n)}
+    sys.path.insert(0, str(out))
+    try:
+        yield importlib.import_module("brdfc.optics")
+    finally:
+        sys.path.remove(str(out))
+        for name in [n for n in sys.modules if re.match(r"brdfc(\.|$)", n)]:
+            del sys.modules[name]
+        sys.modules.update(earlier)
+
+
+def config_in(folder, space):
+    """Ours with another working space."""
+    path = folder / f"{space.split()[-1]}.ocio"
+    text = CONFIG.read_text(encoding="utf-8")
+    path.write_text(text.replace("scene_linear: Linear Rec.709", f"scene_linear: {space}"))
+    return path
+
+
+def run(*arguments, config=None):
+    environment = {k: v for k, v in os.environ.items() if k != "OCIO"}
+    if config:
+        environment["OCIO"] = str(config)
+    command = [TOOL, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=environment)
+
+
+def optical(*arguments, config=None):
+    done = run("optical", *arguments, "--json", config=config)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def converted(config, first, second, colors):
+    pixels = np.array(colors, np.float32, order="C")
+    cpu = ocio.Config.CreateFromFile(str(config)).getProcessor(first, second)
+    lossless = ocio.OptimizationFlags.OPTIMIZATION_LOSSLESS
+    cpu.getOptimizedCPUProcessor(lossless).applyRGB(pixels.reshape(-1, 3))
+    return pixels.astype(float)
+
+
+XYZ = "Linear CIE-XYZ D65"
+
+
+def test_colours_are_those_of_an_independent_source():
+    found = {s["name"]: s["xyz"] for s in optical()}
+    assert set(COLOUR_SCIENCE) <= set(found)
+    for name, xyz in COLOUR_SCIENCE.items():
+        np.testing.assert_allclose(found[name], xyz, atol=1e-4, err_msg=name)
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_a_substance_has_one_colour_in_every_working_space(tmp_path, optics, space):
+    """Also as n and k by channel, but for gold's red in Rec.709, which does not hold it."""
+    config = config_in(tmp_path, space)
+    white = converted(config, space, XYZ, [1, 1, 1])
+    for s in optical(config=config):
+        expected = np.array(s["xyz"]) * white
+        in_space = converted(config, space, XYZ, s["reflectance"])
+        np.testing.assert_allclose(in_space, expected, atol=1e-5, err_msg=s["name"])
+        of_index = optics._optics.reflectance(1.0, np.array(s["n"]), np.array(s["k"]))
+        in_space = converted(config, space, XYZ, of_index)
+        off = np.abs(in_space - expected).max()
+        if s["name"] == "gold" and space == SPACES[0]:
+            assert s["reflectance"][0] > 1.03 and off > 0.01
+        else:
+            assert max(s["reflectance"]) < 1 and off < 1e-3, (s["name"], off)
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_the_package_and_the_tool_say_the_same(tmp_path, optics, space):
+    config = config_in(tmp_path, space)
+    white = converted(config, space, XYZ, [1, 1, 1])
+    of_tool = {s["name"]: s for s in optical(config=config)}
+    assert of_tool.keys() == optics.substances().keys()
+    for name, s in optics.substances().items():
+        values = s.values(lambda xyz: converted(config, XYZ, space, xyz * white))
+        told = of_tool[name]
+        np.testing.assert_allclose(s.xyz(), told["xyz"], rtol=1e-12)
+        np.testing.assert_allclose(values.unclipped, told["reflectance"], atol=2e-6)
+        np.testing.assert_allclose(values.n, told["n"], rtol=2e-3, atol=1e-4, err_msg=name)
+        np.testing.assert_allclose(values.k, told["k"], rtol=2e-3, atol=1e-4, err_msg=name)
+        assert s.conductor == told["conductor"] and s.index_d == pytest.approx(told["n_d"])
+        # data/optical is a folder of such files.
+        read = optics.read(ROOT / "data" / "optical" / f"{name}.csv")
+        assert (read.label, read.source, read.n, read.k) == (s.label, s.source, s.n, s.k)
+
+
+def test_a_file_is_a_conductor_or_a_dielectric(tmp_path):
+    """As refractiveindex.info exports them, with the line ends of Windows, and in one block."""
+    file = tmp_path / "own.csv"
+    rows = [(0.35, 0.2, 3.0), (0.5, 0.4, 3.5), (0.8, 0.3, 4.0)]
+    n, k = ("".join(f"{r[0]},{r[i]}\r\n" for r in rows) for i in (1, 2))
+    file.write_bytes(f"wl,n\r\n{n}\r\nwl,k\r\n{k}".encode())
+    two = optical(file)
+    assert two["conductor"] and two["label"] == "own"
+    file.write_text("\ufeff# Mine\nwl,n,k\n" + "".join(f"{a}, {b}, {c}\n" for a, b, c in rows))
+    one = optical(file)
+    assert one["label"] == "Mine" and one["n"] == two["n"] and one["k"] == two["k"]
+    file.write_text("wl,n\n0.3,1.53\n0.48613,1.52\n0.65627,1.515\n0.8,1.51\n")
+    glass = optical(file)
+    assert not glass["conductor"] and glass["abbe"] == pytest.approx(0.5170 / 0.005, rel=0.01)
+    assert glass["k"] == [0, 0, 0] and glass["n"] == pytest.approx([1.516, 1.518, 1.521], abs=2e-3)
+
+
+#: What is wrong, and what is said, the file's name left out.
+BAD = {
+    "": ": expected a line wl,n and rows below it, found no n",
+    "wl,k\n0.3,1\n0.8,1\n": ": expected a line wl,n and rows below it, found no n",
+    "0.3,1\n": " line 1: expected the header wl,n or wl,k, got '0.3,1'",
+    "nm,n\n380,1\n": " line 1: expected the header wl,n or wl,k, got 'nm,n'",
+    "wl,n,x\n": " line 1: expected the header wl,n or wl,k, got 'wl,n,x'",
+    "wl\n": " line 1: expected the header wl,n or wl,k, got 'wl'",
+    "wl,n,n\n": " line 1: expected n once",
+    "wl,n\n0.3,1.5\n\nwl,n\n": " line 4: expected n once",
+    "wl,n\n\n0.3,one\n": " line 3: expected 2 numbers, a wavelength in µm and n, got '0.3,one'",
+    "wl,n\n0.3;1.5\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3;1.5'",
+    "wl,n\n0.3,1.5,2\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3,1.5,2'",
+    "wl,n\n0.3,nan\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3,nan'",
+    "wl,n,k\n0.3,1\n": " line 2: expected 3 numbers, a wavelength in µm and n and k, got '0.3,1'",
+    "wl,n\n0.4,1.5\n0.4,1.5\n": " line 3: expected wavelengths that increase, got 0.4 after 0.4",
+    "wl,n\n0.4,0\n": " line 2: expected n in (0, 100], got 0",
+    "wl,n\n0.4,1\nwl,k\n0.4,-2\n": " line 4: expected k in [0, 100], got -2",
+    "wl,n\n380,1.5\n780,1.5\n": ": expected n from 0.4 to 0.7 µm, got 380 to 780",
+    "wl,n\n0.3,1\n0.8,1\nwl,k\n0.5,1\n": ": expected k from 0.4 to 0.7 µm, got 0.5 to 0.5",
+}
+
+
+@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
+def test_what_is_wrong_in_a_file_is_said(tmp_path, optics, text):
+    file = tmp_path / "bad.csv"
+    file.write_text(text, encoding="utf-8")
+    done = run("optical", file)
+    assert done.returncode == 2 and f"{file}{BAD[text]}" in done.stderr
+    with pytest.raises(ValueError, match=re.escape(f"{file}{BAD[text]}") + "$"):
+        optics.read(file)
+
+
+def test_names_that_there_are_not_are_errors(tmp_path, optics):
+    for name, expected in (("unobtainium", "expected a file NAME.csv or one of aluminium"),):
+        done = run("optical", name)
+        assert done.returncode == 2 and expected in done.stderr and name in done.stderr
+    done = run("optical", tmp_path / "none.csv")
+    assert done.returncode == 2 and "none.csv: cannot be read" in done.stderr
+    with pytest.raises(ValueError, match="expected one of aluminium.*unobtainium"):
+        optics.substance("unobtainium")
+
+
+def test_a_scene_names_a_substance_or_a_file(tmp_path):
+    (tmp_path / "own.csv").write_text("wl,n\n0.3,1.5\n0.8,1.5\n", encoding="utf-8")
+    materials = {
+        "a": {"model": "fresnel_conductor", "optical": "gold"},
+        "b": {"model": "glass", "optical": "own.csv", "parameters": {"density": 0}},
+    }
+    path = tmp_path / "s.json"
+
+    def resolved(**changes):
+        content = {"materials": {**materials, **changes}}
+        objects = [{"name": "o", "shape": {"type": "sphere"}, "material": "a"}]
+        path.write_text(json.dumps(scene(**content, objects=objects)), encoding="utf-8")
+        return run("scene", path, "--out", tmp_path / "out")
+
+    assert resolved().returncode == 0
+    found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]
+    gold = optical("gold")
+    of_channels = [found["a"]["parameters"][f"{q}_{c}"] for q in "nk" for c in "rgb"]
+    assert of_channels == pytest.approx([*gold["n"], *gold["k"]])
+    assert found["b"]["parameters"] == {"ior": 1.5, "density": 0}
+    for change, expected in (
+        ({"optical": "mithril"}, "materials.a.optical: expected a file NAME.csv or one of"),
+        ({"optical": "none.csv"}, "materials.a.optical: "),
+        ({"parameters": {"n_r": 1}}, 'n_r: "optical" says what it is'),
+        ({"model": "glass"}, "glass has no parameter that says which metal"),
+    ):
+        done = resolved(a=materials["a"] | change)
+        assert done.returncode == 2 and "s.json" in done.stderr and expected in done.stderr, (
+            done.stderr
+        )
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_a_patch_has_one_colour_in_every_working_space(tmp_path, space):
+    """A mirror of copper under a white sky, by the reference renderer."""
+    content = scene(
+        camera={
+            "type": "orthographic",
+            "height": 1,
+            "position": [0, 0, 4],
+            "look_at": [0, 0, 0],
+            "up": [0, 1, 0],
+        },
+        materials={"m": {"model": "fresnel_conductor", "optical": "copper"}},
+        objects=[{"name": "o", "shape": {"type": "quad", "size": [4, 4]}, "material": "m"}],
+    )
+    (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+    config = config_in(tmp_path, space)
+    done = run("render", tmp_path / "s.json", "--out", tmp_path / "s.exr", config=config)
+    assert done.returncode == 0, done.stderr
+    import OpenImageIO as oiio
+
+    pixel = oiio.ImageBuf(str(tmp_path / "s.exr")).get_pixels(oiio.FLOAT)[4, 4, :3]
+    white = converted(config, space, XYZ, [1, 1, 1])
+    expected = np.array(optical("copper")["xyz"]) * white
+    np.testing.assert_allclose(converted(config, space, XYZ, pixel), expected, atol=1e-3)
