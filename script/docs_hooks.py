@@ -20,6 +20,8 @@ PAGES = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
 }
+#: Where script/gallery writes a page a model.
+MODELS = "gallery/models"
 #: [text](target) and ![text](target), with what follows a #.
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
 
@@ -28,6 +30,17 @@ log = logging.getLogger("mkdocs.hooks.brdfc")  # a warning fails a strict build
 
 def _in_the_site(target):
     return PAGES.get(target, target.removeprefix("docs/"))
+
+
+def on_config(config):
+    """The pages of models, which no list names, after the gallery's others."""
+    pages = sorted((ROOT / "docs" / MODELS).glob("*.md"))
+    names = [f"{MODELS}/{p.name}" for p in pages if p.name != "overview.md"]
+    for section in config["nav"]:
+        for title, entries in section.items():
+            if title == "Gallery":
+                entries.append({"Models": [f"{MODELS}/overview.md", *names]})
+    return config
 
 
 def on_files(files, config):

@@ -17,7 +17,6 @@ import sys
 from pathlib import Path
 
 from gallery_pages import measured, page_of, strip
-from markdown_table import heading, line
 
 ROOT = Path(__file__).resolve().parent.parent
 #: What a scene of a model is called.
@@ -161,7 +160,7 @@ def claims(model):
     ]
     if not q["isotropic"]:
         parts.append("highlights may be stretched along the tangent")
-    text = ", ".join(parts[:-1]) + " and " + parts[-1]
+    text = ", ".join(parts[:-1]) + (", and " if len(parts) > 2 else " and ") + parts[-1]
     return text[0].upper() + text[1:] + "."
 
 
@@ -365,11 +364,9 @@ def page(model, scene, folder, pages):
     ]
     if model["scatter"]:
         lines += [
-            "Above, the plane of incidence, seen from the left at four",
-            "angles: the radius is the square",
-            "root of f cos, in 1/sr. Below, the half sphere from above,",
-            "equal areas for equal solid",
-            "angles: × is the view, + the mirror direction.",
+            "Above, the plane of incidence, seen from the left at four angles: the radius is",
+            "the square root of f cos, in 1/sr. Below, the half sphere from above, equal areas for",
+            "equal solid angles: × is the view, + the mirror direction.",
         ]
         if model["mirror"]:
             lines += ["Dotted is ideal reflection: the square root of its weight, 1 at the rim."]
@@ -383,9 +380,8 @@ def page(model, scene, folder, pages):
         "",
         f"![Albedo of {model['label']}]({name}-albedo.png)",
         "",
-        "The share of the light that a surface gives back when it is",
-        "lit from everywhere, mean of the",
-        "three colours; what a boundary lets through is counted.",
+        "The share of the light that a surface gives back when it is lit from everywhere, mean of",
+        "the three colours; what a boundary lets through is counted.",
         "",
         "## The same by hand",
         "",
@@ -398,7 +394,9 @@ def page(model, scene, folder, pages):
     if links := scenes_with(name):
         lines += [f"Scenes with it: {', '.join(links)}.", ""]
     made = scene["provenance"]
-    lines += [f"*{made['Blender']}; {made['Processor']}. [How to read it](../overview.md).*"]
+    lines += [
+        f"*Blender {made['Blender']}; {made['Processor']}. [How to read it](../overview.md).*"
+    ]
     (pages / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -407,18 +405,15 @@ def overview(models, pages):
         "# A page a model",
         "",
         "Each model as three balls under one lamp, in Blender, by the reference renderer, and the",
-        "difference; its lobes; and how much of the light comes",
-        "back. `script/gallery models` makes",
-        "these pages from the models' schemas.",
+        "difference; its lobes; and how much of the light comes back. `script/gallery models`",
+        "makes these pages from the models' schemas.",
         "",
-        *heading("Model", "", "Paper"),
     ]
     for model in models:
         name = model["name"]
         if (pages / f"{name}.md").is_file():
-            link = f"[{model['label']}]({name}.md)<br>{model['doc']}"
-            picture = f"[![{model['label']}]({name}.jpg)]({name}.md)"
-            lines.append(line(link, picture, model["paper"]))
+            lines += [f"[![{model['label']}]({name}.jpg)]({name}.md)", ""]
+            lines += [f"**[{model['label']}]({name}.md)** {model['doc']}", ""]
     (pages / "overview.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

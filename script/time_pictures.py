@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of equal CPU time: one model in every form, and Blender's own node.
 
-    python script/time_pictures.py jobs COSTS.csv OUT     OUT/ball.json, OUT/jobs.json
+    python script/time_pictures.py scene - OUT            OUT/ball.json
+    python script/time_pictures.py jobs COSTS.csv OUT     OUT/jobs.json, of what native_nodes.py
+                                                          fitted, OUT/fitted.json
     python script/time_pictures.py page OUT DOCS          DOCS/time-pictures.png, OUT/pictures.md
 
 Samples are those of the time that the Glossy node takes for SPP, by the costs that script/bench
@@ -27,20 +29,18 @@ SIZE, GAP, EPSILON = 176, 6, 0.01
 def scene():
     return {
         "name": "ball",
-        "description": "A ball under a lamp.",
+        "description": "A ball under a lamp. No floor: it would become a Glossy node too.",
         "settings": {"width": SIZE, "height": SIZE, "spp": SPP, "seed": 1, "max_bounces": 4},
         "camera": {
             "type": "perspective",
             "position": [0, -6, 2.2],
-            "look_at": [0, 0, 0.95],
+            "look_at": [0, 0, 1],
             "fov_y_degrees": 22,
         },
         "materials": {
-            "floor": {"model": "lambert", "parameters": {"rho": [0.4, 0.4, 0.4]}},
             "ball": {"model": MODEL, "parameters": PARAMETERS},
         },
         "objects": [
-            {"name": "floor", "shape": {"type": "quad", "size": [40, 40]}, "material": "floor"},
             {
                 "name": "ball",
                 "shape": {"type": "sphere", "radius": 1},
@@ -58,8 +58,8 @@ def jobs(costs, out):
         cost = {r["form"]: float(r["cost"]) for r in csv.DictReader(file) if r["model"] == MODEL}
     if missing := [f for f in FORMS if f not in cost]:
         sys.exit(f"{costs}: expected a row of {MODEL}, {missing[0]}")
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "ball.json").write_text(json.dumps(scene()), encoding="utf-8")
+    fitted = json.loads((out / "fitted.json").read_text(encoding="utf-8"))["ball"]["materials"]
+    (out / "native.json").write_text(json.dumps(fitted), encoding="utf-8")
     listed = [
         {
             "name": form,
@@ -67,6 +67,7 @@ def jobs(costs, out):
             "out": str((out / f"{form}.exr").resolve()),
             "representation": form,
             "spp": max(1, round(SPP / cost[form])),
+            "native": str((out / "native.json").resolve()),
             "timed": False,
         }
         for form in FORMS
@@ -111,23 +112,27 @@ def page(out, docs):
         "",
         f"![{', '.join(FORMS)}, reference](time-pictures.png)",
         "",
-        f"A ball of `{MODEL}` under a point lamp of radius 0.1, from",
-        f"left to right {', '.join(FORMS)} and",
-        "the reference. All but the reference have the CPU time of",
-        f"{SPP} samples of the Glossy node,",
-        f"which is Blender's own with the model's colour. {records[FORMS[0]]['blender']}.",
+        f"A ball of `{MODEL}` under a point lamp of radius 0.1: {', '.join(FORMS)}, the reference.",
+        f"All but the reference have the CPU time of {SPP} samples of the Glossy node. That is",
+        "Blender's own, with the colour and roughness that come nearest to the model's f cos.",
+        f"Blender {records[FORMS[0]]['blender']}.",
         "",
         *table,
         "",
-        "relMSE and mean of the picture are against the reference with 1,024 samples.",
+        "relMSE and mean of the picture are against the reference with 256 samples.",
         "`script/times --pictures` renders them.",
     ]
     (out / "pictures.md").write_text("\n".join(text) + "\n", encoding="utf-8")
 
 
 def main():
-    if len(sys.argv) != 4 or sys.argv[1] not in ("jobs", "page"):
+    if len(sys.argv) != 4 or sys.argv[1] not in ("scene", "jobs", "page"):
         sys.exit(__doc__)
+    if sys.argv[1] == "scene":
+        out = Path(sys.argv[3])
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "ball.json").write_text(json.dumps(scene()), encoding="utf-8")
+        return
     {"jobs": jobs, "page": page}[sys.argv[1]](Path(sys.argv[2]), Path(sys.argv[3]))
 
 

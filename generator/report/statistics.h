@@ -51,8 +51,8 @@ inline constexpr double kTestSignificance = 0.01, kTestAccepted = 0.9975;
 
 /// `pictures` differ in their random numbers alone, two at least; the reference needs a variance layer (its channels
 /// are taken to vary together, which for luminance is the largest variance they allow). What single precision rounds
-/// counts as noise. Throws std::invalid_argument for too few pictures or no variance, InputError when sizes differ or
-/// a pixel is not finite.
+/// counts as noise, and so does 1e-12 of the picture's mean radiance. Throws std::invalid_argument for too few pictures
+/// or no variance, InputError when sizes differ or a pixel is not finite.
 WelchTest welch_test(std::span<const reference::Rendering> pictures, const reference::Rendering& reference,
                      const std::string& picture_name, const std::string& reference_name);
 

@@ -65,6 +65,11 @@ def test_every_model_that_scatters_is_in_what_scripts_make(file):
     assert not missing, "run the script that the page names"
 
 
+def test_every_model_has_its_page():
+    pages = {p.stem for p in (ROOT / "docs" / "gallery" / "models").glob("*.md")} - {"overview"}
+    assert pages == set(MODELS), "run script/gallery models"
+
+
 def test_no_other_file_is_a_list_of_models():
     known = {*BY_HAND, *A_SECOND_TIME, *PICTURE, *GENERATED, *GENERATED_OF_SCATTERING}
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)

@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the papers say of their models in words, as curves: drawn with the Python package `brdfc`.
+
+    python script/landmarks.py crescents CHOICE FILE.json   a scene, with that choice of `below`
+    python script/landmarks.py page PICTURES DOCS           DOCS/gallery/landmarks.md, its pictures
+
+PICTURES holds the reference renderer's mirror.png and lose.png of those scenes.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from markdown_table import heading, line
+
+#: Normal reflectance of polish in the coupled paper.
+R0 = 0.05
+SHARPNESS = (4, 12, 25, 100)
+ROOT = Path(__file__).resolve().parent.parent
+#: Pixels of the longer side of the crescents, and between the two pictures.
+SIZE, GAP = 240, 6
+
+
+def in_plane(theta):
+    """Directions in the x-z plane, at these angles from the normal."""
+    return np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=-1)
+
+
+def reflectances(model, angle, **values):
+    """Directional-hemispherical reflectance by view: (matte part, mirror part)."""
+    wo = in_plane(np.radians(angle))
+    mirror = model.mirror(wo, **values)[..., 0]
+    return model.albedo(wo[:, 2], **values)[..., 0] - mirror, mirror
+
+
+def spdf(model, theta, view, **values):
+    """Density per solid angle of where matte light goes: f cos over its own reflectance."""
+    wo = in_plane(np.radians(np.array([view])))
+    matte, _ = reflectances(model, np.array([view]), **values)
+    f = model.eval(in_plane(theta), wo, **values)[..., 0]
+    return f * np.cos(theta) / matte[0]
+
+
+def anisotropy(model, view, samples=20000, **values):
+    """Spread of a lobe across the plane of incidence over that along it, both root mean squares
+    about the mirror direction in the plane that touches the sphere there."""
+    wo = in_plane(np.radians(-view))
+    u = np.random.default_rng(1).uniform(size=(samples, 3))
+    drawn = model.sample(wo, u, **values)
+    wi, weight = drawn.wi, drawn.weight[:, 0]
+    mirror = np.array([-wo[0], 0, wo[2]])
+    along = np.array([mirror[2], 0, -mirror[0]])
+    near = wi @ mirror > 0
+    spread = [
+        np.sqrt(np.average(x[near] ** 2, weights=weight[near])) for x in (wi[:, 1], wi @ along)
+    ]
+    return spread[0] / spread[1]
+
+
+def save(figure, out):
+    figure.savefig(out, metadata={"Software": None}, pil_kwargs={"optimize": True})
+    plt.close(figure)
+
+
+def draw_coupled(out):
+    import brdfc
+
+    coupled = brdfc.model("coupled")
+    angle = np.linspace(0, 89, 90)
+    theta = np.radians(np.linspace(-90, 90, 361))
+    figure, axes = plt.subplots(1, 3, figsize=(9, 2.9), dpi=90, layout="constrained")
+    matte, mirror = reflectances(coupled, angle, r0=R0, rm=0.5)
+    axes[0].plot(angle, matte, label="matte")
+    axes[0].plot(angle, mirror, label="mirror")
+    axes[0].plot(angle, matte + mirror, "k", lw=1, label="R, both")
+    axes[0].set(title="R, R0 = 0.05, Rm = 0.5", ylim=(0, 1.05))
+    for view in (0, 40, 60, 80):
+        axes[1].plot(np.degrees(theta), spdf(coupled, theta, view, r0=R0, rm=0.5), label=f"{view}°")
+    axes[1].plot(np.degrees(theta), np.cos(theta) / np.pi, "k:", lw=1, label="Lambert")
+    axes[1].set(title="SPDF of the matte part, 1/sr")
+    others = {
+        "coupled": {"rm": 1},
+        "shirley_1991": {"rd": 1},
+        "schlick_double": {"rd": 1},
+        "lambertian_specular": {"rd": 1, "rs": R0},
+    }
+    for name, values in others.items():
+        model = brdfc.model(name)
+        polish = {} if "rs" in values else {"r0": R0}
+        axes[2].plot(angle, sum(reflectances(model, angle, **polish, **values)), label=model.label)
+    axes[2].set(title="R over a white base", ylim=(0.9, 2.05))
+    for a in axes:
+        a.set_xlabel("degrees from the normal", fontsize=8)
+        a.title.set_size(9)
+        a.tick_params(labelsize=7)
+        a.legend(fontsize=6.5)
+    save(figure, out)
+
+
+def draw_anisotropy(out):
+    """The curves; returns the ratios by sharpness at the views of the table."""
+    import brdfc
+
+    model = brdfc.model("radziszewski_alda")
+    angle = np.array([0, 15, 30, 45, 55, 65, 70, 75, 80, 83, 86])
+    figure, axes = plt.subplots(figsize=(6, 2.9), dpi=90, layout="constrained")
+    found = {}
+    for n in SHARPNESS:
+        ratio = [anisotropy(model, a, n=n) for a in angle]
+        found[n] = dict(zip(angle.tolist(), ratio, strict=True))
+        axes.plot(angle, ratio, "o-", ms=3, label=f"n={n}")
+    phong = [anisotropy(brdfc.model("phong"), a, e=25) for a in angle]
+    axes.plot(angle, phong, "k:", lw=1, label="Phong, e=25")
+    axes.axhline(1, color="0.6", lw=0.7)
+    axes.set_xlabel("view, degrees from the normal", fontsize=8)
+    axes.set_ylabel("spread across / along", fontsize=8)
+    axes.tick_params(labelsize=7)
+    axes.legend(fontsize=7)
+    save(figure, out)
+    return found
+
+
+def crescents(choice, file):
+    """The scene of the crescents, smaller, with that choice for what falls below the horizon."""
+    scene = json.loads((ROOT / "scenes" / "gl-fig12.json").read_text(encoding="utf-8"))
+    settings = scene["settings"]
+    factor = SIZE / settings["width"]
+    settings |= {"width": SIZE, "height": round(settings["height"] * factor)}
+    scene["materials"]["sphere"]["parameters"]["below"] = choice
+    del scene["$schema"]
+    Path(file).write_text(json.dumps(scene), encoding="utf-8")
+
+
+def beside(files, out):
+    """Pictures of one size side by side."""
+    from PIL import Image
+
+    pictures = [Image.open(f).convert("RGB") for f in files]
+    width, height = pictures[0].size
+    sheet = Image.new("RGB", (len(pictures) * (width + GAP) - GAP, height), "white")
+    for i, picture in enumerate(pictures):
+        sheet.paste(picture, (i * (width + GAP), 0))
+    sheet.save(out, quality=90)
+
+
+def main():
+    if len(sys.argv) == 4 and sys.argv[1] == "crescents":
+        crescents(*sys.argv[2:])
+        return
+    if len(sys.argv) != 4 or sys.argv[1] != "page":
+        sys.exit(__doc__)
+    pictures, folder = Path(sys.argv[2]), Path(sys.argv[3]) / "gallery"
+    beside((pictures / "mirror.png", pictures / "lose.png"), folder / "landmark-crescents.jpg")
+    draw_coupled(folder / "landmark-coupled.png")
+    found = draw_anisotropy(folder / "landmark-anisotropy.png")
+    views = (0, 45, 70, 80, 86)
+    text = [
+        "# What papers say, as curves",
+        "",
+        "`script/landmarks` made this page from the [Python package](../python.md).",
+        "",
+        "## Shirley, Smits, Hu and Lafortune 1997: R and SPDF",
+        "",
+        "![R and SPDF of the coupled model, and R of its rivals](landmark-coupled.png)",
+        "",
+        "Left: the share of the light that comes back. What the mirror gains towards grazing views",
+        "the matte base gives up. Middle: where the matte part sends its light; the same at every",
+        "view, and lower than Lambert's at the rim. Right: over a base that keeps all light the",
+        "coupled model and Shirley's of 1991 keep all of it too, constant shares make 5 % out of",
+        "nothing, and Schlick's double term nearly doubles the light at the rim. The same in a",
+        "picture: [furnace](more.md#furnace).",
+        "",
+        "## Radziszewski and Alda 2008: anisotropy at grazing light",
+        "",
+        "![Spread of the lobe across over along, by view](landmark-anisotropy.png)",
+        "",
+        "The spread of the lobe across the plane of incidence over",
+        "that along it: root mean squares",
+        "about the mirror direction. The paper says that the lobe is anisotropic where light is",
+        "grazing: there it is drawn out along the plane, twice as",
+        "far as across. Sharper lobes are so",
+        "at middle views too, the other way round, and nowhere but from above are they even.",
+        "",
+        *heading("n", *(f"{v}°" for v in views)),
+        *(line(n, *(f"{found[n][v]:.2f}" for v in views)) for n in SHARPNESS),
+        "",
+        "## Suffern 2007: crescents at the horizon",
+        "",
+        "![A glossy sphere on a chequered plane, twice](landmark-crescents.jpg)",
+        "",
+        "Figure 25.12 and exercise 25.1: near the horizon of a",
+        "glossy sphere plane and sky are seen",
+        "as crescents. Left as in the book, where a ray that would go below the surface is turned",
+        "to the other side of the mirror direction; right without those rays (`below=lose`). The",
+        "crescents stay and the outermost rim darkens: they come of the part of the lobe that lies",
+        "above the surface, not of turned rays.",
+    ]
+    (folder / "landmarks.md").write_text("\n".join(text) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
