@@ -20,6 +20,7 @@ import OpenImageIO as oiio
 from markdown_table import heading, line
 from time_page import PICTURES
 
+CONFIG = Path(__file__).resolve().parents[1] / "data" / "color" / "config.ocio"
 #: The model: its kept fit gives it every drawn form. Samples of the Glossy node.
 MODEL, PARAMETERS, SPP = "cook_torrance", {"m": 0.3, "f0": [0.9, 0.6, 0.3]}, 64
 FORMS = ("glossy", "aimed", "fitted", "sampled")
@@ -85,6 +86,10 @@ def pixels(path):
 
 def page(out, docs):
     import numpy as np
+    import PyOpenColorIO as ocio
+
+    config = ocio.Config.CreateFromFile(str(CONFIG))
+    to_screen = config.getProcessor("scene_linear", "sRGB").getDefaultCPUProcessor()
 
     records = {r["name"]: r for r in json.loads((out / "records.json").read_text(encoding="utf-8"))}
     reference = pixels(out / "reference.exr")
@@ -92,11 +97,8 @@ def page(out, docs):
     sheet = np.ones((SIZE, (SIZE + GAP) * (len(shown) + 1) - GAP, 3), np.float32)
     table = heading("Form", "samples", "relMSE", "mean")
     for i, (name, picture) in enumerate([*shown, ("reference", reference)]):
-        coded = np.where(
-            picture <= 0.0031308,
-            12.92 * picture,
-            1.055 * np.maximum(picture, 0) ** (1 / 2.4) - 0.055,
-        )
+        coded = np.array(picture, np.float32, order="C")
+        to_screen.applyRGB(coded)
         sheet[:, i * (SIZE + GAP) : i * (SIZE + GAP) + SIZE] = np.clip(coded, 0, 1)
         if name != "reference":
             error = float(np.mean((picture - reference) ** 2 / (reference**2 + EPSILON)))
