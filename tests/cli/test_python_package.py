@@ -12,12 +12,15 @@ import csv
 import doctest
 import importlib.util
 import io
+import json
 import os
 import re
 import subprocess
 import sys
 import zipfile
 
+import gallery_models
+import landmarks
 import numpy as np
 import pytest
 from support import MODELS, ROOT, TOOL
@@ -332,3 +335,31 @@ def test_the_plots_of_the_page(folder, tmp_path):
     assert image.shape == (450, 1500, 4) and image[..., :3].std() > 0.05
     shown = importlib.import_module("matplotlib.image").imread(ROOT / "docs" / "python.png")
     assert np.abs(image - shown).mean() < 0.01, "script/plot_models.py docs/python.png"
+
+
+def test_what_papers_say_as_curves(brdfc):
+    """The figures of docs/gallery/landmarks.md."""
+    lobe = brdfc.model("radziszewski_alda")
+    for n in (4, 100):
+        assert landmarks.anisotropy(lobe, 0, n=n) == pytest.approx(1, abs=0.03)
+        assert landmarks.anisotropy(lobe, 86, n=n) < 0.6, "drawn out along the plane at grazing"
+    assert landmarks.anisotropy(lobe, 45, n=100) > 2
+    assert landmarks.anisotropy(brdfc.model("phong"), 45, e=25) == pytest.approx(1, abs=0.03)
+
+    theta, views = np.radians(np.linspace(-80, 80, 33)), np.array([0.0, 40, 80])
+    coupled, double = brdfc.model("coupled"), brdfc.model("schlick_double")
+    densities = [landmarks.spdf(coupled, theta, v, r0=0.05, rm=0.5) for v in views]
+    assert np.ptp(densities, axis=0).max() < 2e-3, "the same at every view"
+    white = sum(landmarks.reflectances(coupled, views, r0=0.05, rm=1))
+    assert white == pytest.approx(1, abs=2e-3)
+    gained = sum(landmarks.reflectances(double, np.array([85.0]), r0=0.05, rd=1))
+    assert gained > 1.5
+
+
+@pytest.mark.parametrize("name", ["schlick", "fresnel_conductor"])
+def test_a_model_is_drawn(brdfc, tmp_path, name):
+    """The gallery's drawings: of lobes and a mirror, and of a mirror alone."""
+    listed = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
+    model = next(m for m in listed if m["name"] == name)
+    gallery_models.draw(model, brdfc.model(name), tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {f"{name}-lobes.png", f"{name}-albedo.png"}
