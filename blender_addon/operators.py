@@ -324,7 +324,7 @@ class BRDFC_OT_details(_OfActiveMaterial, Operator):
 
 class BRDFC_OT_more(Operator):
     bl_idname = "brdfc.more"
-    bl_label = "More"
+    bl_label = "More About This"
     bl_description = "Show what is behind this sentence"
     bl_options = {"INTERNAL"}
 

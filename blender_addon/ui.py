@@ -223,7 +223,7 @@ def draw_node(layout, node, material, scene, editable=True):
     entry = {"representations": {}}
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
-        _wrapped(layout, f"{entry['paper']} {entry['equations']}".strip())
+        _wrapped(layout.column(align=True), f"{entry['paper']} {entry['equations']}".strip())
         _draw_form(layout, node, made[0], scene, editable)
     _draw_values(layout, node)
     if made and optical.can_have(model_name):
@@ -291,7 +291,9 @@ BUTTONS = {
 def _more(layout, said):
     """A button for what is behind a sentence, where there is something."""
     if more := getattr(said, "more", ""):
-        layout.operator("brdfc.more", icon="QUESTION", emboss=False).text = more
+        row = layout.row()
+        row.alignment = "LEFT"
+        row.operator("brdfc.more", icon="QUESTION", emboss=False).text = more
 
 
 def draw_warnings(layout, material, scene):
