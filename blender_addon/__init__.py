@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import i18n, lamps, operators, plot_panel, ui, update
+from . import i18n, imports, lamps, operators, plot_panel, ui, update
 
 
 def _refuse_beside_another():
@@ -25,11 +25,13 @@ def register():
     ui.register()
     plot_panel.register()
     lamps.register()
+    imports.register()
     update.register()
 
 
 def unregister():
     update.unregister()
+    imports.unregister()
     lamps.unregister()
     plot_panel.unregister()
     ui.unregister()

@@ -17,11 +17,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, convert, lamps, lean, nodes, pack, update
+from . import checks, convert, lamps, lean, library, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
 from .i18n import Sentence, say
 from .lamps import Lamp
 from .lean import PlanError
+from .library import LibraryError
 from .nodes import CompileError, has_twin
 from .pack import PackError
 from .update import Update
@@ -30,10 +31,12 @@ __all__ = [
     "CompileError",
     "PackError",
     "PlanError",
+    "LibraryError",
     "Finding",
     "Lamp",
     "Update",
     "add_albedo",
+    "add_library",
     "add_twin",
     "albedo",
     "bake",
@@ -47,6 +50,7 @@ __all__ = [
     "plan",
     "plan_conversion",
     "prepare_material",
+    "remove_library",
     "see_lamps",
     "set_kernel",
     "set_parameters",
@@ -338,6 +342,21 @@ def add_twin(material):
     output.target = "EEVEE"
     output.location = (twin.location.x + 300, twin.location.y)
     tree.links.new(twin.outputs["BSDF"], output.inputs["Surface"])
+
+
+def add_library():
+    """Makes the library of ready-made materials, anew if there is one, and names it in the
+    preferences, so that the Asset Browser shows it. Takes seconds: another Blender makes it.
+
+    Returns how many materials it has. Raises LibraryError; nothing is changed then.
+    """
+    return library.Making().wait()
+
+
+def remove_library():
+    """Takes that library out of the preferences and deletes it; materials that files have of it
+    stay. Returns whether there was one."""
+    return library.remove()
 
 
 def albedo(model, cos_theta_o, **parameters):

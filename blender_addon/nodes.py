@@ -387,6 +387,17 @@ def find_group(model_name, representation, albedo=False):
     return None
 
 
+def give_way(group):
+    """Puts the group of the open file that is equal in its place, if there is one."""
+    tag = group[TAG].to_dict()
+    for other in bpy.data.node_groups:
+        same = other != group and other.library is None and TAG in other
+        if same and other[TAG].to_dict() == tag and script_problem(other) is None:
+            group.user_remap(other)
+            remove_group(group)
+            return
+
+
 def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     """Node group of a model, made if the file has none. Raises ValueError, CompileError.
 

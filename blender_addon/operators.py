@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import AddonPreferences, Operator
 
-from . import api, checks, color, nodes, pack
+from . import api, checks, color, library, nodes, pack
 from .i18n import Sentence, iface, of_error, rpt, say, tip
 
 _ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
@@ -15,9 +15,10 @@ _ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeEr
 
 def _doc(properties):
     try:
-        return pack.model(properties.model)["doc"]
+        entry = pack.model(properties.model)
     except _ERRORS:
         return ""
+    return f"{entry['doc']}\n{entry['paper']}"
 
 
 class _ModelOperator:
@@ -112,6 +113,48 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         self.report({"INFO"}, rpt(said))
         _report_osl(self, context.scene)
         return {"FINISHED"}
+
+
+#: Blender keeps no reference to the texts of a list that is made when it is asked for.
+_listed = []
+
+
+def _models(_operator, _context):
+    """Every model as an item to choose: what its label, authors, title and year find."""
+    found = [
+        (name, f"{entry['label']} ({entry['paper']})", entry["doc"])
+        for name, entry in api.models().items()
+    ]
+    if _listed != found:
+        _listed[:] = found
+    return _listed
+
+
+class BRDFC_OT_search(Operator):
+    bl_idname = "brdfc.search"
+    bl_label = "Search Reflection Models..."
+    bl_description = (
+        "Find a model by its name, or by authors, title and year of its paper; a shader "
+        "editor gets a node of it, elsewhere a material is made"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+    bl_property = "model"
+
+    model: EnumProperty(name="Model", description="What was found", items=_models)
+
+    @classmethod
+    def poll(cls, context):
+        return BRDFC_OT_add_node.poll(context) or BRDFC_OT_new_material.poll(context)
+
+    def invoke(self, context, event):
+        context.window_manager.invoke_search_popup(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        if BRDFC_OT_add_node.poll(context):
+            how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+            return bpy.ops.brdfc.add_node(how, model=self.model)
+        return bpy.ops.brdfc.new_material(model=self.model)
 
 
 class _OfActiveMaterial:
@@ -688,6 +731,66 @@ class BRDFC_OT_bake_apply(_Long, Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_add_library(_Long, Operator):
+    bl_idname = "brdfc.add_library"
+    bl_label = "Add the brdfc Materials to the Asset Browser"
+    bl_description = (
+        "Make a library of ready-made materials and name it in the preferences: from then "
+        "on they are in the Asset Browser, to be dragged onto objects"
+    )
+    bl_options = {"REGISTER"}
+
+    def invoke(self, context, event):
+        try:
+            return self.begin(context, library.Making())
+        except _ERRORS as error:
+            return _refused(self, error)
+
+    def finish(self, context, count):
+        said = say(
+            "Materials in the library {name} of the Asset Browser: {count}",
+            name=library.NAME,
+            count=count,
+        )
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}
+
+    def execute(self, context):
+        try:
+            count = api.add_library()
+        except _ERRORS as error:
+            return _refused(self, error)
+        return self.finish(context, count)
+
+
+class BRDFC_OT_remove_library(Operator):
+    bl_idname = "brdfc.remove_library"
+    bl_label = "Remove the brdfc Materials from the Asset Browser"
+    bl_description = (
+        "Take the library out of the preferences and delete it; materials in files stay as they are"
+    )
+    bl_options = {"REGISTER"}
+
+    def execute(self, context):
+        there_was = api.remove_library()
+        said = say("Library removed") if there_was else say("There was no library")
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}
+
+
+def draw_library(layout):
+    """Buttons for the library of materials, where this extension has one."""
+    if not library.available():
+        return
+    if library.registered() is None:
+        layout.operator("brdfc.add_library", icon="ASSET_MANAGER")
+        return
+    if not library.is_current():
+        layout.label(text="Another version made the brdfc materials", icon="INFO")
+        layout.operator("brdfc.add_library", text="Make Them Anew", icon="FILE_REFRESH")
+    layout.operator("brdfc.remove_library", icon="TRASH")
+
+
 class BrdfcPreferences(AddonPreferences):
     bl_idname = __package__
 
@@ -706,6 +809,7 @@ class BrdfcPreferences(AddonPreferences):
     def draw(self, context):
         self.layout.prop(self, "program")
         self.layout.prop(self, "update_on_load")
+        draw_library(self.layout)
 
 
 _CLASSES = (
@@ -724,6 +828,9 @@ _CLASSES = (
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,
     BRDFC_OT_new_material,
+    BRDFC_OT_search,
+    BRDFC_OT_add_library,
+    BRDFC_OT_remove_library,
     BRDFC_OT_enable_osl,
     BRDFC_OT_fix_material,
     BRDFC_OT_no_guiding,

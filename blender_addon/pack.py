@@ -73,6 +73,19 @@ def model(name):
     return models[name]
 
 
+def citation(entry):
+    """Who wrote a model's paper, and when: "Oren, Nayar 1994", of a manifest entry. Raises
+    PackError for a paper that is not cited as "I. Name, J. Name: Title, Journal, year"."""
+    cited = re.match(r"([^:]+): .*?\b(1[5-9]\d\d|20\d\d)\b", entry["paper"])
+    if cited is None:
+        raise PackError(
+            f"{entry['label']}: expected authors, a colon, a title and a year, got "
+            f"{entry['paper']!r}"
+        )
+    surnames = [author.split()[-1] for author in cited[1].split(",")]
+    return f"{', '.join(surnames)} {cited[2]}"
+
+
 def same(value, only):
     """Whether a socket, which is in single precision, holds a value."""
     if isinstance(only, str) or value is None:

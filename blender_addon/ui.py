@@ -54,10 +54,18 @@ def _wrapped(layout, text, icon="NONE"):
         icon = "BLANK1" if icon != "NONE" else "NONE"
 
 
+def menu_label(name):
+    """A model's label and its paper's authors and year: what typing into a menu finds."""
+    entry = pack.model(name)
+    return f"{entry['label']} ({pack.citation(entry)})"
+
+
 def _draw_models(layout, operator):
+    layout.operator("brdfc.search", icon="VIEWZOOM")
+    layout.separator()
     for name in pack.model_names():
         # The names are those of the papers, in every language.
-        item = layout.operator(operator, text=pack.model(name)["label"], translate=False)
+        item = layout.operator(operator, text=menu_label(name), translate=False)
         item.model = name
         item.representation = "auto"
 

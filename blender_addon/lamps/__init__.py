@@ -6,9 +6,10 @@ expressions, so a saved file renders and animates where neither the extension no
 A list that is out of date costs noise and nothing else: forms are right whatever it says.
 """
 
-from .filling import count, ensure_group, see, seen
+from .filling import count, ensure_group, follow, see, seen
 from .handlers import register, unregister
 from .shared_group import find as find_group
+from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
 from .slots import SLOTS, Lamp, part_names, too_many
 
@@ -18,6 +19,8 @@ __all__ = [
     "count",
     "ensure_group",
     "find_group",
+    "follow",
+    "is_group",
     "part_names",
     "register",
     "remove_unused_group",

@@ -126,6 +126,12 @@ def quietly(scene, depsgraph=None, **options):
         memory.busy = False
 
 
+def follow():
+    """Brings the shared group, if the file has one, up to date with the window's scene."""
+    if shared_group.find() is not None and (scene := current_scene()):
+        quietly(scene)
+
+
 def see(scene):
     """Fills the slots of the shared group from a scene, the brightest lamp first, and looks at
     environment images anew. Returns every lamp of the scene as a slots.Lamp, those with a

@@ -104,8 +104,7 @@ def _now(*_):
     """A file was loaded or is to be saved, an undo or a picture is over."""
     global _rendering
     _rendering = filling.memory.scene = None
-    if shared_group.find() is not None and (scene := filling.current_scene()):
-        filling.quietly(scene)
+    filling.follow()
 
 
 _HANDLERS = {

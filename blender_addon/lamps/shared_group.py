@@ -29,8 +29,13 @@ def make():
     return group
 
 
+def is_shared(group):
+    """Whether a node group is a shared group, of the open file or another."""
+    return TAG in group
+
+
 def _own():
-    return [g for g in bpy.data.node_groups if g.library is None and TAG in g]
+    return [g for g in bpy.data.node_groups if g.library is None and is_shared(g)]
 
 
 def find():
@@ -49,12 +54,18 @@ def remove_unused():
 
 
 def the_one():
-    """The shared group; copies, which come with appended materials, give way to it."""
-    group = find()
-    for other in _own():
-        if other != group:
-            other.user_remap(group)
-            bpy.data.node_groups.remove(other)
+    """The shared group; copies, which come with appended materials, give way to it.
+
+    One that was appended is kept, if there is one: Blender knows it as that of its library, and
+    appends neither it nor what hangs on it again.
+    """
+    group = next((g for g in _own() if g.library_weak_reference is not None), find())
+    copies = [other for other in _own() if other != group]
+    for other in copies:
+        other.user_remap(group)
+        bpy.data.node_groups.remove(other)
+    if copies:
+        group.name = GROUP
     return group
 
 

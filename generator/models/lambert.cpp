@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Lambert's diffuse reflector: f = rho / pi.
 //
-// J. H. Lambert, Photometria, 1760. Cycles' diffuse closure equals it.
+// J. H. Lambert: Photometria, 1760. Cycles' diffuse closure equals it.
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -12,7 +12,7 @@ template <class T> struct Lambert {
   static ModelInfo info() {
     return {.name = "lambert",
             .label = "Lambert",
-            .paper = "J. H. Lambert, Photometria, 1760",
+            .paper = "J. H. Lambert: Photometria, 1760",
             .equations = "f = rho / pi",
             .doc = "Ideal diffuse reflection: the same radiance in every direction.",
             .properties = {.lossless = true, .diffuse_limit = "rho=0.8"},

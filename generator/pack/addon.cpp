@@ -62,8 +62,11 @@ std::map<std::string, std::string> addon_files(const fs::path& folder, const std
   std::map<std::string, std::string> files;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
     const std::string name = entry.path().lexically_relative(folder).generic_string();
-    const bool words = entry.path().parent_path().filename() == kTranslations && entry.path().extension() == ".json";
-    if (words || entry.path().extension() == ".py") files[name] = read_text(entry.path());
+    const std::string kind = entry.path().extension().string();
+    const bool words = entry.path().parent_path().filename() == kTranslations && kind == ".json";
+    // The library of ready-made materials is made of all models.
+    const bool of_library = cut.empty() && name.starts_with("library/") && (kind == ".json" || kind == ".jpg");
+    if (words || of_library || kind == ".py") files[name] = read_text(entry.path());
   }
   std::string& manifest = files[kManifest] = read_text(folder / kManifest);
   const fs::path path = folder / kManifest;

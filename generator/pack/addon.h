@@ -8,11 +8,11 @@
 
 namespace brdfc::pack {
 
-/// Contents by path within the folder, of .py files, translations/*.json and blender_manifest.toml, which gets the
-/// version of this program in place of @version@, and where `cut` is not empty an id and a name of its own: Blender
-/// puts an extension in the place of another one of its id, and what is cut to a scene must not take that of the whole.
-/// Throws InputError for a file that can't be read, and for a manifest without the lines `version = "@version@"`, `id =
-/// "brdfc_shaders"` and `name = "brdfc Shaders"`.
+/// Contents by path within the folder, of .py files, translations/*.json, where `cut` is empty what library/ has beside
+/// them, and blender_manifest.toml, which gets the version of this program in place of @version@, and where `cut` is
+/// not empty an id and a name of its own: Blender puts an extension in the place of another one of its id, and what is
+/// cut to a scene must not take that of the whole. Throws InputError for a file that can't be read, and for a manifest
+/// without the lines `version = "@version@"`, `id = "brdfc_shaders"` and `name = "brdfc Shaders"`.
 std::map<std::string, std::string> addon_files(const std::filesystem::path& folder, const std::string& cut = "");
 
 /// The extension's id: brdfc_shaders, and where `cut`, the name of a file, is not empty what of it an id may have.

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension as a user meets it: installation, nodes, menus, panels, operators, saved files."""
 
+import contextlib
 import hashlib
 import json
 import math
@@ -49,7 +50,7 @@ def test_zip_holds_no_binary(extension_zip):
 
     with zipfile.ZipFile(extension_zip) as archive:
         suffixes = {Path(name).suffix for name in archive.namelist()}
-    assert suffixes <= {".py", ".toml", ".json", ".osl", ".exr"}
+    assert suffixes <= {".py", ".toml", ".json", ".osl", ".exr", ".jpg"}
 
 
 @pytest.fixture(scope="module")
@@ -877,6 +878,21 @@ def test_saved_file_renders_without_the_extension(every_form, tmp_path):
 # Menus, panels, operators
 
 
+@contextlib.contextmanager
+def shader_editor(material):
+    """An area of the window that shows the material's nodes is the context."""
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    area.type = "NODE_EDITOR"
+    area.ui_type = "ShaderNodeTree"
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        space = bpy.context.space_data
+        space.shader_type = "OBJECT"
+        space.pin = True
+        space.node_tree = material.node_tree
+        yield
+
+
 def draw_functions(menu):
     return [f.__name__ for f in getattr(bpy.types, menu)._dyn_ui_initialize()]
 
@@ -888,11 +904,61 @@ def test_add_menu_lists_every_model(extension, empty):
     assert layout.log == ["menu NODE_MT_brdfc"]
     layout = helpers.Layout()
     bpy.types.NODE_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
-    labels = [e["label"] for e in extension.api.models().values()]
-    assert layout.log == [f"operator brdfc.add_node {label}" for label in labels]
+    models = extension.api.models()
+
+    def drawn(operator):
+        cited = [f"{e['label']} ({extension.pack.citation(e)})" for e in models.values()]
+        return ["operator brdfc.search ", *(f"operator {operator} {label}" for label in cited)]
+
+    assert layout.log == drawn("brdfc.add_node")
     layout = helpers.Layout()
     bpy.types.MATERIAL_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
-    assert layout.log == [f"operator brdfc.new_material {label}" for label in labels]
+    assert layout.log == drawn("brdfc.new_material")
+
+
+def test_menus_cite_papers_as_the_page_of_models_does(extension, subtests):
+    page = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \|[^|]*\| ([^|]*) \|", page, re.M)
+    assert dict(rows).keys() == extension.api.models().keys()
+    for name, papers in rows:
+        with subtests.test(name):
+            cited = extension.pack.citation(extension.pack.model(name))
+            assert papers.split("; ")[0] == cited
+    with pytest.raises(extension.pack.PackError, match="expected authors, a colon"):
+        extension.pack.citation({"label": "X", "paper": "J. H. Lambert, Photometria, 1760"})
+
+
+def test_search_finds_models_by_name_author_title_and_year(extension, empty):
+    items = extension.operators._models(None, bpy.context)
+    assert [item[0] for item in items] == extension.pack.model_names()
+    texts = {name: text.lower() for name, text, _ in items}
+
+    def found(words):
+        """Blender's search lists what has all of the words."""
+        return {n for n, text in texts.items() if all(w in text for w in words.lower().split())}
+
+    assert found("ward") == found("measuring anisotropic 1992") == {"ward"}
+    assert found("Nayar") == {"oren_nayar"}
+    assert "coupled" in found("smits practitioners") and found("Photometria 1760") == {"lambert"}
+    doc = extension.operators.BRDFC_OT_add_node.description(None, SimpleNamespace(model="ward"))
+    entry = extension.pack.model("ward")
+    assert entry["doc"] in doc and entry["paper"] in doc, "tooltips name the paper"
+
+
+def test_search_makes_a_node_or_a_material(extension, empty):
+    assert not bpy.ops.brdfc.search.poll()
+    target = bpy.data.objects.new("target", bpy.data.meshes.new("mesh"))
+    empty.collection.objects.link(target)
+    bpy.context.view_layer.objects.active = target
+    assert bpy.ops.brdfc.search(model="ward") == {"FINISHED"}
+    material = target.active_material
+    assert [extension.nodes.identity(n)[0] for n in extension.nodes.group_nodes(material)] == [
+        "ward"
+    ]
+    with shader_editor(material):
+        assert bpy.ops.brdfc.search(model="glass") == {"FINISHED"}
+    assert len(extension.nodes.group_nodes(material)) == 2
+    assert target.active_material == material
 
 
 def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
@@ -1145,15 +1211,7 @@ def test_operator_add_node(extension, empty):
     target = bpy.data.objects.new("target", mesh)
     empty.collection.objects.link(target)
     bpy.context.view_layer.objects.active = target
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    area.type = "NODE_EDITOR"
-    area.ui_type = "ShaderNodeTree"
-    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
-        space = bpy.context.space_data
-        space.shader_type = "OBJECT"
-        space.pin = True
-        space.node_tree = material.node_tree
+    with shader_editor(material):
         assert bpy.types.NODE_PT_brdfc.poll(bpy.context) is False
         assert bpy.ops.brdfc.add_node(model="coupled") == {"FINISHED"}
         assert bpy.types.NODE_PT_brdfc.poll(bpy.context) is True

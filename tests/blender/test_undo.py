@@ -7,7 +7,14 @@ import bpy
 import pytest
 
 #: What changes no data of the file: no undo.
-CHANGE_NOTHING = {"brdfc.write_materials", "brdfc.details", "brdfc.more", "brdfc.bake_plan"}
+CHANGE_NOTHING = {
+    "brdfc.write_materials",
+    "brdfc.details",
+    "brdfc.more",
+    "brdfc.bake_plan",
+    "brdfc.add_library",
+    "brdfc.remove_library",
+}
 
 
 @pytest.fixture
@@ -98,6 +105,11 @@ def test_every_operator_that_changes_the_file_has_undo(extension):
 def test_new_material(extension, start):
     start()
     is_one_step(lambda: bpy.ops.brdfc.new_material(model="coupled"))
+
+
+def test_search(extension, start):
+    start()
+    is_one_step(lambda: bpy.ops.brdfc.search(model="coupled"))
 
 
 def test_settings(extension, start):

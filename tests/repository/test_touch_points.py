@@ -20,8 +20,9 @@ SCATTERING = [m["name"] for m in LISTED if m["representations"] != ["exact"]]
 BY_HAND = {"tests/models/cases.csv": "{},", "docs/models.md": "| `{}` |"}
 #: Values of arbitrary precision, of the paper's formula typed a second time: who adds a model may.
 A_SECOND_TIME = {"tests/models/make_golden.py", "tests/models/golden.csv"}
-#: A picture of the models that there were: a new one is welcome in it.
-PICTURE = {"scenes/as-fig8.json"}
+#: A picture of the models that there were, and materials made of them: a new one is welcome there,
+#: and in the library it is anyway, with its defaults.
+PICTURE = {"scenes/as-fig8.json", "blender_addon/library/materials.json"}
 #: Made by scripts.
 GENERATED = {
     "docs/tables/properties.md": "| `{}` |",

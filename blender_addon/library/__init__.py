@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ready-made materials for the Asset Browser.
+
+materials.json lists them, once: by catalogue, each with its model, the values that are not the
+model's defaults, tags and a sentence; a model that none is made of is there with its defaults.
+The .blend is made of that on the user's machine when it is asked for, by a Blender without a window
+that runs build.py: so it is of the version of Blender and of the extension that use it.
+"""
+
+import contextlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from .. import pack
+from ..i18n import say
+from ..lean import Job
+
+_HERE = Path(__file__).parent
+#: What the library is called in the Asset Browser, and on top of its catalogues.
+NAME = "brdfc"
+#: Says in the library's folder what made it.
+STAMP = "brdfc.json"
+BLEND = "materials.blend"
+CATALOGS = "blender_assets.cats.txt"
+#: Catalogue of models that materials.json makes nothing of.
+_REST = "More Models"
+#: What a catalogue's identifier is made of with its path, so that it is the same ever after.
+_NAMESPACE = uuid.UUID("5a4df0f5-8f0c-4c53-9c0d-3f6f6a1e7b62")
+
+
+class LibraryError(RuntimeError):
+    """The library can't be made."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A material: its name, its catalogue's path below NAME, and what it is made of."""
+
+    name: str
+    catalog: str
+    model: str
+    values: dict
+    tags: tuple
+    description: str
+    #: The metal, glass or liquid of measured refractive index that it is of, or None.
+    substance: str | None = None
+
+    @property
+    def preview(self):
+        """Its picture, which script/assets renders."""
+        slug = re.sub(r"[^a-z0-9]+", "_", self.name.lower())
+        return _HERE / "previews" / f"{slug}.jpg"
+
+
+def available():
+    """Whether this extension has a library: one that was cut to a scene has none."""
+    return (_HERE / "materials.json").is_file()
+
+
+def entries():
+    """[Entry] of all materials, by catalogue and name as they are listed. Raises LibraryError."""
+    path = _HERE / "materials.json"
+    try:
+        listed = json.loads(path.read_text(encoding="utf-8"))
+        found = [
+            Entry(
+                row["name"],
+                catalog,
+                row["model"],
+                row["values"],
+                tuple(row["tags"]),
+                row["description"],
+                row.get("substance"),
+            )
+            for catalog, rows in listed.items()
+            for row in rows
+        ]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        more = (
+            f"{path}: expected, by catalogue, objects with name, model, values, tags and "
+            f"description: {error!r}"
+        )
+        raise LibraryError(
+            say("A file of this extension is damaged: install it again", more)
+        ) from error
+    used = {entry.model for entry in found}
+    for name in pack.model_names():
+        if name not in used:
+            model = pack.model(name)
+            found.append(Entry(model["label"], _REST, name, {}, (), model["doc"].rstrip(".")))
+    return found
+
+
+def make(api, entry):
+    """A material of the open file, of an entry."""
+    material = api.new_material(entry.model, **entry.values)
+    if entry.substance:
+        api.set_substance(material, entry.substance)
+    return material
+
+
+def description(entry):
+    """What the Asset Browser says of a material: its sentence, and of its model the paper."""
+    model = pack.model(entry.model)
+    return f"{entry.description}. {model['label']}: {model['paper']}"
+
+
+def tags(entry):
+    """Words by which the Asset Browser finds a material, beside those of its name."""
+    model = pack.model(entry.model)
+    return tuple(dict.fromkeys([*entry.tags, model["label"], pack.citation(model)]))
+
+
+def catalog_id(catalog):
+    return str(uuid.uuid5(_NAMESPACE, catalog))
+
+
+def catalogs_text(found):
+    """Content of the file that names the catalogues of these entries."""
+    paths = dict.fromkeys(entry.catalog for entry in found)
+    lines = [
+        f"{catalog_id(path)}:{NAME}/{path}:{NAME}-{path.replace('/', '-')}\n" for path in paths
+    ]
+    return "VERSION 1\n\n" + "".join(lines)
+
+
+def stamp():
+    """What a library that this extension makes says of itself."""
+    return {"generator": pack.manifest()["generator"], "hash": pack.manifest()["hash"]}
+
+
+def folder():
+    """Where this extension's library is, which may not be made yet; uninstalling takes it away."""
+    package = __package__.rpartition(".")[0]
+    return Path(bpy.utils.extension_path_user(package)) / "library"
+
+
+def registered():
+    """The library among those of the preferences, or None."""
+    for library in bpy.context.preferences.filepaths.asset_libraries:
+        path = Path(bpy.path.abspath(library.path))
+        if path == folder() or (path / STAMP).is_file():
+            return library
+    return None
+
+
+def is_current():
+    """Whether the library of the preferences is of this extension."""
+    library = registered()
+    if library is None:
+        return False
+    try:
+        text = (Path(bpy.path.abspath(library.path)) / STAMP).read_text(encoding="utf-8")
+        return json.loads(text) == stamp()
+    except (OSError, ValueError):
+        return False
+
+
+def _program():
+    """Blender's own, or "" where Blender is a Python module."""
+    return bpy.app.binary_path
+
+
+def _command(target):
+    build = str(_HERE / "build.py")
+    if not _program():
+        return [sys.executable, build, "--", target]
+    options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", build]
+    return [_program(), *options, "--", target]
+
+
+class Making(Job):
+    """Makes the library and names it in the preferences; the result is how many materials it has.
+
+    Until the last step nothing is changed. Steps raise LibraryError.
+    """
+
+    #: Seconds that step() waits for the other Blender.
+    PATIENCE = 0.05
+
+    def __init__(self):
+        self._count = len(entries())
+        self._folder = tempfile.TemporaryDirectory(prefix="brdfc-library-")
+        scratch = Path(self._folder.name)
+        self._made, self._log = scratch / "library", scratch / "log.txt"
+        self._made.mkdir()
+        command = _command(str(self._made))
+        try:
+            with self._log.open("wb") as log:
+                self._process = subprocess.Popen(
+                    command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
+                )
+        except OSError as failed:
+            self._folder.cleanup()
+            raise LibraryError(
+                say("The library of materials could not be made", f"{command[0]}: {failed}")
+            ) from failed
+
+    def step(self):
+        if self.result is not None:
+            return None
+        try:
+            status = self._process.wait(self.PATIENCE)
+        except subprocess.TimeoutExpired:
+            said = self._log.read_text(encoding="utf-8", errors="replace")
+            return min(len(re.findall(r"^brdfc: made ", said, re.M)) / self._count, 0.99)
+        if status != 0 or not (self._made / STAMP).is_file():
+            said = self._log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+            self.cancel()
+            more = (said or [f"status {status}"])[-1]
+            raise LibraryError(say("The library of materials could not be made", more))
+        try:
+            _replace(self._made)
+        except OSError as failed:
+            raise LibraryError(
+                say("The library of materials could not be put into place", str(failed))
+            ) from failed
+        finally:
+            self._folder.cleanup()
+        _name_it()
+        self.result = self._count
+        return None
+
+    def cancel(self):
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        if self.result is None:
+            self._folder.cleanup()
+
+
+def _replace(made):
+    target = folder()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        shutil.rmtree(target)
+    shutil.move(made, target)
+
+
+def _name_it():
+    library = registered()
+    if library is None:
+        libraries = bpy.context.preferences.filepaths.asset_libraries
+        library = libraries.new(name=NAME, directory=str(folder()))
+        _append_from(library)
+    library.path = str(folder())
+    _changed()
+
+
+def _append_from(library):
+    """Has Blender append what is dragged, for a linked material's list of lamps can't be kept; and
+    where it can, as it could before 5.0, not append again what it has appended."""
+    for method in ("APPEND", "APPEND_REUSE"):
+        with contextlib.suppress(TypeError):  # the choices hang on more than the version
+            library.import_method = method
+
+
+def remove():
+    """Takes the library out of the preferences, and its folder away; what was dragged into files
+    stays. Returns whether there was one."""
+    library = registered()
+    if library is not None:
+        bpy.context.preferences.filepaths.asset_libraries.remove(library)
+        _changed()
+    shutil.rmtree(folder(), ignore_errors=True)
+    return library is not None
+
+
+def _changed():
+    bpy.context.preferences.is_dirty = True
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.ui_type == "ASSETS":
+                with bpy.context.temp_override(window=window, area=area):
+                    if bpy.ops.asset.library_refresh.poll():
+                        bpy.ops.asset.library_refresh()
