@@ -75,7 +75,7 @@ class ProgressLine {
 
 void add_render_command(CLI::App& app) {
   struct Options {
-    std::string scene, out, preview, view = "Standard", strategy = "mis";
+    std::string scene, out, preview, view = "Standard", strategy, pattern, from = "camera";
     int spp = 0, seed = -1, threads = 0, width = 0, height = 0;
     double max_seconds = 0, scale = 1, exposure = 0;
   };
@@ -96,8 +96,18 @@ void add_render_command(CLI::App& app) {
       ->check(CLI::Range(0.001, 64.0))
       ->excludes(width)
       ->excludes(height);
-  command->add_option("--strategy", options->strategy, "Sample both ways (mis), or the BRDF or the lights alone")
-      ->check(CLI::IsMember({"mis", "brdf", "light"}))
+  command
+      ->add_option("--strategy", options->strategy,
+                   "Sample both ways (mis), or the BRDF or the lights alone (default: the scene's)")
+      ->check(CLI::IsMember(reference::strategy_names()));
+  command->add_option("--pattern", options->pattern, "Sampling pattern of a pixel (default: the scene's)")
+      ->check(CLI::IsMember(reference::pattern_names()));
+  command
+      ->add_option(
+          "--from", options->from,
+          "Follow light from the camera, or from the lamps; lamps-swapped: as a program does that trusts models\n"
+          "to be reciprocal, which shows those that are not")
+      ->check(CLI::IsMember({"camera", "lamps", "lamps-swapped"}))
       ->capture_default_str();
   command->add_option("--preview", options->preview, "Write a PNG as well, as a display shows it");
   command
@@ -128,9 +138,19 @@ void add_render_command(CLI::App& app) {
     r.settings.height = options->height ? options->height : scaled(scene.settings.height);
     r.threads = options->threads;
     r.max_seconds = options->max_seconds;
-    r.strategy = options->strategy == "brdf"    ? reference::Strategy::Brdf
-                 : options->strategy == "light" ? reference::Strategy::Light
-                                                : reference::Strategy::Mis;
+    if (!options->strategy.empty()) r.settings.strategy = reference::strategy_named(options->strategy);
+    if (!options->pattern.empty()) r.settings.pattern = reference::pattern_named(options->pattern);
+    r.origin = options->from == "camera"  ? reference::Origin::Camera
+               : options->from == "lamps" ? reference::Origin::Lamps
+                                          : reference::Origin::LampsSwapped;
+    if (r.origin != reference::Origin::Camera) {
+      if (r.settings.pattern != reference::Pattern::Random)
+        input_error("--from {}: expected the pattern random, not {}", options->from,
+                    reference::pattern_names()[std::size_t(r.settings.pattern)]);
+      if (r.settings.strategy != reference::Strategy::Mis)
+        input_error("--from {}: expected the strategy mis, not {}", options->from,
+                    reference::strategy_names()[std::size_t(r.settings.strategy)]);
+    }
     ProgressLine line(scene.name);
     r.progress = [&](const reference::Progress& p) { line.show(p); };
     reference::RenderResult result;
@@ -140,7 +160,9 @@ void add_render_command(CLI::App& app) {
       result = reference::render(scene, r);
     }
     line.close();
-    result.rendering.metadata["strategy"] = options->strategy;
+    result.rendering.metadata["strategy"] = reference::strategy_names()[std::size_t(r.settings.strategy)];
+    result.rendering.metadata["from"] = options->from;
+    result.rendering.metadata["pattern"] = reference::pattern_names()[std::size_t(r.settings.pattern)];
     reference::write_rendering(out, result.rendering);
     if (!options->preview.empty())
       reference::write_preview(options->preview, result.rendering.mean, options->exposure, options->view);

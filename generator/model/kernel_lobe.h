@@ -23,20 +23,6 @@
 
 namespace brdfc::inline model {
 
-/// iterate(), ended early where numbers can tell that nothing changes any more.
-template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
-  for (int i = 0; i < count; ++i) {
-    const std::array<T, N> next = step(state);
-    if (next == state) break;
-    state = next;
-  }
-  return state;
-}
-template <std::size_t N, class Step>
-std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step step) {
-  return iterate(count, state, step);
-}
-
 /// Knots 0, 1, 2, ... of a curve: what a shader has sockets for.
 template <class T, int Count> struct EvenKnots {
   static constexpr int kNewtonSteps = 20;

@@ -123,6 +123,12 @@ template <class T> struct Sample {
   T pdf;          ///< per solid angle
 };
 
+/// A BRDF and the density of sampling it, for one pair of directions.
+template <class T> struct Evaluation {
+  Rgb<T> f;
+  T pdf;
+};
+
 /// A model with its parameters bound.
 template <class T> class Brdf {
  public:
@@ -131,6 +137,8 @@ template <class T> class Brdf {
   virtual Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
   /// Density of sample() per solid angle.
   virtual T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
+  /// eval() and pdf(), which have much in common: for double faster than one after the other, with the same values.
+  virtual Evaluation<T> evaluate(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
   /// u: three numbers in [0, 1): lobe choice, and two for the direction.
   virtual Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const = 0;
   /// Weight of ideal reflection; 0 for a model without a mirror term.
@@ -149,6 +157,9 @@ template <class T> class Brdf {
   /// error is claimed: who uses them adds what they lack. Weights are not negative, nor is there a delta term among
   /// them.
   virtual ClosureSum<T> base(const Vec3<T>& wo) const = 0;
+  /// Binds a number, the first element, or a colour anew. The value is not checked; another name than that of a number
+  /// or colour does nothing.
+  virtual void assign(const std::string& name, const std::array<double, 3>& value) = 0;
 };
 
 /// A registered model.
@@ -299,6 +310,19 @@ template <class T> struct BindVisitor {
   }
 };
 
+/// Binds one number or colour.
+template <class T> struct AssignVisitor {
+  const std::string& name;
+  const std::array<double, 3>& value;
+  void operator()(T& member, const NumberSpec& s) const {
+    if (name == s.name) member = T(value[0]);
+  }
+  void operator()(Rgb<T>& member, const ColorSpec& s) const {
+    if (name == s.name) member = Rgb<T>(T(value[0]), T(value[1]), T(value[2]));
+  }
+  void operator()(Choice&, const ChoiceSpec&) const {}
+};
+
 /// Binds what is fixed to constants and the rest to inputs.
 struct RecordVisitor {
   const ParamValues& values;  // complete
@@ -369,6 +393,15 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
     else
       return T(0);
   }
+  Evaluation<T> evaluate(const Vec3<T>& wi, const Vec3<T>& wo) const override {
+    if constexpr (kScatters && std::same_as<T, double>)
+      return in_one(m_, wi, wo);
+    else
+      return {eval(wi, wo), pdf(wi, wo)};
+  }
+  void assign(const std::string& name, const std::array<double, 3>& value) override {
+    m_.parameters(AssignVisitor<T>{name, value});
+  }
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const override {
     if constexpr (kScatters)
       return m_.sample(wo, u);
@@ -421,6 +454,12 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
   }
 
  private:
+  /// All is inlined, so that the compiler sees what both compute.
+  [[gnu::flatten]] static Evaluation<double> in_one(const M<double>& m, const Vec3<double>& wi,
+                                                    const Vec3<double>& wo) {
+    return {m.eval(wi, wo), m.pdf(wi, wo)};
+  }
+
   ClosureSum<T> delta_terms(const Vec3<T>& wo) const {
     ClosureSum<T> sum;
     if constexpr (HasMirror<M<double>>) sum.emplace_back(ClosureKind::Reflection, mirror(wo));

@@ -6,6 +6,20 @@
 
 namespace brdfc::inline model {
 
+/// iterate(), ended early where numbers can tell that nothing changes any more.
+template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
+  for (int i = 0; i < count; ++i) {
+    const std::array<T, N> next = step(state);
+    if (next == state) break;
+    state = next;
+  }
+  return state;
+}
+template <std::size_t N, class Step>
+std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step step) {
+  return iterate(count, state, step);
+}
+
 /// True where both directions are above the surface; the BRDF is 0 elsewhere.
 template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
 

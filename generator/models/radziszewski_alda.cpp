@@ -254,7 +254,7 @@ template <class T> struct RadziszewskiAlda {
     // The lobe is even: solve for t in [0, pi] at the share 2 |u - 1/2|, then restore the sign.
     const T share = named("share", abs(T(2) * u - T(1)));
     const T target = named("target", share * c0 * pi<T>());
-    const std::array<T, 3> state = iterate(
+    const std::array<T, 3> state = settle(
         newton_steps<T>(), std::array<T, 3>{T(0), pi<T>(), pi<T>() / T(2) * share}, [&](const std::array<T, 3>& s) {
           const T t = s[2];
           const T C = named("C", cos(t)), S = named("S", sin(t));

@@ -329,18 +329,21 @@ void write_preview(const fs::path& path, const Image& linear, double exposure, c
 }
 
 Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical) {
-  const auto index = [](long i, int size, Wrap wrap) {
-    if (wrap == Wrap::Clamp) return int(std::clamp(i, 0L, long(size - 1)));
-    const long m = i % size;
-    return int(m < 0 ? m + size : m);
+  // Coordinates are of this or a neighbouring tile: no division.
+  const auto index = [](int i, int size, Wrap wrap) {
+    if (i < 0) return wrap == Wrap::Clamp ? 0 : size - 1;
+    if (i >= size) return wrap == Wrap::Clamp ? size - 1 : 0;
+    return i;
   };
-  const double x = (u - std::floor(u)) * image.width - 0.5;
-  const double fraction = vertical == Wrap::Repeat ? v - std::floor(v) : std::clamp(v, 0.0, 1.0);
+  const auto part = [](double z) { return z >= 0 && z < 1 ? z : z - std::floor(z); };
+  const double x = part(u) * image.width - 0.5;
+  const double fraction = vertical == Wrap::Repeat ? part(v) : std::clamp(v, 0.0, 1.0);
   const double y = (1 - fraction) * image.height - 0.5;
-  const double floor_x = std::floor(x), floor_y = std::floor(y);
-  const double s = x - floor_x, t = y - floor_y;
-  const int x0 = index(long(floor_x), image.width, horizontal), x1 = index(long(floor_x) + 1, image.width, horizontal);
-  const int y0 = index(long(floor_y), image.height, vertical), y1 = index(long(floor_y) + 1, image.height, vertical);
+  // Not below -1/2, where truncation rounds up.
+  const int column = int(x) - (x < 0), row = int(y) - (y < 0);
+  const double s = x - column, t = y - row;
+  const int x0 = index(column, image.width, horizontal), x1 = index(column + 1, image.width, horizontal);
+  const int y0 = index(row, image.height, vertical), y1 = index(row + 1, image.height, vertical);
   const double w00 = (1 - s) * (1 - t), w10 = s * (1 - t), w01 = (1 - s) * t, w11 = s * t;
   const float *p00 = image.pixel(x0, y0), *p10 = image.pixel(x1, y0), *p01 = image.pixel(x0, y1),
               *p11 = image.pixel(x1, y1);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reference/cone.h"
 #include "reference/procedural.h"
 
 namespace brdfc::reference {
@@ -12,29 +13,10 @@ namespace {
 
 using Vector = Vec3<double>;
 
-/// Two unit vectors that with n are an orthonormal basis (Duff et al., JCGT 6(1), 2017).
-void basis(const Vector& n, Vector& a, Vector& b) {
-  const double sign = std::copysign(1.0, n.z);
-  const double s = -1 / (sign + n.z), t = n.x * n.y * s;
-  a = {1 + sign * n.x * n.x * s, sign * t, -sign * n.x};
-  b = {t, sign + n.y * n.y * s, -n.y};
-}
-
-/// Uniform in the cone about n; 1 - cos of its half angle is given, since it may be tiny.
-Vector sample_cone(const Vector& n, double one_minus_cos, double u1, double u2) {
-  const double h = u1 * one_minus_cos;  // 1 - cos(theta)
-  const double sin_theta = sqrt(std::max(h * (2 - h), 0.0)), phi = 2 * kPi * u2;
-  Vector a, b;
-  basis(n, a, b);
-  return normalize(a * (sin_theta * cos(phi)) + b * (sin_theta * sin(phi)) + n * (1 - h));
-}
-
-double one_minus_cos_from_sin2(double sin2) { return sin2 / (1 + sqrt(std::max(1 - sin2, 0.0))); }
-
 }  // namespace
 
-EnvironmentSampler::EnvironmentSampler(const Environment& environment) {
-  const Image& image = *environment.image;
+EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(*environment.image) {
+  const Image& image = image_;
   width_ = image.width;
   height_ = image.height;
   const std::size_t cells = std::size_t(width_) * height_;
@@ -59,16 +41,15 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) {
   mean_ = total * environment.strength / (4 * kPi);
   if (!(total > 0)) return;
 
-  density_.resize(cells);
+  cells_.resize(cells);
   for (int y = 0; y < height_; ++y) {
     const double solid_angle = ((y == 0 ? 1.0 : z_[y - 1]) - z_[y]) * 2 * kPi / width_;
     for (int x = 0; x < width_; ++x) {
       const std::size_t i = std::size_t(y) * width_ + x;
-      density_[i] = weight[i] / total / solid_angle;
+      cells_[i].density = weight[i] / total / solid_angle;
     }
   }
   // Vose's alias table: a cell in constant time.
-  alias_.resize(cells);
   std::vector<int> small, large;
   for (std::size_t i = 0; i < cells; ++i) {
     weight[i] *= double(cells) / total;
@@ -77,7 +58,8 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) {
   while (!small.empty() && !large.empty()) {
     const int s = small.back(), l = large.back();
     small.pop_back();
-    alias_[s] = {weight[s], l};
+    cells_[s].keep = weight[s];
+    cells_[s].other = l;
     weight[l] -= 1 - weight[s];
     if (weight[l] < 1) {
       large.pop_back();
@@ -85,29 +67,32 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) {
     }
   }
   for (const auto& rest : {small, large})
-    for (const int i : rest) alias_[i] = {1.0, i};
+    for (const int i : rest) cells_[i].keep = 1;
 }
 
-Vec3<double> EnvironmentSampler::sample(double u1, double u2, double u3, double& pdf) const {
-  pdf = 0;
-  if (density_.empty()) return {0, 0, 1};
-  const double scaled = u1 * double(alias_.size());
-  const std::size_t slot = std::min(std::size_t(scaled), alias_.size() - 1);
-  const std::size_t cell = scaled - double(slot) < alias_[slot].keep ? slot : std::size_t(alias_[slot].other);
-  const int x = int(cell % width_), y = int(cell / width_);
+Vec3<double> EnvironmentSampler::sample(double u1, double u2, double u3, double& pdf, double& u, double& v) const {
+  pdf = u = v = 0;
+  if (cells_.empty()) return {0, 0, 1};
+  const double scaled = u1 * double(cells_.size());
+  const std::size_t slot = std::min(std::size_t(scaled), cells_.size() - 1);
+  const unsigned cell = unsigned(scaled - double(slot) < cells_[slot].keep ? slot : std::size_t(cells_[slot].other));
+  const int x = int(cell % unsigned(width_)), y = int(cell / unsigned(width_));
+  // The colour there is asked for next: its memory is fetched while the direction is computed.
+  __builtin_prefetch(image_.pixel(x, y));
+  __builtin_prefetch(image_.pixel(x, std::min(y + 1, height_ - 1)));
   const double top = y == 0 ? 1.0 : z_[y - 1];
   const double z = top + (z_[y] - top) * u3;
-  const double phi = kPi * (1 - 2 * (x + u2) / width_), s = sqrt(std::max(1 - z * z, 0.0));
-  pdf = density_[cell];
+  u = (x + u2) / width_;
+  v = asin(z) / kPi + 0.5;
+  const double phi = kPi * (1 - 2 * u), s = sqrt(std::max(1 - z * z, 0.0));
+  pdf = cells_[cell].density;
   return {s * cos(phi), s * sin(phi), z};
 }
 
-double EnvironmentSampler::pdf(const Vec3<double>& direction) const {
-  if (density_.empty()) return 0;
-  double u, v;
-  direction_to_equirectangular(direction, u, v);
+double EnvironmentSampler::pdf(double u, double v) const {
+  if (cells_.empty()) return 0;
   const int x = std::clamp(int(u * width_), 0, width_ - 1), y = std::clamp(int((1 - v) * height_), 0, height_ - 1);
-  return density_[std::size_t(y) * width_ + x];
+  return cells_[std::size_t(y) * width_ + x].density;
 }
 
 Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_(scene.lights.size()) {
@@ -137,9 +122,16 @@ Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_
   if (sampled_environment_) ++count_;
 }
 
-double Lights::environment_pdf(const Vector& direction, const Vector& normal) const {
-  if (image_) return image_->pdf(direction);
-  return dot(direction, normal) > 0 ? 1 / (2 * kPi) : 0.0;
+Rgb<double> Lights::environment(const Vector& direction, const Vector& normal, double* pdf) const {
+  const Environment& e = scene_.environment;
+  if (!e.image) {
+    if (pdf) *pdf = dot(direction, normal) > 0 ? 1 / (2 * kPi) : 0.0;
+    return e.color;
+  }
+  double u, v;
+  direction_to_equirectangular(direction, u, v);
+  if (pdf) *pdf = image_->pdf(u, v);
+  return e.radiance(u, v);
 }
 
 double Lights::weight(std::size_t i, const Vector& p, const Vector& normal) const {
@@ -164,7 +156,10 @@ bool Lights::chances(const Vector& p, const Vector& normal, std::vector<double>&
   for (std::size_t i = 0; i < scene_.lights.size(); ++i) sum += chance[i] = weight(i, p, normal);
   if (sampled_environment_) sum += chance.back() = environment_weight_;
   if (!(sum > 0)) return false;
-  for (double& c : chance) c /= sum;
+  if (count_ == 1)
+    chance[0] = 1;
+  else
+    for (double& c : chance) c /= sum;
   return true;
 }
 
@@ -177,8 +172,9 @@ LightSample Lights::sample(const Vector& p, const Vector& normal, const std::vec
   if (i < scene_.lights.size()) {
     s = sample_light(i, p, u1, u2);
   } else if (image_) {
-    s.wi = image_->sample(u1, u2, u3, s.pdf);
-    s.radiance = scene_.environment.radiance(s.wi);
+    double u, v;
+    s.wi = image_->sample(u1, u2, u3, s.pdf, u, v);
+    s.radiance = scene_.environment.radiance(u, v);
   } else {
     s.wi = sample_cone(normal, 1, u1, u2);
     s.pdf = 1 / (2 * kPi);

@@ -25,21 +25,25 @@ struct LightSample {
 class EnvironmentSampler {
  public:
   explicit EnvironmentSampler(const Environment& environment);
-  /// pdf per solid angle; 0 if the image is black.
-  Vec3<double> sample(double u1, double u2, double u3, double& pdf) const;
-  double pdf(const Vec3<double>& direction) const;
+  /// A direction, its density per solid angle, 0 if the image is black, and its place in the image, as
+  /// direction_to_equirectangular() gives it.
+  Vec3<double> sample(double u1, double u2, double u3, double& pdf, double& u, double& v) const;
+  /// Density of the direction at that place.
+  double pdf(double u, double v) const;
   /// Mean luminance over all directions.
   double mean() const { return mean_; }
 
  private:
-  struct Alias {
-    double keep = 1;
-    int other = 0;
+  /// What is read together lies together: images are larger than caches.
+  struct Cell {
+    double density = 0;  // per solid angle
+    double keep = 1;     // chance to stay, of Vose's alias table
+    int other = 0;       // cell to go to otherwise
   };
+  const Image& image_;
   int width_, height_;
-  std::vector<Alias> alias_;
-  std::vector<double> density_;  // per solid angle
-  std::vector<double> z_;        // sine of latitude at the lower edge of each row, row 0 on top
+  std::vector<Cell> cells_;  // empty if the image is black
+  std::vector<double> z_;    // sine of latitude at the lower edge of each row, row 0 on top
   double mean_ = 0;
 };
 
@@ -71,11 +75,9 @@ class Lights {
       if (pdf > 0) found(light.radiance, chance ? pdf * (*chance)[i] : 0.0);
     }
     if (distance == kInfinity) {
-      const Rgb<double> radiance = scene_.environment.radiance(direction);
-      if (max_component(radiance) > 0)
-        found(radiance, chance && sampled_environment_
-                            ? environment_pdf(direction, normal) * (*chance)[scene_.lights.size()]
-                            : 0.0);
+      double pdf = 0;
+      const Rgb<double> radiance = environment(direction, normal, chance && sampled_environment_ ? &pdf : nullptr);
+      if (max_component(radiance) > 0) found(radiance, pdf > 0 ? pdf * (*chance)[scene_.lights.size()] : 0.0);
     }
   }
 
@@ -90,7 +92,8 @@ class Lights {
   };
 
   double weight(std::size_t i, const Vec3<double>& p, const Vec3<double>& normal) const;
-  double environment_pdf(const Vec3<double>& direction, const Vec3<double>& normal) const;
+  /// Radiance from the environment, and where asked for the density of sampling that direction.
+  Rgb<double> environment(const Vec3<double>& direction, const Vec3<double>& normal, double* pdf) const;
   LightSample sample_light(std::size_t i, const Vec3<double>& p, double u1, double u2) const;
   /// Density of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
   double pdf_of_hit(std::size_t i, const Vec3<double>& p, const Vec3<double>& direction, double distance) const;

@@ -23,6 +23,13 @@ class Random {
     return {a, b, uniform()};
   }
 
+  /// SplitMix64's finaliser: a bijection.
+  static std::uint64_t mix(std::uint64_t z) {
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebULL;
+    return z ^ z >> 31;
+  }
+
  private:
   static std::uint64_t rotate(std::uint64_t x, int k) { return x << k | x >> (64 - k); }
 
@@ -36,13 +43,6 @@ class Random {
     state_[2] ^= t;
     state_[3] = rotate(state_[3], 45);
     return result;
-  }
-
-  /// SplitMix64's finaliser: a bijection.
-  static std::uint64_t mix(std::uint64_t z) {
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebULL;
-    return z ^ z >> 31;
   }
 
   std::uint64_t state_[4];

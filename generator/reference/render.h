@@ -10,17 +10,18 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 
 #include "reference/image.h"
 #include "reference/scene.h"
 
 namespace brdfc::reference {
 
-/// Which samples are taken of light that does not come from a mirror; all give the same mean.
-enum class Strategy {
-  Mis,    ///< both, weighted by the power heuristic
-  Brdf,   ///< the BRDF's directions alone (and lamps that no ray can meet)
-  Light,  ///< the lights' directions alone
+/// Where paths begin; all give the same mean, but for LampsSwapped.
+enum class Origin {
+  Camera,
+  Lamps,         ///< see light_tracer.h
+  LampsSwapped,  ///< as Lamps, with the roles of the BRDF's directions swapped: wrong unless it is reciprocal
 };
 
 struct Progress {
@@ -32,7 +33,8 @@ struct Progress {
 
 struct RenderOptions {
   RenderSettings settings;
-  Strategy strategy = Strategy::Mis;
+  std::optional<Strategy> strategy;  ///< in place of the settings'
+  Origin origin = Origin::Camera;
   int threads = 0;                                ///< 0: all cores
   double max_seconds = 0;                         ///< 0: no limit; else stops early, after at least one sample a pixel
   const std::atomic<bool>* cancel = nullptr;      ///< set from anywhere: stop soon and keep what is done

@@ -103,6 +103,10 @@ class Loader {
     scene_.resolved["settings"] = {
         {"width", s.width}, {"height", s.height},           {"spp", s.spp},
         {"seed", s.seed},   {"max_bounces", s.max_bounces}, {"scale_radiance", s.scale_radiance}};
+    // Blender has its own ways.
+    if (s.pattern != Pattern::Random) scene_.resolved["settings"]["pattern"] = pattern_names()[std::size_t(s.pattern)];
+    if (s.strategy != Strategy::Mis)
+      scene_.resolved["settings"]["strategy"] = strategy_names()[std::size_t(s.strategy)];
     return std::move(scene_);
   }
 
@@ -123,7 +127,7 @@ class Loader {
   }
 
   void read_settings(const JsonView& j) {
-    j.only({"width", "height", "spp", "seed", "max_bounces", "scale_radiance"});
+    j.only({"width", "height", "spp", "seed", "max_bounces", "scale_radiance", "pattern", "strategy"});
     RenderSettings& s = scene_.settings;
     if (const auto v = j.find("width")) s.width = v->integer(1, 16384);
     if (const auto v = j.find("height")) s.height = v->integer(1, 16384);
@@ -131,6 +135,8 @@ class Loader {
     if (const auto v = j.find("seed")) s.seed = v->integer(0, 2147483647);
     if (const auto v = j.find("max_bounces")) s.max_bounces = v->integer(0, 1024);
     if (const auto v = j.find("scale_radiance")) s.scale_radiance = v->boolean();
+    if (const auto v = j.find("strategy")) s.strategy = strategy_named(v->choice(strategy_names()));
+    if (const auto v = j.find("pattern")) s.pattern = pattern_named(v->choice(pattern_names()));
   }
 
   void read_camera(const JsonView& j) {
@@ -519,7 +525,16 @@ Rgb<double> Environment::radiance(const Vec3<double>& direction) const {
   if (!image) return color;
   double u, v;
   direction_to_equirectangular(direction, u, v);
-  return bilinear(*image, u, v, Wrap::Repeat, Wrap::Clamp) * strength;
+  return radiance(u, v);
+}
+
+const std::vector<std::string>& strategy_names() {
+  static const std::vector<std::string> names{"mis", "brdf", "light"};
+  return names;
+}
+
+Strategy strategy_named(const std::string& name) {
+  return Strategy(std::ranges::find(strategy_names(), name) - strategy_names().begin());
 }
 
 Scene load_scene(const fs::path& path) { return Loader(path).load(); }

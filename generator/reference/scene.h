@@ -21,8 +21,21 @@
 #include "model/model.h"
 #include "reference/image.h"
 #include "reference/mesh.h"
+#include "reference/patterns.h"
 
 namespace brdfc::reference {
+
+/// Which samples are taken of light that does not come from a mirror; all give the same mean.
+enum class Strategy {
+  Mis,    ///< both, weighted by the power heuristic
+  Brdf,   ///< the BRDF's directions alone (and lamps that no ray can meet)
+  Light,  ///< the lights' directions alone
+};
+
+/// As scene files and the command line spell them, in the order of Strategy.
+const std::vector<std::string>& strategy_names();
+/// The strategy of one of them.
+Strategy strategy_named(const std::string& name);
 
 struct RenderSettings {
   int width = 256, height = 256;
@@ -32,6 +45,9 @@ struct RenderSettings {
   int max_bounces = 8;
   /// Radiance changes with the squared index where it is refracted, as in nature; Cycles leaves it as it is.
   bool scale_radiance = false;
+  /// Of the samples of a pixel; the variance layer then states more noise than there is.
+  Pattern pattern = Pattern::Random;
+  Strategy strategy = Strategy::Mis;  ///< of paths from the camera
 };
 
 struct Camera {
@@ -87,6 +103,10 @@ struct Environment {
   double strength = 1;                 ///< factor on the image
 
   Rgb<double> radiance(const Vec3<double>& direction) const;
+  /// At a place of the image, as direction_to_equirectangular() gives it.
+  Rgb<double> radiance(double u, double v) const {
+    return bilinear(*image, u, v, Wrap::Repeat, Wrap::Clamp) * strength;
+  }
 };
 
 struct Scene {

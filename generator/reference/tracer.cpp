@@ -124,18 +124,19 @@ bool Tracer::intersect(const Vector& p, const Vector& direction, bool from_camer
   return true;
 }
 
+Sphere Tracer::bounds() const {
+  RTCBounds b;
+  rtcGetSceneBounds(camera_scene_, &b);
+  const Vector low{b.lower_x, b.lower_y, b.lower_z}, high{b.upper_x, b.upper_y, b.upper_z};
+  return {(low + high) * 0.5, length(high - low) * (0.5 * (1 + 1e-6))};
+}
+
 bool Tracer::occluded(const Vector& p, const Vector& direction, double distance) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRay ray = make_ray(p, direction, distance);
   rtcOccluded1(scene_, &context, &ray);
   return ray.tfar < 0;
-}
-
-Vec3<double> Tracer::leave(const Vector& p, const Vector& geometric, const Vector& direction) {
-  // Eight units in the last place of the largest coordinate cover the rounding of the corners and of the origin.
-  const double step = std::max({abs(p.x), abs(p.y), abs(p.z), 1e-3}) * 0x1p-20;
-  return p + geometric * (dot(geometric, direction) > 0 ? step : -step);
 }
 
 }  // namespace brdfc::reference

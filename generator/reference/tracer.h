@@ -4,10 +4,17 @@
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
+
 #include "reference/lights.h"
 #include "reference/scene.h"
 
 namespace brdfc::reference {
+
+struct Sphere {
+  Vec3<double> centre;
+  double radius = 0;
+};
 
 /// A point on a surface as seen along a ray. Unit vectors, both normals on the viewer's side.
 struct Hit {
@@ -30,8 +37,14 @@ class Tracer {
   bool intersect(const Vec3<double>& p, const Vec3<double>& direction, bool from_camera, Hit& hit) const;
   /// Is anything nearer than `distance`?
   bool occluded(const Vec3<double>& p, const Vec3<double>& direction, double distance) const;
+  /// A sphere that holds all triangles.
+  Sphere bounds() const;
   /// `p` moved off its surface by a few units in the last place of float, to the side of `direction`.
-  static Vec3<double> leave(const Vec3<double>& p, const Vec3<double>& geometric, const Vec3<double>& direction);
+  static Vec3<double> leave(const Vec3<double>& p, const Vec3<double>& geometric, const Vec3<double>& direction) {
+    // Eight units in the last place of the largest coordinate cover the rounding of the corners and of the origin.
+    const double step = std::max({abs(p.x), abs(p.y), abs(p.z), 1e-3}) * 0x1p-20;
+    return p + geometric * (dot(geometric, direction) > 0 ? step : -step);
+  }
 
  private:
   struct Part {

@@ -241,15 +241,20 @@ TEST(Reference, EnvironmentDensityIsNormalised) {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < 2 * n; ++i) {
       const double z = (j + 0.5) / n * 2 - 1, phi = 2 * kPi * (i + 0.5) / (2 * n), r = std::sqrt(1 - z * z);
-      sum += sampler.pdf({r * std::cos(phi), r * std::sin(phi), z}) * 4 * kPi / (2.0 * n * n);
+      double u, v;
+      direction_to_equirectangular({r * std::cos(phi), r * std::sin(phi), z}, u, v);
+      sum += sampler.pdf(u, v) * 4 * kPi / (2.0 * n * n);
     }
   EXPECT_NEAR(sum, 1, 2e-3);
   for (int i = 0; i < 1000; ++i) {
-    double pdf;
+    double pdf, u, v, found_u, found_v;
     const double t = (i + 0.5) / 1000;
-    const Vec3<double> w = sampler.sample(t, std::fmod(t * 37, 1), std::fmod(t * 91, 1), pdf);
+    const Vec3<double> w = sampler.sample(t, std::fmod(t * 37, 1), std::fmod(t * 91, 1), pdf, u, v);
     EXPECT_NEAR(dot(w, w), 1, 1e-12);
-    EXPECT_NEAR(sampler.pdf(w), pdf, 1e-9 * pdf);
+    direction_to_equirectangular(w, found_u, found_v);
+    EXPECT_NEAR(found_u, u, 1e-12);
+    EXPECT_NEAR(found_v, v, 1e-8);
+    EXPECT_NEAR(sampler.pdf(found_u, found_v), pdf, 1e-9 * pdf);
   }
 }
 

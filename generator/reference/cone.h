@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Directions in a cone about an axis.
+#pragma once
+
+#include <algorithm>
+
+#include "core/vec.h"
+
+namespace brdfc::reference {
+
+/// Two unit vectors that with n are an orthonormal basis (Duff et al., JCGT 6(1), 2017).
+inline void basis(const Vec3<double>& n, Vec3<double>& a, Vec3<double>& b) {
+  const double sign = std::copysign(1.0, n.z);
+  const double s = -1 / (sign + n.z), t = n.x * n.y * s;
+  a = {1 + sign * n.x * n.x * s, sign * t, -sign * n.x};
+  b = {t, sign + n.y * n.y * s, -n.y};
+}
+
+/// Uniform in the cone about n, for numbers in [0, 1); 1 - cos of its half angle is given, since it may be tiny. 2 is
+/// the whole sphere.
+inline Vec3<double> sample_cone(const Vec3<double>& n, double one_minus_cos, double u1, double u2) {
+  const double h = u1 * one_minus_cos;  // 1 - cos(theta)
+  const double sin_theta = sqrt(std::max(h * (2 - h), 0.0)), phi = 2 * kPi * u2;
+  Vec3<double> a, b;
+  basis(n, a, b);
+  return normalize(a * (sin_theta * cos(phi)) + b * (sin_theta * sin(phi)) + n * (1 - h));
+}
+
+/// 1 - cos of the angle whose squared sine that is.
+inline double one_minus_cos_from_sin2(double sin2) { return sin2 / (1 + sqrt(std::max(1 - sin2, 0.0))); }
+
+}  // namespace brdfc::reference

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/film.h"
+
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+namespace brdfc::reference {
+
+void camera_ray(const Camera& c, const RenderSettings& settings, double x, double y, Vec3<double>& origin,
+                Vec3<double>& direction) {
+  const double scale = 2 * c.half_height / settings.height;
+  const double right = (x - settings.width / 2.0) * scale, up = (settings.height / 2.0 - y) * scale;
+  const Vec3<double> offset = c.right * right + c.up * up;
+  origin = c.orthographic ? c.position + offset : c.position;
+  direction = c.orthographic ? c.forward : normalize(c.forward + offset);
+}
+
+void PixelMoments::write(std::size_t i, Image& mean, Image& variance) const {
+  for (std::size_t c = 0; c < 3; ++c) {
+    mean.rgb[3 * i + c] += float(channels_[c].mean);
+    if (count_ > 1) variance.rgb[3 * i + c] += float(channels_[c].m2 / (double(count_) * (count_ - 1)));
+  }
+}
+
+void in_arena(int threads, const std::function<void()>& f) {
+  // TBB allows no more threads than cores unless told to.
+  const tbb::global_control allow(
+      tbb::global_control::max_allowed_parallelism,
+      std::max(std::size_t(threads), tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+  tbb::task_arena(threads).execute(f);
+}
+
+nlohmann::json render_metadata(const Scene& scene, const RenderSettings& settings, int least, int most, int threads,
+                               double seconds) {
+  return {{"scene", scene.name}, {"scene_hash", scene.hash}, {"seed", settings.seed},
+          {"samples", least},    {"samples_max", most},      {"max_bounces", settings.max_bounces},
+          {"threads", threads},  {"seconds", seconds},       {"version", BRDFC_VERSION}};
+}
+
+}  // namespace brdfc::reference

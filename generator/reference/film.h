@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What pictures have in common, whichever way light was followed: rays through pixels, sums over samples, metadata.
+#pragma once
+
+#include <functional>
+
+#include "reference/image.h"
+#include "reference/scene.h"
+
+namespace brdfc::reference {
+
+/// The ray through a point of the film, in pixels from the upper left corner.
+void camera_ray(const Camera& camera, const RenderSettings& settings, double x, double y, Vec3<double>& origin,
+                Vec3<double>& direction);
+
+/// Mean and sum of squared deviations of a pixel's samples (Welford): exact for constants, stable otherwise.
+class PixelMoments {
+ public:
+  void add(const Rgb<double>& c) {
+    ++count_;
+    channels_[0].add(c.r, count_);
+    channels_[1].add(c.g, count_);
+    channels_[2].add(c.b, count_);
+  }
+  int count() const { return count_; }
+  /// Adds the mean and its variance to pixel `i`; the variance of less than two samples is left as it is.
+  void write(std::size_t i, Image& mean, Image& variance) const;
+
+ private:
+  struct Moments {
+    double mean = 0, m2 = 0;
+    void add(double x, int count) {
+      const double d = x - mean;
+      mean += d / count;
+      m2 += d * (x - mean);
+    }
+  };
+  std::array<Moments, 3> channels_;
+  int count_ = 0;
+};
+
+/// Runs f with that many threads for TBB's loops, be they more than cores.
+void in_arena(int threads, const std::function<void()>& f);
+
+/// RenderResult::rendering's.
+nlohmann::json render_metadata(const Scene& scene, const RenderSettings& settings, int least, int most, int threads,
+                               double seconds);
+
+}  // namespace brdfc::reference

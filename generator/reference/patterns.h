@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Sampling patterns: where the samples of a pixel lie in the unit square.
+//
+// K. Suffern, Ray Tracing from the Ground Up, 2007, chapter 5; multi-jittered points: K. Chiu, P. Shirley, C. Wang,
+// Multi-Jittered Sampling, Graphics Gems IV, 1994. The square is cut into columns x rows = count cells, columns the
+// largest divisor of count that is not above its root, so that there are as many points as cells for any count.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "reference/random.h"
+
+namespace brdfc::reference {
+
+enum class Pattern {
+  Random,         ///< independent points
+  Regular,        ///< the middles of the cells
+  Jittered,       ///< one anywhere in each cell
+  MultiJittered,  ///< one in each cell, and also one in each of `count` columns and of `count` rows
+  Hammersley,     ///< (i / count, radical inverse of i); the same points everywhere
+};
+
+/// As scene files and the command line spell them, in the order of Pattern.
+const std::vector<std::string>& pattern_names();
+/// The pattern of one of pattern_names(); for another name throws std::out_of_range.
+Pattern pattern_named(const std::string& name);
+
+/// Van der Corput's sequence: the binary digits of i mirrored at the point, in [0, 1).
+double radical_inverse(std::uint32_t i);
+
+/// Place of i in a permutation of 0 .. n - 1 that depends on the key. 0 <= i < n.
+std::uint32_t permuted(std::uint32_t i, std::uint32_t n, std::uint64_t key);
+
+/// The points of a pattern.
+class PatternPoints {
+ public:
+  /// count > 0
+  PatternPoints(Pattern pattern, int count);
+
+  Pattern pattern() const { return pattern_; }
+  int count() const { return int(count_); }
+  int columns() const { return int(columns_); }
+  int rows() const { return int(rows_); }
+  /// Point `index` of count(), in [0, 1)^2. The key chooses one pattern of the kind; Regular and Hammersley have but
+  /// one.
+  std::array<double, 2> point(int index, std::uint64_t key) const;
+
+ private:
+  Pattern pattern_;
+  std::uint32_t count_, columns_, rows_;
+};
+
+/// The random numbers of one path. Under Pattern::Random they are those of Random, one after the other. Otherwise the
+/// samples of a pixel share a pattern for each dimension, in an order of its own, so that the dimensions know nothing
+/// of each other.
+class PathSampler {
+ public:
+  /// Sample `sample` of points.count() of a pixel; later ones are random.
+  PathSampler(const PatternPoints& points, std::uint64_t seed, std::uint64_t pixel, int sample)
+      : points_(points),
+        random_(seed, pixel, std::uint64_t(sample)),
+        sample_(sample),
+        in_pattern_(points.pattern() != Pattern::Random && sample < points.count()) {
+    if (in_pattern_) key_ = random_key(seed, pixel);
+  }
+
+  /// Of no pattern.
+  double uniform() { return random_.uniform(); }
+  /// One or two numbers of a dimension, which must be another at each call.
+  double one(std::uint64_t dimension) { return in_pattern_ ? point(dimension)[0] : uniform(); }
+  std::array<double, 2> two(std::uint64_t dimension) {
+    if (in_pattern_) return point(dimension);
+    const double first = uniform();
+    return {first, uniform()};
+  }
+
+ private:
+  static std::uint64_t random_key(std::uint64_t seed, std::uint64_t pixel);
+  std::array<double, 2> point(std::uint64_t dimension) const;
+
+  const PatternPoints& points_;
+  Random random_;
+  const int sample_;
+  const bool in_pattern_;
+  std::uint64_t key_ = 0;
+};
+
+}  // namespace brdfc::reference

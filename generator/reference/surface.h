@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Materials as tracers evaluate them.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "model/model.h"
+#include "model/sampling.h"
+#include "reference/lights.h"
+#include "reference/random.h"
+#include "reference/scene.h"
+
+namespace brdfc::reference {
+
+inline constexpr int kRouletteStart = 3;  ///< scatterings before a path may be ended by chance
+
+/// A material ready to be evaluated, with what is known about it beforehand.
+class Surface {
+ public:
+  explicit Surface(const Material& material)
+      : material_(material),
+        brdf_(material.model->make_double(material.values)),
+        has_scatter_(material.model->has_scatter()),
+        has_mirror_(material.model->has_mirror()),
+        has_transmit_(material.model->has_transmit()),
+        has_medium_(material.model->has_medium()),
+        through_(brdf_->scatters_through()) {
+    if (!has_scatter_ || !(has_mirror_ || has_transmit_)) return;  // nothing to choose between
+    Random random(0, 0, 0);
+    for (int i = 0; i < kCosines; ++i) {
+      double sum = 0;
+      for (int k = 0; k < kSamples; ++k) {
+        const double z = (i + random.uniform()) / kCosines, phi = 2 * kPi * random.uniform();
+        const double s = std::sqrt(1 - z * z);
+        const Sample<double> sample = brdf_->sample({s * std::cos(phi), s * std::sin(phi), z}, random.uniform3());
+        sum += luminance(sample.weight);
+      }
+      albedo_[i] = sum / kSamples;
+    }
+  }
+
+  bool has_scatter() const { return has_scatter_; }
+  bool has_mirror() const { return has_mirror_; }
+  bool has_transmit() const { return has_transmit_; }
+  bool has_medium() const { return has_medium_; }
+  bool scatters_through() const { return through_; }
+
+  /// Chance to follow one of the delta terms, whose weights add up to `delta`, rather than to sample the rest. Any
+  /// number strictly between 0 and 1 is unbiased where both exist; the estimate of the rest's albedo only keeps the
+  /// weights even.
+  double delta_chance(const Rgb<double>& delta, double cosine) const {
+    const double m = luminance(delta);
+    if (!has_scatter_) return 1;
+    if (!(m > 0)) return 0;
+    const double rest = albedo_[std::min(int(std::abs(cosine) * kCosines), kCosines - 1)];
+    return std::min(std::max(m / (m + rest), 0.05), 0.95);
+  }
+
+  /// A BRDF to bind anew at each place, for a thread; nullptr if it is the same everywhere.
+  std::unique_ptr<Brdf<double>> make_scratch() const {
+    return material_.textures.empty() ? nullptr : material_.model->make_double(material_.values);
+  }
+  /// The BRDF at texture coordinates, until `scratch` is bound to other ones.
+  const Brdf<double>& at(double u, double v, Brdf<double>* scratch) const {
+    if (!scratch) return *brdf_;
+    for (const auto& [name, image] : material_.textures) {
+      const Rgb<double> c = bilinear(*image, u, v, Wrap::Repeat, Wrap::Repeat);
+      scratch->assign(name, {c.r, c.g, c.b});
+    }
+    return *scratch;
+  }
+
+  [[noreturn]] void bad_value(const char* what, const Vec3<double>& wi, const Vec3<double>& wo,
+                              const Rgb<double>& value) const {
+    throw ValueError(fmt::format(
+        "{} {}: {} = ({:.9g}, {:.9g}, {:.9g}) at wi = ({:.17g}, {:.17g}, {:.17g}), wo = ({:.17g}, {:.17g}, {:.17g})",
+        material_.model->info().name, format_values(material_.model->info(), material_.values), what, value.r, value.g,
+        value.b, wi.x, wi.y, wi.z, wo.x, wo.y, wo.z));
+  }
+
+  void check(const char* what, const Vec3<double>& wi, const Vec3<double>& wo, const Rgb<double>& value) const {
+    // Written so that NaN fails.
+    const auto good = [](double x) { return x >= 0 && x < kInfinity; };
+    if (!(good(value.r) && good(value.g) && good(value.b))) bad_value(what, wi, wo, value);
+  }
+
+ private:
+  static constexpr int kCosines = 32, kSamples = 128;
+  const Material& material_;
+  std::unique_ptr<Brdf<double>> brdf_;
+  const bool has_scatter_, has_mirror_, has_transmit_, has_medium_, through_;
+  std::array<double, kCosines> albedo_{};
+};
+
+/// What a thread needs beside the surfaces, which are shared.
+class SurfaceScratch {
+ public:
+  explicit SurfaceScratch(const std::vector<Surface>& surfaces) {
+    for (const Surface& s : surfaces) brdfs_.push_back(s.make_scratch());
+  }
+  /// What Surface::at() asks for.
+  Brdf<double>* of(int material) const { return brdfs_[std::size_t(material)].get(); }
+
+ private:
+  std::vector<std::unique_ptr<Brdf<double>>> brdfs_;
+};
+
+}  // namespace brdfc::reference
