@@ -69,6 +69,31 @@ TEST(Figures, LostRaysDarkenTheRimOfASphereAndTurnedRaysDoNot) {
   EXPECT_NEAR(mean(even, inside) / mean(even, ring(middle, 1 / 2.4, 1.05, 1.15)), 0.8, 0.003);
 }
 
+/// Figure 25.13 of Suffern's book: one sample a pixel. The one Hammersley point is the middle of the lobe, whatever its
+/// width, so a matte sphere looks like a mirror; a regular point leads every pixel aside in the same way; random ones
+/// are noise.
+TEST(Figures, OneSampleAPixelMakesAMirrorOfAMatteSphere) {
+  const auto roughness = [](const Image& image) {  // mean step between neighbours on the sphere
+    double sum = 0;
+    int count = 0;
+    const auto on_sphere = ring({0, 0}, 1 / 2.4, 0, 0.8);
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 1; x < image.width; ++x)
+        if (on_sphere(place(image, x, y))) {
+          sum += std::abs(luminance(image.color(x, y)) - luminance(image.color(x - 1, y)));
+          ++count;
+        }
+    return sum / count;
+  };
+  Scene s = scene("gl-fig13-hammersley");
+  const Image matte = picture(s, 128, 1);
+  s.materials[0].values["e"] = 1e5;
+  EXPECT_THAT(picture(s, 128, 1).rgb, testing::Pointwise(testing::FloatNear(1e-4f), matte.rgb));
+  const double random = roughness(picture(scene("gl-fig13-random"), 128, 1));
+  EXPECT_GT(random, 3 * roughness(matte));
+  EXPECT_GT(random, 3 * roughness(picture(scene("gl-fig13-regular"), 128, 1)));
+}
+
 /// Radziszewski and Alda: a model that loses no light can't be told from an even world.
 TEST(Figures, ALosslessSphereVanishes) {
   const Image image = picture(scene("ra-vanish"), 96, 64);
