@@ -316,9 +316,10 @@ TWIN = "twin"
 def add_twin(material):
     """Gives a material of one model its twin for EEVEE, in an output of its own.
 
-    The outputs that there are become those for Cycles. Raises ValueError where the extension has no
-    twin of the model (`brdfc build --materials FILE --twin` makes one), the model is inside another
-    group, or the material has an output for EEVEE.
+    Values of the twin's node follow those of the model's, by drivers without Python, and links are
+    its links. The outputs that there are become those for Cycles. Raises ValueError where the model
+    has no twin for these values, the model is inside another group, or the material has an output
+    for EEVEE.
     """
     node = _the_node(material)
     tree = material.node_tree
@@ -330,11 +331,11 @@ def add_twin(material):
         raise ValueError(
             say("Material {material!r} has an output for EEVEE already", material=material.name)
         )
-    twin = nodes.add_group_node(tree, nodes.identity(node)[0], TWIN)
+    model = nodes.identity(node)[0]
+    pack.resolve(model, TWIN, nodes.all_values(node))
+    twin = nodes.add_group_node(tree, model, TWIN)
     twin.location = (node.location.x, node.location.y - 400)
-    normal = nodes.sockets(node)[pack.NORMAL]
-    if normal.is_linked:
-        tree.links.new(normal.links[0].from_socket, nodes.sockets(twin)[pack.NORMAL])
+    nodes.follow(twin, node, material)
     for output in tree.nodes:
         if output.bl_idname == "ShaderNodeOutputMaterial" and output.target == "ALL":
             output.target = "CYCLES"

@@ -366,7 +366,8 @@ def _under_eevee(found, ours, material):
         return [f for f in found if f.code != "engine"]
     model_name, _ = nodes.identity(ours[0])
     forms = pack.manifest()["models"].get(model_name, {}).get("representations", {})
-    if len(ours) > 1 or "twin" not in forms:
+    inside = ours[0].id_data != material.node_tree  # of another group, where no twin is added
+    if len(ours) > 1 or inside or "twin" not in forms:
         return found
     values = nodes.all_values(ours[0])
     if pack.refusal(model_name, "twin", values):

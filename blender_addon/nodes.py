@@ -290,19 +290,19 @@ def _start_group(group, outputs=OUTPUTS):
 
 
 def _fill_native_group(group, model_name, representation, source):
-    """A twin has the sockets of the other forms; what it looks like does not hang on a tangent.
-    What is left of its parameters are factors of all that the model scatters."""
+    """A twin has the sockets of the other forms; what it looks like does not hang on a tangent."""
     group_input, group_output = _start_group(group)
     group_input.location = (-300, 0)
-    sockets, factors = {}, []
+    sockets, outputs = {}, {}
     for name, parameter in pack.socket_parameters(model_name, representation).items():
         relay = group.nodes.new("NodeReroute")
-        relay.location = (-100, -40 * len(factors))
+        relay.location = (-100, -40 * len(outputs))
         sockets[name] = _add_parameter(group, group_input, relay.inputs[0], parameter)
-        factors.append(relay.outputs[0])
+        outputs[name] = relay.outputs[0]
     sockets |= {name: _vector_socket(group, name, text) for name, text in VECTORS.items()}
     normal = group_input.outputs[pack.NORMAL]
-    made = twin.wire(group, json.loads(source), normal, factors)
+    tables = f"{pack.model(model_name)['label']} (twin)"
+    made = twin.wire(group, json.loads(source), normal, outputs, tables)
     for name, output in zip(OUTPUTS, made, strict=True):
         group.links.new(output, group_output.inputs[name])
     group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
@@ -561,6 +561,26 @@ def get_value(node, name):
         choices = _choices(node, name)
         return choices[min(max(socket.default_value, 0), len(choices) - 1)]
     return socket.default_value
+
+
+def follow(node, leader, material):
+    """Gives the sockets of a group node the links of another one of the same model in the tree of a
+    material; where that has values, these, and drivers that keep them so."""
+    theirs = sockets(leader)
+    for name, socket in sockets(node).items():
+        if (other := theirs.get(name)) is None:
+            continue
+        if other.is_linked:
+            node.id_data.links.new(other.links[0].from_socket, socket)
+        elif socket.type in ("VALUE", "RGBA"):
+            socket.default_value = other.default_value
+            for channel in range(3) if socket.type == "RGBA" else (-1,):
+                curve = socket.driver_add("default_value", channel)
+                curve.driver.type = "AVERAGE"
+                target = curve.driver.variables.new().targets[0]
+                target.id_type, target.id = "MATERIAL", material
+                path = other.path_from_id("default_value")
+                target.data_path = f"node_tree.{path}" + (f"[{channel}]" if channel >= 0 else "")
 
 
 def _trees(tree, seen):

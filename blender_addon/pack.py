@@ -136,7 +136,9 @@ def resolve(model_name, representation, values=None):
     entry, values = model(model_name), values or {}
     name = representation
     if name == "auto":
-        others = [n for n in entry["representations"] if n != entry["auto"]]
+        forms = entry["representations"]
+        # Blender's own nodes only where they are asked for.
+        others = [n for n in forms if n != entry["auto"] and "nodes" not in forms[n]]
         fitting = [n for n in (entry["auto"], *others) if refusal(model_name, n, values) is None]
         name = fitting[0] if fitting else entry["auto"]
     if name not in entry["representations"]:

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The twin of a model: Blender's own nodes, steered by curves over the view angle.
+"""The twin of a model: Blender's own nodes, steered by tables over the view angle and a slider.
 
 Runs where Open Shading Language does not: EEVEE, any GPU, render farms. What the nodes take is in
 the extension's twins/*.json, which the tool fits; how they are wired is here.
 """
+
+import math
+
+import bpy
+import numpy as np
 
 _DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
 
@@ -59,15 +64,6 @@ class _Wiring:
         self.give(node.inputs["Value"], x)
         return node.outputs["Value"]
 
-    def colour(self, x, channels, factor):
-        """One curve that multiplies a colour, or one for each of its channels."""
-        if len(channels) == 1:
-            return self.vector("SCALE", factor, scale=self.curve(x, channels[0]))
-        combined = self.node("ShaderNodeCombineXYZ")
-        for socket, heights in zip(combined.inputs, channels, strict=True):
-            self.give(socket, self.curve(x, heights))
-        return self.vector("MULTIPLY", combined.outputs["Vector"], factor)
-
     def bsdf(self, kind, color, normal, roughness=0.0):
         if kind == "diffuse":
             node = self.node("ShaderNodeBsdfDiffuse")
@@ -89,13 +85,128 @@ class _Wiring:
         return shaders[0]
 
 
-def wire(tree, data, normal, factors=()):
+class _Curves:
+    """Tables of one row over the view: a curve node each."""
+
+    def __init__(self, wiring, data, cos_theta, place, name):
+        self.wiring, self.cos_theta = wiring, cos_theta
+
+    def look_up(self, rows):
+        return self.wiring.curve(self.cos_theta, rows[0])
+
+
+class _Picture:
+    """Tables of several rows, one above the other and three beside each other as red, green and
+    blue: an image of numbers, which every engine looks up linearly between pixels."""
+
+    def __init__(self, wiring, data, cos_theta, place, name):
+        self.wiring = wiring
+        tables = list(_tables(data))
+        count, width = len(tables[0]), len(tables[0][0])
+        height = count * math.ceil(len(tables) / 3)
+        pixels = np.ones((height, width, 4), np.float32)
+        self.where, self.bands = {}, {}
+        for i, rows in enumerate(tables):
+            band, channel = divmod(i, 3)
+            pixels[band * count : (band + 1) * count, :, channel] = rows
+            self.where[id(rows)] = band, channel
+        self.image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=True)
+        self.image.use_half_precision = False
+        self.image.alpha_mode = "NONE"
+        self.image.pixels.foreach_set(pixels.ravel())
+        self.image.pack()
+        # From the middle of the first pixel to that of the last.
+        self.u = wiring.math("MULTIPLY_ADD", cos_theta, (width - 1) / width, 0.5 / width)
+        self.v = wiring.math("MULTIPLY", place, (count - 1) / height)
+        self.first, self.step = 0.5 / height, count / height
+
+    def look_up(self, rows):
+        band, channel = self.where[id(rows)]
+        if band not in self.bands:
+            w = self.wiring
+            at = w.node("ShaderNodeCombineXYZ")
+            w.give(at.inputs["X"], self.u)
+            w.give(at.inputs["Y"], w.math("ADD", self.v, self.first + band * self.step))
+            texture = w.node("ShaderNodeTexImage", interpolation="Linear", extension="EXTEND")
+            texture.image = self.image
+            w.give(texture.inputs["Vector"], at.outputs["Vector"])
+            parts = w.node("ShaderNodeSeparateColor")
+            w.give(parts.inputs["Color"], texture.outputs["Color"])
+            self.bands[band] = parts.outputs
+        return self.bands[band][channel]
+
+
+def _tables(data):
+    """All of them, each a list of rows."""
+    for closure in data["closures"]:
+        yield from (closure[key] for key in ("lean", "roughness", "spread") if key in closure)
+        for channels in closure["weight"]:
+            yield from channels
+    for channels in data["albedo"]:
+        yield from channels
+
+
+def _place(w, axis, value):
+    """Where a number lies on its slider, from 0 to 1 on the slider's scale."""
+    scale = {
+        "linear": lambda x: x,
+        "log": lambda x: w.math("LOGARITHM", x, math.e),
+        "log1p": lambda x: w.math("LOGARITHM", w.math("ADD", x, 1.0), math.e),
+    }[axis["scale"]]
+    number = {"linear": float, "log": math.log, "log1p": math.log1p}[axis["scale"]]
+    low, high = number(axis["low"]), number(axis["high"])
+    inside = w.math("MINIMUM", w.math("MAXIMUM", value, axis["low"]), axis["high"])
+    return w.math("MULTIPLY", w.math("SUBTRACT", scale(inside), low), 1 / (high - low))
+
+
+def _polynomial(w, terms, colours):
+    """A sum of [times, powers of the colours]."""
+    total = None
+    for times, powers in terms:
+        part = (abs(times),) * 3
+        for colour, power in zip(colours, powers, strict=True):
+            for _ in range(power):
+                part = w.vector("MULTIPLY", colour, part)
+        if total is None:
+            total = part if times > 0 else w.vector("SCALE", part, scale=-1.0)
+        else:
+            total = w.vector("ADD" if times > 0 else "SUBTRACT", total, part)
+    return total
+
+
+class _Looked:
+    """Colours of tables by term and channel."""
+
+    def __init__(self, wiring, tables):
+        self.wiring, self.tables = wiring, tables
+
+    def colour(self, terms, weights):
+        w, parts = self.wiring, []
+        for channels, weight in zip(terms, weights, strict=True):
+            if len(channels) == 1:
+                parts.append(w.vector("SCALE", weight, scale=self.tables.look_up(channels[0])))
+                continue
+            combined = w.node("ShaderNodeCombineXYZ")
+            for socket, rows in zip(combined.inputs, channels, strict=True):
+                w.give(socket, self.tables.look_up(rows))
+            parts.append(w.vector("MULTIPLY", combined.outputs["Vector"], weight))
+        total = parts[0]
+        for part in parts[1:]:
+            total = w.vector("ADD", total, part)
+        return total
+
+
+def wire(tree, data, normal, parameters, name):
     """Builds the nodes of a twin; returns the outputs that are its BSDF and its albedo.
 
-    `data` is what twins/*.json has; `normal` an output that is 0 where the surface's own is meant.
-    `factors`: outputs, colours of all but the mirror.
+    `data` is what twins/*.json has; `normal` an output that is 0 where the surface's own is meant;
+    `parameters`: outputs by name. Those that `data` does not name multiply all but a mirror.
+    `name`: of the image that is made where tables run over a slider.
     """
     w = _Wiring(tree)
+    axis, mixed = data["axis"], [parameters[n] for n in data["mixed"]]
+    known = [*data["mixed"], *([axis["parameter"]] if axis else [])]
+    factors = [output for n, output in parameters.items() if n not in known]
     geometry = w.node("ShaderNodeNewGeometry")
     viewer = geometry.outputs["Incoming"]
     missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
@@ -103,28 +214,33 @@ def wire(tree, data, normal, factors=()):
     normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
     cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
     across = w.vector("CROSS_PRODUCT", normal, viewer)
-    tint, half_tint = data["tint"], [t / 2 for t in data["tint"]]
+    place = _place(w, axis, parameters[axis["parameter"]]) if axis else None
+    tables = (_Picture if axis else _Curves)(w, data, cos_theta, place, name)
+    looked = _Looked(w, tables)
+    tint = tuple(data["tint"])
     for factor in factors:
         tint = w.vector("MULTIPLY", factor, tint)
-        half_tint = w.vector("MULTIPLY", factor, half_tint)
-    albedo = w.colour(cos_theta, data["albedo"], tint)
+    weights = [w.vector("MULTIPLY", tint, _polynomial(w, t, mixed)) for t in data["terms"]]
+    of_mirror = [_polynomial(w, t, mixed) for t in data["mirror_terms"]]
+    albedo = looked.colour(data["albedo"], weights)
     shaders = []
     for closure in data["closures"]:
         kind = closure["kind"]
         if kind == "mirror":
-            colour = w.colour(cos_theta, closure["weight"], (1, 1, 1))
+            colour = looked.colour(closure["weight"], of_mirror)
             albedo = w.vector("ADD", albedo, colour)
             shaders.append(w.bsdf(kind, colour, normal))
             continue
+        colour = looked.colour(closure["weight"], weights)
         if kind not in _DISTRIBUTIONS:
-            shaders.append(w.bsdf(kind, w.colour(cos_theta, closure["weight"], tint), normal))
+            shaders.append(w.bsdf(kind, colour, normal))
             continue
-        half = w.colour(cos_theta, closure["weight"], half_tint)
-        lean = w.curve(cos_theta, closure["lean"])
-        roughness = w.curve(cos_theta, closure["roughness"])
+        half = w.vector("SCALE", colour, scale=0.5)
+        lean = tables.look_up(closure["lean"])
+        roughness = tables.look_up(closure["roughness"])
         upright = w.vector("SCALE", normal, scale=w.math("SUBTRACT", 1.0, lean))
         middle = w.vector("ADD", upright, w.vector("SCALE", viewer, scale=lean))
-        aside = w.vector("SCALE", across, scale=w.curve(cos_theta, closure["spread"]))
+        aside = w.vector("SCALE", across, scale=tables.look_up(closure["spread"]))
         for operation in ("ADD", "SUBTRACT"):
             facet_normal = w.vector("NORMALIZE", w.vector(operation, middle, aside))
             shaders.append(w.bsdf(kind, half, facet_normal, roughness))

@@ -11,6 +11,7 @@
 #include "fit/terms.h"
 #include "fit/twin.h"
 #include "fit/view.h"
+#include "forms/form.h"
 #include "tables/store.h"
 
 namespace brdfc::app {
@@ -66,9 +67,9 @@ void add_fit_command(CLI::App& app) {
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
                 "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
   cmd->add_flag("--store", o->store,
-                "With --over: makes the fit anew and keeps it in data/fits, in place of what is kept of the model")
-      ->needs("--over")
-      ->excludes("--pairs", "--twin");
+                "With --over: makes the fit anew and keeps it in data/fits, in place of what is kept of the model.\n"
+                "With --twin: the same in data/twins, of the twin that the extension has")
+      ->excludes("--pairs");
   cmd->add_option(
          "--exr", o->exr,
          "Also writes the tables that the closures are looked up in as a float EXR, a row a table; what each is\n"
@@ -83,18 +84,27 @@ void add_fit_command(CLI::App& app) {
              std::ranges::any_of(o->values, [&](const std::string& value) { return value.starts_with(name + "="); });
     };
     const ParamValues asked = values;
+    if (o->store && o->twin) {
+      if (!o->values.empty() || !o->over.empty() || !o->any.empty())
+        input_error("fit: --twin --store keeps the twin that the extension has: expected no values, --over and --any");
+      values = forms::form("twin")->values(model, {});
+      if (const auto reason = fit::unfit(model, values)) input_error("{}: has no twin: {}", o->model, *reason);
+      const fit::Twin twin(model, values, fit::Twin::From::Scratch);
+      twin.store(model, values);
+      print_errors(twin.errors(), twin.axis() ? twin.axis()->parameter : "", o->model);
+      return;
+    }
+    if (o->store && o->over.empty()) input_error("fit: --store: expected --over or --twin beside it");
     if (!o->over.empty()) {
       const ParamInfo* p = model.info().param(o->over);
       if (!p || p->kind != ParamKind::Number)
         input_error("fit: --over {}: expected a parameter of {} that is a number", o->over, o->model);
-      if (o->twin) input_error("fit: a twin is for one set of parameters: --over goes without --twin");
       if (superfluous(o->over))
         input_error("fit: --over {0} runs over all values of {0}: {0}= is one too many", o->over);
       values.erase(o->over);
     }
     for (const std::string& name : o->any) {
       if (!model.info().param(name)) input_error("fit: --any {}: {} has no such parameter", name, o->model);
-      if (o->twin) input_error("fit: a twin is for one set of parameters: --any goes without --twin");
       if (superfluous(name)) input_error("fit: --any {0} is for any value of {0}: {0}= is one too many", name);
       values.erase(name);
     }
@@ -129,7 +139,8 @@ void add_fit_command(CLI::App& app) {
       print_errors(fit.errors(), o->over, label());
     } else if (o->twin) {
       const fit::Twin& twin = fit::twin_of(model, values);
-      print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo); });
+      const fit::Varied<double> varied = fit::varied_of(twin.axis(), twin.terms(), asked);
+      print(twin, [&](const Vec3<double>& wo) { return twin.closures(wo, varied); });
     } else {
       const fit::Fit& fit = fit::fit_of(model, values);
       const fit::Varied<double> varied = fit.varied(asked);

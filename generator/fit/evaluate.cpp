@@ -133,6 +133,13 @@ class TurnedFrame {
 
 }  // namespace
 
+Varied<double> varied_of(const std::optional<FitAxis>& axis, const Terms& terms, const ParamValues& values) {
+  Varied<double> out;
+  if (axis) out.number = std::get<double>(values.at(axis->parameter));
+  for (const std::string& name : terms.parameters) out.parameters[name] = as_rgb(values.at(name));
+  return out;
+}
+
 template <class T>
 ClosureSum<T> closures(const FitTables& t, const Vec3<T>& wo, const Varied<T>& varied, const T& share, bool divided) {
   if constexpr (std::is_same_v<T, double>)

@@ -22,6 +22,9 @@ template <class T> struct Varied {
   Varied(const T& n) : number(n) {}  // NOLINT: all that most fits need
 };
 
+/// From complete values. Throws std::out_of_range for a parameter that they lack.
+Varied<double> varied_of(const std::optional<FitAxis>&, const Terms&, const ParamValues&);
+
 /// The closures for a view above the surface. Their weights add up to the albedo. Those with ramps have `share` of
 /// theirs and colours that make up for it; not `divided`, the colours still have to be divided by the weight: by its
 /// largest channel, with mixed parameters by each. Of numbers, a lower view than kLowestView is taken as described

@@ -35,10 +35,7 @@ Fit::Fit(const Model& model, const ParamValues& given, From from) {
 }
 
 Varied<double> Fit::varied(const ParamValues& values) const {
-  Varied<double> out;
-  if (tables_.axis) out.number = std::get<double>(values.at(tables_.axis->parameter));
-  for (const std::string& name : tables_.terms.parameters) out.parameters[name] = as_rgb(values.at(name));
-  return out;
+  return varied_of(tables_.axis, tables_.terms, values);
 }
 
 void Fit::store(const Model& model, const ParamValues& values, const std::filesystem::path& path) const {

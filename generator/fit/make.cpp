@@ -44,15 +44,6 @@ double l1_at(const FitTables& fit, const View& view, double number) {
   return worst;
 }
 
-ViewError worse(const ViewError& a, const ViewError& b) {
-  return {a.cos_theta_o,
-          std::max(a.relative_l1, b.relative_l1),
-          std::max(a.relative_l2, b.relative_l2),
-          std::max(a.albedo, b.albedo),
-          std::max(a.negative, b.negative),
-          a.number};
-}
-
 double mean_error(const std::vector<Solution>& knots) {
   double sum = 0;
   for (const Solution& f : knots) sum += f.error;

@@ -70,4 +70,23 @@ struct ViewSettings {
 };
 inline constexpr ViewSettings kViewSettings;
 
+/// Pairs of facet lobes of a twin.
+inline constexpr std::size_t kTwinFacets = 3;
+
+/// The same of twins (twin.h), with ViewSettings.
+struct TwinSettings {
+  std::size_t code = 1;    ///< as FitSettings::code
+  std::size_t places = 17; ///< of the number that a twin runs over
+  std::size_t stride = 3;  ///< leaning and roughness are sought at every so-many-th view, weights at all
+  std::size_t few_points = 800, points = 3000;  ///< directions, about as many, for the one and the other
+  std::size_t rounds = 2;                       ///< as FitSettings::rounds
+  double last_cosine = 2e-3;  ///< the view of the first knot, which is level with the surface, is this much above it
+  double least_roughness = 0.03;
+  double some = 0.05;  ///< as FitSettings::some
+  /// How strongly a view is held to the weights of the one above it: what is as good either way would show as rings.
+  double ridge = 1e-3, slight_ridge = 1e-5;
+  std::size_t lead = 9;  ///< along the normal there is no view above: so many from below lead there
+};
+inline constexpr TwinSettings kTwinSettings;
+
 }  // namespace brdfc::fit

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/twin.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <limits>
+#include <nlohmann/json.hpp>
 
 #include "core/parallel.h"
 #include "fit/roles.h"
+#include "fit/settings.h"
+#include "fit/solution.h"
+#include "fit/twin_search.h"
 #include "measure/bound_model.h"
+#include "measure/formula.h"
+#include "tables/table_file.h"
 
 namespace brdfc::fit {
 namespace {
@@ -14,232 +21,333 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Leaning and roughness are sought at every third knot, with fewer points; weights at all.
-constexpr int kStride = 3, kFewPoints = 800, kPoints = 3000, kRounds = 2;
-/// The view of the first knot, which is level with the surface, is this much above it.
-constexpr double kLastCosine = 2e-3;
-constexpr std::size_t kFacets = 3;
-constexpr double kLeastRoughness = 0.03;
-/// How strongly a view is held to the weights of the one above it: what is as good either way would show as rings.
-constexpr double kRidge = 1e-3, kSlightRidge = 1e-5;
-
-/// Pairs of facet lobes, and where the search begins: how far each leans towards the viewer, and all to the sides.
-struct Dictionary {
-  std::array<ClosureKind, kFacets> kinds;
-  std::array<double, kFacets> lean;
-  double spread;
-};
-constexpr Dictionary kDictionaries[] = {
-    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0, 0}, 0.02},
-    {{ClosureKind::Beckmann, ClosureKind::Beckmann, ClosureKind::Ggx}, {0, 0, 0}, 0.02},
-    {{ClosureKind::Beckmann, ClosureKind::Beckmann, ClosureKind::Ggx}, {0, 0, 0}, 0.1},
-    {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0.3, 0.9}, 0.02},
-};
-
-/// Lean, roughness and spread of each pair of facet lobes, one after the other.
-using Shape = std::vector<double>;
-constexpr std::size_t kShape = 3;
-
-/// One of a pair, on the side of the plane of incidence that the sign of `spread` says.
-Closure<double> facet(ClosureKind kind, double lean, double roughness, double spread, const Vec3<double>& wo) {
-  const Vec3<double> n = {0, 0, 1};
-  Closure<double> c(kind, Rgb<double>(1.0));
-  c.normal = normalize(n * (1 - lean) + wo * lean + cross(n, wo) * spread);
-  c.turned = true;
-  c.alpha = sqr(roughness);
-  return c;
-}
-
-/// A lean below which the facets turn away from the viewer, and a little more.
-double least_lean(const Vec3<double>& wo) { return std::max(-0.9 * wo.z / std::max(1 - wo.z, 1e-3), -2.0); }
-
-/// What each closure gives at the points, the matte one last; facets of which nothing is above the surface give 0.
-MatrixXd columns(const Dictionary& dictionary, const Shape& shape, const View& view) {
-  MatrixXd a(Eigen::Index(view.points.wi.size()), Eigen::Index(kFacets + 1));
-  const Closure<double> matte(ClosureKind::Diffuse, Rgb<double>(1.0));
-  for (std::size_t j = 0; j <= kFacets; ++j) {
-    const double* s = shape.data() + kShape * j;
-    const Closure<double> left = j < kFacets ? facet(dictionary.kinds[j], s[0], s[1], s[2], view.wo) : matte,
-                          right = j < kFacets ? facet(dictionary.kinds[j], s[0], s[1], -s[2], view.wo) : matte;
-    for (std::size_t p = 0; p < view.points.wi.size(); ++p) {
-      const Vec3<double>& wi = view.points.wi[p];
-      a(Eigen::Index(p), Eigen::Index(j)) = (evaluate(left, wi, view.wo).r + evaluate(right, wi, view.wo).r) / 2;
-    }
-  }
-  return a;
-}
-
-VectorXd weights_for(const MatrixXd& a, const View& view, Eigen::Index channel, const VectorXd& near, double ridge) {
-  return solve(a, weights_of(view.points), view.f.col(channel), near, VectorXd::Constant(a.cols(), ridge), a.cols(),
-               std::numeric_limits<double>::infinity(), std::nullopt);
-}
-
-/// Relative L1, over all channels.
-double error_of(const Dictionary& dictionary, const Shape& shape, const View& view) {
-  const MatrixXd a = columns(dictionary, shape, view);
-  const VectorXd weight = weights_of(view.points);
-  double off = 0, light = 0;
-  for (Eigen::Index channel = 0; channel < view.f.cols(); ++channel) {
-    off += (a * weights_for(a, view, channel, VectorXd::Zero(a.cols()), kSlightRidge) - view.f.col(channel))
-               .cwiseAbs()
-               .dot(weight);
-    light += view.f.col(channel).dot(weight);
-  }
-  return light > 0 ? off / light : 0;
-}
-
-/// Roughness of facets whose lobe is as wide as cos^e about its axis, seen along the normal.
-double roughness_of(double e) { return std::pow(1 / (2 * std::max(e, 0.5) + 1), 0.25); }
-
-/// A better shape for a view than `shape`, which is moved into the view's bounds.
-Shape improved(const Dictionary& dictionary, const Shape& shape, const View& view) {
-  std::vector<Variable> variables;
-  for (std::size_t j = 0; j < kFacets; ++j) {
-    const double* s = shape.data() + kShape * j;
-    variables.push_back({s[0], least_lean(view.wo), 1, 0.02});
-    variables.push_back({s[1], kLeastRoughness, 1, 0.1 * s[1]});
-    variables.push_back({s[2], 0, 1, 0.02});
-  }
-  return argmin(variables, [&](const Shape& x) { return error_of(dictionary, x, view); });
-}
-
-/// Shapes of every kStride-th knot, from that along the normal down.
-struct Found {
-  std::vector<Shape> shapes;
-  double error = 0;  ///< mean over the views
-};
-Found search(const Dictionary& dictionary, const std::vector<View>& views) {
-  Found found;
-  const double e = views.front().lobe.narrow;
-  Shape shape;
-  const double widths[kFacets] = {1, 0.5, 4};
-  for (std::size_t j = 0; j < kFacets; ++j)
-    shape.insert(shape.end(), {dictionary.lean[j], std::clamp(roughness_of(e / widths[j]), kLeastRoughness, 1.0),
-                               dictionary.spread});
-  for (const View& v : views) {
-    // A search that begins again where it ended, with wide steps, leaves many a bad place.
-    for (int round = 0; round < kRounds; ++round) shape = improved(dictionary, shape, v);
-    found.shapes.push_back(shape);
-    found.error += error_of(dictionary, shape, v) / double(views.size());
-  }
-  // Along the normal nothing leans, whatever the numbers: those of the next view go on.
-  found.shapes[0] = found.shapes[1];
-  return found;
-}
-
 Vec3<double> view_at(int knot) {
-  const double z = std::max(double(knot) / (kTwinKnots - 1), kLastCosine);
+  const double z = std::max(double(knot) / (kTwinKnots - 1), kTwinSettings.last_cosine);
   return {std::sqrt(1 - z * z), 0, z};
 }
 
-/// One of three channels over the view, or one for all.
-Rgb<double> colour(const Channels& channels, const std::array<double, 1>& at) {
+/// One of three channels, or one for all.
+Rgb<double> colour(const Channels& channels, const std::vector<double>& at) {
   if (channels.size() == 1) return Rgb<double>(lookup(channels[0], at));
   return {lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at)};
+}
+/// One term of weight 1 without parameters.
+std::vector<Rgb<double>> weights_of_terms(const Terms& terms, const std::map<std::string, Rgb<double>>& values) {
+  return terms.parameters.empty() ? std::vector<Rgb<double>>{Rgb<double>(1.0)} : terms.weights(values);
+}
+/// The sum over terms, by their weights.
+Rgb<double> colour(const std::vector<Channels>& terms, const std::vector<Rgb<double>>& weights,
+                   const std::vector<double>& at) {
+  Rgb<double> sum(0.0);
+  for (std::size_t t = 0; t < terms.size(); ++t) sum = sum + weights[t] * colour(terms[t], at);
+  return sum;
+}
+
+/// A model at places of the axis, with values of mixed parameters.
+class Bound {
+ public:
+  Bound(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis)
+      : model_(model), values_(values), axis_(axis) {}
+  measure::BoundModel operator()(double place, const ParamValues& mixed) const {
+    ParamValues values = values_;
+    if (axis_) values[axis_->parameter] = axis_->at(place);
+    for (const auto& [name, value] : mixed) values[name] = value;
+    return measure::bind_model(model_, values);
+  }
+
+ private:
+  const Model& model_;
+  const ParamValues& values_;
+  const std::optional<FitAxis>& axis_;
+};
+
+ParamValues all_of(const Model& model, const Terms& terms, double value) {
+  ParamValues out;
+  for (const std::string& name : terms.parameters)
+    out[name] = as_value(*model.info().param(name), Rgb<double>(value));
+  return out;
+}
+
+/// The view of one place, with the columns of one term after those of the other; the lobe as it was found, or sought.
+View view_of_terms(const Model& model, const Bound& bound, const Terms& terms, double place, int knot, int points,
+                   const Moments* lobe) {
+  const bool mixed = !terms.parameters.empty();
+  const measure::BoundModel some =
+      bound(place, mixed ? all_of(model, terms, kTwinSettings.some) : ParamValues());
+  View v = lobe ? view_of(some, view_at(knot), points, *lobe) : view_of(some, view_at(knot), points);
+  if (!mixed) return v;
+  v.f.resize(v.f.rows(), Eigen::Index(3 * terms.terms.size()));
+  for (std::size_t t = 0; t < terms.terms.size(); ++t)
+    v.f.middleCols(Eigen::Index(3 * t), 3) =
+        scattering(bound(place, terms.terms[t].values), v.points, v.wo) / terms.terms[t].scale;
+  return v;
+}
+
+/// A number for each place of the axis, evenly spaced from 0 to 1; 0 without one.
+std::vector<double> even_places(int count) {
+  std::vector<double> out;
+  for (int i = 0; i < count; ++i) out.push_back(count == 1 ? 0 : double(i) / double(count - 1));
+  return out;
 }
 
 }  // namespace
 
-Twin::Twin(const Model& model, const ParamValues& values) {
+Twin::Twin(const Model& model, const ParamValues& given, From from) {
+  const Roles& roles = roles_of(model, given);
+  if (const ParamInfo* number = roles.axis()) axis_ = fit_axis(*number);
+  terms_ = roles.terms();
   // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
-  const auto [white, factor] = without_factors(model, values);
-  const measure::BoundModel bound = measure::bind_model(model, white);
-  std::vector<View> views(kTwinKnots);
-  for_all(kTwinKnots, [&](std::size_t k) { views[k] = view_of(bound, view_at(int(k)), kPoints); });
+  const auto [values, factor] = without_factors(model, roles.fitted());
+  const StoreKey key = stored_twin(model, values);
+  std::optional<std::filesystem::path> file;
+  if (from == From::Store) {
+    if (axis_)
+      file = find_stored(key, fmt::format("stored twin of {} over {}", model.info().name, axis_->parameter),
+                         "a minute or two");
+    else if (std::filesystem::exists(key.path()))  // in seconds it is made, too
+      file = key.path();
+  }
+  make_mirror(model, values);
+  if (file)
+    read(key.hash(), *file);
+  else
+    make(model, values);
+  multiply(factor);
+}
+
+int Twin::places() const { return axis_ ? int(kTwinSettings.places) : 1; }
+
+std::vector<TableAxis> Twin::axes() const {
+  std::vector<TableAxis> out;
+  if (axis_) out.push_back(even_axis("place_on_axis", places()));
+  out.push_back(even_axis("cos_theta_o", kTwinKnots));
+  return out;
+}
+
+void Twin::make(const Model& model, const ParamValues& values) {
+  const Bound bound(model, values, axis_);
+  const std::vector<double> at = even_places(places());
+  const std::size_t terms = terms_.terms.size();
+  // All views in a row, place by place, to find out whether they have one tint.
+  std::vector<View> row(at.size() * kTwinKnots);
+  for_all(row.size(), [&](std::size_t i) {
+    row[i] = view_of_terms(model, bound, terms_, at[i / kTwinKnots], int(i % kTwinKnots), int(kTwinSettings.points),
+                           nullptr);
+  });
   // A mirror has a colour of its own.
-  if (!model.has_mirror()) tint_ = make_grey(views);
-  const Eigen::Index channels = views.front().f.cols();
+  if (!model.has_mirror()) tint_ = make_grey(row);
+  const Eigen::Index channels = row.front().f.cols() / Eigen::Index(terms);
+  const auto view = [&](std::size_t place, std::size_t knot) -> const View& { return row[place * kTwinKnots + knot]; };
 
   // From the normal down, for what is found of one view is where the next one starts.
-  std::vector<View> few;
-  for (int k = kTwinKnots - 1; k >= 0; k -= kStride) {
-    View v = view_of(bound, view_at(k), kFewPoints, views[std::size_t(k)].lobe);
-    if (tint_) v.f = brightest(v.f);
-    few.push_back(std::move(v));
-  }
-  std::vector<Found> found(std::size(kDictionaries));
-  for_all(found.size(), [&](std::size_t i) { found[i] = search(kDictionaries[i], few); });
-  const auto best =
-      std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.error < b.error; });
-  const Dictionary& dictionary = kDictionaries[best - found.begin()];
-
-  // Rows are knots; columns are numbers of the shape, weights channel by channel, and channels of the albedo.
-  const Eigen::Index closures_count = Eigen::Index(kFacets + 1);
-  MatrixXd shapes(kTwinKnots, Eigen::Index(kShape * kFacets)), weights(kTwinKnots, closures_count * channels),
-      light(kTwinKnots, channels), x = MatrixXd::Zero(closures_count, channels);
-  // Along the normal there is none above: a few views from below lead there.
-  constexpr int kLead = 9;
-  for (int step = -kLead; step < kTwinKnots; ++step) {
-    const auto i = std::size_t(std::abs(step));
-    const std::size_t k = kTwinKnots - 1 - i, at = std::min(i / kStride, best->shapes.size() - 2);
-    const double t = double(i) / kStride - double(at);
-    Shape shape;
-    for (std::size_t j = 0; j < kShape * kFacets; ++j)
-      shape.push_back(best->shapes[at][j] * (1 - t) + best->shapes[at + 1][j] * t);
-    const View& view = views[k];
-    const MatrixXd a = columns(dictionary, shape, view);
-    for (Eigen::Index channel = 0; channel < channels; ++channel)
-      x.col(channel) = weights_for(a, view, channel, x.col(channel), step == -kLead ? kSlightRidge : kRidge);
-    const auto row = Eigen::Index(k);
-    shapes.row(row) = Eigen::Map<const VectorXd>(shape.data(), Eigen::Index(shape.size()));
-    weights.row(row) = x.reshaped();
-    light.row(row) = view.f.transpose() * weights_of(view.points);
-  }
-  if (tint_) {
-    tint_ = *tint_ * factor;
-  } else {
-    const double of_channel[] = {factor.r, factor.g, factor.b};
-    for (Eigen::Index channel = 0; channel < channels; ++channel) {
-      weights.middleCols(channel * closures_count, closures_count) *= of_channel[channel];
-      light.col(channel) *= of_channel[channel];
+  std::vector<std::vector<View>> few(at.size());
+  for_all(at.size(), [&](std::size_t place) {
+    for (int k = kTwinKnots - 1; k >= 0; k -= int(kTwinSettings.stride)) {
+      View v = view_of_terms(model, bound, terms_, at[place], k, int(kTwinSettings.few_points),
+                             &view(place, std::size_t(k)).lobe);
+      if (tint_) {
+        MatrixXd grey(v.f.rows(), v.f.cols() / 3);
+        for (Eigen::Index t = 0; t < grey.cols(); ++t) grey.col(t) = brightest(v.f.middleCols(3 * t, 3));
+        v.f = std::move(grey);
+      }
+      few[place].push_back(std::move(v));
     }
-  }
-  const auto table = [](const std::string& name, const auto& column) {
-    return make_table(name, {even_axis("cos_theta_o", kTwinKnots)}, {column.begin(), column.end()});
+  });
+  const TwinShapes found = find_twin_shapes(few, mixtures_of(terms_));
+
+  // Rows are places and knots; columns are numbers of the shape, weights by term, channel and closure, and the albedo.
+  const Eigen::Index closures_count = Eigen::Index(kTwinFacets + 1), columns = Eigen::Index(terms) * channels;
+  MatrixXd shapes(Eigen::Index(row.size()), Eigen::Index(kTwinShape * kTwinFacets)),
+      weights(Eigen::Index(row.size()), closures_count * columns), light(Eigen::Index(row.size()), columns);
+  for_all(at.size(), [&](std::size_t place) {
+    const std::vector<TwinShape>& sought = found.shapes[place];
+    MatrixXd x = MatrixXd::Zero(closures_count, columns);
+    for (int step = -int(kTwinSettings.lead); step < kTwinKnots; ++step) {
+      const auto i = std::size_t(std::abs(step));
+      const std::size_t k = kTwinKnots - 1 - i, above = std::min(i / kTwinSettings.stride, sought.size() - 2);
+      const double t = double(i) / double(kTwinSettings.stride) - double(above);
+      TwinShape shape;
+      for (std::size_t j = 0; j < kTwinShape * kTwinFacets; ++j)
+        shape.push_back(sought[above][j] * (1 - t) + sought[above + 1][j] * t);
+      const View& v = view(place, k);
+      const MatrixXd a = twin_columns(*found.dictionary, shape, v);
+      const bool first = step == -int(kTwinSettings.lead);
+      for (Eigen::Index c = 0; c < columns; ++c)
+        x.col(c) = twin_weights(a, v, c, x.col(c), first ? kTwinSettings.slight_ridge : kTwinSettings.ridge);
+      const auto index = Eigen::Index(place * kTwinKnots + k);
+      shapes.row(index) = Eigen::Map<const VectorXd>(shape.data(), Eigen::Index(shape.size()));
+      weights.row(index) = x.reshaped();
+      light.row(index) = v.f.transpose() * weights_of(v.points);
+    }
+  });
+  const auto table = [&](const std::string& name, const auto& column) {
+    std::vector<double> numbers;
+    for (const double number : column) numbers.push_back(rounded(number));
+    return make_table(name, axes(), std::move(numbers));
   };
-  for (std::size_t j = 0; j <= kFacets; ++j) {
-    TwinClosure part{j < kFacets ? dictionary.kinds[j] : ClosureKind::Diffuse, {}, {}, {}, {}};
-    if (j < kFacets) {
-      const auto number = Eigen::Index(kShape * j);
+  std::vector<TwinClosure> scattering_parts;
+  for (std::size_t j = 0; j <= kTwinFacets; ++j) {
+    TwinClosure part{j < kTwinFacets ? found.dictionary->kinds[j] : ClosureKind::Diffuse, {}, {}, {}, {}};
+    if (j < kTwinFacets) {
+      const auto number = Eigen::Index(kTwinShape * j);
       part.lean = table(fmt::format("lean_of_{}", j), shapes.col(number));
       part.roughness = table(fmt::format("roughness_of_{}", j), shapes.col(number + 1));
       part.spread = table(fmt::format("spread_of_{}", j), shapes.col(number + 2));
     }
-    for (Eigen::Index channel = 0; channel < channels; ++channel)
-      part.weight.push_back(
-          table(fmt::format("weight_of_{}", j), weights.col(channel * closures_count + Eigen::Index(j))));
-    parts_.push_back(std::move(part));
-  }
-  if (model.has_mirror()) {
-    MatrixXd mirror(kTwinKnots, channels);
-    for (int k = 0; k < kTwinKnots; ++k) {
-      const Rgb<double> m = bound.brdf->mirror(view_at(k));
-      mirror.row(k) << m.r, m.g, m.b;
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      if (c % channels == 0) part.weight.emplace_back();
+      part.weight.back().push_back(
+          table(fmt::format("weight_of_{}_{}", j, c), weights.col(c * closures_count + Eigen::Index(j))));
     }
-    TwinClosure part{ClosureKind::Reflection, {}, {}, {}, {}};
-    for (const auto& channel : mirror.colwise()) part.weight.push_back(table("weight_of_mirror", channel));
-    parts_.push_back(std::move(part));
+    scattering_parts.push_back(std::move(part));
   }
-  for (const auto& channel : light.colwise()) albedo_.push_back(table("albedo", channel));
-  errors_ = view_errors(measure::bind_model(model, values), [&](const Vec3<double>& wo) { return closures(wo); });
+  parts_.insert(parts_.begin(), scattering_parts.begin(), scattering_parts.end());
+  for (Eigen::Index c = 0; c < columns; ++c) {
+    if (c % channels == 0) albedo_.emplace_back();
+    albedo_.back().push_back(table(fmt::format("albedo_{}", c), light.col(c)));
+  }
+  measure(model, values);
 }
 
-ClosureSum<double> Twin::closures(const Vec3<double>& wo) const {
-  const std::array<double, 1> at = {wo.z};
+void Twin::make_mirror(const Model& model, const ParamValues& values) {
+  if (!model.has_mirror()) return;
+  const Bound bound(model, values, axis_);
+  // A product of x or 1 - x of each mixed parameter: nothing negative.
+  const std::size_t count = terms_.parameters.size(), corners = std::size_t(1) << count;
+  mirror_terms_ = {terms_.parameters, {}};
+  for (std::size_t corner = 0; corner < corners; ++corner) {
+    Terms::Term& term = mirror_terms_.terms.emplace_back();
+    for (std::size_t i = 0; i < count; ++i)
+      term.values[terms_.parameters[i]] =
+          as_value(*model.info().param(terms_.parameters[i]), Rgb<double>(double(corner >> i & 1)));
+    // (1 - x) of those that are 0 here, multiplied out.
+    for (std::size_t more = 0; more < corners; ++more) {
+      if (more & corner) continue;
+      std::vector<int> powers(count);
+      int sign = 1;
+      for (std::size_t i = 0; i < count; ++i) {
+        powers[i] = int((corner | more) >> i & 1);
+        if (more >> i & 1) sign = -sign;
+      }
+      term.polynomial[powers] = sign;
+    }
+  }
+  const std::vector<double> at = even_places(places());
+  TwinClosure part{ClosureKind::Reflection, {}, {}, {}, {}};
+  for (std::size_t t = 0; t < corners; ++t) {
+    std::vector<std::vector<double>> numbers(3);
+    for (const double place : at) {
+      const measure::BoundModel corner = bound(place, mirror_terms_.terms[t].values);
+      for (int k = 0; k < kTwinKnots; ++k) {
+        const Rgb<double> m = corner.brdf->mirror(view_at(k));
+        numbers[0].push_back(rounded(m.r));
+        numbers[1].push_back(rounded(m.g));
+        numbers[2].push_back(rounded(m.b));
+      }
+    }
+    Channels& channels = part.weight.emplace_back();
+    for (std::size_t c = 0; c < 3; ++c)
+      channels.push_back(make_table(fmt::format("weight_of_mirror_{}_{}", t, c), axes(), std::move(numbers[c])));
+  }
+  parts_.push_back(std::move(part));
+  // What the nodes take for granted: between the corners as the polynomial, and whatever the factors are.
+  ParamValues between = all_of(model, terms_, 0.3);
+  for (const std::string& name : roles_of(model, values).proportional())
+    between[name] = as_value(*model.info().param(name), Rgb<double>(0.6));
+  const std::vector<Rgb<double>> weights =
+      weights_of_terms(mirror_terms_, colours_of(all_of(model, terms_, 0.3)));
+  for (const double place : at)
+    for (int k = 0; k < kTwinKnots; ++k) {
+      std::vector<double> x;
+      if (axis_) x.push_back(place);
+      x.push_back(double(k) / (kTwinKnots - 1));
+      const Rgb<double> is = bound(place, between).brdf->mirror(view_at(k)),
+                        off = is - colour(parts_.back().weight, weights, x);
+      if (!(max_component(magnitude(off)) <= 1e-5))
+        throw std::logic_error(model.info().name + ": a mirror that is no polynomial of the twin's colours");
+    }
+}
+
+void Twin::measure(const Model& model, const ParamValues& values) {
+  const Bound bound(model, values, axis_);
+  std::vector<double> proof = {0};
+  for (int i = 1; i < places(); ++i) proof.push_back((i - 0.5) / (places() - 1));
+  if (axis_) proof.push_back(1);
+  for (const double place : proof) {
+    Varied<double> varied(axis_ ? axis_->at(place) : 0);
+    std::vector<ViewError> worst;
+    for (const Terms::Term& term : terms_.terms) {
+      varied.parameters = colours_of(term.judged);
+      const auto errors =
+          view_errors(bound(place, term.judged), [&](const Vec3<double>& wo) { return closures(wo, varied); });
+      if (worst.empty()) worst = errors;
+      for (std::size_t i = 0; i < errors.size(); ++i) worst[i] = worse(worst[i], errors[i]);
+    }
+    for (ViewError e : worst) {
+      e.number = varied.number;
+      for (double* x : numbers_of(e)) *x = rounded(*x);
+      errors_.push_back(e);
+    }
+  }
+}
+
+void Twin::multiply(const Rgb<double>& factor) {
+  if (tint_) {
+    tint_ = *tint_ * factor;
+    return;
+  }
+  if (factor.r == 1 && factor.g == 1 && factor.b == 1) return;
+  const auto times = [&](std::vector<Channels>& terms) {
+    const double of_channel[] = {factor.r, factor.g, factor.b};
+    for (Channels& channels : terms)
+      for (std::size_t c = 0; c < channels.size(); ++c) {
+        std::vector<double> numbers = channels[c]->values;
+        for (double& x : numbers) x *= of_channel[c];
+        channels[c] = make_table(channels[c]->name, channels[c]->axes, std::move(numbers));
+      }
+  };
+  for (TwinClosure& part : parts_)
+    if (part.kind != ClosureKind::Reflection) times(part.weight);
+  times(albedo_);
+}
+
+ClosureSum<double> Twin::closures(const Vec3<double>& wo, const Varied<double>& varied) const {
+  std::vector<double> at;
+  if (axis_) at.push_back(axis_->place(varied.number));
+  at.push_back(wo.z);
+  const std::vector<Rgb<double>> weights = weights_of_terms(terms_, varied.parameters),
+                                 of_mirror = weights_of_terms(mirror_terms_, varied.parameters);
   ClosureSum<double> sum;
   for (const TwinClosure& part : parts_) {
-    const Rgb<double> weight = colour(part.weight, at) * tint_.value_or(Rgb<double>(1.0));
+    if (part.kind == ClosureKind::Reflection) {
+      sum.emplace_back(part.kind, colour(part.weight, of_mirror, at));
+      continue;
+    }
+    const Rgb<double> weight = colour(part.weight, weights, at) * tint_.value_or(Rgb<double>(1.0));
     if (!has_facets(part.kind)) {
       sum.emplace_back(part.kind, weight);
       continue;
     }
     for (const double side : {1, -1}) {
       sum.push_back(
-          facet(part.kind, lookup(part.lean, at), lookup(part.roughness, at), side * lookup(part.spread, at), wo));
+          twin_facet(part.kind, lookup(part.lean, at), lookup(part.roughness, at), side * lookup(part.spread, at), wo));
       sum.back().weight = weight / 2.0;
     }
   }
   return sum;
+}
+
+StoreKey stored_twin(const Model& model, const ParamValues& given) {
+  const Roles& roles = roles_of(model, given);
+  const ParamValues values = without_factors(model, roles.fitted()).values;
+  StoreKey key("twins", model.info().name);
+  key.add("values", format_values(model.info(), values));
+  if (const ParamInfo* number = roles.axis()) {
+    const FitAxis axis = fit_axis(*number);
+    key.add("axis", fmt::format("{} {} {} {}", axis.parameter, axis.low, axis.high, name_of(axis.scale)));
+  }
+  key.add("formula", measure::formula_of(model, values));
+  return key.add_settings(kTwinSettings).add_settings(kViewSettings);
 }
 
 const Twin& twin_of(const Model& model, const ParamValues& values) {

@@ -280,6 +280,15 @@ std::vector<ViewError> view_errors(const measure::BoundModel& bound,
   return errors;
 }
 
+ViewError worse(const ViewError& a, const ViewError& b) {
+  return {a.cos_theta_o,
+          std::max(a.relative_l1, b.relative_l1),
+          std::max(a.relative_l2, b.relative_l2),
+          std::max(a.albedo, b.albedo),
+          std::max(a.negative, b.negative),
+          a.number};
+}
+
 bool turns(const Brdf<double>& brdf) {
   measure::Random random(11);
   const double c = std::cos(1.0), s = std::sin(1.0);

@@ -106,6 +106,8 @@ struct ViewError {
   double negative = 0;     ///< integral of what lies below 0, over the albedo
   double number = 0;       ///< for a fit along a number: its value, in units of the parameter
 };
+/// Of one view the larger of each, at the place of the first.
+ViewError worse(const ViewError&, const ViewError&);
 /// The errors of `closures`, which gives their sum for a view, at ViewSettings::error_views cosines evenly spaced from
 /// 1 to 0.
 std::vector<ViewError> view_errors(const measure::BoundModel&,

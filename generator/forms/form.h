@@ -94,6 +94,11 @@ class Form {
   virtual bool cost_is_measured(const Setting&) const { return true; }
   /// What its closures are looked up in, made at first use; nullptr for a form without tables of its own.
   virtual const fit::Fit* fit(const Model&, const Setting&) const { return nullptr; }
+  /// The number that what is fitted runs over, where one does.
+  virtual std::optional<fit::FitAxis> axis(const Model& model, const Setting& setting) const {
+    const fit::Fit* made = made_of_fit() ? fit(model, setting) : nullptr;
+    return made ? made->axis() : std::nullopt;
+  }
   /// Makes or reads what it is made of, so that asking for it takes no time afterwards.
   virtual void prepare(const Model& model, const Setting& setting) const { fit(model, setting); }
   /// @}

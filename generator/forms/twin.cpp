@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The twin: no shader but Blender's own nodes, close to the model for one set of parameters (fit/twin.h).
+// The twin: no shader but Blender's own nodes, close to the model along one number (fit/twin.h).
 #include "fit/twin.h"
 
 #include <fmt/format.h>
@@ -31,15 +31,45 @@ const char* node_of(ClosureKind kind) {
   }
 }
 
-/// Nodes are in single precision.
-std::vector<float> floats(const std::shared_ptr<const Table>& table) {
-  return {table->values.begin(), table->values.end()};
+/// Nodes are in single precision. A row a place of the axis, one without.
+Json rows_of(const fit::TablePtr& table) {
+  const std::size_t width = std::size_t(fit::kTwinKnots), rows = table->values.size() / width;
+  Json out = Json::array();
+  for (std::size_t row = 0; row < rows; ++row) {
+    const auto first = table->values.begin() + std::ptrdiff_t(row * width);
+    out.push_back(std::vector<float>(first, first + std::ptrdiff_t(width)));
+  }
+  return out;
 }
 
-Json by_channel(const fit::Channels& tables) {
-  Json channels = Json::array();
-  for (const auto& table : tables) channels.push_back(floats(table));
-  return channels;
+Json by_term(const std::vector<fit::Channels>& terms) {
+  Json out = Json::array();
+  for (const fit::Channels& channels : terms) {
+    Json list = Json::array();
+    for (const auto& table : channels) list.push_back(rows_of(table));
+    out.push_back(list);
+  }
+  return out;
+}
+
+/// Of what it never gives more than a millionth of the light there is no node.
+bool black(const fit::TwinClosure& part) {
+  for (const fit::Channels& channels : part.weight)
+    for (const fit::TablePtr& table : channels)
+      if (std::ranges::any_of(table->values, [](double x) { return x > 1e-6; })) return false;
+  return true;
+}
+
+/// Of each term [times, powers of the parameters], to be added up.
+Json polynomials(const fit::Terms& terms) {
+  Json out = Json::array();
+  for (const fit::Terms::Term& term : terms.terms) {
+    Json sum = Json::array();
+    for (const auto& [powers, times] : term.polynomial) sum.push_back({times, powers});
+    if (terms.parameters.empty()) sum = Json::array({Json::array({1, Json::array()})});
+    out.push_back(sum);
+  }
+  return out;
 }
 
 class Twin final : public Form {
@@ -47,9 +77,9 @@ class Twin final : public Form {
   Twin() : Form("twin") {}
 
   When when() const override { return When::Asked; }
-  bool in_whole_pack(const Model&) const override { return false; }
+  bool in_whole_pack(const Model& model) const override { return !fit::unfit(model, values_of_fit(model, {})); }
   bool made_of_fit() const override { return true; }
-  bool serves(fit::Role role) const override { return role == fit::Role::Constant || role == fit::Role::Factor; }
+  bool serves(fit::Role role) const override { return role != fit::Role::Open; }
   ParamValues values(const Model& model, const ParamValues& fixed) const override {
     return values_of_fit(model, fixed);
   }
@@ -59,7 +89,11 @@ class Twin final : public Form {
 
   bool native() const override { return true; }
   FormError error(const Model& model, const Setting& setting) const override {
-    return error_of_fit(fit::twin_of(model, setting.fixed).errors(), "Blender's nodes");
+    const fit::Twin& twin = fit::twin_of(model, setting.fixed);
+    return error_of_fit(twin.errors(), "Blender's nodes", twin.axis());
+  }
+  std::optional<fit::FitAxis> axis(const Model& model, const Setting& setting) const override {
+    return fit::twin_of(model, setting.fixed).axis();
   }
   void prepare(const Model& model, const Setting& setting) const override { fit::twin_of(model, setting.fixed); }
 
@@ -72,20 +106,23 @@ class Twin final : public Form {
   bool highlights(const Model& model, const Shader&) const override { return !model.has_mirror(); }
 };
 
-/// `source` is JSON: what the nodes make of closures. `closures`: kind, and tables over the cosine of the view, evenly
-/// spaced from 0 to 1 (fit/twin.h says what they are); `weight` and `albedo` by channel, one where `tint` multiplies
-/// them. Factors multiply all but a mirror's weight.
+/// `source` is JSON: what the nodes make of closures. Tables are over the cosine of the view, evenly spaced from 0 to 1
+/// (fit/twin.h says what they are), a row for each even place of `axis`, which is null where there is one row.
+/// `closures`: kind, and tables; `weight` and `albedo` by term and channel, one where `tint` multiplies them. `terms`
+/// says how weights of terms come of the `mixed` parameters, `mirror_terms` the same for a mirror. Factors multiply all
+/// but a mirror's weight.
 Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Setting& setting) const {
   const fit::Twin& twin = fit::twin_of(model, setting.fixed);
   Shader out;
   out.name = fmt::format("brdfc_{}_twin", model.info().name);
   Json closures = Json::array();
   for (const fit::TwinClosure& part : twin.parts()) {
-    Json j = {{"kind", node_of(part.kind)}, {"weight", by_channel(part.weight)}};
+    if (black(part)) continue;
+    Json j = {{"kind", node_of(part.kind)}, {"weight", by_term(part.weight)}};
     if (has_facets(part.kind)) {
-      j["lean"] = floats(part.lean);
-      j["roughness"] = floats(part.roughness);
-      j["spread"] = floats(part.spread);
+      j["lean"] = rows_of(part.lean);
+      j["roughness"] = rows_of(part.roughness);
+      j["spread"] = rows_of(part.spread);
     }
     closures.push_back(j);
     const int nodes = has_facets(part.kind) ? 2 : 1;
@@ -97,10 +134,20 @@ Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Settin
   out.slots = out.closures;
   out.closure_bytes += std::max(out.closures - 1, 0) * kPoolNode;
   const Rgb<double> tint = twin.tint().value_or(Rgb<double>(1.0));
-  out.source = Json{{"format", 1},
+  const std::optional<fit::FitAxis>& axis = twin.axis();
+  const Json over = axis ? Json{{"parameter", axis->parameter},
+                                {"low", axis->low},
+                                {"high", axis->high},
+                                {"scale", name_of(axis->scale)}}
+                         : Json();
+  out.source = Json{{"format", 2},
+                    {"axis", over},
+                    {"mixed", twin.terms().parameters},
+                    {"terms", polynomials(twin.terms())},
+                    {"mirror_terms", model.has_mirror() ? polynomials(twin.mirror_terms()) : Json::array()},
                     {"tint", {tint.r, tint.g, tint.b}},
                     {"closures", closures},
-                    {"albedo", by_channel(twin.albedo())}}
+                    {"albedo", by_term(twin.albedo())}}
                    .dump() +
                "\n";
   return out;

@@ -82,9 +82,9 @@ Json table_json(const measure::AlbedoTable& t, const std::string& file, const Mo
           {"terms", terms},     {"grids", grids}};
 }
 
-Json axis_json(const fit::Fit* fit) {
-  if (!fit || !fit->axis()) return {};
-  return {{"name", fit->axis()->parameter}, {"min", fit->axis()->low}, {"max", fit->axis()->high}};
+Json axis_json(const std::optional<fit::FitAxis>& axis) {
+  if (!axis) return {};
+  return {{"name", axis->parameter}, {"min", axis->low}, {"max", axis->high}};
 }
 
 Json highlight_json(const Model& model, const forms::Form& form, const forms::Shader& shader,

@@ -21,7 +21,7 @@ Json error_json(const forms::FormError&);
 /// Without what is fixed. `file`: where the pack has the table as an image.
 Json table_json(const measure::AlbedoTable&, const std::string& file, const Model&, const ParamValues& fixed);
 /// The number that a fit runs over, and how far; null without one.
-Json axis_json(const fit::Fit*);
+Json axis_json(const std::optional<fit::FitAxis>&);
 /// How bright a form's highlight is: f cos about the mirror direction, the brighter of two views; and over which number
 /// of its sliders, if any. A clamp on indirect light shows the earlier the brighter it is. Null for a form in which a
 /// clamp does not show by that.

@@ -331,13 +331,10 @@ def test_there_and_back_are_one_step_of_undo_each(extension, item):
     assert shown_nodes() == converted
 
 
-def test_back_where_the_node_of_before_is_gone_is_the_twin(extension, convert, use_pack):
+def test_back_where_the_node_of_before_is_gone_is_the_twin(extension, convert):
     material, node = material_of("diffuse", Color=(0.5, 0.5, 0.5))
     assert convert.apply(convert.plan([material])) == 1
     material.node_tree.nodes.remove(node)
-    with pytest.raises(ValueError, match="has no form 'twin'"):
-        convert.restore(material)
-    use_pack({"m": {"model": "lambert", "parameters": {"rho": 0.5}}}, "--twin")
     assert convert.restore(material) == 1
     (group,) = extension.nodes.group_nodes(material)
     assert extension.nodes.identity(group) == ("lambert", "twin")

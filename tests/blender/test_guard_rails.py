@@ -45,7 +45,7 @@ def old_blender(extension, scene, monkeypatch):
 SPOILED = [
     (old_gpu, "CUDA devices can't run these shaders", "brdfc.enable_osl Use the CPU"),
     (no_osl, "Open Shading Language is off", "brdfc.enable_osl Turn On OSL"),
-    (eevee, "EEVEE can't run these shaders", "brdfc.enable_osl Use Cycles"),
+    (eevee, "EEVEE can't run these shaders", "brdfc.add_twin Add Twin for EEVEE"),
     (workbench, "Workbench can't run these shaders", "brdfc.enable_osl Use Cycles"),
     (old_blender, "99.0 is needed", "wm.url_open Get Blender"),
 ]
@@ -71,9 +71,16 @@ def test_one_line_and_one_button(extension, empty, phong, monkeypatch, spoil, li
     assert line in said
     assert len(said) <= extension.ui._WRAP, "it fits a line of the panel"
     assert offered == f"operator {button}"
-    if button.startswith("brdfc."):
-        assert bpy.ops.brdfc.enable_osl() == {"FINISHED"}
+    module, name = button.split()[0].split(".")
+    if module == "brdfc":
+        assert getattr(bpy.ops.brdfc, name)() == {"FINISHED"}
         assert shown(extension, phong, empty) == []
+
+
+def test_eevee_without_a_twin_offers_cycles(extension, empty, phong):
+    glass = extension.api.new_material("glass")
+    empty.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    assert shown(extension, glass, empty)[1] == "operator brdfc.enable_osl Use Cycles"
 
 
 def test_every_button_is_an_operator_with_these_settings(extension):

@@ -159,8 +159,113 @@ def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
     assert "leaning_facets" not in {f.code for f in lean.api.warnings(material, empty)}
 
 
-def test_no_twin_in_the_whole_extension(extension, empty):
-    material = extension.api.new_material("phong")
-    with pytest.raises(ValueError, match="has no form 'twin'"):
+def test_the_whole_extension_has_twins_that_follow_their_models(extension, empty, tmp_path):
+    """Beside the model without the program brdfc: the twin's values are the model's, also after a
+    change, in a copy of the material, and in the file that was saved."""
+    material = extension.api.new_material("cook_torrance", f0=(0.9, 0.6, 0.2), m=0.3)
+    extension.api.add_twin(material)
+
+    def values(of):
+        found = extension.nodes.group_nodes(of)
+        assert [extension.nodes.identity(n)[1] for n in found] == ["aimed", "twin"]
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        depsgraph.update()
+        tree = of.evaluated_get(depsgraph).node_tree
+        every = [extension.nodes.all_values(tree.nodes[n.name]) for n in found]
+        return [{key: value[key] for key in ("f0", "m")} for value in every]
+
+    add_sphere(empty, material)
+    model, twin = values(material)
+    assert twin == model == {"f0": pytest.approx((0.9, 0.6, 0.2)), "m": pytest.approx(0.3)}
+    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "m", 0.5)
+    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "f0", (0.1, 0.2, 0.3))
+    model, twin = values(material)
+    assert twin == model == {"f0": pytest.approx((0.1, 0.2, 0.3)), "m": pytest.approx(0.5)}
+    name = material.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "twin.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "twin.blend"))
+    material = bpy.data.materials[name]
+    assert values(material)[1]["m"] == pytest.approx(0.5)
+    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "m", 0.7)
+    assert values(material)[1]["m"] == pytest.approx(0.7)
+
+
+def test_all_models_that_scatter_have_a_twin_and_none_takes_it_unasked(extension):
+    for name, entry in extension.api.models().items():
+        assert ("twin" in entry["representations"]) == entry["scatter"], name
+        assert entry["auto"] != "twin"
+        values = {p["name"]: None for p in entry["parameters"]}  # all linked
+        assert extension.pack.resolve(name, "auto", values) != "twin"
+
+
+def test_every_twin_renders_without_osl(extension):
+    """A row of balls, pixels a ball: none is black or has a value that is no number."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene, pixels = bpy.context.scene, 12
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    scene.cycles.shading_system = False
+    models = [m for m, e in extension.api.models().items() if "twin" in e["representations"]]
+    for i, model in enumerate(models):
+        add_sphere(scene, extension.api.new_material(model, "twin")).location.x = 2.2 * i
+    middle = 1.1 * (len(models) - 1)
+    add_camera(scene, (middle, -6, 0), orthographic=2.2 * len(models))
+    scene.world = bpy.data.worlds.new("world")
+    scene.world.use_nodes = True
+    scene.render.resolution_x, scene.render.resolution_y = pixels * len(models), pixels
+    scene.cycles.samples = 16
+    picture = render(scene)[..., :3]
+    assert np.isfinite(picture).all()
+    for i, model in enumerate(models):
+        ball = picture[3:-3, pixels * i + 3 : pixels * (i + 1) - 3]
+        assert 1e-3 < ball.mean() < 0.1, f"{model}: {ball.mean():.3g} in a world of 0.05"
+
+
+def test_no_twin_for_other_values_than_it_has(extension, empty):
+    material = extension.api.new_material("ward", ax=0.0625, ay=0.3)
+    with pytest.raises(ValueError, match="Twin is only for .* = 0.15, not for 0.0625"):
         extension.api.add_twin(material)
     assert len(material.node_tree.nodes) == 2
+
+
+#: By model a value of the number that its twin runs over, away from the middle between two rows of
+#: its tables, and what it mixes. Of two colours, none, and a mirror's.
+SLIDERS = {
+    "phong": {"e": 73.0, "ks": (0.9, 0.6, 0.2)},
+    "cook_torrance": {"m": 0.37, "f0": (0.9, 0.3, 0.05)},
+    "schlick": {"rough": 0.21, "r": (0.7, 0.4, 0.1)},
+    "coupled": {"r0": 0.15, "rm": (0.8, 0.3, 0.5)},
+}
+
+
+@pytest.mark.full
+def test_tables_over_a_slider_are_what_the_tool_judges(extension, tool, empty):
+    """Nodes with values in their sockets, half of all highlights, as test_a_sun_on_a_twin."""
+    rng = np.random.default_rng(5)
+    count = 64
+    which = np.repeat(np.arange(len(SLIDERS)), count)
+    towards = (0.3, -0.2, 0.9)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    scene.cycles.shading_system = False
+    materials = [extension.api.new_material(m, "twin", **v) for m, v in SLIDERS.items()]
+    normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
+    half = unit(unit(towards) + (0, 0, 1))
+    near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
+    normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+    meter = Goniometer(scene, materials, normals, samples=4, which=which)
+    wi = meter.local(meter.add_sun(unit(towards)))
+    wo, picture = meter.wo(), meter.measure()
+    for i, (name, values) in enumerate(SLIDERS.items()):
+        lit = (which == i) & (wi[:, 2] > 1e-3) & (wo[:, 2] > 0.02)
+        axis = extension.pack.representation(name, "twin")["axis"]
+        mixed = [n for n in values if n in ("f0", "r", "r0")]
+        over = ["--over", axis["name"]] if axis else []
+        over += ["--any", *mixed] if mixed else []
+        stdin = pairs_csv(wi[lit], wo[lit])
+        pairs = ["fit", name, *arguments(values), "--twin", *over, "--pairs"]
+        expected = read_csv(tool(*pairs, stdin=stdin))[1]
+        off, largest = np.abs(picture[lit] - expected).max(), expected.max()
+        print(f"{name}: off by {off:.2g} of {largest:.2g}")
+        assert largest > 0.1, name
+        assert off <= 2e-3 * largest, name

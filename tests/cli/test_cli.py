@@ -72,7 +72,7 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
     entry = manifest["models"]["lafortune"]
     assert entry["auto"] == "aimed"
     forms = entry["representations"]
-    assert list(forms) == ["aimed", "sampled", "fitted"]
+    assert list(forms) == ["aimed", "sampled", "fitted", "twin"]
     assert forms["sampled"]["only"] == {}
     assert forms["fitted"]["only"] == {"cxy": -1, "cz": 0.8}
     assert forms["fitted"]["axis"] == {"name": "e", "min": 1, "max": 100}
@@ -83,9 +83,9 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
 def test_list_json_is_the_schema():
     models = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
     assert set(MODELS) <= set(models)
-    assert models["lambert"]["representations"] == ["exact", "sampled"]
-    assert models["coupled"]["representations"] == ["exact", "aimed", "sampled"]
-    assert models["ashikhmin_shirley"]["representations"] == ["aimed", "sampled"]
+    assert models["lambert"]["representations"] == ["exact", "sampled", "twin"]
+    assert models["coupled"]["representations"] == ["exact", "aimed", "sampled", "twin"]
+    assert models["ashikhmin_shirley"]["representations"] == ["aimed", "sampled", "twin"]
     assert models["coupled"]["mirror"] is True
     parameters = {p["name"]: p for p in models["ashikhmin_shirley"]["parameters"]}
     assert parameters["rs"]["kind"] == "color" and parameters["rs"]["default"] == [0.05] * 3
@@ -489,7 +489,10 @@ def test_fit_prints_its_error_by_view_and_its_closures():
         (["fit", "ward", "ax=0.5", "--twin"], ["ward", "anisotropic"]),
         (["fit", "schlick", "--any", "q"], ["--any q", "no such parameter"]),
         (["fit", "schlick", "--any", "p"], ["--any p", "a polynomial of"]),
-        (["fit", "schlick", "--any", "r", "--twin"], ["--any goes without --twin"]),
+        (["fit", "schlick", "--over", "p", "--twin"], ["schlick", "rough"]),
+        (["fit", "phong", "e=4", "--twin", "--store"], ["--twin --store", "no values"]),
+        (["fit", "glass", "--twin", "--store"], ["glass", "no twin", "only reflects"]),
+        (["fit", "phong", "--store"], ["--store", "--over or --twin"]),
         (["fit", "phong_material", "--over", "kd"], ["--over kd", "take --any kd"]),
         (["fit", "phong", "--over", "e", "e=4"], ["--over e", "e="]),
         (["fit", "schlick", "--any", "r", "r=0.5"], ["--any r", "r="]),

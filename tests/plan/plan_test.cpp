@@ -160,35 +160,35 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   EXPECT_EQ(plan[0].fixed.count("ks"), 0u);
 }
 
-/// One number that varies is an axis of a fit's tables, and there is no twin then.
+/// One number that varies is an axis of the tables of fits and twins.
 TEST(Plan, FitsAlongANumber) {
   auto textured = need("b", "oren_nayar", {"sigma=0.1"}, "fitted");
   textured.textured.insert("sigma");
   const std::vector<MaterialNeed> needs = {need("a", "oren_nayar", {"sigma=0.05"}, "fitted"), textured};
   const PlannedModel plan = plan_scene(needs, {{}, false, true})[0];
-  EXPECT_THAT(plan.forms, ElementsAre(forms::form("fitted")));
+  EXPECT_THAT(plan.forms, ElementsAre(forms::form("fitted"), forms::form("twin")));
   EXPECT_EQ(plan.fixed.count("sigma"), 0u);
-  EXPECT_EQ(why(plan, forms::form("twin")), "sigma varies over b");
-  EXPECT_THROW(plan_scene({need("a", "oren_nayar", {"sigma=0.05"}, "twin"), textured}), InputError);
   textured.textured = {"form"};
   EXPECT_THROW(plan_scene({textured}), InputError) << "a choice is no axis";
+  textured.representation = "auto";
+  EXPECT_EQ(why(plan_scene({textured}, {{}, false, true})[0], forms::form("twin")), "form varies over b");
 }
 
-/// What f is a polynomial of may vary beside a number, in fits but not in twins.
+/// What f is a polynomial of may vary beside a number, in fits and twins.
 TEST(Plan, FitsWhatThereAreTermsBy) {
   auto textured = need("b", "cook_torrance", {"m=0.4"});
   textured.textured.insert("f0");
   const std::vector<MaterialNeed> needs = {need("a", "cook_torrance", {"f0=0.04", "m=0.2"}), textured};
   const PlannedModel plan = plan_scene(needs, {0.2, false, true})[0];
-  EXPECT_THAT(plan.forms, ElementsAre(forms::form("fitted")));
+  EXPECT_THAT(plan.forms, ElementsAre(forms::form("fitted"), forms::form("twin")));
   EXPECT_TRUE(plan.fixed.empty());
-  EXPECT_EQ(why(plan, forms::form("twin")), "f0 varies over b");
   EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(forms::form("aimed")));
 
   // Its shares add up, whatever they are; its exponents are two numbers.
   const auto phong = [](const char* id, const char* value) { return need(id, "phong_material", {value}, "fitted"); };
   EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms, ElementsAre(forms::form("fitted")));
   EXPECT_THROW(plan_scene({phong("a", "es=10"), phong("b", "e=20")}), InputError);
+  EXPECT_THROW(plan_scene({need("a", "phong_material", {"es=10"}, "twin"), phong("b", "e=20")}), InputError);
 }
 
 const forms::Form *const kExact = forms::form("exact"), *const kAimed = forms::form("aimed"),
