@@ -312,5 +312,8 @@ class Layout:
         self.log.append(f"operator {name} {text}")
         return SimpleNamespace()
 
+    def operator_menu_enum(self, name, choice, text="", **_):
+        return self.operator(name, text)
+
     def prop(self, data, name, text="", **_):
         self.log.append(f"value {text}: {getattr(data, name)}")
