@@ -34,9 +34,7 @@ Fit::Fit(const Model& model, const ParamValues& given, From from) {
   tables_.multiply(factor);
 }
 
-Varied<double> Fit::varied(const ParamValues& values) const {
-  return varied_of(tables_.axis, tables_.terms, values);
-}
+Varied<double> Fit::varied(const ParamValues& values) const { return varied_of(tables_.axis, tables_.terms, values); }
 
 void Fit::store(const Model& model, const ParamValues& values, const std::filesystem::path& path) const {
   write_fit(tables_, model, values, axis() ? stored_fit(model, values).hash() : "", path);

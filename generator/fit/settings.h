@@ -75,9 +75,9 @@ inline constexpr std::size_t kTwinFacets = 3;
 
 /// The same of twins (twin.h), with ViewSettings.
 struct TwinSettings {
-  std::size_t code = 1;    ///< as FitSettings::code
-  std::size_t places = 17; ///< of the number that a twin runs over
-  std::size_t stride = 3;  ///< leaning and roughness are sought at every so-many-th view, weights at all
+  std::size_t code = 1;     ///< as FitSettings::code
+  std::size_t places = 17;  ///< of the number that a twin runs over
+  std::size_t stride = 3;   ///< leaning and roughness are sought at every so-many-th view, weights at all
   std::size_t few_points = 800, points = 3000;  ///< directions, about as many, for the one and the other
   std::size_t rounds = 2;                       ///< as FitSettings::rounds
   double last_cosine = 2e-3;  ///< the view of the first knot, which is level with the surface, is this much above it

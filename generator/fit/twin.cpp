@@ -63,8 +63,7 @@ class Bound {
 
 ParamValues all_of(const Model& model, const Terms& terms, double value) {
   ParamValues out;
-  for (const std::string& name : terms.parameters)
-    out[name] = as_value(*model.info().param(name), Rgb<double>(value));
+  for (const std::string& name : terms.parameters) out[name] = as_value(*model.info().param(name), Rgb<double>(value));
   return out;
 }
 
@@ -72,8 +71,7 @@ ParamValues all_of(const Model& model, const Terms& terms, double value) {
 View view_of_terms(const Model& model, const Bound& bound, const Terms& terms, double place, int knot, int points,
                    const Moments* lobe) {
   const bool mixed = !terms.parameters.empty();
-  const measure::BoundModel some =
-      bound(place, mixed ? all_of(model, terms, kTwinSettings.some) : ParamValues());
+  const measure::BoundModel some = bound(place, mixed ? all_of(model, terms, kTwinSettings.some) : ParamValues());
   View v = lobe ? view_of(some, view_at(knot), points, *lobe) : view_of(some, view_at(knot), points);
   if (!mixed) return v;
   v.f.resize(v.f.rows(), Eigen::Index(3 * terms.terms.size()));
@@ -254,8 +252,7 @@ void Twin::make_mirror(const Model& model, const ParamValues& values) {
   ParamValues between = all_of(model, terms_, 0.3);
   for (const std::string& name : roles_of(model, values).proportional())
     between[name] = as_value(*model.info().param(name), Rgb<double>(0.6));
-  const std::vector<Rgb<double>> weights =
-      weights_of_terms(mirror_terms_, colours_of(all_of(model, terms_, 0.3)));
+  const std::vector<Rgb<double>> weights = weights_of_terms(mirror_terms_, colours_of(all_of(model, terms_, 0.3)));
   for (const double place : at)
     for (int k = 0; k < kTwinKnots; ++k) {
       std::vector<double> x;

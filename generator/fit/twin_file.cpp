@@ -64,19 +64,18 @@ void Twin::store(const Model& model, const ParamValues& given) const {
   for (const TwinClosure& part : parts_)
     for (const auto& [kind, name] : kKinds)
       if (kind == part.kind) kinds.push_back(name);
-  const Json meta = {
-      {"model", model.info().name},
-      {"quantity", axis_ ? "nodes that come close to a model, over a number and the view"
-                         : "nodes that come close to a model, over the view"},
-      {"axis", axis_ ? Json(axis_->parameter) : Json()},
-      {"hash", key.hash()},
-      {"kinds", kinds},
-      {"terms", terms_.terms.size()},
-      {"channels", albedo_.front().size()},
-      {"errors", errors_.size()},
-      {"tint", tint_ ? Json{tint_->r, tint_->g, tint_->b} : Json()},
-      {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
-      {"tables", names}};
+  const Json meta = {{"model", model.info().name},
+                     {"quantity", axis_ ? "nodes that come close to a model, over a number and the view"
+                                        : "nodes that come close to a model, over the view"},
+                     {"axis", axis_ ? Json(axis_->parameter) : Json()},
+                     {"hash", key.hash()},
+                     {"kinds", kinds},
+                     {"terms", terms_.terms.size()},
+                     {"channels", albedo_.front().size()},
+                     {"errors", errors_.size()},
+                     {"tint", tint_ ? Json{tint_->r, tint_->g, tint_->b} : Json()},
+                     {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
+                     {"tables", names}};
   TableImage image = image_of(rows);
   image.meta = meta.dump();
   replace_stored(key, [&](const std::filesystem::path& path) { write_table_image(image, path); });

@@ -80,8 +80,7 @@ Found search(const TwinDictionary& dictionary, const std::vector<View>& views, c
                   dictionary.spread});
   for (const View& v : views) {
     // A search that begins again where it ended, with wide steps, leaves many a bad place.
-    for (std::size_t round = 0; round < kTwinSettings.rounds; ++round)
-      shape = improved(dictionary, shape, v, mixtures);
+    for (std::size_t round = 0; round < kTwinSettings.rounds; ++round) shape = improved(dictionary, shape, v, mixtures);
     found.shapes.push_back(shape);
     found.error += error_of(dictionary, shape, v, mixtures) / double(views.size());
   }
@@ -106,10 +105,8 @@ MatrixXd twin_columns(const TwinDictionary& dictionary, const TwinShape& shape, 
   const Closure<double> matte(ClosureKind::Diffuse, Rgb<double>(1.0));
   for (std::size_t j = 0; j <= kTwinFacets; ++j) {
     const double* s = shape.data() + kTwinShape * j;
-    const Closure<double> left =
-                              j < kTwinFacets ? twin_facet(dictionary.kinds[j], s[0], s[1], s[2], view.wo) : matte,
-                          right =
-                              j < kTwinFacets ? twin_facet(dictionary.kinds[j], s[0], s[1], -s[2], view.wo) : matte;
+    const Closure<double> left = j < kTwinFacets ? twin_facet(dictionary.kinds[j], s[0], s[1], s[2], view.wo) : matte,
+                          right = j < kTwinFacets ? twin_facet(dictionary.kinds[j], s[0], s[1], -s[2], view.wo) : matte;
     for (std::size_t p = 0; p < view.points.wi.size(); ++p) {
       const Vec3<double>& wi = view.points.wi[p];
       a(Eigen::Index(p), Eigen::Index(j)) = (evaluate(left, wi, view.wo).r + evaluate(right, wi, view.wo).r) / 2;

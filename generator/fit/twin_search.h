@@ -39,8 +39,8 @@ struct TwinShapes {
   const TwinDictionary* dictionary = nullptr;
   std::vector<std::vector<TwinShape>> shapes;  ///< by place and view
 };
-/// Those of the dictionary that comes closest at a few places, from the best of these on, by place and view: `views` have the columns of one term after those of
-/// the other; `mixtures` is mixtures_of() of the terms (solution.h).
+/// Those of the dictionary that comes closest at a few places, from the best of these on, by place and view: `views`
+/// have the columns of one term after those of the other; `mixtures` is mixtures_of() of the terms (solution.h).
 TwinShapes find_twin_shapes(const std::vector<std::vector<View>>& views, const Eigen::MatrixXd& mixtures);
 
 }  // namespace brdfc::fit

@@ -90,8 +90,7 @@ TEST(Twin, StatesItsErrorAlongANumber) {
         ParamValues values = roles_of(m, given).fitted_at(e.number);
         for (const auto& [parameter, value] : term.judged) values[parameter] = value;
         const auto brdf = m.make_double(values);
-        const auto [l1, albedo] =
-            by_grid(*brdf, twin.closures(wo, varied_of(twin.axis(), twin.terms(), values)), wo);
+        const auto [l1, albedo] = by_grid(*brdf, twin.closures(wo, varied_of(twin.axis(), twin.terms(), values)), wo);
         worst = std::max(worst, l1);
       }
       EXPECT_NEAR(worst, e.relative_l1, 0.1 * e.relative_l1 + 1e-3) << name << " " << e.number << " " << e.cos_theta_o;
