@@ -489,7 +489,7 @@ def test_fit_prints_its_error_by_view_and_its_closures():
         (["fit", "ward", "ax=0.5", "--twin"], ["ward", "anisotropic"]),
         (["fit", "schlick", "--any", "q"], ["--any q", "no such parameter"]),
         (["fit", "schlick", "--any", "p"], ["--any p", "a polynomial of"]),
-        (["fit", "schlick", "--over", "p", "--twin"], ["schlick", "rough"]),
+        (["fit", "schlick", "--over", "p", "--twin"], ["schlick", "anisotropic"]),
         (["fit", "phong", "e=4", "--twin", "--store"], ["--twin --store", "no values"]),
         (["fit", "glass", "--twin", "--store"], ["glass", "no twin", "only reflects"]),
         (["fit", "phong", "--store"], ["--store", "--over or --twin"]),
