@@ -73,6 +73,14 @@ def model(name):
     return models[name]
 
 
+def by_look():
+    """{look: models' identifiers}, both as menus list them; without looks that no model has."""
+    names = {look: [] for look in manifest()["looks"]}
+    for name in model_names():
+        names[model(name)["look"]].append(name)
+    return {look: found for look, found in names.items() if found}
+
+
 def citation(entry):
     """Who wrote a model's paper, and when: "Oren, Nayar 1994", of a manifest entry. Raises
     PackError for a paper that is not cited as "I. Name, J. Name: Title, Journal, year"."""

@@ -54,6 +54,16 @@ def _wrapped(layout, text, icon="NONE"):
         icon = "BLANK1" if icon != "NONE" else "NONE"
 
 
+#: Headings of menus by the looks that models declare.
+LOOKS = {
+    "matte": say("Matte"),
+    "glossy": say("Glossy"),
+    "metal": say("Metal"),
+    "glass": say("Glass"),
+    "special": say("Special"),
+}
+
+
 def menu_label(name):
     """A model's label and its paper's authors and year: what typing into a menu finds."""
     entry = pack.model(name)
@@ -62,12 +72,14 @@ def menu_label(name):
 
 def _draw_models(layout, operator):
     layout.operator("brdfc.search", icon="VIEWZOOM")
-    layout.separator()
-    for name in pack.model_names():
-        # The names are those of the papers, in every language.
-        item = layout.operator(operator, text=menu_label(name), translate=False)
-        item.model = name
-        item.representation = "auto"
+    for look, names in pack.by_look().items():
+        layout.separator()
+        layout.label(text=iface(LOOKS[look]), translate=False)
+        for name in names:
+            # The names are those of the papers, in every language.
+            item = layout.operator(operator, text=menu_label(name), translate=False)
+            item.model = name
+            item.representation = "auto"
 
 
 class NODE_MT_brdfc(Menu):

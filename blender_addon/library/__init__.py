@@ -117,7 +117,7 @@ def description(entry):
 def tags(entry):
     """Words by which the Asset Browser finds a material, beside those of its name."""
     model = pack.model(entry.model)
-    return tuple(dict.fromkeys([*entry.tags, model["label"], pack.citation(model)]))
+    return tuple(dict.fromkeys([*entry.tags, model["look"], model["label"], pack.citation(model)]))
 
 
 def catalog_id(catalog):

@@ -47,6 +47,7 @@ Json describe(const Model& m) {
   const ModelProperties& q = info.properties;
   return {{"name", info.name},
           {"label", info.label},
+          {"look", name_of(info.look)},
           {"paper", info.paper},
           {"equations", info.equations},
           {"doc", info.doc},

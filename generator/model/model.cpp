@@ -71,6 +71,24 @@ const char* name_of(Optical what) {
 ScaledRange ParamInfo::slider() const { return range(*this, soft_min, soft_max); }
 ScaledRange ParamInfo::accepted() const { return range(*this, min, max); }
 
+std::string name_of(Look look) {
+  switch (look) {
+    case Look::Undeclared:
+      break;
+    case Look::Matte:
+      return "matte";
+    case Look::Glossy:
+      return "glossy";
+    case Look::Metal:
+      return "metal";
+    case Look::Glass:
+      return "glass";
+    case Look::Special:
+      return "special";
+  }
+  return "undeclared";
+}
+
 const ParamInfo* ModelInfo::param(const std::string& wanted) const {
   for (const ParamInfo& p : params)
     if (p.name == wanted) return &p;
@@ -97,6 +115,8 @@ std::vector<const Model*> models_named(const std::string& name) {
 bool register_model(std::unique_ptr<Model> model) {
   const ModelInfo& info = model->info();
   check_identifier("model name", info.name);
+  if (info.look == Look::Undeclared)
+    throw std::logic_error(info.name + ": expected a look, such as .look = Look::Matte");
   for (const ParamInfo& p : info.params) {
     check_identifier(info.name + ": parameter name", p.name);
     for (const std::string& c : p.choices) check_identifier(info.name + ": " + p.name + ": choice", c);

@@ -99,10 +99,16 @@ struct ModelProperties {
   std::string fit_axis = "";
 };
 
+/// What a surface of a model looks like first of all: menus group models by it.
+enum class Look { Undeclared, Matte, Glossy, Metal, Glass, Special };
+/// "matte", "glossy", ...
+std::string name_of(Look);
+
 struct ModelInfo {
-  std::string name;       ///< identifier
-  std::string label;      ///< for people
-  std::string paper;      ///< citation
+  std::string name;   ///< identifier
+  std::string label;  ///< for people
+  Look look = Look::Undeclared;
+  std::string paper;      ///< citation, "I. Name, J. Name: Title, Journal, year"
   std::string equations;  ///< "eqs. 10, 14, 16, 19, 20"
   std::string doc;        ///< one or two sentences
   ModelProperties properties;
@@ -205,7 +211,7 @@ const Model& find_model(const std::string& name);
 /// That one, or without a name all of them.
 std::vector<const Model*> models_named(const std::string& name);
 
-/// Called by BRDFC_MODEL; a name taken twice throws std::logic_error.
+/// Called by BRDFC_MODEL; a name taken twice, or a look that is not declared, throws std::logic_error.
 bool register_model(std::unique_ptr<Model>);
 
 /// A parameter's index among its choices, fixed while a formula is recorded.

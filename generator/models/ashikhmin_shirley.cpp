@@ -101,6 +101,7 @@ template <class T> struct AshikhminShirley {
     return {
         .name = "ashikhmin_shirley",
         .label = "Ashikhmin-Shirley",
+        .look = Look::Glossy,
         .paper = "M. Ashikhmin, P. Shirley: An Anisotropic Phong Light Reflection Model, 2000",
         .equations = "eqs. 11, 12, 14-16, 19, 20; eq. 18 inverted",
         .doc = "Anisotropic Phong lobe with Fresnel reflection over a diffuse base that gives way at grazing angles.",

@@ -20,6 +20,7 @@ template <class T> struct Blinn {
   static ModelInfo info() {
     return {.name = "blinn",
             .label = "Blinn",
+            .look = Look::Metal,
             .paper = "J. Blinn: Models of Light Reflection for Computer Synthesized Pictures, SIGGRAPH 1977",
             .equations = "f = k_s D G / (4 (n.i)(n.o)), D = (e + 2) / (2 pi) (n.h)^e",
             .doc = "Microfacets in V-shaped cavities with a cosine-power distribution of normals.",

@@ -21,6 +21,7 @@ template <class T> struct CookTorrance {
   static ModelInfo info() {
     return {.name = "cook_torrance",
             .label = "Cook-Torrance",
+            .look = Look::Metal,
             .paper =
                 "R. Cook, K. Torrance: A Reflectance Model for Computer Graphics, ACM Transactions on Graphics 1(1), "
                 "1982",

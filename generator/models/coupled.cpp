@@ -83,6 +83,7 @@ template <class T> struct Coupled {
   static ModelInfo info() {
     return {.name = "coupled",
             .label = "Coupled Matte/Specular",
+            .look = Look::Glossy,
             .paper =
                 "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
                 "Models, Pacific Graphics 1997",

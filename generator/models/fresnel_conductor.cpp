@@ -18,6 +18,7 @@ template <class T> struct FresnelConductor {
   static ModelInfo info() {
     return {.name = "fresnel_conductor",
             .label = "Fresnel Conductor",
+            .look = Look::Metal,
             .paper =
                 "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
                 "Models, Pacific Graphics 1997",

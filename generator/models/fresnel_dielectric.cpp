@@ -14,6 +14,7 @@ template <class T> struct FresnelDielectric {
   static ModelInfo info() {
     return {.name = "fresnel_dielectric",
             .label = "Fresnel Dielectric",
+            .look = Look::Glass,
             .paper =
                 "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
                 "Models, Pacific Graphics 1997",

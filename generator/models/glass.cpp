@@ -17,6 +17,7 @@ template <class T> struct Glass {
   static ModelInfo info() {
     return {.name = "glass",
             .label = "Glass",
+            .look = Look::Glass,
             .paper =
                 "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
                 "Models, Pacific Graphics 1997",

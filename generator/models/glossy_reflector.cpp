@@ -26,6 +26,7 @@ template <class T> struct GlossyReflector {
   static ModelInfo info() {
     return {.name = "glossy_reflector",
             .label = "Glossy Reflector",
+            .look = Look::Glossy,
             .paper = "K. Suffern: Ray Tracing from the Ground Up, chapter 25, 2007",
             .equations = "eqs. 25.1, 25.7, 25.8",
             .doc = "Blurred mirror: rays spread about the mirror direction, all of the same weight.",

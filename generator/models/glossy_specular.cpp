@@ -24,6 +24,7 @@ template <class T> struct GlossySpecular {
   static ModelInfo info() {
     return {.name = "glossy_specular",
             .label = "Glossy Specular",
+            .look = Look::Glossy,
             .paper = "K. Suffern: Ray Tracing from the Ground Up, chapter 25, 2007",
             .equations = "eqs. 25.2, 25.8",
             .doc = "Specular highlight: a power of the cosine about the mirror direction, with a choice of scale.",

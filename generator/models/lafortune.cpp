@@ -23,6 +23,7 @@ template <class T> struct Lafortune {
   static ModelInfo info() {
     return {.name = "lafortune",
             .label = "Lafortune",
+            .look = Look::Special,
             .paper =
                 "E. Lafortune, S. Foo, K. Torrance, D. Greenberg: Non-Linear Approximation of Reflectance Functions, "
                 "SIGGRAPH 1997",

@@ -12,6 +12,7 @@ template <class T> struct Lambert {
   static ModelInfo info() {
     return {.name = "lambert",
             .label = "Lambert",
+            .look = Look::Matte,
             .paper = "J. H. Lambert: Photometria, 1760",
             .equations = "f = rho / pi",
             .doc = "Ideal diffuse reflection: the same radiance in every direction.",

@@ -15,6 +15,7 @@ template <class T> struct LambertianSpecular {
   static ModelInfo info() {
     return {.name = "lambertian_specular",
             .label = "Lambertian-Specular",
+            .look = Look::Glossy,
             .paper =
                 "P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection "
                 "Models, Pacific Graphics 1997",

@@ -11,6 +11,7 @@ template <class T> struct Lossless : KernelLobe<T, EvenKnots<T, 4>> {
   static ModelInfo info() {
     return {.name = "lossless",
             .label = "Lossless Kernel",
+            .look = Look::Special,
             .paper = "M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008",
             .equations = "eqs. 9-16",
             .doc = "Latitudinal reflection without loss made from a kernel; the light spreads over all azimuths.",

@@ -19,6 +19,7 @@ template <class T> struct MaxPhong {
   static ModelInfo info() {
     return {.name = "max_phong",
             .label = "Max-Phong",
+            .look = Look::Metal,
             .paper =
                 "L. Neumann, A. Neumann, L. Szirmay-Kalos: Compact Metallic Reflectance Models, Computer Graphics "
                 "Forum 18(3), 1999",

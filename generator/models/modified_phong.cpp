@@ -17,6 +17,7 @@ template <class T> struct ModifiedPhong {
   static ModelInfo info() {
     return {.name = "modified_phong",
             .label = "Modified Phong",
+            .look = Look::Glossy,
             .paper =
                 "E. Lafortune, Y. Willems: Using the Modified Phong Reflectance Model for Physically Based Rendering, "
                 "Report CW 197, K.U. Leuven, 1994",

@@ -32,6 +32,7 @@ template <class T> struct OrenNayar {
   static ModelInfo info() {
     return {.name = "oren_nayar",
             .label = "Oren-Nayar",
+            .look = Look::Matte,
             .paper = "M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model, SIGGRAPH 1994",
             .equations = "eqs. of section 4.3 (full) and 4.4 (qualitative)",
             .doc = "Rough matte surface, as clay or the moon: flatter than Lambert's, bright towards the light.",

@@ -20,6 +20,7 @@ template <class T> struct Phong {
   static ModelInfo info() {
     return {.name = "phong",
             .label = "Phong",
+            .look = Look::Glossy,
             .paper = "B. T. Phong: Illumination for Computer Generated Pictures, Communications of the ACM 18(6), 1975",
             .equations = "f = k_s cos^e alpha / cos theta_i",
             .doc = "The original highlight around the mirror direction: neither reciprocal nor energy conserving.",

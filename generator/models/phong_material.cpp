@@ -25,6 +25,7 @@ template <class T> struct PhongMaterial {
   static ModelInfo info() {
     return {.name = "phong_material",
             .label = "Phong Material",
+            .look = Look::Glossy,
             .paper = "K. Suffern: Ray Tracing from the Ground Up, chapters 15 and 25, 2007",
             .equations = "eqs. 25.2, 25.7, 25.8, listing 25.4",
             .doc = "The book's material: matte, with a highlight, and a blurred mirror. Their strengths just add up.",

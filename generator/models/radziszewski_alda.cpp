@@ -41,6 +41,7 @@ template <class T> struct RadziszewskiAlda {
   static ModelInfo info() {
     return {.name = "radziszewski_alda",
             .label = "Radziszewski-Alda",
+            .look = Look::Glossy,
             .paper = "M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008",
             .equations = "eqs. 17-19; factor 2 and nbar mended",
             .doc = "Glossy reflection or transmission that loses no light at any angle, from matte (0) to mirror.",

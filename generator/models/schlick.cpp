@@ -30,6 +30,7 @@ template <class T> struct Schlick {
   static ModelInfo info() {
     return {.name = "schlick",
             .label = "Schlick",
+            .look = Look::Glossy,
             .paper =
                 "C. Schlick: An Inexpensive BRDF Model for Physically-based Rendering, Computer Graphics Forum 13(3), "
                 "1994",

@@ -19,6 +19,7 @@ template <class T> struct SchlickDouble {
   static ModelInfo info() {
     return {.name = "schlick_double",
             .label = "Schlick Double",
+            .look = Look::Glossy,
             .paper =
                 "C. Schlick: A Customizable Reflectance Model for Everyday Rendering, 1993, in Shirley et al.: A "
                 "Practitioners' Assessment of Light Reflection Models, Pacific Graphics 1997",

@@ -21,6 +21,7 @@ template <class T> struct Shirley1991 {
   static ModelInfo info() {
     return {.name = "shirley_1991",
             .label = "Shirley 1991",
+            .look = Look::Glossy,
             .paper =
                 "P. Shirley: Physically Based Lighting Calculations for Computer Graphics, 1991, in Shirley et al.: A "
                 "Practitioners' Assessment of Light Reflection Models, Pacific Graphics 1997",

@@ -26,6 +26,7 @@ template <class T> struct Ward {
   static ModelInfo info() {
     return {.name = "ward",
             .label = "Ward",
+            .look = Look::Metal,
             .paper = "G. Ward: Measuring and Modeling Anisotropic Reflection, SIGGRAPH 1992",
             .equations = "f = k_s exp(-tan^2 theta_h (cos^2 phi_h / a_x^2 + sin^2 phi_h / a_y^2)) / (4 pi a_x a_y N)",
             .doc = "Anisotropic lobe, Gaussian in the slope of the half vector.",

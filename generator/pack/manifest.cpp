@@ -12,6 +12,13 @@
 
 namespace brdfc::pack {
 
+Json looks_json() {
+  Json names = Json::array();
+  for (const Look look : {Look::Matte, Look::Glossy, Look::Metal, Look::Glass, Look::Special})
+    names.push_back(name_of(look));
+  return names;
+}
+
 Json parameter_json(const ParamInfo& p) {
   Json j = {{"name", p.name}, {"label", p.label}};
   switch (p.kind) {

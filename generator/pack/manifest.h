@@ -15,6 +15,8 @@ namespace brdfc::pack {
 
 using Json = nlohmann::ordered_json;
 
+/// Every look that a model may declare, in the order of menus.
+Json looks_json();
 Json parameter_json(const ParamInfo&);
 Json values_json(const ParamValues&);
 Json error_json(const forms::FormError&);

@@ -110,6 +110,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
   BuiltModel built;
   Json& j = built.manifest;
   j = {{"label", info.label},
+       {"look", name_of(info.look)},
        {"paper", info.paper},
        {"equations", info.equations},
        {"doc", info.doc},
@@ -215,6 +216,7 @@ Result build_pack(const Options& options) {
                    {"generator", std::string("brdfc ") + BRDFC_VERSION},
                    {"hash", ""},
                    {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
+                   {"looks", looks_json()},
                    {"models", Json::object()}};
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     manifest["models"][chosen[i].model->info().name] = built[i].manifest;

@@ -880,6 +880,8 @@ def test_saved_file_renders_without_the_extension(every_form, tmp_path):
 
 # Menus, panels, operators
 
+LOOKS = ("Matte", "Glossy", "Metal", "Glass", "Special")
+
 
 @contextlib.contextmanager
 def shader_editor(material):
@@ -907,11 +909,20 @@ def test_add_menu_lists_every_model(extension, empty):
     assert layout.log == ["menu NODE_MT_brdfc"]
     layout = helpers.Layout()
     bpy.types.NODE_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
+    by_look = extension.pack.by_look()
     models = extension.api.models()
+    assert sorted(sum(by_look.values(), [])) == sorted(models)
+    assert list(by_look) == [look.lower() for look in LOOKS], "a model of each look, in this order"
 
     def drawn(operator):
-        cited = [f"{e['label']} ({extension.pack.citation(e)})" for e in models.values()]
-        return ["operator brdfc.search ", *(f"operator {operator} {label}" for label in cited)]
+        log = ["operator brdfc.search "]
+        for look, names in by_look.items():
+            log.append(look.capitalize())
+            for name in names:
+                assert models[name]["look"] == look
+                cited = extension.pack.citation(models[name])
+                log.append(f"operator {operator} {models[name]['label']} ({cited})")
+        return log
 
     assert layout.log == drawn("brdfc.add_node")
     layout = helpers.Layout()

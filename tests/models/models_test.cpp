@@ -115,9 +115,10 @@ TEST(Registry, EveryModelHasACaseAndARowOfTheDocsAndNoneIsLeftOver) {
     EXPECT_TRUE(in_docs.count(name)) << "docs/models.md needs a table row starting with | `" << name << "`";
 }
 
-TEST(Registry, NamesAreTakenOnce) {
+TEST(Registry, NamesAreTakenOnceAndLooksAreDeclared) {
   struct Again : Model {
-    const ModelInfo& info() const override { return find_model("lambert").info(); }
+    ModelInfo own = find_model("lambert").info();
+    const ModelInfo& info() const override { return own; }
     bool has_scatter() const override { return true; }
     bool has_mirror() const override { return false; }
     bool has_exact() const override { return false; }
@@ -127,6 +128,11 @@ TEST(Registry, NamesAreTakenOnce) {
     std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { return nullptr; }
   };
   EXPECT_THROW(register_model(std::make_unique<Again>()), std::logic_error);
+  auto plain = std::make_unique<Again>();
+  plain->own.name = "plain";
+  plain->own.look = Look::Undeclared;
+  EXPECT_THROW(register_model(std::move(plain)), std::logic_error);
+  EXPECT_EQ(models().count("plain"), 0u);
 }
 
 class ModelCase : public testing::TestWithParam<Case> {
