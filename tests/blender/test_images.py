@@ -132,12 +132,12 @@ def test_small_lamps_against_the_reference(extension_zip, tool, tmp_path, judge,
 
 @pytest.mark.full
 def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_path, judge):
-    # Those that equal their model; what a fitted one is off by test_fitted.py tells.
+    # Those that equal their model; what the others are off by test_fitted.py and test_twin.py tell.
     materials = {
         f"{model}_{form}": {"model": model, "representation": form}
         for model in extension.pack.model_names()
         for form in extension.pack.model(model)["representations"]
-        if form != "fitted"
+        if form not in ("fitted", "twin")
     }
     # Smooth light alone: where a form meets a lamp once in a thousand samples, the spread of a few
     # pictures does not show its noise, which the test takes from there.
