@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc albedo: directional-hemispherical reflectance against the view cosine.
-#include <unistd.h>
-
 #include <iostream>
 #include <optional>
 
 #include "app/commands.h"
 #include "core/csv.h"
+#include "core/process.h"
 #include "measure/albedo.h"
 #include "measure/albedo_file.h"
 #include "measure/bound_model.h"
@@ -63,7 +62,8 @@ void add_albedo_command(CLI::App& app) {
       out.row({cos_theta_o, t.r, t.g, t.b, a.mirror.r, a.mirror.g, a.mirror.b, a.error});
     };
     std::optional<CsvReader> in;
-    if (o->count == 0 && !isatty(STDIN_FILENO)) in.emplace(std::cin, "stdin", std::vector<std::string>{"cos_theta_o"});
+    if (o->count == 0 && !is_terminal(Stream::In))
+      in.emplace(std::cin, "stdin", std::vector<std::string>{"cos_theta_o"});
     if (!in || in->empty()) {
       const int n = o->count > 0 ? o->count : 64;
       for (int i = 0; i < n; ++i) write(i + 1 == n ? 1. : 0.01 + 0.99 * i / (n - 1));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,6 +8,7 @@
 #include <csignal>
 
 #include "app/commands.h"
+#include "core/process.h"
 #include "reference/color.h"
 #include "reference/image.h"
 #include "reference/render.h"
@@ -49,7 +49,7 @@ std::string clock_text(double seconds) {
 /// One line that is rewritten on a terminal; elsewhere a line every ten seconds.
 class ProgressLine {
  public:
-  explicit ProgressLine(std::string name) : name_(std::move(name)), terminal_(::isatty(2)) {}
+  explicit ProgressLine(std::string name) : name_(std::move(name)), terminal_(is_terminal(Stream::Err)) {}
   void show(const reference::Progress& p) {
     if (!terminal_ && p.seconds < next_) return;
     next_ = p.seconds + 10;

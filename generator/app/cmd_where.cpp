@@ -11,7 +11,7 @@ void add_where_command(CLI::App& app) {
   app.add_subcommand("where",
                      "Prints the folder that stored fits and albedos and the extension's Python are taken from: what\n"
                      "the environment variable BRDFC_DATA names, or share/brdfc beside the program's folder, or the\n"
-                     "sources that it was built from.")
+                     "nearest folder above it that has them, as are the sources that it is built in.")
       ->callback([] { fmt::print("{}\n", data_dir().string()); });
 }
 

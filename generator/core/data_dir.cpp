@@ -2,9 +2,9 @@
 #include "core/data_dir.h"
 
 #include <cstdlib>
-#include <vector>
 
 #include "core/error.h"
+#include "core/process.h"
 
 namespace brdfc::inline core {
 namespace {
@@ -19,13 +19,6 @@ bool holds_data(const fs::path& folder) {
   return fs::exists(folder / kSign, ignored);
 }
 
-/// The folder of the running program, links followed; empty where the system does not tell.
-fs::path program_folder() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  return error ? fs::path() : program.parent_path();
-}
-
 }  // namespace
 
 fs::path data_dir() {
@@ -35,16 +28,14 @@ fs::path data_dir() {
                   kSign);
     return given;
   }
-  std::vector<fs::path> places;
-  if (const fs::path program = program_folder(); !program.empty())
-    places.push_back(program.parent_path() / "share" / "brdfc");
-  places.push_back(BRDFC_SOURCE_DIR);
-  for (const fs::path& place : places)
-    if (holds_data(place)) return place;
-  std::string tried;
-  for (const fs::path& place : places) tried += (tried.empty() ? "" : " or ") + place.string();
-  input_error("the tool's data: expected {} in {}; the environment variable BRDFC_DATA names another folder", kSign,
-              tried);
+  const fs::path program = program_file(), installed = program.parent_path().parent_path() / "share" / "brdfc";
+  if (holds_data(installed)) return installed;
+  for (fs::path above = program.parent_path(); above != above.parent_path(); above = above.parent_path())
+    if (holds_data(above)) return above;
+  input_error(
+      "the tool's data: expected {} in {} or a folder above {}; the environment variable BRDFC_DATA names another "
+      "folder",
+      kSign, installed.string(), program.string());
 }
 
 }  // namespace brdfc::inline core

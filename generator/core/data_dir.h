@@ -8,8 +8,8 @@ namespace brdfc::inline core {
 
 /// The first of these that holds the extension's Python: the folder that the environment variable BRDFC_DATA names,
 /// and if it is set no other; share/brdfc beside the folder of the program, as `cmake --install` lays it out; the
-/// sources that the program was built from. Stored fits and albedos are in its folder data, the Python in
-/// blender_addon. Throws InputError that names what was looked for and where.
+/// nearest folder above the program, as are the sources that it is built in. Stored fits and albedos are in its folder
+/// data, the Python in blender_addon. Throws InputError that names what was looked for and where.
 std::filesystem::path data_dir();
 
 }  // namespace brdfc::inline core

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/pack.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <stdio.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -17,6 +12,7 @@
 #include "closures/closure_pool.h"
 #include "core/hash.h"
 #include "core/parse.h"
+#include "core/process.h"
 #include "fit/fit.h"
 #include "forms/form.h"
 #include "measure/albedo_file.h"
@@ -48,7 +44,7 @@ void write_text(const fs::path& path, const std::string& text) {
 /// A folder beside the target that goes away unless renamed.
 class Staging {
  public:
-  explicit Staging(const fs::path& out) : path_(out / fmt::format("{}{}", kPrefix, getpid())) {
+  explicit Staging(const fs::path& out) : path_(out / fmt::format("{}{}", kPrefix, process_id())) {
     std::error_code error;
     remove_abandoned(out);
     fs::create_directories(path_, error);
@@ -71,8 +67,8 @@ class Staging {
     for (const fs::directory_entry& entry : fs::directory_iterator(out, ignored)) {
       const std::string name = entry.path().filename().string();
       if (!name.starts_with(kPrefix)) continue;
-      const auto process = parse<pid_t>(std::string_view(name).substr(std::string_view(kPrefix).size()));
-      if (process && *process > 0 && kill(*process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), ignored);
+      const auto process = parse<long>(std::string_view(name).substr(std::string_view(kPrefix).size()));
+      if (process && process_is_over(*process)) fs::remove_all(entry.path(), ignored);
     }
   }
 
@@ -83,9 +79,7 @@ class Staging {
 /// is none; elsewhere the old folder steps aside first. It goes with the staging folder.
 void replace_folder(const fs::path& fresh, const fs::path& target, const fs::path& scratch) {
   if (fs::exists(target)) {
-#ifdef RENAME_EXCHANGE
-    if (renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) return;
-#endif
+    if (exchange(fresh, target)) return;
     fs::rename(target, scratch);
   }
   fs::rename(fresh, target);

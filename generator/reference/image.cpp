@@ -3,7 +3,6 @@
 
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imageio.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +13,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/process.h"
 #include "reference/color.h"
 
 namespace brdfc::reference {
@@ -170,7 +170,7 @@ void write_beside(const fs::path& path, const std::function<void(const fs::path&
   if (error || !fs::is_directory(folder)) input_error("{}: can't create this folder", folder.string());
   if (fs::is_directory(path)) input_error("{}: is a folder, expected a file name", path.string());
   const fs::path temporary =
-      folder / fmt::format(".{}.{}{}", path.stem().string(), ::getpid(), path.extension().string());
+      folder / fmt::format(".{}.{}{}", path.stem().string(), process_id(), path.extension().string());
   try {
     write(temporary);
     fs::rename(temporary, path, error);

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/process.h"
+
+#define BOOST_DLL_USE_STD_FS
+#include <boost/dll/runtime_symbol_info.hpp>
+
+#ifdef _WIN32
+#include <io.h>
+#include <process.h>
+#else
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include <cerrno>
+#endif
+
+namespace brdfc::inline core {
+
+namespace fs = std::filesystem;
+
+#ifdef _WIN32
+long process_id() { return _getpid(); }
+bool process_is_over(long) { return false; }
+bool is_terminal(Stream stream) { return _isatty(stream == Stream::In ? 0 : 2); }
+#else
+long process_id() { return getpid(); }
+bool process_is_over(long id) { return id > 0 && kill(pid_t(id), 0) != 0 && errno == ESRCH; }
+bool is_terminal(Stream stream) { return isatty(stream == Stream::In ? STDIN_FILENO : STDERR_FILENO); }
+#endif
+
+fs::path program_file() {
+  std::error_code error;
+  const fs::path program = boost::dll::program_location(error);
+  return error ? fs::path() : fs::weakly_canonical(program, error);
+}
+
+bool exchange([[maybe_unused]] const fs::path& a, [[maybe_unused]] const fs::path& b) {
+#ifdef RENAME_EXCHANGE
+  return renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0;
+#else
+  return false;
+#endif
+}
+
+}  // namespace brdfc::inline core
