@@ -16,7 +16,7 @@ import sys
 import tempfile
 import uuid
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import bpy
 
@@ -128,7 +128,8 @@ def catalogs_text(found):
     """Content of the file that names the catalogues of these entries."""
     paths = dict.fromkeys(entry.catalog for entry in found)
     lines = [
-        f"{catalog_id(path)}:{NAME}/{path}:{NAME}-{path.replace('/', '-')}\n" for path in paths
+        f"{catalog_id(path)}:{PurePosixPath(NAME, path)}:{NAME}-{path.replace('/', '-')}\n"
+        for path in paths
     ]
     return "VERSION 1\n\n" + "".join(lines)
 

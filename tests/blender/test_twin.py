@@ -161,33 +161,38 @@ def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
 
 def test_the_whole_extension_has_twins_that_follow_their_models(extension, empty, tmp_path):
     """Beside the model without the program brdfc: the twin's values are the model's, also after a
-    change, in a copy of the material, and in the file that was saved."""
-    material = extension.api.new_material("cook_torrance", f0=(0.9, 0.6, 0.2), m=0.3)
-    extension.api.add_twin(material)
+    change, and in the file that was saved. To single precision: a driver computes."""
 
-    def values(of):
-        found = extension.nodes.group_nodes(of)
+    def follows(material, **expected):
+        found = extension.nodes.group_nodes(material)
         assert [extension.nodes.identity(n)[1] for n in found] == ["aimed", "twin"]
         depsgraph = bpy.context.evaluated_depsgraph_get()
         depsgraph.update()
-        tree = of.evaluated_get(depsgraph).node_tree
-        every = [extension.nodes.all_values(tree.nodes[n.name]) for n in found]
-        return [{key: value[key] for key in ("f0", "m")} for value in every]
+        tree = material.evaluated_get(depsgraph).node_tree
+        for node in found:
+            values = extension.nodes.all_values(tree.nodes[node.name])
+            for name, value in expected.items():
+                assert values[name] == pytest.approx(value, rel=1e-6), (node.name, name)
 
-    add_sphere(empty, material)
-    model, twin = values(material)
-    assert twin == model == {"f0": pytest.approx((0.9, 0.6, 0.2)), "m": pytest.approx(0.3)}
-    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "m", 0.5)
-    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "f0", (0.1, 0.2, 0.3))
-    model, twin = values(material)
-    assert twin == model == {"f0": pytest.approx((0.1, 0.2, 0.3)), "m": pytest.approx(0.5)}
-    name = material.name
+    made = {"cook_torrance": {"f0": (0.9, 0.6, 0.2), "m": 0.3}, "phong": {"e": 300.0}}
+    changed = {"cook_torrance": {"f0": (0.1, 0.2, 0.3), "m": 0.5}, "phong": {"e": 12.5}}
+    names = {}
+    for model, values in made.items():
+        material = extension.api.new_material(model, **values)
+        names[model] = material.name
+        extension.api.add_twin(material)
+        add_sphere(empty, material)
+        follows(material, **values)
+        for name, value in changed[model].items():
+            extension.nodes.set_value(extension.nodes.group_nodes(material)[0], name, value)
+        follows(material, **changed[model])
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "twin.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "twin.blend"))
-    material = bpy.data.materials[name]
-    assert values(material)[1]["m"] == pytest.approx(0.5)
-    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "m", 0.7)
-    assert values(material)[1]["m"] == pytest.approx(0.7)
+    for model, name in names.items():
+        follows(bpy.data.materials[name], **changed[model])
+    material = bpy.data.materials[names["phong"]]
+    extension.nodes.set_value(extension.nodes.group_nodes(material)[0], "e", 700.0)
+    follows(material, e=700)
 
 
 def test_all_models_that_scatter_have_a_twin_and_none_takes_it_unasked(extension):
