@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/axis.h"
 
+#include <fmt/format.h>
+
 #include "trace/expr.h"
 
 namespace brdfc::fit {
@@ -8,6 +10,10 @@ namespace brdfc::fit {
 FitAxis fit_axis(const ParamInfo& p) {
   const ScaledRange slider = p.slider();
   return {p.name, slider.low, slider.high, slider.scale};
+}
+
+std::string text_of(const FitAxis& axis) {
+  return fmt::format("{} {} {} {}", axis.parameter, axis.low, axis.high, name_of(axis.scale));
 }
 
 double FitAxis::at(double x) const { return ScaledRange{scale, low, high}.at(x); }

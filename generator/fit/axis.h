@@ -21,6 +21,9 @@ struct FitAxis {
   template <class T> T place(const T& value) const;
 };
 
+/// All of it in a line, for the key of what is kept.
+std::string text_of(const FitAxis&);
+
 /// The axis that a Number parameter gives: its slider, on the scale that the schema declares.
 FitAxis fit_axis(const ParamInfo&);
 

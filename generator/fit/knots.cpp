@@ -10,34 +10,6 @@
 #include "measure/probes.h"
 
 namespace brdfc::fit {
-namespace {
-
-struct ScaledModel {
-  measure::BoundModel model;
-  double scale;  ///< what its f has to be divided by
-};
-/// The views of a fit, for one set of parameters: f of each of `terms`, at points where `some` of all is seen.
-std::vector<View> views_of(const measure::BoundModel& some, const std::vector<ScaledModel>& terms) {
-  std::vector<View> views(kSettings.views);
-  for_all(kSettings.views, [&](std::size_t i) {
-    View& v = views[i] = view_of(some, view_at(double(i) / double(kSettings.views - 1)), int(kSettings.points));
-    if (terms.empty()) return;
-    v.f.resize(v.f.rows(), Eigen::Index(3 * terms.size()));
-    for (std::size_t t = 0; t < terms.size(); ++t)
-      v.f.middleCols(Eigen::Index(3 * t), 3) = scattering(terms[t].model, v.points, v.wo) / terms[t].scale;
-  });
-  return views;
-}
-
-}  // namespace
-
-measure::BoundModel Knots::bound(double x, const ParamValues& mixed) const {
-  ParamValues values = values_;
-  if (axis_) values[axis_->parameter] = axis_->at(x);
-  for (const auto& [name, value] : mixed) values[name] = value;
-  return measure::bind_model(model_, values);
-}
-
 bool Knots::see(const std::vector<double>& places) {
   std::vector<View> fresh;
   std::vector<double> at;
@@ -61,9 +33,9 @@ bool Knots::see(const std::vector<double>& places) {
 }
 
 bool Knots::find_shapes() {
-  const std::size_t last = axis_ ? kSettings.shape_places - 1 : 0, middle = last / 2;
+  const std::size_t last = along_.axis() ? kSettings.shape_places - 1 : 0, middle = last / 2;
   std::vector<double> places;
-  for (std::size_t k = 0; k <= last; ++k) places.push_back(axis_ ? double(k) / double(last) : 0);
+  for (std::size_t k = 0; k <= last; ++k) places.push_back(along_.axis() ? double(k) / double(last) : 0);
   if (!see(places)) return false;
   shapes_.assign(places.size(), std::vector<FacetShape>(kSettings.views / kSettings.shape_stride + 1, kFirstShape));
   const auto search = [&](std::size_t k, std::size_t v, const FacetShape& begin) {
@@ -98,7 +70,7 @@ std::vector<Solution> Knots::fitted(const std::vector<double>& places, std::size
   std::vector<Solution> out(places.size());
   for_all(places.size(), [&](std::size_t i) {
     const double x = places[i];
-    out[i] = solve_views(views_.at(x), stride, family, terms_, [&](std::size_t view) {
+    out[i] = solve_views(views_.at(x), stride, family, along_.terms(), [&](std::size_t view) {
       return family == Family::Microfacet ? shape(x, view) : FacetShape();
     });
   });
@@ -123,13 +95,12 @@ FacetShape Knots::shape(double x, std::size_t view) const {
 }
 
 std::vector<View> Knots::views_at(double x) const {
-  if (terms_.parameters.empty()) return views_of(bound(x, {}), {});
-  ParamValues some;
-  std::vector<ScaledModel> terms;
-  for (const Terms::Term& term : terms_.terms) terms.push_back({bound(x, term.values), term.scale});
-  for (const std::string& name : terms_.parameters)
-    some[name] = as_value(*model_.info().param(name), Rgb<double>(kSettings.some));
-  return views_of(bound(x, some), terms);
+  const Along::At at(along_, x, kSettings.some);
+  std::vector<View> views(kSettings.views);
+  for_all(kSettings.views, [&](std::size_t i) {
+    views[i] = at.view(view_at(double(i) / double(kSettings.views - 1)), int(kSettings.points));
+  });
+  return views;
 }
 
 }  // namespace brdfc::fit

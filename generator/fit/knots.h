@@ -6,23 +6,16 @@
 #include <optional>
 #include <vector>
 
-#include "fit/axis.h"
+#include "fit/along.h"
 #include "fit/solution.h"
-#include "measure/bound_model.h"
 
 namespace brdfc::fit {
 
-/// Places run from 0 to 1; without an axis there is the place 0 alone.
 class Knots {
  public:
-  /// `grey`: the channels of f differ by a factor alone, and one column that serves all is sought. `values` lack the
-  /// axis and mixed parameters. All arguments must outlive this.
-  Knots(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis, const Terms& terms,
-        bool grey)
-      : model_(model), values_(values), axis_(axis), terms_(terms), grey_(grey) {}
-
-  /// The model at a place, with these values of mixed parameters.
-  measure::BoundModel bound(double place, const ParamValues& mixed) const;
+  /// `grey`: the channels of f differ by a factor alone, and one column that serves all is sought. `along` must outlive
+  /// this.
+  Knots(const Along& along, bool grey) : along_(along), grey_(grey) {}
 
   /// Looks at the model at these places, unless it has done so. False where it was said to be grey and is not, or has
   /// another tint there than elsewhere. Throws ValueError for a value of the model that is NaN, infinite or negative.
@@ -44,10 +37,7 @@ class Knots {
   FacetShape shape(double place, std::size_t view) const;
   std::vector<View> views_at(double place) const;
 
-  const Model& model_;
-  const ParamValues& values_;
-  const std::optional<FitAxis>& axis_;
-  const Terms& terms_;
+  const Along& along_;
   bool grey_;
   std::optional<Rgb<double>> tint_;
   std::map<double, std::vector<View>> views_;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "fit/along.h"
 #include "fit/evaluate.h"
 #include "fit/knots.h"
 #include "fit/roles.h"
@@ -53,7 +54,8 @@ double mean_error(const std::vector<Solution>& knots) {
 /// Fills a fit whose axis and terms are set. False where `grey` and the channels do not differ by a factor alone.
 bool make(FitTables& fit, const Model& model, const ParamValues& values, bool grey) {
   const std::optional<FitAxis>& axis = fit.axis;
-  Knots at(model, values, fit.axis, fit.terms, grey);
+  const Along along(model, values, fit.axis, fit.terms);
+  Knots at(along, grey);
   std::vector<double> knots = {0};
   for (int i = 1; axis && i <= int(kSettings.first_steps); ++i)
     knots.push_back(double(i) / double(kSettings.first_steps));
@@ -95,27 +97,9 @@ bool make(FitTables& fit, const Model& model, const ParamValues& values, bool gr
   fit.tint = {rounded(fit.tint.r), rounded(fit.tint.g), rounded(fit.tint.b)};
   fit.knots = knots, fit.family = int(family), fit.grey = grey;
   fit.tabulate(knots, at.fitted(knots, 1, family));
-  // With an axis at both ends, and half way between knots.
-  std::vector<double> proof = {0};
-  for (std::size_t k = 1; k < knots.size(); ++k) proof.push_back((knots[k - 1] + knots[k]) / 2);
-  if (axis) proof.push_back(1);
-  for (const double x : proof) {
-    const double number = axis ? axis->at(x) : 0;
-    std::vector<ViewError> worst;
-    for (const Terms::Term& term : fit.terms.terms) {
-      Varied<double> varied(number);
-      varied.parameters = colours_of(term.judged);
-      const auto errors =
-          view_errors(at.bound(x, term.judged), [&](const Vec3<double>& wo) { return closures(fit, wo, varied); });
-      if (worst.empty()) worst = errors;
-      for (std::size_t i = 0; i < errors.size(); ++i) worst[i] = worse(worst[i], errors[i]);
-    }
-    for (ViewError e : worst) {
-      e.number = number;
-      for (double* x : numbers_of(e)) *x = rounded(*x);
-      fit.errors.push_back(e);
-    }
-  }
+  fit.errors = along.errors(proof_places(knots), [&](const Vec3<double>& wo, const Varied<double>& varied) {
+    return closures(fit, wo, varied);
+  });
   return true;
 }
 
@@ -134,7 +118,8 @@ FitTables make_fit(const Model& model, const ParamValues& values) {
 
 FitTables make_knot(const FitTables& fit, const Model& model, const ParamValues& values, double place) {
   const Family family = Family(fit.family);
-  Knots at(model, values, fit.axis, fit.terms, fit.grey);
+  const Along along(model, values, fit.axis, fit.terms);
+  Knots at(along, fit.grey);
   if (!at.see({place}) || (family == Family::Microfacet && !at.find_shapes()))
     throw std::logic_error(model.info().name + ": a fit of another tint");
   const Solution found = std::move(at.fitted({place}, 1, family).front());

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/stored.h"
 
-#include <fmt/format.h>
-
 #include "fit/axis.h"
 #include "fit/roles.h"
 #include "fit/settings.h"
@@ -12,10 +10,9 @@ namespace brdfc::fit {
 
 StoreKey stored_fit(const Model& model, const ParamValues& given) {
   const ParamValues values = along_axis(model, given).values;
-  const FitAxis axis = fit_axis(*roles_of(model, values).axis());
   StoreKey key("fits", model.info().name);
   key.add("values", format_values(model.info(), values));
-  key.add("axis", fmt::format("{} {} {} {}", axis.parameter, axis.low, axis.high, name_of(axis.scale)));
+  key.add("axis", text_of(fit_axis(*roles_of(model, values).axis())));
   key.add("formula", measure::formula_of(model, values));
   return key.add_settings(kSettings).add_settings(kViewSettings);
 }

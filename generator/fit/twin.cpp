@@ -4,16 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "core/parallel.h"
 #include "fit/roles.h"
 #include "fit/settings.h"
 #include "fit/solution.h"
 #include "fit/twin_search.h"
-#include "measure/bound_model.h"
 #include "measure/formula.h"
-#include "tables/table_file.h"
 
 namespace brdfc::fit {
 namespace {
@@ -43,44 +40,6 @@ Rgb<double> colour(const std::vector<Channels>& terms, const std::vector<Rgb<dou
   return sum;
 }
 
-/// A model at places of the axis, with values of mixed parameters.
-class Bound {
- public:
-  Bound(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis)
-      : model_(model), values_(values), axis_(axis) {}
-  measure::BoundModel operator()(double place, const ParamValues& mixed) const {
-    ParamValues values = values_;
-    if (axis_) values[axis_->parameter] = axis_->at(place);
-    for (const auto& [name, value] : mixed) values[name] = value;
-    return measure::bind_model(model_, values);
-  }
-
- private:
-  const Model& model_;
-  const ParamValues& values_;
-  const std::optional<FitAxis>& axis_;
-};
-
-ParamValues all_of(const Model& model, const Terms& terms, double value) {
-  ParamValues out;
-  for (const std::string& name : terms.parameters) out[name] = as_value(*model.info().param(name), Rgb<double>(value));
-  return out;
-}
-
-/// The view of one place, with the columns of one term after those of the other; the lobe as it was found, or sought.
-View view_of_terms(const Model& model, const Bound& bound, const Terms& terms, double place, int knot, int points,
-                   const Moments* lobe) {
-  const bool mixed = !terms.parameters.empty();
-  const measure::BoundModel some = bound(place, mixed ? all_of(model, terms, kTwinSettings.some) : ParamValues());
-  View v = lobe ? view_of(some, view_at(knot), points, *lobe) : view_of(some, view_at(knot), points);
-  if (!mixed) return v;
-  v.f.resize(v.f.rows(), Eigen::Index(3 * terms.terms.size()));
-  for (std::size_t t = 0; t < terms.terms.size(); ++t)
-    v.f.middleCols(Eigen::Index(3 * t), 3) =
-        scattering(bound(place, terms.terms[t].values), v.points, v.wo) / terms.terms[t].scale;
-  return v;
-}
-
 /// A number for each place of the axis, evenly spaced from 0 to 1; 0 without one.
 std::vector<double> even_places(int count) {
   std::vector<double> out;
@@ -105,11 +64,12 @@ Twin::Twin(const Model& model, const ParamValues& given, From from) {
     else if (std::filesystem::exists(key.path()))  // in seconds it is made, too
       file = key.path();
   }
-  make_mirror(model, values);
+  const Along along(model, values, axis_, terms_);
+  if (model.has_mirror()) make_mirror(model, along);
   if (file)
     read(key.hash(), *file);
   else
-    make(model, values);
+    make(model, along);
   multiply(factor);
 }
 
@@ -122,15 +82,15 @@ std::vector<TableAxis> Twin::axes() const {
   return out;
 }
 
-void Twin::make(const Model& model, const ParamValues& values) {
-  const Bound bound(model, values, axis_);
+void Twin::make(const Model& model, const Along& along) {
   const std::vector<double> at = even_places(places());
   const std::size_t terms = terms_.terms.size();
+  std::vector<Along::At> models;
+  for (const double place : at) models.emplace_back(along, place, kTwinSettings.some);
   // All views in a row, place by place, to find out whether they have one tint.
   std::vector<View> row(at.size() * kTwinKnots);
   for_all(row.size(), [&](std::size_t i) {
-    row[i] = view_of_terms(model, bound, terms_, at[i / kTwinKnots], int(i % kTwinKnots), int(kTwinSettings.points),
-                           nullptr);
+    row[i] = models[i / kTwinKnots].view(view_at(int(i % kTwinKnots)), int(kTwinSettings.points));
   });
   // A mirror has a colour of its own.
   if (!model.has_mirror()) tint_ = make_grey(row);
@@ -141,13 +101,8 @@ void Twin::make(const Model& model, const ParamValues& values) {
   std::vector<std::vector<View>> few(at.size());
   for_all(at.size(), [&](std::size_t place) {
     for (int k = kTwinKnots - 1; k >= 0; k -= int(kTwinSettings.stride)) {
-      View v = view_of_terms(model, bound, terms_, at[place], k, int(kTwinSettings.few_points),
-                             &view(place, std::size_t(k)).lobe);
-      if (tint_) {
-        MatrixXd grey(v.f.rows(), v.f.cols() / 3);
-        for (Eigen::Index t = 0; t < grey.cols(); ++t) grey.col(t) = brightest(v.f.middleCols(3 * t, 3));
-        v.f = std::move(grey);
-      }
+      View v = models[place].view(view_at(k), int(kTwinSettings.few_points), &view(place, std::size_t(k)).lobe);
+      if (tint_) v.f = brightest_of_each(v.f);
       few[place].push_back(std::move(v));
     }
   });
@@ -204,12 +159,11 @@ void Twin::make(const Model& model, const ParamValues& values) {
     if (c % channels == 0) albedo_.emplace_back();
     albedo_.back().push_back(table(fmt::format("albedo_{}", c), light.col(c)));
   }
-  measure(model, values);
+  errors_ = along.errors(proof_places(at),
+                         [&](const Vec3<double>& wo, const Varied<double>& varied) { return closures(wo, varied); });
 }
 
-void Twin::make_mirror(const Model& model, const ParamValues& values) {
-  if (!model.has_mirror()) return;
-  const Bound bound(model, values, axis_);
+void Twin::make_mirror(const Model& model, const Along& along) {
   // A product of x or 1 - x of each mixed parameter: nothing negative.
   const std::size_t count = terms_.parameters.size(), corners = std::size_t(1) << count;
   mirror_terms_ = {terms_.parameters, {}};
@@ -235,7 +189,7 @@ void Twin::make_mirror(const Model& model, const ParamValues& values) {
   for (std::size_t t = 0; t < corners; ++t) {
     std::vector<std::vector<double>> numbers(3);
     for (const double place : at) {
-      const measure::BoundModel corner = bound(place, mirror_terms_.terms[t].values);
+      const measure::BoundModel corner = along.bound(place, mirror_terms_.terms[t].values);
       for (int k = 0; k < kTwinKnots; ++k) {
         const Rgb<double> m = corner.brdf->mirror(view_at(k));
         numbers[0].push_back(rounded(m.r));
@@ -249,41 +203,20 @@ void Twin::make_mirror(const Model& model, const ParamValues& values) {
   }
   parts_.push_back(std::move(part));
   // What the nodes take for granted: between the corners as the polynomial, and whatever the factors are.
-  ParamValues between = all_of(model, terms_, 0.3);
-  for (const std::string& name : roles_of(model, values).proportional())
+  const ParamValues mixed = along.mixed(0.3);
+  ParamValues between = mixed;
+  for (const std::string& name : roles_of(model, along.values()).proportional())
     between[name] = as_value(*model.info().param(name), Rgb<double>(0.6));
-  const std::vector<Rgb<double>> weights = weights_of_terms(mirror_terms_, colours_of(all_of(model, terms_, 0.3)));
-  for (const double place : at)
+  const std::vector<Rgb<double>> weights = weights_of_terms(mirror_terms_, colours_of(mixed));
+  for (const double place : at) {
+    const measure::BoundModel bound = along.bound(place, between);
     for (int k = 0; k < kTwinKnots; ++k) {
       std::vector<double> x;
       if (axis_) x.push_back(place);
       x.push_back(double(k) / (kTwinKnots - 1));
-      const Rgb<double> is = bound(place, between).brdf->mirror(view_at(k)),
-                        off = is - colour(parts_.back().weight, weights, x);
+      const Rgb<double> off = bound.brdf->mirror(view_at(k)) - colour(parts_.back().weight, weights, x);
       if (!(max_component(magnitude(off)) <= 1e-5))
         throw std::logic_error(model.info().name + ": a mirror that is no polynomial of the twin's colours");
-    }
-}
-
-void Twin::measure(const Model& model, const ParamValues& values) {
-  const Bound bound(model, values, axis_);
-  std::vector<double> proof = {0};
-  for (int i = 1; i < places(); ++i) proof.push_back((i - 0.5) / (places() - 1));
-  if (axis_) proof.push_back(1);
-  for (const double place : proof) {
-    Varied<double> varied(axis_ ? axis_->at(place) : 0);
-    std::vector<ViewError> worst;
-    for (const Terms::Term& term : terms_.terms) {
-      varied.parameters = colours_of(term.judged);
-      const auto errors =
-          view_errors(bound(place, term.judged), [&](const Vec3<double>& wo) { return closures(wo, varied); });
-      if (worst.empty()) worst = errors;
-      for (std::size_t i = 0; i < errors.size(); ++i) worst[i] = worse(worst[i], errors[i]);
-    }
-    for (ViewError e : worst) {
-      e.number = varied.number;
-      for (double* x : numbers_of(e)) *x = rounded(*x);
-      errors_.push_back(e);
     }
   }
 }
@@ -339,10 +272,7 @@ StoreKey stored_twin(const Model& model, const ParamValues& given) {
   const ParamValues values = without_factors(model, roles.fitted()).values;
   StoreKey key("twins", model.info().name);
   key.add("values", format_values(model.info(), values));
-  if (const ParamInfo* number = roles.axis()) {
-    const FitAxis axis = fit_axis(*number);
-    key.add("axis", fmt::format("{} {} {} {}", axis.parameter, axis.low, axis.high, name_of(axis.scale)));
-  }
+  if (const ParamInfo* number = roles.axis()) key.add("axis", text_of(fit_axis(*number)));
   key.add("formula", measure::formula_of(model, values));
   return key.add_settings(kTwinSettings).add_settings(kViewSettings);
 }

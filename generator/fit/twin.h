@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/along.h"
 #include "fit/evaluate.h"
 #include "fit/fit_tables.h"
 #include "fit/view.h"
@@ -70,9 +71,8 @@ class Twin {
   const std::vector<ViewError>& errors() const { return errors_; }
 
  private:
-  void make(const Model&, const ParamValues& values);
-  void make_mirror(const Model&, const ParamValues& values);
-  void measure(const Model&, const ParamValues& values);
+  void make(const Model&, const Along&);
+  void make_mirror(const Model&, const Along&);
   void read(const std::string& hash, const std::filesystem::path&);
   /// All tables, in the order in which files have them.
   std::vector<TablePtr*> all();

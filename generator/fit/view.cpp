@@ -108,6 +108,12 @@ MatrixXd scattering(const measure::BoundModel& model, const Points& points, cons
 
 VectorXd brightest(const MatrixXd& f) { return f.rowwise().maxCoeff(); }
 
+MatrixXd brightest_of_each(const MatrixXd& f) {
+  MatrixXd out(f.rows(), f.cols() / 3);
+  for (Eigen::Index model = 0; model < out.cols(); ++model) out.col(model) = brightest(f.middleCols(3 * model, 3));
+  return out;
+}
+
 View view_of(const measure::BoundModel& bound, const Vec3<double>& wo, int points) {
   return view_of(bound, wo, points, moments(bound, wo));
 }
@@ -132,12 +138,7 @@ std::optional<Rgb<double>> make_grey(std::vector<View>& views) {
         for (int k = 0; k < 3; ++k)
           if (!(std::abs(v.f(i, first + k) - ratio[k] * grey) <= 1e-9 * grey)) return std::nullopt;
       }
-  for (View& v : views) {
-    MatrixXd grey(v.f.rows(), v.f.cols() / 3);
-    for (Eigen::Index model = 0; model < grey.cols(); ++model)
-      grey.col(model) = brightest(v.f.middleCols(3 * model, 3));
-    v.f = std::move(grey);
-  }
+  for (View& v : views) v.f = brightest_of_each(v.f);
   return Rgb<double>{ratio[0], ratio[1], ratio[2]};
 }
 

@@ -68,6 +68,9 @@ View view_of(const measure::BoundModel&, const Vec3<double>& wo, int points, con
 /// The largest channel of each point.
 Eigen::VectorXd brightest(const Eigen::MatrixXd& f);
 
+/// The same of each model: a column for three.
+Eigen::MatrixXd brightest_of_each(const Eigen::MatrixXd& f);
+
 /// f cos(theta_i) at the points, a column a channel. Throws ValueError where the model gives a value that is NaN,
 /// infinite or negative.
 Eigen::MatrixXd scattering(const measure::BoundModel&, const Points&, const Vec3<double>& wo);
