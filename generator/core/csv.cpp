@@ -7,14 +7,13 @@
 #include "core/parse.h"
 
 namespace brdfc::inline core {
-namespace {
 
 std::string trim(const std::string& s) {
   const auto first = s.find_first_not_of(" \t\r"), last = s.find_last_not_of(" \t\r");
   return first == std::string::npos ? "" : s.substr(first, last - first + 1);
 }
 
-std::vector<std::string> split(const std::string& line) {
+std::vector<std::string> split_fields(const std::string& line) {
   std::vector<std::string> fields;
   std::size_t start = 0;
   for (;;) {
@@ -24,8 +23,6 @@ std::vector<std::string> split(const std::string& line) {
     start = comma + 1;
   }
 }
-
-}  // namespace
 
 CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::string> columns)
     : in_(in), source_(std::move(source)), columns_(std::move(columns)) {
@@ -51,7 +48,7 @@ bool CsvReader::read_line(std::vector<std::string>& fields) {
   while (std::getline(in_, line)) {
     ++line_;
     if (trim(line).empty()) continue;
-    fields = split(line);
+    fields = split_fields(line);
     return true;
   }
   return false;

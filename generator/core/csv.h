@@ -13,6 +13,11 @@
 
 namespace brdfc::inline core {
 
+/// Without spaces, tabs and carriage returns at both ends.
+std::string trim(const std::string&);
+/// What stands between commas, trimmed.
+std::vector<std::string> split_fields(const std::string& line);
+
 /// Numbers in named columns. Columns may come in any order; others than those asked for are ignored, so that the
 /// output of one command can be the input of the next. Every error is an InputError naming line, column and what
 /// was expected. Numbers must be finite.

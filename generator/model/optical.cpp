@@ -6,27 +6,13 @@
 #include <fstream>
 #include <limits>
 
+#include "core/csv.h"
 #include "core/data_dir.h"
 #include "core/parse.h"
 
 namespace brdfc::inline model {
 namespace fs = std::filesystem;
 namespace {
-
-std::string trim(const std::string& s) {
-  const auto first = s.find_first_not_of(" \t\r"), last = s.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : s.substr(first, last - first + 1);
-}
-
-std::vector<std::string> fields_of(const std::string& line) {
-  std::vector<std::string> out;
-  for (std::size_t start = 0;;) {
-    const auto comma = line.find(',', start);
-    out.push_back(trim(line.substr(start, comma == std::string::npos ? comma : comma - start)));
-    if (comma == std::string::npos) return out;
-    start = comma + 1;
-  }
-}
 
 void add_row(Curve& curve, char letter, double um, double value, const std::string& where) {
   const double nm = um * 1000;
@@ -90,7 +76,7 @@ Substance read_substance(const fs::path& path) {
       if (comments == 2) out.source = trim(line.substr(1));
       continue;
     }
-    const std::vector<std::string> fields = fields_of(line);
+    const std::vector<std::string> fields = split_fields(line);
     if (fields[0] == "wl") {
       block.clear();
       for (std::size_t i = 1; i < fields.size(); ++i) {
