@@ -203,6 +203,17 @@ void put_figures(std::string& out, const SceneReport& s) {
   out += "</tbody></table></div></details>\n";
 }
 
+/// Lines of an axis of powers of 10 from `left` to `right`, named; `y` is where a value lies.
+template <class Y>
+void put_decades(std::string& out, double left, double right, double bottom, double top, const Y& y) {
+  for (double decade = bottom; decade <= top; ++decade) {
+    const double at = y(std::pow(10, decade));
+    put(out, "<line class=\"axis\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", left, right, at, at);
+    put(out, "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">10<tspan dy=\"-5\">{}</tspan></text>\n", left - 8, at + 5,
+        with_minus(fmt::format("{:.0f}", decade)));
+  }
+}
+
 /// All scenes at once: error (logarithmic) over cost (logarithmic), a colour a form. Pointing at a dot says what it is.
 void put_overview(std::string& out, const std::vector<SceneReport>& scenes) {
   constexpr const char* kGreys[] = {"#8a8f98", "#b9bec6", "#5f646c"};
@@ -226,12 +237,7 @@ void put_overview(std::string& out, const std::vector<SceneReport>& scenes) {
   const auto y = [&](double e) { return kTop + (top - std::log10(e)) / (top - bottom) * (kHeight - kTop - kBottom); };
   put(out, "<svg id=\"overview\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"relMSE over CPU time, all scenes\">\n",
       kWidth, kHeight);
-  for (double decade = bottom; decade <= top; ++decade) {
-    const double at = y(std::pow(10, decade));
-    put(out, "<line class=\"axis\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", kLeft, kWidth - kRight, at, at);
-    put(out, "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">10<tspan dy=\"-5\">{}</tspan></text>\n", kLeft - 8,
-        at + 5, with_minus(fmt::format("{:.0f}", decade)));
-  }
+  put_decades(out, kLeft, kWidth - kRight, bottom, top, y);
   for (const double tick : {0.125, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0, 32.0, 64.0})
     if (tick > cheap && tick < dear)
       put(out, "<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:g}</text>\n", x(tick), kHeight - kBottom + 18,
@@ -298,12 +304,7 @@ void put_chart(std::string& out, const SceneReport& s) {
   const auto y = [&](double e) { return kTop + (top - std::log10(e)) / (top - bottom) * (kHeight - kTop - kBottom); };
   put(out, "<svg viewBox=\"0 0 {} {}\" width=\"{}\" role=\"img\" aria-label=\"relMSE over CPU time\">\n", kWidth,
       kHeight, kWidth);
-  for (double decade = bottom; decade <= top; ++decade) {
-    const double at = y(std::pow(10, decade));
-    put(out, "<line class=\"axis\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>", kLeft, kWidth - kRight, at, at);
-    put(out, "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">10<tspan dy=\"-5\">{}</tspan></text>\n", kLeft - 8,
-        at + 5, with_minus(fmt::format("{:.0f}", decade)));
-  }
+  put_decades(out, kLeft, kWidth - kRight, bottom, top, y);
   for (double tick = 0; tick <= x_end; tick += x_end > 4 ? 1 : 0.5)
     put(out, "<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:g}</text>\n", x(tick), kHeight - kBottom + 18, tick);
   put(out, "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">CPU time / Glossy node</text>\n",
