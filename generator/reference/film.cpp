@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <thread>
 
 namespace brdfc::reference {
 
@@ -22,6 +23,10 @@ void PixelMoments::write(std::size_t i, Image& mean, Image& variance) const {
     mean.rgb[3 * i + c] += float(channels_[c].mean);
     if (count_ > 1) variance.rgb[3 * i + c] += float(channels_[c].m2 / (double(count_) * (count_ - 1)));
   }
+}
+
+int threads_of(const RenderOptions& options) {
+  return options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
 }
 
 void in_arena(int threads, const std::function<void()>& f) {

@@ -2,9 +2,11 @@
 // What pictures have in common, whichever way light was followed: rays through pixels, sums over samples, metadata.
 #pragma once
 
+#include <chrono>
 #include <functional>
 
 #include "reference/image.h"
+#include "reference/render.h"
 #include "reference/scene.h"
 
 namespace brdfc::reference {
@@ -39,6 +41,29 @@ class PixelMoments {
   int count_ = 0;
 };
 
+/// How long a picture takes: from its making on, and of that what followed light.
+class RenderClock {
+ public:
+  explicit RenderClock(const RenderOptions& options) : options_(options) {}
+  /// All is ready: light is followed from now on.
+  void begin_tracing() { traced_ = Clock::now(); }
+  /// Seconds from the start, and from begin_tracing().
+  double seconds() const { return since(start_); }
+  double tracing() const { return since(traced_); }
+  bool cancelled() const { return options_.cancel && options_.cancel->load(std::memory_order_relaxed); }
+  /// Whether the picture is cancelled, or its time is over.
+  bool stop() const { return cancelled() || (options_.max_seconds > 0 && seconds() > options_.max_seconds); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+  const RenderOptions& options_;
+  const Clock::time_point start_ = Clock::now();
+  Clock::time_point traced_ = start_;
+};
+
+/// Threads that the options ask for: all cores where they do not say.
+int threads_of(const RenderOptions&);
 /// Runs f with that many threads for TBB's loops, be they more than cores.
 void in_arena(int threads, const std::function<void()>& f);
 

@@ -4,8 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 
 #include "core/error.h"
 #include "model/horizon.h"
@@ -20,12 +18,9 @@ namespace {
 
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
-using Clock = std::chrono::steady_clock;
 
 /// Parts of the particles, whose pictures are compared for the variance.
 constexpr int kBatches = 64;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Sums over particles, a colour a pixel.
 struct Film {
@@ -180,25 +175,21 @@ void require_reachable(const Scene& scene) {
 
 RenderResult render_from_lamps(const Scene& scene, const RenderOptions& options) {
   require_reachable(scene);
-  const auto start = Clock::now();
+  RenderClock clock(options);
   const RenderSettings& settings = options.settings;
   const int width = settings.width, height = settings.height;
   const std::size_t pixels = std::size_t(width) * std::size_t(height);
   const LightTracer tracer(scene, options);
   const Lights lights(scene, false);
-  const auto traced = Clock::now();
+  clock.begin_tracing();
   const std::uint64_t particles = std::uint64_t(pixels) * std::uint64_t(settings.spp);
-  const auto stop = [&] {
-    return (options.cancel && options.cancel->load(std::memory_order_relaxed)) ||
-           (options.max_seconds > 0 && seconds_since(start) > options.max_seconds);
-  };
 
   // Batches are added in their order, whatever thread makes them: a picture depends on the seed alone.
-  const int threads = options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+  const int threads = threads_of(options);
   std::vector<PixelMoments> moments(pixels);
   int done = 0;
   std::uint64_t traced_particles = 0;
-  while (done < kBatches && !(done > 0 && stop())) {
+  while (done < kBatches && !(done > 0 && clock.stop())) {
     const int wave = std::min(threads, kBatches - done);
     std::vector<Film> films(std::size_t(wave), Film(width, height));
     std::vector<std::uint64_t> counts(std::size_t(wave), 0);
@@ -222,9 +213,9 @@ RenderResult render_from_lamps(const Scene& scene, const RenderOptions& options)
       p.fraction = double(done) / kBatches;
       p.samples = settings.spp * done / kBatches;
       p.spp = settings.spp;
-      p.seconds = seconds_since(start);
-      p.seconds_left = seconds_since(traced) * (kBatches - done) / done;
-      p.paths_per_second = double(traced_particles) / seconds_since(traced);
+      p.seconds = clock.seconds();
+      p.seconds_left = clock.tracing() * (kBatches - done) / done;
+      p.paths_per_second = double(traced_particles) / clock.tracing();
       options.progress(p);
     }
   }
@@ -244,9 +235,9 @@ RenderResult render_from_lamps(const Scene& scene, const RenderOptions& options)
   });
   RenderResult result;
   result.samples = settings.spp * done / kBatches;
-  result.seconds = seconds_since(start);
-  result.paths_per_second = double(traced_particles) / std::max(seconds_since(traced), 1e-9);
-  result.cancelled = options.cancel && options.cancel->load();
+  result.seconds = clock.seconds();
+  result.paths_per_second = double(traced_particles) / std::max(clock.tracing(), 1e-9);
+  result.cancelled = clock.cancelled();
   result.rendering.mean = std::move(mean);
   result.rendering.variance = std::move(variance);
   result.rendering.metadata = render_metadata(scene, settings, result.samples, result.samples, threads, result.seconds);

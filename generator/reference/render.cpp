@@ -5,9 +5,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include <chrono>
 #include <cmath>
-#include <thread>
 
 #include "model/horizon.h"
 #include "model/sampling.h"
@@ -24,7 +22,6 @@ namespace {
 
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
-using Clock = std::chrono::steady_clock;
 
 constexpr int kTile = 16;
 
@@ -33,7 +30,7 @@ class PathTracer {
   PathTracer(const Scene& scene, const RenderOptions& options)
       : scene_(scene),
         settings_(options.settings),
-        strategy_(options.strategy.value_or(options.settings.strategy)),
+        strategy_(options.settings.strategy),
         points_(options.settings.pattern, options.settings.spp),
         tracer_(scene),
         lights_(scene, strategy_ == Strategy::Light) {
@@ -165,6 +162,7 @@ class PathTracer {
   }
 
  private:
+  /// 1 where one strategy alone finds light.
   double power_heuristic(double mine, double other) const {
     if (strategy_ != Strategy::Mis) return 1;
     const double ratio = other / mine;
@@ -192,8 +190,7 @@ class PathTracer {
     surface.check("f", wi, wo, f);
     const Color value = f * s.radiance * std::abs(wi.z);
     if (!(max_component(value) > 0)) return Color(0);
-    double weight = 1;
-    if (!s.delta && strategy_ == Strategy::Mis) weight = power_heuristic(s.pdf, pdf * rest_chance);
+    const double weight = s.delta ? 1 : power_heuristic(s.pdf, pdf * rest_chance);
     const Vector origin = Tracer::leave(hit.p, hit.geometric, s.wi);
     // A little short of a lamp, which may lie in a surface.
     if (tracer_.occluded(origin, s.wi, s.distance * (1 - 0x1p-18))) return Color(0);
@@ -209,23 +206,17 @@ class PathTracer {
   std::vector<Surface> surfaces_;
 };
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
 }  // namespace
 
 RenderResult render(const Scene& scene, const RenderOptions& options) {
   if (options.origin != Origin::Camera) return render_from_lamps(scene, options);
   const RenderSettings& settings = options.settings;
-  const int threads = options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
-  const auto start = Clock::now();
+  const int threads = threads_of(options);
+  RenderClock clock(options);
   std::unique_ptr<const PathTracer> built;
   in_arena(threads, [&] { built = std::make_unique<const PathTracer>(scene, options); });
   const PathTracer& tracer = *built;
-  const auto traced = Clock::now();
-  const auto stop = [&] {
-    return (options.cancel && options.cancel->load(std::memory_order_relaxed)) ||
-           (options.max_seconds > 0 && seconds_since(start) > options.max_seconds);
-  };
+  clock.begin_tracing();
 
   const int columns = (settings.width + kTile - 1) / kTile, rows = (settings.height + kTile - 1) / kTile;
   const int tiles = columns * rows;
@@ -245,7 +236,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
             std::uint64_t done = 0;
             for (int y = y0; y < std::min(y0 + kTile, settings.height); ++y)
               for (int x = x0; x < std::min(x0 + kTile, settings.width); ++x) {
-                if (stoppable ? stop() : options.cancel && options.cancel->load(std::memory_order_relaxed)) return;
+                if (stoppable ? clock.stop() : clock.cancelled()) return;
                 PixelMoments& pixel = pixels[std::size_t(y) * settings.width + x];
                 for (int s = from; s < to; ++s) pixel.add(tracer.path(x, y, s, scratch));
                 done += std::uint64_t(to - from);
@@ -256,13 +247,13 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
         tbb::simple_partitioner());
   };
   int done = 0, step = 1;
-  while (done < settings.spp && !(done > 0 && stop())) {
+  while (done < settings.spp && !(done > 0 && clock.stop())) {
     const int to = int(std::min<std::int64_t>(std::int64_t(done) + step, settings.spp));
-    const auto pass_start = Clock::now();
+    const double pass_start = clock.seconds();
     in_arena(threads, [&] { pass(done, to, done > 0); });
-    if (options.cancel && options.cancel->load()) break;
+    if (clock.cancelled()) break;
     done = to;
-    const double pass_seconds = seconds_since(pass_start);
+    const double pass_seconds = clock.seconds() - pass_start;
     // Passes of about half a second.
     if (pass_seconds < 0.25) step *= 2;
     if (pass_seconds > 1 && step > 1) step /= 2;
@@ -270,8 +261,8 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
       Progress p;
       p.samples = done;
       p.spp = settings.spp;
-      p.seconds = seconds_since(start);
-      const double tracing = seconds_since(traced);
+      p.seconds = clock.seconds();
+      const double tracing = clock.tracing();
       p.fraction = double(done) / settings.spp;
       p.seconds_left = tracing * (settings.spp - done) / done;
       if (options.max_seconds > 0) {
@@ -284,9 +275,9 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
   }
 
   RenderResult result;
-  result.seconds = seconds_since(start);
-  result.paths_per_second = double(paths) / std::max(seconds_since(traced), 1e-9);
-  result.cancelled = options.cancel && options.cancel->load();
+  result.seconds = clock.seconds();
+  result.paths_per_second = double(paths) / std::max(clock.tracing(), 1e-9);
+  result.cancelled = clock.cancelled();
   Image mean(settings.width, settings.height), variance(settings.width, settings.height);
   int least = settings.spp, most = 0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {

@@ -10,7 +10,6 @@
 
 #include <atomic>
 #include <functional>
-#include <optional>
 
 #include "reference/image.h"
 #include "reference/scene.h"
@@ -33,7 +32,6 @@ struct Progress {
 
 struct RenderOptions {
   RenderSettings settings;
-  std::optional<Strategy> strategy;  ///< in place of the settings'
   Origin origin = Origin::Camera;
   int threads = 0;                                ///< 0: all cores
   double max_seconds = 0;                         ///< 0: no limit; else stops early, after at least one sample a pixel

@@ -107,7 +107,7 @@ Estimate total(const Rendering& r) {
 void expect_radiance(const Scene& scene, double expected, double precision, int spp = 4096,
                      Strategy strategy = Strategy::Mis) {
   RenderOptions o = options(4, spp);
-  o.strategy = strategy;
+  o.settings.strategy = strategy;
   const Estimate e = total(render(scene, o).rendering);
   EXPECT_LE(e.error, precision * expected) << "the test has no power";
   // Pixels are floats, and points are rounded to float.
@@ -318,10 +318,10 @@ TEST(Reference, StrategiesAgree) {
   RenderOptions mis = options(size, 512, 1), light = mis, brdf = mis;
   light.settings.seed = 8;
   light.settings.spp = 1024;
-  light.strategy = Strategy::Light;
+  light.settings.strategy = Strategy::Light;
   brdf.settings.seed = 9;
   brdf.settings.spp = 4096;
-  brdf.strategy = Strategy::Brdf;
+  brdf.settings.strategy = Strategy::Brdf;
   const Rendering a = render(s, mis).rendering, b = render(s, light).rendering, c = render(s, brdf).rendering;
   EXPECT_LT(total(a).error, 0.01 * total(a).mean);
   // Whole picture, and blocks of 4 x 4 pixels, in which the central limit theorem has set in.
