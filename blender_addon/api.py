@@ -235,7 +235,7 @@ def set_substance(material, substance, node=None):
 
     node = node or _the_node(material)
     values = optical.parameters(nodes.identity(node)[0], optical.find(substance))
-    _set(node, f"material {material.name!r}", values)
+    _set(node, say("material {name!r}", name=material.name), values)
     return values
 
 

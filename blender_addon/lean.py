@@ -9,14 +9,13 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import tempfile
 from pathlib import Path
 
 import bpy
 
 from . import checks, lamps, nodes, pack
 from .i18n import say
+from .jobs import Job, ProgramJob
 
 #: Forms that a budget does not choose: they are for who asks for them.
 ASKED_FOR = ("twin",)
@@ -52,11 +51,6 @@ def program():
     )
 
 
-def _no_window():
-    """How Windows is told to open no console beside Blender; 0 elsewhere."""
-    return getattr(subprocess, "CREATE_NO_WINDOW", 0)
-
-
 def needs(materials):
     """Content of a file for `brdfc build --materials`: `materials` as those of a scene file, and
     what of the lamps of the open file its forms hang on: which have no size, and how many there
@@ -69,31 +63,10 @@ def needs(materials):
     return found
 
 
-class Job:
-    """Work in steps, between which Blender stays alive. What is wrong is raised by step(); the file
-    is then as it was, as it is after cancel()."""
-
-    result = None
-
-    def step(self):
-        """Does a part of the work; returns the share that is done, None once `result` is there."""
-        raise NotImplementedError
-
-    def cancel(self):
-        """Gives up; may be called at any time, also twice."""
-
-    def wait(self):
-        """All of it at once; returns the result."""
-        while self.step() is not None:
-            pass
-        return self.result
-
-
-class Planning(Job):
+class Planning(ProgramJob):
     """The program brdfc at work on a Plan, beside Blender."""
 
-    #: Seconds that step() waits for the program.
-    PATIENCE = 0.05
+    failure = PlanError
 
     def __init__(self, used, error=None, time=None, fit=False):
         """`used`: [(id, group node, entry)], entries as `materials` of a scene file has them.
@@ -107,66 +80,30 @@ class Planning(Job):
         materials = {name: entry for (name, _, _), (_, entry) in zip(used, self._used, strict=True)}
         self._program = program()
         content = json.dumps(needs(materials))
+        folder = self._open_folder("brdfc-lean-", {"materials.json": content})
+        command = [self._program, "build", "--materials", folder / "materials.json", "--explain"]
+        command += [*options, "--out", folder]
+        self._said = folder / "said.json"
         try:
-            # On Windows a scanner may still read what is to be removed.
-            self._folder = tempfile.TemporaryDirectory(
-                prefix="brdfc-lean-", ignore_cleanup_errors=True
-            )
-            folder = Path(self._folder.name)
-            file = folder / "materials.json"
-            file.write_text(content, encoding="utf-8")
-        except OSError as failed:
-            more = str(failed)
-            raise PlanError(
-                say("The folder for temporary files can't be written", more=more)
-            ) from failed
-        command = [self._program, "build", "--materials", file, "--explain", *options]
-        command += ["--out", folder]
-        self._said, self._log = folder / "said.json", folder / "log.txt"
-        try:
-            with self._said.open("wb") as said, self._log.open("wb") as log:
-                self._process = subprocess.Popen(
-                    [str(c) for c in command],
-                    stdin=subprocess.DEVNULL,
-                    stdout=said,
-                    stderr=log,
-                    creationflags=_no_window(),
-                )
+            self._start(command, self._said)
         except OSError as failed:
             more = f"{command[0]}: {failed}"
             raise PlanError(say("The program brdfc does not start", more=more)) from failed
 
-    def step(self):
-        if self.result is not None:
-            return None
-        try:
-            status = self._process.wait(self.PATIENCE)
-        except subprocess.TimeoutExpired:
-            return self._share()
-        log = self._log.read_text(encoding="utf-8", errors="replace")
+    def _ended(self, status):
         if status != 0:
-            said = log.strip().splitlines() or [f"exit status {status}"]
-            raise PlanError(say("The program brdfc made no plan", more=said[-1]))
+            raise PlanError(say("The program brdfc made no plan", more=self._last_words(status)))
         try:
             explanation = json.loads(self._said.read_text(encoding="utf-8"))
         except ValueError as bad:
             more = f"{self._program}: expected an explanation: {bad}"
             raise PlanError(say("The program brdfc made no plan", more=more)) from bad
-        self.result = Plan(self._used, explanation, self._folder)
-        return None
+        return Plan(self._used, explanation, self._folder)
 
-    def _share(self):
+    def _share(self, log):
         """Of the models that the program says it has begun."""
-        log = self._log.read_text(encoding="utf-8", errors="replace")
         counted = re.findall(r"^brdfc build: (\d+)/(\d+) ", log, re.M)
         return int(counted[-1][0]) / max(int(counted[-1][1]), 1) if counted else 0.0
-
-    def cancel(self):
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.wait()
-        if self.result is None:
-            self._folder.cleanup()
 
 
 def _open(entry):

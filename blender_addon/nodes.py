@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from . import lamps, pack, twin
+from . import drivers, lamps, pack, twin
 from .i18n import say
 from .pack import choice_label
 
@@ -575,12 +575,9 @@ def follow(node, leader, material):
         elif socket.type in ("VALUE", "RGBA"):
             socket.default_value = other.default_value
             for channel in range(3) if socket.type == "RGBA" else (-1,):
-                curve = socket.driver_add("default_value", channel)
-                curve.driver.type = "AVERAGE"
-                target = curve.driver.variables.new().targets[0]
-                target.id_type, target.id = "MATERIAL", material
-                path = other.path_from_id("default_value")
-                target.data_path = f"node_tree.{path}" + (f"[{channel}]" if channel >= 0 else "")
+                path = f"node_tree.{other.path_from_id('default_value')}"
+                path += f"[{channel}]" if channel >= 0 else ""
+                drivers.point_at(drivers.add(socket, channel)[1], material, path)
 
 
 def _trees(tree, seen):

@@ -249,8 +249,8 @@ def draw_node(layout, node, material, scene, editable=True):
     if made and optical.can_have(model_name):
         row = layout.row()
         row.enabled = editable
-        button = row.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
-        button.node = node.name
+        menu = row.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
+        menu.node = node.name
     if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
     if api.TWIN in entry["representations"] and representation != api.TWIN:

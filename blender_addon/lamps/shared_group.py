@@ -5,6 +5,7 @@ import math
 
 import bpy
 
+from .. import drivers
 from . import slots
 
 #: Name of the shared group, and the custom property that tells it from another of that name.
@@ -81,12 +82,12 @@ def sockets(group):
 def written(group):
     """What the group's numbers are now: floats and slots.Driven; None for a driver of
     someone else."""
-    drivers = {}
+    curves = {}
     if group.animation_data is not None:
-        drivers = {curve.data_path: curve for curve in group.animation_data.drivers}
+        curves = {curve.data_path: curve for curve in group.animation_data.drivers}
     values = []
     for socket, path in sockets(group):
-        curve = drivers.get(path)
+        curve = curves.get(path)
         values.append(socket.default_value if curve is None else _read(curve))
     return values
 
@@ -111,9 +112,7 @@ def write(socket, value):
     if not isinstance(value, slots.Driven):
         socket.default_value = value
         return
-    curve = socket.driver_add("default_value")
-    curve.driver.type = "AVERAGE"
-    variable = curve.driver.variables.new()
+    curve, variable = drivers.add(socket)
     if value.is_channel:
         variable.type = "TRANSFORMS"
         target = variable.targets[0]
@@ -122,10 +121,7 @@ def write(socket, value):
         target.transform_space = "WORLD_SPACE"
         target.rotation_mode = "QUATERNION"
     else:
-        target = variable.targets[0]
-        target.id_type = value.of.id_type
-        target.id = value.of
-        target.data_path = value.path
+        drivers.point_at(variable, value.of, value.path)
     if value.factor != 1.0:
         # 4.5 gives a driver's curve this modifier, later versions two keys on the diagonal.
         modifier = curve.modifiers[0] if curve.modifiers else curve.modifiers.new("GENERATOR")

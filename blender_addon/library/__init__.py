@@ -11,9 +11,7 @@ import contextlib
 import json
 import re
 import shutil
-import subprocess
 import sys
-import tempfile
 import uuid
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -22,7 +20,7 @@ import bpy
 
 from .. import pack
 from ..i18n import say
-from ..lean import Job
+from ..jobs import ProgramJob
 
 _HERE = Path(__file__).parent
 #: What the library is called in the Asset Browser, and on top of its catalogues.
@@ -179,45 +177,33 @@ def _command(target):
     return [_program(), *options, "--", target]
 
 
-class Making(Job):
+class Making(ProgramJob):
     """Makes the library and names it in the preferences; the result is how many materials it has.
 
     Until the last step nothing is changed. Steps raise LibraryError.
     """
 
-    #: Seconds that step() waits for the other Blender.
-    PATIENCE = 0.05
+    failure = LibraryError
 
     def __init__(self):
         self._count = len(entries())
-        self._folder = tempfile.TemporaryDirectory(prefix="brdfc-library-")
-        scratch = Path(self._folder.name)
-        self._made, self._log = scratch / "library", scratch / "log.txt"
+        self._made = self._open_folder("brdfc-library-") / "library"
         self._made.mkdir()
         command = _command(str(self._made))
         try:
-            with self._log.open("wb") as log:
-                self._process = subprocess.Popen(
-                    command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
-                )
+            self._start(command)
         except OSError as failed:
-            self._folder.cleanup()
             raise LibraryError(
                 say("The library of materials could not be made", f"{command[0]}: {failed}")
             ) from failed
 
-    def step(self):
-        if self.result is not None:
-            return None
-        try:
-            status = self._process.wait(self.PATIENCE)
-        except subprocess.TimeoutExpired:
-            said = self._log.read_text(encoding="utf-8", errors="replace")
-            return min(len(re.findall(r"^brdfc: made ", said, re.M)) / self._count, 0.99)
+    def _share(self, log):
+        return min(len(re.findall(r"^brdfc: made ", log, re.M)) / self._count, 0.99)
+
+    def _ended(self, status):
         if status != 0 or not (self._made / STAMP).is_file():
-            said = self._log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+            more = self._last_words(status)
             self.cancel()
-            more = (said or [f"status {status}"])[-1]
             raise LibraryError(say("The library of materials could not be made", more))
         try:
             _replace(self._made)
@@ -228,15 +214,7 @@ class Making(Job):
         finally:
             self._folder.cleanup()
         _name_it()
-        self.result = self._count
-        return None
-
-    def cancel(self):
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.wait()
-        if self.result is None:
-            self._folder.cleanup()
+        return self._count
 
 
 def _replace(made):

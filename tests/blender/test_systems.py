@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections import Counter
 from importlib import import_module
@@ -149,17 +150,18 @@ def test_a_file_beside_it_that_stays_in_use_hides_no_reason(
 
 
 def test_temporary_files_that_cannot_be_made(extension, lambert, monkeypatch, program):
-    lean = import_module(f"{extension.package}.lean")
     monkeypatch.setenv("BRDFC_TOOL", str(program))
 
     def refuse(*_, **__):
         raise PermissionError(errno.EACCES, "denied")
 
-    monkeypatch.setattr(lean.tempfile, "TemporaryDirectory", refuse)
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", refuse)
     with pytest.raises(extension.api.PlanError, match="temporary files can't be written.*denied"):
         extension.api.start_plan()
     with pytest.raises(RuntimeError, match="folder for temporary files can't be written"):
         bpy.ops.brdfc.bake()
+    with pytest.raises(extension.api.LibraryError, match="temporary files can't be written"):
+        extension.api.add_library()
 
 
 # ---- the program brdfc ---------------------------------------------------------------------------
@@ -212,7 +214,7 @@ def test_no_console_opens_beside_blender(extension, lean, lambert, monkeypatch, 
         seen.update(options, command=command)
         raise OSError("not started")
 
-    monkeypatch.setattr(lean.subprocess, "Popen", start)
+    monkeypatch.setattr(subprocess, "Popen", start)
     with pytest.raises(extension.api.PlanError, match="does not start.*not started"):
         extension.api.start_plan()
     assert seen["creationflags"] == 0, "other systems know no flags"
@@ -221,6 +223,10 @@ def test_no_console_opens_beside_blender(extension, lean, lambert, monkeypatch, 
         extension.api.start_plan()
     assert seen["creationflags"] == 0x08000000
     assert all(isinstance(part, str) for part in seen["command"])
+    seen.clear()
+    with pytest.raises(extension.api.LibraryError, match="could not be made.*not started"):
+        extension.api.add_library()
+    assert seen["creationflags"] == 0x08000000, "nor beside the Blender that makes the library"
 
 
 # ---- profiles ------------------------------------------------------------------------------------

@@ -46,6 +46,14 @@ def start(lean):
     return scene, [lean.api.new_material(name, "twin", **v) for name, v in MATERIALS.items()]
 
 
+def facets(rng, count, towards):
+    """Normals of so many facets under a sun: every second one is near where its highlight is."""
+    normals = tilted(rng.uniform(0.05, 1, count), rng.uniform(0, 2 * math.pi, count))
+    half = unit(unit(towards) + (0, 0, 1))
+    near = unit(half + 0.1 * rng.normal(size=(count, 3)))
+    return np.where((np.arange(count) % 2 == 0)[:, None], near, normals)
+
+
 @pytest.mark.full
 def test_a_sun_on_a_twin(lean, tool):
     """Every pair is within 1e-3 of the largest value of what the tool says of the nodes."""
@@ -54,10 +62,7 @@ def test_a_sun_on_a_twin(lean, tool):
     found = {name: [] for name in MATERIALS}
     for towards in SUNS:
         scene, materials = start(lean)
-        normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
-        half = unit(unit(towards) + (0, 0, 1))
-        near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
-        normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+        normals = facets(rng, len(which), towards)
         meter = Goniometer(scene, materials, normals, samples=4, which=which)
         wi = meter.local(meter.add_sun(unit(towards)))
         wo, picture = meter.wo(), meter.measure()
@@ -254,10 +259,7 @@ def test_tables_over_a_slider_are_what_the_tool_judges(extension, tool, empty):
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
     scene.cycles.shading_system = False
     materials = [extension.api.new_material(m, "twin", **v) for m, v in SLIDERS.items()]
-    normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
-    half = unit(unit(towards) + (0, 0, 1))
-    near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
-    normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+    normals = facets(rng, len(which), towards)
     meter = Goniometer(scene, materials, normals, samples=4, which=which)
     wi = meter.local(meter.add_sun(unit(towards)))
     wo, picture = meter.wo(), meter.measure()
