@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import os
+import sys
 import tempfile
 import zipfile
 from pathlib import Path
@@ -282,6 +283,12 @@ def counts():
         kind: len(getattr(bpy.data, kind))
         for kind in ("materials", "node_groups", "texts", "images")
     }
+
+
+def modules_of_operators(extension):
+    """The modules that define operators, a file a subject."""
+    prefix = f"{extension.operators.__name__}."
+    return [module for name, module in sys.modules.items() if name.startswith(prefix)]
 
 
 class Layout:

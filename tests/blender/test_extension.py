@@ -943,7 +943,7 @@ def test_menus_cite_papers_as_the_page_of_models_does(extension, subtests):
 
 
 def test_search_finds_models_by_name_author_title_and_year(extension, empty):
-    items = extension.operators._models(None, bpy.context)
+    items = extension.operators.adding.models_as_items(None, bpy.context)
     assert [item[0] for item in items] == extension.pack.model_names()
     texts = {name: text.lower() for name, text, _ in items}
 
@@ -1236,7 +1236,7 @@ def test_disable_leaves_nothing_behind(extension, empty):
     classes = [c for module in (extension.ui, extension.operators) for c in module._CLASSES]
     defined = {
         value
-        for module in (extension.ui, extension.operators)
+        for module in (extension.ui, *helpers.modules_of_operators(extension))
         for value in vars(module).values()
         if isinstance(value, type)
         and issubclass(value, bpy.types.bpy_struct)

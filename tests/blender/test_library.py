@@ -133,7 +133,7 @@ def test_catalogues_and_what_is_said_of_each_material(extension, library, made, 
 def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty):
     def buttons():
         layout = helpers.Layout()
-        extension.operators.draw_library(layout)
+        extension.operators.preferences.draw_library(layout)
         return [re.search(r"brdfc\.\w+", line)[0] for line in layout.log if "brdfc." in line]
 
     libraries = bpy.context.preferences.filepaths.asset_libraries

@@ -44,8 +44,8 @@ def phong(extension, empty):
 def classes(extension):
     """Every class of the extension that Blender draws."""
     kinds = (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.AddonPreferences)
-    for name in ("operators", "ui", "plot_panel"):
-        module = import_module(f"{extension.package}.{name}")
+    drawn = [import_module(f"{extension.package}.{name}") for name in ("ui", "plot_panel")]
+    for module in (*drawn, *helpers.modules_of_operators(extension)):
         for _, found in inspect.getmembers(module, inspect.isclass):
             if (
                 issubclass(found, kinds)

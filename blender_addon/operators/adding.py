@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bring models into the file: a node, a material, a search."""
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+from bpy.types import Operator
+
+from .. import api, nodes, pack
+from ..i18n import rpt, say
+from .common import ERRORS, refused, report_osl
+
+
+def _doc(properties):
+    try:
+        entry = pack.model(properties.model)
+    except ERRORS:
+        return ""
+    return f"{entry['doc']}\n{entry['paper']}"
+
+
+class _ModelOperator:
+    model: StringProperty(name="Model", description="Identifier of the model")
+    representation: StringProperty(
+        name="Form",
+        description="Form of the model: auto, or one that the model has",
+        default="auto",
+    )
+
+    @classmethod
+    def description(cls, context, properties):
+        return _doc(properties)
+
+
+class BRDFC_OT_add_node(_ModelOperator, Operator):
+    bl_idname = "brdfc.add_node"
+    bl_label = "Add Reflection Model"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        space = context.space_data
+        return (
+            space is not None
+            and space.type == "NODE_EDITOR"
+            and space.tree_type == "ShaderNodeTree"
+            and space.edit_tree is not None
+            and space.edit_tree.is_editable
+        )
+
+    def execute(self, context):
+        space = context.space_data
+        try:
+            node = nodes.add_group_node(space.edit_tree, self.model, self.representation)
+        except ERRORS as error:
+            return refused(self, error)
+        for other in space.edit_tree.nodes:
+            other.select = False
+        node.select = True
+        space.edit_tree.nodes.active = node
+        node.location = space.cursor_location
+        if isinstance(space.id, bpy.types.Material):
+            for change in api.prepare_material(space.id):
+                self.report({"INFO"}, rpt(change))
+        report_osl(self, context.scene)
+        return {"FINISHED"}
+
+    def invoke(self, context, event):
+        context.space_data.cursor_location_from_region(event.mouse_region_x, event.mouse_region_y)
+        result = self.execute(context)
+        if result == {"FINISHED"}:
+            bpy.ops.node.translate_attach_remove_on_cancel("INVOKE_DEFAULT")
+        return result
+
+
+class BRDFC_OT_new_material(_ModelOperator, Operator):
+    bl_idname = "brdfc.new_material"
+    bl_label = "New Reflection Model Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        data = getattr(context.object, "data", None)
+        return data is not None and hasattr(data, "materials") and data.is_editable
+
+    def execute(self, context):
+        try:
+            material = api.new_material(self.model, self.representation)
+        except ERRORS as error:
+            return refused(self, error)
+        target = context.object
+        if not target.material_slots:
+            target.data.materials.append(material)
+        else:
+            target.active_material = material
+        said = say("{material} assigned to {object}", material=material.name, object=target.name)
+        self.report({"INFO"}, rpt(said))
+        report_osl(self, context.scene)
+        return {"FINISHED"}
+
+
+#: Blender keeps no reference to the texts of a list that is made when it is asked for.
+_listed = []
+
+
+def models_as_items(_operator, _context):
+    """Every model as an item to choose: what its label, authors, title and year find."""
+    found = [
+        (name, f"{entry['label']} ({entry['paper']})", entry["doc"])
+        for name, entry in api.models().items()
+    ]
+    if _listed != found:
+        _listed[:] = found
+    return _listed
+
+
+class BRDFC_OT_search(Operator):
+    bl_idname = "brdfc.search"
+    bl_label = "Search Reflection Models..."
+    bl_description = (
+        "Find a model by its name, or by authors, title and year of its paper; a shader "
+        "editor gets a node of it, elsewhere a material is made"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+    bl_property = "model"
+
+    model: EnumProperty(name="Model", description="What was found", items=models_as_items)
+
+    @classmethod
+    def poll(cls, context):
+        return BRDFC_OT_add_node.poll(context) or BRDFC_OT_new_material.poll(context)
+
+    def invoke(self, context, event):
+        context.window_manager.invoke_search_popup(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        if BRDFC_OT_add_node.poll(context):
+            how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+            return bpy.ops.brdfc.add_node(how, model=self.model)
+        return bpy.ops.brdfc.new_material(model=self.model)

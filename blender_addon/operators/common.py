@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What operators share: how they refuse, and whose material they are about."""
+
+from .. import checks, nodes
+from ..i18n import Sentence, iface, of_error, rpt, say
+
+ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
+
+
+def refused(operator, error):
+    """Reports an error in a sentence; what is behind it goes into the Info editor before it."""
+    said, more = of_error(error)
+    if more:
+        operator.report({"INFO"}, more)
+    operator.report({"ERROR"}, rpt(said))
+    return {"CANCELLED"}
+
+
+def report_osl(operator, scene):
+    for finding in checks.scene_warnings(scene):
+        operator.report({"WARNING"}, rpt(finding.message))
+
+
+class OfActiveMaterial:
+    @classmethod
+    def poll(cls, context):
+        return getattr(context.object, "active_material", None) is not None
+
+
+def model_node(material, name):
+    """The model node of that name. Raises ValueError."""
+    for node in nodes.group_nodes(material):
+        if node.name == name:
+            return node
+    raise ValueError(
+        say("Material {material!r} has no model node {node!r}", material=material.name, node=name)
+    )
+
+
+class Long:
+    """An operator whose work is a jobs.Job: it goes on beside the interface, which shows how far it
+    is; Esc gives up, and then nothing is changed."""
+
+    def begin(self, context, job):
+        self.job = job
+        manager = context.window_manager
+        self.timer = manager.event_timer_add(0.1, window=context.window)
+        manager.progress_begin(0, 100)
+        manager.modal_handler_add(self)
+        self.tell(context, 0)  # before the first step: a user may want to cancel at once
+        return {"RUNNING_MODAL"}
+
+    def tell(self, context, share):
+        context.window_manager.progress_update(100 * share)
+        said = say("{work}: {share}   Esc: cancel", work=self.work(), share=f"{share:.0%}")
+        context.workspace.status_text_set(iface(said))
+
+    def work(self):
+        return Sentence(self.bl_label)
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self.cancel(context)
+            said = say("{work}: cancelled, nothing is changed", work=self.work())
+            self.report({"INFO"}, rpt(said))
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            share = self.job.step()
+        except ERRORS as error:
+            self.cancel(context)
+            return refused(self, error)
+        if share is None:
+            self.end(context)
+            return self.finish(context, self.job.result)
+        self.tell(context, share)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Also what Blender calls when a window closes or a file is opened."""
+        self.job.cancel()
+        self.end(context)
+
+    def end(self, context):
+        context.window_manager.event_timer_remove(self.timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that put models in place of Blender's own nodes, and back."""
+
+from bpy.types import Operator
+
+from .. import api
+from ..i18n import iface, rpt, say
+from .common import ERRORS, OfActiveMaterial, refused, report_osl
+
+
+def _selected_materials(context):
+    objects = context.selected_objects or ([context.object] if context.object else [])
+    found = [slot.material for o in objects for slot in o.material_slots if slot.material]
+    return list(dict.fromkeys(found))
+
+
+class BRDFC_OT_convert(Operator):
+    bl_idname = "brdfc.convert"
+    bl_label = "Convert to Reflection Models"
+    bl_description = (
+        "Put the nearest model in place of each Principled, Glossy, Diffuse or Glass node "
+        "of the selected objects' materials; links stay, and it can be taken back"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return bool(_selected_materials(context))
+
+    def invoke(self, context, event):
+        try:
+            self._plans = api.plan_conversion(_selected_materials(context))
+        except ERRORS as error:
+            return refused(self, error)
+        if not self._plans:
+            none = say("No selected material shows a Principled, Glossy, Diffuse or Glass node")
+            return refused(self, ValueError(none))
+        return context.window_manager.invoke_props_dialog(self, width=600)
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        for made in self._plans:
+            icon = "ERROR" if made.refusal else "CHECKMARK"
+            column.label(text=iface(made.line()), icon=icon, translate=False)
+
+    def execute(self, context):
+        try:
+            plans = getattr(self, "_plans", None)
+            if plans is None:
+                plans = api.plan_conversion(_selected_materials(context))
+            count = api.convert_materials(plans)
+        except ERRORS as error:
+            return refused(self, error)
+        for made in plans:
+            self.report({"WARNING" if made.refusal else "INFO"}, rpt(made.line()))
+        report_osl(self, context.scene)
+        return {"FINISHED"} if count else {"CANCELLED"}
+
+
+class BRDFC_OT_convert_back(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.convert_back"
+    bl_label = "Back to Blender's Nodes"
+    bl_description = (
+        "Put Blender's own nodes back into the active material; where they were deleted, "
+        "the model's twin"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            count = api.convert_back(context.object.active_material)
+        except ERRORS as error:
+            return refused(self, error)
+        self.report({"INFO"}, rpt(say("Nodes put back: {count}", count=count)))
+        return {"FINISHED"} if count else {"CANCELLED"}

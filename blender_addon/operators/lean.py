@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that make shaders for the open file alone."""
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.types import Operator
+
+from .. import api
+from ..i18n import iface, rpt, say
+from .common import ERRORS, Long, refused
+
+
+class BRDFC_OT_write_materials(Operator):
+    bl_idname = "brdfc.write_materials"
+    bl_label = "Write Materials"
+    bl_description = (
+        "List what this file uses, for `brdfc build --materials` to make an extension of it alone"
+    )
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(
+        name="File", description="What is written", subtype="FILE_PATH", default="materials.json"
+    )
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        path = bpy.path.abspath(self.filepath)
+        try:
+            count = api.write_materials(path)
+        except (*ERRORS, OSError) as error:
+            return refused(self, error)
+        self.report({"INFO"}, rpt(say("{count} materials in {file}", count=count, file=path)))
+        return {"FINISHED"}
+
+
+class _Budget:
+    error: FloatProperty(
+        name="Error in Percent",
+        description="Part of the light that a fitted form may misplace, which is then taken in "
+        "place of a sampled one; 0: every material keeps its form",
+        min=0,
+        max=100,
+        default=0,
+    )
+
+    fit: BoolProperty(
+        name="Fit Closures",
+        description="Less noise of aimed and sampled forms under skies and images, for seconds to "
+        "minutes of work a material",
+        default=False,
+    )
+
+    def budget(self):
+        return {"error": self.error or None, "fit": self.fit}
+
+
+class BRDFC_OT_bake(Long, _Budget, Operator):
+    bl_idname = "brdfc.bake"
+    bl_label = "Bake Lean Materials"
+    bl_description = (
+        "Give the materials shaders that hold no more than this file needs; the program brdfc "
+        "makes them"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def invoke(self, context, event):
+        try:
+            return self.begin(context, api.start_plan(**self.budget()))
+        except ERRORS as error:
+            return refused(self, error)
+
+    def finish(self, context, plan):
+        BRDFC_OT_bake_plan.plan, BRDFC_OT_bake_plan.planned_with = plan, self.budget()
+        bpy.ops.brdfc.bake_plan("INVOKE_DEFAULT", error=self.error, fit=self.fit)
+        return {"CANCELLED"}  # nothing is changed yet, so there is nothing to undo
+
+    def execute(self, context):
+        try:
+            count = api.bake(api.plan(**self.budget()))
+        except ERRORS as error:
+            return refused(self, error)
+        self.report({"INFO"}, rpt(say("Nodes that are lean now: {count}", count=count)))
+        return {"FINISHED"}
+
+
+class BRDFC_OT_bake_plan(_Budget, Operator):
+    bl_idname = "brdfc.bake_plan"
+    bl_label = "Bake Lean Materials"
+    bl_description = "Show what lean materials would hold, and bake them"
+    bl_options = {"INTERNAL"}
+
+    plan, planned_with = None, None  # of the class: brdfc.bake leaves them here
+
+    @classmethod
+    def poll(cls, context):
+        return cls.plan is not None
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self, width=800)
+
+    def draw(self, context):
+        self.layout.prop(self, "error")
+        self.layout.prop(self, "fit")
+        column = self.layout.column(align=True)
+        for line in self.plan.lines():
+            column.label(text=iface(line), translate=False)
+
+    def execute(self, context):
+        if self.budget() == self.planned_with:
+            bpy.ops.brdfc.bake_apply("INVOKE_DEFAULT")
+        else:  # then another plan is to be seen first
+            bpy.ops.brdfc.bake("INVOKE_DEFAULT", error=self.error, fit=self.fit)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_bake_apply(Long, Operator):
+    bl_idname = "brdfc.bake_apply"
+    bl_label = "Bake Lean Materials"
+    bl_description = "Put the lean shaders of a plan into the materials"
+    bl_options = {"INTERNAL", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return BRDFC_OT_bake_plan.plan is not None
+
+    def invoke(self, context, event):
+        plan, BRDFC_OT_bake_plan.plan = BRDFC_OT_bake_plan.plan, None
+        return self.begin(context, api.start_bake(plan))
+
+    def finish(self, context, count):
+        self.report({"INFO"}, rpt(say("Nodes that are lean now: {count}", count=count)))
+        return {"FINISHED"}

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on a material's model: its form, what is known of it, outputs, values."""
+
+import functools
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.types import Operator
+
+from .. import api, color, nodes
+from ..i18n import iface, of_error, rpt, say, tip
+from .common import ERRORS, OfActiveMaterial, model_node, refused
+
+
+class BRDFC_OT_switch(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.switch"
+    bl_label = "Switch Form"
+    bl_description = "Use another form of the same model; values and links stay"
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(name="Node", description="Name of the group node")
+    representation: StringProperty(
+        name="Form",
+        description="Form of the model: auto, or one that the model has",
+        default="auto",
+    )
+    all_users: BoolProperty(
+        name="All Materials",
+        description="Also in every other material that has this model and form",
+        default=False,
+    )
+
+    def execute(self, context):
+        material = context.object.active_material
+        materials = bpy.data.materials if self.all_users else [material]
+        try:
+            node = model_node(material, self.node)
+            identity = nodes.identity(node)
+            for user in materials:
+                for other in nodes.group_nodes(user):
+                    if other == node or (self.all_users and nodes.identity(other) == identity):
+                        nodes.switch(other, self.representation)
+                api.prepare_material(user)
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_details(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.details"
+    bl_label = "What This Means"
+    bl_description = (
+        "The part of the reflected light that this form sends in other directions than its "
+        "model, on average over views: of an error of 1.2 % that is 1.2 of 100 parts, and 1 % is "
+        "hard to see. Click for more figures"
+    )
+    bl_options = {"INTERNAL"}
+
+    node: StringProperty(name="Node", description="Name of the group node")
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_popup(self, width=500)
+
+    def draw(self, context):
+        for line in self.lines(context):
+            self.layout.label(text=iface(line), translate=False)
+
+    def execute(self, context):
+        for line in self.lines(context):
+            self.report({"INFO"}, rpt(line))
+        return {"FINISHED"}
+
+    def lines(self, context):
+        from .. import ui
+
+        try:
+            node = model_node(context.object.active_material, self.node)
+            made = nodes.manifest_entry(node)
+        except ERRORS as error:
+            said, more = of_error(error)
+            return [said, more] if more else [said]
+        return ui.details(node, made[0]) if made else [say("Made by another version")]
+
+
+class BRDFC_OT_more(Operator):
+    bl_idname = "brdfc.more"
+    bl_label = "More About This"
+    bl_description = "Show what is behind this sentence"
+    bl_options = {"INTERNAL"}
+
+    text: StringProperty(name="Text", description="What is shown")
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_popup(self, width=500)
+
+    def draw(self, context):
+        from .. import ui
+
+        for line in ui.lines_of(self.text):
+            self.layout.label(text=line, translate=False)
+
+    def execute(self, context):
+        self.report({"INFO"}, self.text)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_update(Operator):
+    bl_idname = "brdfc.update"
+    bl_label = "Update Materials"
+    bl_description = (
+        "Give the models that another version of the extension made the shaders of this "
+        "one, where all that they are set to can stay"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            result = api.update_materials()
+        except ERRORS as error:
+            return refused(self, error)
+        for sentence in (*result.refusals, *result.notes):
+            self.report({"WARNING"}, rpt(sentence))
+        self.report({"INFO"}, rpt(say("Models updated: {count}", count=result.count)))
+        return {"FINISHED"}
+
+
+class BRDFC_OT_add_albedo(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.add_albedo"
+    bl_label = "Add Albedo Output"
+    bl_description = (
+        "Give the model's node an output for its albedo, whose tables make the file larger"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(name="Node", description="Name of the group node")
+
+    def execute(self, context):
+        material = context.object.active_material
+        try:
+            nodes.add_albedo(model_node(material, self.node))
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_add_twin(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.add_twin"
+    bl_label = "Add Twin for EEVEE"
+    bl_description = (
+        "Give the active material a second output, for EEVEE, made of Blender's own nodes"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            api.add_twin(context.object.active_material)
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+
+class BRDFC_OT_kernel(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.kernel"
+    bl_label = "Kernel from Float Curve"
+    bl_description = (
+        "Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(
+        name="Node", description="Name of the group node; empty for the active one"
+    )
+
+    def execute(self, context):
+        material = context.object.active_material
+        try:
+            node = self._group(material)
+            api.set_kernel(node, self._curve(node.id_data))
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+    def _group(self, material):
+        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n)[0] == api.KERNEL_MODEL]
+        wanted = [n for n in ours if n.name == self.node] if self.node else ours
+        active = [n for n in wanted if n == n.id_data.nodes.active]
+        if not wanted or (len(wanted) > 1 and not active):
+            raise ValueError(
+                say(
+                    "Material {material!r}: expected an active node of the model {model!r}",
+                    material=material.name,
+                    model=api.KERNEL_MODEL,
+                )
+            )
+        return (active or wanted)[0]
+
+    def _curve(self, tree):
+        curves = [n for n in tree.nodes if n.bl_idname == "ShaderNodeFloatCurve"]
+        chosen = curves if len(curves) == 1 else [n for n in curves if n.select]
+        if len(chosen) != 1:
+            raise ValueError(
+                say(
+                    "Expected one Float Curve node beside the model's, or one that is selected; "
+                    "there are {count}, {selected} selected",
+                    count=len(curves),
+                    selected=len(chosen),
+                )
+                if curves
+                else say("Expected a Float Curve node beside the model's; there is none")
+            )
+        return chosen[0]
+
+
+#: No name of a substance.
+_FILE = "FILE"
+
+
+@functools.cache
+def _substances(locale):
+    """Items of a menu in a language; Blender needs somebody to keep their texts."""
+    known = api.substances().values()
+    metals, others = ([s for s in known if s.conductor is kind] for kind in (True, False))
+    rows = [(s.name, s.label, s.source) for s in (*metals, *others)]
+    about = tip(say("Measurements as refractiveindex.info exports them: wl,n and wl,k"))
+    return [*rows, (_FILE, iface(say("From File\u2026")), about)]
+
+
+class BRDFC_OT_substance(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.substance"
+    bl_label = "Metal or Glass from n, k"
+    bl_description = (
+        "Give the model the colours of a metal, glass or liquid of measured refractive index, in "
+        "the working space of the file"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: StringProperty(name="Node", description="Name of the group node", options={"HIDDEN"})
+    substance: EnumProperty(
+        name="Substance",
+        description="What the surface is made of",
+        items=lambda self, context: _substances(bpy.app.translations.locale),
+    )
+    filepath: StringProperty(
+        name="File",
+        description="Measurements as refractiveindex.info exports them: wl,n and wl,k",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        if self.substance != _FILE:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        material = context.object.active_material
+        name = bpy.path.abspath(self.filepath) if self.substance == _FILE else self.substance
+        try:
+            if self.substance == _FILE and not name.endswith(".csv"):
+                raise ValueError(say("{file}: expected a file NAME.csv", file=repr(name)))
+            node = model_node(material, self.node) if self.node else None
+            values = api.set_substance(material, name, node)
+        except ERRORS as error:
+            return refused(self, error)
+        space = color.working_space()
+        said = say("Set in {space}: {names}", space=space, names=", ".join(values))
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The preferences, and operators for the library of materials that they add."""
+
+from bpy.props import BoolProperty, StringProperty
+from bpy.types import AddonPreferences, Operator
+
+from .. import api, library
+from ..i18n import rpt, say
+from .common import ERRORS, Long, refused
+
+
+class BRDFC_OT_add_library(Long, Operator):
+    bl_idname = "brdfc.add_library"
+    bl_label = "Add the brdfc Materials to the Asset Browser"
+    bl_description = (
+        "Make a library of ready-made materials and name it in the preferences: from then "
+        "on they are in the Asset Browser, to be dragged onto objects"
+    )
+    bl_options = {"REGISTER"}
+
+    def invoke(self, context, event):
+        try:
+            return self.begin(context, library.Making())
+        except ERRORS as error:
+            return refused(self, error)
+
+    def finish(self, context, count):
+        said = say(
+            "Materials in the library {name} of the Asset Browser: {count}",
+            name=library.NAME,
+            count=count,
+        )
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}
+
+    def execute(self, context):
+        try:
+            count = api.add_library()
+        except ERRORS as error:
+            return refused(self, error)
+        return self.finish(context, count)
+
+
+class BRDFC_OT_remove_library(Operator):
+    bl_idname = "brdfc.remove_library"
+    bl_label = "Remove the brdfc Materials from the Asset Browser"
+    bl_description = (
+        "Take the library out of the preferences and delete it; materials in files stay as they are"
+    )
+    bl_options = {"REGISTER"}
+
+    def execute(self, context):
+        there_was = api.remove_library()
+        said = say("Library removed") if there_was else say("There was no library")
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}
+
+
+def draw_library(layout):
+    """Buttons for the library of materials, where this extension has one."""
+    if not library.available():
+        return
+    if library.registered() is None:
+        layout.operator("brdfc.add_library", icon="ASSET_MANAGER")
+        return
+    if not library.is_current():
+        layout.label(text="Another version made the brdfc materials", icon="INFO")
+        layout.operator("brdfc.add_library", text="Make Them Anew", icon="FILE_REFRESH")
+    layout.operator("brdfc.remove_library", icon="TRASH")
+
+
+class BrdfcPreferences(AddonPreferences):
+    bl_idname = __package__.rpartition(".")[0]  # that of the extension
+
+    program: StringProperty(
+        name="Program brdfc",
+        description="What Bake Lean Materials runs; empty: it is looked for on the PATH",
+        subtype="FILE_PATH",
+    )
+    update_on_load: BoolProperty(
+        name="Update Materials of Files That Are Opened",
+        description="Give models that another version of this extension made the shaders of this "
+        "one when a file is opened, where all that they are set to can stay. Pictures may change",
+        default=False,
+    )
+
+    def draw(self, context):
+        self.layout.prop(self, "program")
+        self.layout.prop(self, "update_on_load")
+        draw_library(self.layout)

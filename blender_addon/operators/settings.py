@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that mend settings of scenes and materials, and look for lamps."""
+
+from bpy.types import Operator
+
+from .. import api, checks
+from ..i18n import rpt, say
+from .common import OfActiveMaterial, refused
+
+
+class BRDFC_OT_enable_osl(Operator):
+    bl_idname = "brdfc.enable_osl"
+    bl_label = "Turn On OSL"
+    bl_description = "Turn on Open Shading Language, which these shaders need, and Cycles with it"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            done = checks.enable_osl(context.scene)
+        except RuntimeError as error:
+            return refused(self, error)
+        for change in done or [say("Open Shading Language is on already")]:
+            self.report({"INFO"}, rpt(change))
+        return {"FINISHED"}
+
+
+class BRDFC_OT_fix_material(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.fix_material"
+    bl_label = "Set Up Material"
+    bl_description = "Give the active material the settings that its models need"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        changes = api.prepare_material(context.object.active_material)
+        for change in changes or [say("Nothing to change")]:
+            self.report({"INFO"}, rpt(change))
+        return {"FINISHED"}
+
+
+class BRDFC_OT_no_guiding(Operator):
+    bl_idname = "brdfc.no_guiding"
+    bl_label = "Turn Off Path Guiding"
+    bl_description = "Turn path guiding off, which the forms of this extension can't follow"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        context.scene.cycles.use_guiding = False
+        return {"FINISHED"}
+
+
+class BRDFC_OT_find_lamps(Operator):
+    bl_idname = "brdfc.find_lamps"
+    bl_label = "Find Lamps"
+    bl_description = "Look again for the lamps that materials aim at, the brightest first"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        found = api.see_lamps(context.scene)
+        taken = sum(lamp.slot is not None for lamp in found)
+        self.report(
+            {"INFO"}, rpt(say("Lamps aimed at: {taken} of {all}", taken=taken, all=len(found)))
+        )
+        return {"FINISHED"}
