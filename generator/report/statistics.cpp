@@ -143,40 +143,46 @@ WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& refer
 
   WelchTest test;
   test.p = Image(width, height);
+  const double pixel_limit = sidak(width * height);
   int noisy = 0;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const Estimate a = estimate(pictures.size(), [&](std::size_t i) { return picture_at(i, x, y); });
-      const Estimate b = reference_at(x, y);
-      const double p = welch_p(a, b, unseen);
-      for (int c = 0; c < 3; ++c) test.p.pixel(x, y)[c] = float(p);
-      test.worst_pixel = std::min(test.worst_pixel, p);
-      ++test.pixels;
-      if (a.variance + b.variance > sqr(kRounding * b.mean)) {
-        ++noisy;
-        ++test.histogram[std::min(std::size_t(p * double(test.histogram.size())), test.histogram.size() - 1)];
-      }
-    }
-  const double pixel_limit = sidak(test.pixels);
-  for (std::size_t i = 0; i < test.p.rgb.size(); i += 3) test.rejected_pixels += double(test.p.rgb[i]) < pixel_limit;
-
   std::vector<double> tile_p;
   for (int y0 = 0; y0 < height; y0 += kTestTile)
     for (int x0 = 0; x0 < width; x0 += kTestTile) {
       const int x1 = std::min(x0 + kTestTile, width), y1 = std::min(y0 + kTestTile, height);
       const double n = double(x1 - x0) * (y1 - y0);
       std::vector<double> means(pictures.size(), 0);
-      Estimate b{0, 0, std::max(samples - 1, 1.0)};
+      // Of the tile's mean, and of one of its pixels as they are on average.
+      Estimate b{0, 0, std::max(samples - 1, 1.0)}, usual_a{0, 0, n * double(pictures.size() - 1)}, usual_b = b;
+      std::vector<std::pair<Estimate, Estimate>> pixels;
       for (int y = y0; y < y1; ++y)
         for (int x = x0; x < x1; ++x) {
           for (std::size_t i = 0; i < pictures.size(); ++i) means[i] += picture_at(i, x, y) / n;
-          const Estimate e = reference_at(x, y);
-          b.mean += e.mean / n;
-          b.variance += e.variance / n / n;
+          const auto& [of_a, of_b] = pixels.emplace_back(
+              estimate(pictures.size(), [&](std::size_t i) { return picture_at(i, x, y); }), reference_at(x, y));
+          b.mean += of_b.mean / n;
+          b.variance += of_b.variance / n / n;
+          usual_a.variance += of_a.variance / n;
+          usual_b.variance += of_b.variance / n;
         }
       tile_p.push_back(welch_p(estimate(means.size(), [&](std::size_t i) { return means[i]; }), b, unseen));
       test.worst_tile = std::min(test.worst_tile, tile_p.back());
+      std::size_t i = 0;
+      for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x, ++i) {
+          const auto& [of_a, of_b] = pixels[i];
+          const double alone = welch_p(of_a, of_b, unseen);
+          usual_a.mean = of_a.mean, usual_b.mean = of_b.mean;
+          const double p = std::max(alone, welch_p(usual_a, usual_b, unseen));
+          for (int c = 0; c < 3; ++c) test.p.pixel(x, y)[c] = float(p);
+          test.worst_pixel = std::min(test.worst_pixel, p);
+          test.rejected_pixels += p < pixel_limit;
+          if (of_a.variance + of_b.variance > sqr(kRounding * of_b.mean)) {
+            ++noisy;
+            ++test.histogram[std::min(std::size_t(alone * double(test.histogram.size())), test.histogram.size() - 1)];
+          }
+        }
     }
+  test.pixels = width * height;
   test.tiles = int(tile_p.size());
   const double tile_limit = sidak(test.tiles);
   test.rejected_tiles = int(std::count_if(tile_p.begin(), tile_p.end(), [&](double p) { return p < tile_limit; }));

@@ -33,11 +33,13 @@ Difference measure_difference(const reference::Rendering& picture, const referen
 
 /// Welch's t-test of "both have the same expectation" on luminance, for every pixel and for the mean of every tile of
 /// kTestTile x kTestTile pixels. A family of n tests rejects where p < 1 - (1 - kTestSignificance)^(1/n) (Sidak).
+/// A pixel's noise is taken from its own spread and, a second time, from the mean of its tile's; the larger p counts:
+/// where light comes once in a thousand samples, few pixels know by themselves that they are noisy.
 struct WelchTest {
   int pixels = 0, tiles = 0;
   int rejected_pixels = 0, rejected_tiles = 0;
   double worst_pixel = 1, worst_tile = 1;  ///< smallest p
-  std::array<int, 20> histogram{};         ///< of the p of the pixels that have noise
+  std::array<int, 20> histogram{};         ///< of the p, by their own spread, of the pixels that have noise
   double uniform = 1;                      ///< p of a chi-square test that the histogram is flat
   reference::Image p;                      ///< p of every pixel, in all three channels
 

@@ -343,6 +343,25 @@ TEST(Welch, RejectsAFewWrongPixels) {
   EXPECT_LT(t.p.pixel(3, 5)[0], 1e-6);
 }
 
+/// Light that comes to one pixel in a hundred: the others are dimmer than the mean by more than rounding, and agree.
+TEST(Welch, RareLightIsNoise) {
+  constexpr double kChance = 0.01, kDot = 0.2;
+  std::vector<Rendering> pictures(4, picture(1, 0, 0));
+  std::mt19937 random(7);
+  std::bernoulli_distribution rare(kChance);
+  for (Rendering& r : pictures)
+    for (std::size_t i = 0; i < r.mean.rgb.size(); i += 3) {
+      const float light = rare(random) ? float(kDot) : 0;
+      for (std::size_t c = 0; c < 3; ++c) r.mean.rgb[i + c] += light;
+    }
+  Rendering expected = reference();
+  for (float& v : expected.mean.rgb) v += float(kChance * kDot);
+  EXPECT_TRUE(welch_test(pictures, expected, "a", "b").passed());
+  // Without it nothing is left that could be noise.
+  pictures.assign(4, picture(1, 0, 0));
+  EXPECT_EQ(welch_test(pictures, expected, "a", "b").rejected_pixels, kSize * kSize);
+}
+
 TEST(Welch, WithoutNoiseOnlyRoundingIsForgiven) {
   std::vector<Rendering> pictures(2, picture(1, 0, 0));
   EXPECT_EQ(welch_test(pictures, reference(), "a", "b").worst_pixel, 1);
