@@ -116,11 +116,9 @@ def main():
     index += [
         "Scenes of the papers, and a few of ours: on the left in Blender, in the form that *auto*",
         "takes, then by the reference renderer, which evaluates the models themselves, and the",
-        "difference, red where Blender is brighter and blue where it is darker. Four pictures with",
+        "difference, red where Blender is brighter and blue where it is darker. Pictures with",
         "other seeds tell error from noise: the pixel test is Welch's, at 0.01 for the whole",
         "picture, and wants 99.75 % of the pixels and all tiles of 16 x 16.",
-        "With few samples rare bright ones follow no normal distribution, which the test supposes:",
-        "scenes of sparse noise may fail it with a bias within its error.",
         f"`{command}` makes these pages and their pictures.",
         "",
         *heading("Page", "Scenes", "same within noise"),
