@@ -132,30 +132,60 @@ template <class T> T pdf_under(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
   return select(dot(lobe.towards, wi) > lobe.cosEnd, T(1) / lobe.extent, T(0));
 }
 
-/// The direction `ray`, moved out of the seam about a lamp if it lies there. The rest is drawn as a lobe 1e-3 wide,
-/// which in the seam still touches the lamp: light sampling finds that rarely, and where it does, what little is left
-/// beside the lamp would be as bright as the lamp, or as dark. Beside the seam it meets next to the same light without.
-template <class T> Vec3<T> beside(const LampPatch<T>& patch, const Vec3<T>& ray) {
-  constexpr double kReach = 5e-3;
-  const auto disk = patch.disk > T(0.5);
+/// Where a direction meets the plane of a lamp.
+template <class T> struct Crossing {
+  T reach;   ///< times the direction: there; not above 0 where it goes the other way
+  T x, y;    ///< in units of the half axes
+  T radius;  ///< less than 1 on the lamp
+  T width;   ///< of the seam (kSeam), in units of length
+};
+
+/// The width of the seam about the edge of a lamp, outside and inside. The rest is drawn as a lobe 1e-3 wide, which in
+/// the seam lies partly on the lamp and partly beside it.
+inline constexpr double kSeam = 5e-3;
+
+template <class T> Crossing<T> crossing(const LampPatch<T>& patch, const Vec3<T>& wi) {
   const Vec3<T> normal = cross(patch.across, patch.along);
-  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
-  const T facing = dot(normal, ray);
-  const T distance = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
-  const Vec3<T> offset = ray * distance - patch.centre;
-  const T x = dot(offset, patch.across) / a2, y = dot(offset, patch.along) / b2;
-  // The seam's width in the plane of the lamp, in units of its axes.
-  const T width = T(kReach) * distance * length(normal) / maximum(abs(facing), tiny<T>());
-  const T seam_x = T(1) + width / sqrt(a2), seam_y = T(1) + width / sqrt(b2);
-  const T r = sqrt(x * x + y * y), seam = maximum(seam_x, seam_y);
-  const auto past_x = abs(x) > T(1);
-  const auto touches = distance > T(0) && select(disk, r, maximum(abs(x), abs(y))) > T(1) &&
-                       select(disk, r / seam, maximum(abs(x) / seam_x, abs(y) / seam_y)) < T(1);
-  const T round = seam / maximum(r, tiny<T>());
-  const T out_x = select(past_x, select(x > T(0), seam_x, -seam_x), x),
-          out_y = select(past_x, y, select(y > T(0), seam_y, -seam_y));
-  const Vec3<T> moved = normalize(patch.at(select(disk, x * round, out_x), select(disk, y * round, out_y)));
+  const T facing = dot(normal, wi);
+  Crossing<T> c;
+  c.reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const Vec3<T> offset = wi * c.reach - patch.centre;
+  c.x = dot(offset, patch.across) / dot(patch.across, patch.across);
+  c.y = dot(offset, patch.along) / dot(patch.along, patch.along);
+  c.radius = select(patch.disk > T(0.5), sqrt(c.x * c.x + c.y * c.y), maximum(abs(c.x), abs(c.y)));
+  c.width = T(kSeam) * c.reach * length(normal) / maximum(abs(facing), tiny<T>());
+  return c;
+}
+
+/// The direction `ray`, moved out of the seam beside a lamp if it lies there: light sampling finds the lamp by what
+/// reaches over of it rarely, and where it does, what little is left beside the lamp would be as bright as the lamp, or
+/// as dark. Beside the seam it meets next to the same light without.
+template <class T> Vec3<T> beside(const LampPatch<T>& patch, const Vec3<T>& ray) {
+  const Crossing<T> c = crossing(patch, ray);
+  const auto disk = patch.disk > T(0.5);
+  const T seam_x = T(1) + c.width / length(patch.across), seam_y = T(1) + c.width / length(patch.along);
+  const T seam = maximum(seam_x, seam_y);
+  const auto past_x = abs(c.x) > T(1);
+  const auto touches = c.reach > T(0) && c.radius > T(1) &&
+                       select(disk, c.radius / seam, maximum(abs(c.x) / seam_x, abs(c.y) / seam_y)) < T(1);
+  const T round = seam / maximum(c.radius, tiny<T>());
+  const T out_x = select(past_x, select(c.x > T(0), seam_x, -seam_x), c.x),
+          out_y = select(past_x, c.y, select(c.y > T(0), seam_y, -seam_y));
+  const Vec3<T> moved = normalize(patch.at(select(disk, c.x * round, out_x), select(disk, c.y * round, out_y)));
   return select(touches && moved.z * ray.z > T(0), moved, ray);
+}
+
+/// The direction `ray`, which meets the lamp, moved off the edge: what reaches over the edge would be lost, as nothing
+/// of the rest reaches back (beside()).
+template <class T> Vec3<T> within(const LampPatch<T>& patch, const Vec3<T>& ray) {
+  const Crossing<T> c = crossing(patch, ray);
+  const auto disk = patch.disk > T(0.5);
+  const T end_x = maximum(T(1) - c.width / length(patch.across), T(0)),
+          end_y = maximum(T(1) - c.width / length(patch.along), T(0));
+  const T round = minimum(minimum(end_x, end_y) / maximum(c.radius, tiny<T>()), T(1));
+  const T in_x = minimum(maximum(c.x, -end_x), end_x), in_y = minimum(maximum(c.y, -end_y), end_y);
+  const Vec3<T> moved = normalize(patch.at(select(disk, c.x * round, in_x), select(disk, c.y * round, in_y)));
+  return select(moved.z * ray.z > T(0), moved, ray);
 }
 
 /// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp.
@@ -187,30 +217,32 @@ AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const
     return abs(dot(normal, p)) / (d2 * sqrt(d2));
   };
   // Its mean over the lamp by four points, which is right to third degree (A. Stroud: Approximate Calculation of
-  // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1).
+  // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1); and by the same, how high above the lobe's normal the lamp is.
   const T node = select(disk, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(disk, T(0), node);
-  const T mean = (density(patch.at(node, other)) + density(patch.at(-node, other * T(-1))) +
-                  density(patch.at(other * T(-1), node)) + density(patch.at(other, -node))) /
-                 T(4);
+  T mean(0), mean_rise(0);
+  for (const Vec3<T>& p :
+       {patch.at(node, other), patch.at(-node, other * T(-1)), patch.at(other * T(-1), node), patch.at(other, -node)}) {
+    const T d = density(p);
+    mean = mean + d / T(4);
+    mean_rise = mean_rise + d / T(4) * (dot(lamp.lobe.half, p) / sqrt(dot(p, p)));
+  }
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
   const T sinRadius = lamp.lobe.sinRadius;
   const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
   const auto usable =
       radius2 < T(kNearest * kNearest) * distance2 && least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
-  lamp.emphasis = select(usable, density(point) / maximum(mean * evaluate(lamp.lobe, lamp.wi), tiny<T>()), T(0));
+  // Over the lobe's height: its profile at the point, which is even about the lamp's centre, but its slope over the
+  // whole lamp. Where f slopes, too, the quotient of both at one point, times the slope where light sampling meets the
+  // lamp, is not f on average.
+  const T profile = aimed_profile(pow(maximum(dot(towards, lamp.wi), lamp.lobe.cosEnd), lamp.lobe.exponent));
+  lamp.emphasis = select(usable, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
   return lamp;
 }
 
 /// 1 where a direction meets the lamp, else 0.
 template <class T> T meets(const LampPatch<T>& patch, const Vec3<T>& wi) {
-  const Vec3<T> normal = cross(patch.across, patch.along);
-  const T facing = dot(normal, wi);
-  const T reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
-  const Vec3<T> offset = wi * reach - patch.centre;
-  const T x2 = sqr(dot(offset, patch.across) / dot(patch.across, patch.across)),
-          y2 = sqr(dot(offset, patch.along) / dot(patch.along, patch.along));
-  const auto inside = reach > T(0) && select(patch.disk > T(0.5), x2 + y2, maximum(x2, y2)) < T(1);
-  return select(inside, T(1), T(0));
+  const Crossing<T> c = crossing(patch, wi);
+  return select(c.reach > T(0) && c.radius < T(1), T(1), T(0));
 }
 
 /// What the drawn direction carries of a lamp of this solid angle, which it meets with this density: the power

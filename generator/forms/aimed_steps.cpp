@@ -102,6 +102,8 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lamp_met", met.solid_angle);
     p.output("density_under", met.density);
     p.output("ray", beside(of_earlier, input3("ray")));
+    const auto here = meets(of_earlier, input3("drawn")) > Expr(0);
+    p.output("on_lamp", select(here, within(of_earlier, input3("drawn")), input3("on_lamp")));
   });
   const auto record_rest = [&](const Expr& count, const Met<Expr>& met) {
     return record_step([&](Program& p) {

@@ -207,6 +207,68 @@ TEST(Aimed, NoPointOfALampStandsForTheWholeOfIt) {
   EXPECT_GT(aimed, 5000);
 }
 
+/// A lamp of ten degrees in the flank of a lobe that falls by half over it: its points and where light sampling meets
+/// it are drawn apart, so the mean of f over the points times that of the aimed lobe over the lamp must be that of f.
+TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
+  constexpr int kSteps = 64;
+  const Model& m = find_model("glossy_reflector");
+  const auto brdf = m.make_double(values_of(m, {"e=25"}));
+  for (const double cosTheta_o : {0.3, 0.6, 0.9}) {
+    const Vec3<double> wo = direction(cosTheta_o, 0.3), mirror = reflect(wo);
+    for (const Vec3<double>& offset :
+         {Vec3<double>{0, 0, 0}, {0.2, 0, 0.1}, {-0.2, 0, 0.1}, {0, 0.2, 0.1}, {0, -0.2, 0.1}})
+      for (const double disk_or_not : {1.0, 0.0}) {
+        LampPatch<double> lamp = disk(normalize(mirror + offset), 0.17);
+        lamp.disk = disk_or_not;
+        if (lamp.centre.z < 0.3) continue;  // wholly above the surface
+        double mean = 0;
+        AimedLamp<double> aimed;
+        for (int i = 0; i < kSteps * kSteps; ++i) {
+          aimed = aim_at(lamp, 1.0, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
+          mean += brdf->eval(aimed.wi, wo).g * aimed.wi.z * aimed.emphasis / (kSteps * kSteps);
+        }
+        const double lit = over_patch(lamp, 1, [&](const Vec3<double>& w) { return evaluate(aimed.lobe, w); });
+        const double truth = over_patch(lamp, 1, [&](const Vec3<double>& w) { return brdf->eval(w, wo).g * w.z; });
+        EXPECT_NEAR(mean * lit, truth, 1e-3 * truth)
+            << cosTheta_o << " " << offset.x << " " << offset.y << " " << disk_or_not;
+      }
+  }
+}
+
+/// What the drawn direction carries of a lamp is a lobe 1e-3 wide: it must lie on the lamp as a whole, and beside it
+/// not at all.
+TEST(Aimed, NothingOfTheRestReachesOverTheEdgeOfALamp) {
+  measure::Random random(5);
+  const auto around = [](const Vec3<double>& w, double by, const auto& all) {
+    const Vec3<double> t = normalize(cross(w, std::abs(w.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0}));
+    for (int k = 0; k < 16; ++k)
+      if (!all(normalize(w + t * (by * std::cos(k * kPi / 8)) + cross(w, t) * (by * std::sin(k * kPi / 8)))))
+        return false;
+    return true;
+  };
+  int near[2] = {}, moved[2] = {};
+  for (int i = 0; i < 40000; ++i) {
+    LampPatch<double> lamp = disk(direction(0.7, 2.0) * 3.0, 0.2, 0.5 + measure::uniform(random));
+    if (i % 2) lamp.disk = 0;
+    const double x = 1.1 * (2 * measure::uniform(random) - 1), y = 1.1 * (2 * measure::uniform(random) - 1);
+    const Vec3<double> w = normalize(lamp.at(x, y));
+    const bool on = meets(lamp, w);
+    const Vec3<double> to = on ? within(lamp, w) : beside(lamp, w);
+    ++near[on];
+    moved[on] += length(to - w) > 1e-9;
+    const auto same_side = [&](const Vec3<double>& d) { return meets(lamp, d) == on; };
+    ASSERT_TRUE(around(to, 3e-3, same_side)) << i << ": " << x << " " << y;
+    ASSERT_LT(length(to - w), 1e-2) << i;
+    if (around(w, 1e-2, same_side)) {
+      ASSERT_LT(length(to - w), 1e-12) << i << ": far from the edge, and moved";
+    }
+  }
+  for (const int side : {0, 1}) {
+    EXPECT_GT(moved[side], near[side] / 20);
+    EXPECT_LT(moved[side], near[side] / 2);
+  }
+}
+
 TEST(Aimed, DirectionsUnderALobeHaveTheirDensity) {
   for (const double radius : {0.01, 0.5}) {
     const Vec3<double> wo = direction(0.6, 1);
