@@ -9,6 +9,7 @@ import json
 import os
 import re
 import shutil
+import sysconfig
 from pathlib import Path
 
 import bpy
@@ -26,8 +27,8 @@ class PlanError(RuntimeError):
 
 
 def program():
-    """Path of brdfc: of the extension's preferences, of the environment variable BRDFC_TOOL, or
-    found on the PATH. Raises PlanError."""
+    """Path of brdfc: of the extension's preferences, of the environment variable BRDFC_TOOL, found
+    on the PATH, or where pip puts programs for the Python that runs. Raises PlanError."""
     addon = bpy.context.preferences.addons.get(__package__)
     named = getattr(addon.preferences, "program", "") if addon and addon.preferences else ""
     for what, path in (
@@ -41,8 +42,9 @@ def program():
         if found := shutil.which(name, path=folder or None):
             return found
         raise PlanError(say("{path} is not the program brdfc; {who}", path=path, who=what))
-    if found := shutil.which("brdfc"):
-        return found
+    for folders in (None, sysconfig.get_path("scripts")):
+        if found := shutil.which("brdfc", path=folders):
+            return found
     raise PlanError(
         say(
             "The program brdfc was not found: give its path in the extension's preferences, or put "

@@ -35,6 +35,10 @@ void run(const fs::path& out) {
   const fs::path project = data / "python" / "pyproject.toml";
   std::string text = pack::read_text(project);
   pack::stamp(text, project, "version", "@version@", BRDFC_VERSION);
+  const std::string tool = "brdfc-tool ==";  // of the same version, which the extra asks for
+  const std::size_t at = text.find(tool + "@version@");
+  if (at == std::string::npos) input_error("{}: expected a requirement \"{}@version@\"", project.string(), tool);
+  text.replace(at, tool.size() + std::string("@version@").size(), tool + BRDFC_VERSION);
   write(out / "pyproject.toml", text);
   write(out / "LICENSE", pack::read_text(data / "LICENSE"));
   std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; pip wheel " << out.string()

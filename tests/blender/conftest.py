@@ -98,7 +98,7 @@ def extension(extension_zip):
         filepath=str(extension_zip), repo="user_default", enable_on_install=True
     )
     assert PACKAGE in bpy.context.preferences.addons
-    names = ("api", "checks", "energy", "nodes", "operators", "pack", "scene_loader", "ui")
+    names = ("api", "checks", "energy", "lean", "nodes", "operators", "pack", "scene_loader", "ui")
     return SimpleNamespace(
         package=PACKAGE, **{name: import_module(f"{PACKAGE}.{name}") for name in names}
     )

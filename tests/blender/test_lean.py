@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lean materials: baked from inside Blender, with the program brdfc."""
 
+import os
+import sysconfig
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -196,6 +198,20 @@ def refused_and_unchanged(extension, material, match):
     assert counts() == before
     assert the_node(extension, material).node_tree == group
     assert extension.pack.root == extension.pack._INSTALLED
+
+
+def test_the_program_of_an_environment_is_found(extension, tmp_path, monkeypatch):
+    """As pip puts it there: on the PATH where the environment is activated, and else beside the
+    Python that runs."""
+    for folder in ("path", "scripts"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "brdfc").symlink_to(os.environ["BRDFC_TOOL"])
+    monkeypatch.delenv("BRDFC_TOOL")
+    monkeypatch.setattr(sysconfig, "get_path", lambda name: str(tmp_path / name))
+    monkeypatch.setenv("PATH", str(tmp_path / "path"))
+    assert extension.lean.program() == str(tmp_path / "path" / "brdfc")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert extension.lean.program() == str(tmp_path / "scripts" / "brdfc")
 
 
 def test_without_the_program_nothing_changes(extension, used, tmp_path, monkeypatch):

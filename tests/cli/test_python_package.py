@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package of `brdfc python`: its formulas against the tool's, its errors, wheel and page.
+"""The package of `brdfc python`: its formulas against the tool's, its errors and page.
 
 The tool evaluates the C++ in double precision. Values agree to 1e-12 of themselves, for every
 model, at defaults, at random parameters and at the stiff ones of tests/models/cases.csv. A sample's
@@ -14,10 +14,8 @@ import importlib.util
 import io
 import json
 import os
-import re
 import subprocess
 import sys
-import zipfile
 
 import gallery_models
 import landmarks
@@ -260,61 +258,6 @@ def test_the_same_bytes_each_time(folder, tmp_path):
     assert len(files) > len(MODELS)
     for file in files:
         assert (folder / file).read_bytes() == (tmp_path / file).read_bytes()
-
-
-@pytest.fixture(scope="module")
-def wheel(folder, tmp_path_factory):
-    out = tmp_path_factory.mktemp("wheel")
-    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index"]
-    command += ["--no-build-isolation", "--wheel-dir", out, folder]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    (made,) = out.glob("*.whl")
-    return made
-
-
-def test_the_wheel_is_python_alone(wheel):
-    version = re.search(r"project\(brdfc VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1]
-    assert wheel.name == f"brdfc-{version}-py3-none-any.whl"
-    with zipfile.ZipFile(wheel) as archive:
-        names = archive.namelist()
-        for name in names:
-            if name.endswith(".py"):
-                assert archive.read(name).startswith(b"# SPDX-License-Identifier: GPL-3.0-or-later")
-    assert {f"brdfc/models/{name}.py" for name in MODELS} <= set(names)
-    assert any(name.endswith("LICENSE") for name in names)
-    assert all(name.endswith((".py", ".typed")) or ".dist-info/" in name for name in names)
-
-
-def test_the_wheel_works_in_a_clean_environment(wheel, tmp_path):
-    """Without network: of what is installed here the environment gets NumPy alone."""
-    subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
-    python = tmp_path / "venv" / "bin" / "python"
-    install = [python, "-m", "pip", "install", "--no-deps", "--no-index", wheel]
-    done = subprocess.run(install, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    numpy = tmp_path / "numpy"
-    numpy.mkdir()
-    site = importlib.util.find_spec("numpy").submodule_search_locations[0]
-    for found in (site, site + ".libs"):
-        if os.path.exists(found):
-            (numpy / os.path.basename(found)).symlink_to(found)
-    code = (
-        "import sys, brdfc\n"
-        "loaded = [m for m in sys.modules if m.startswith('brdfc.models.')]\n"
-        "f = brdfc.model('ward').eval([[0, 0, 1]] * 2, [0, 0, 1], ax=.1)\n"
-        "print(brdfc.__version__, len(brdfc.models()), loaded, f.shape, brdfc.__file__)"
-    )
-    done = subprocess.run(
-        [python, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(numpy)},
-    )
-    assert done.returncode == 0, done.stderr
-    assert f" {len(MODELS)} [] (2, 3) " in done.stdout  # no model is loaded before it is asked for
-    assert str(tmp_path / "venv") in done.stdout
 
 
 def test_examples_of_the_page(brdfc):
