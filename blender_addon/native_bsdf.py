@@ -49,7 +49,9 @@ def dielectric(f0, cosine):
     eta = (1 + f0**0.5) / (1 - f0**0.5)
     c = np.clip(cosine, 0, 1)
     g = np.sqrt(np.maximum(eta**2 - 1 + c**2, 0))
-    a, b = (g - c) / (g + c), (c * (g + c) - 1) / np.maximum(c * (g - c) + 1, 1e-12)
+    # Along the surface of what refracts nothing both are 0.
+    a = (g - c) / np.maximum(g + c, 1e-12)
+    b = (c * (g + c) - 1) / np.maximum(c * (g - c) + 1, 1e-12)
     return 0.5 * a**2 * (1 + b**2)
 
 

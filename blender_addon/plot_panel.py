@@ -12,7 +12,7 @@ from .i18n import iface, of_error, say
 #: Pictures that are kept; the oldest gives its place away.
 _KEPT = 16
 _previews = None
-_places = {}  # what is shown, to the name of a preview and the roughness of the nearest Glossy node
+_places = {}  # what is shown, to the name of a preview and the nearest nodes of Blender's
 
 
 def _values(node):
@@ -24,8 +24,8 @@ def _values(node):
 
 
 def picture(node):
-    """The preview of a node's values and the roughness of the nearest Glossy node, or None; drawn
-    where the values are new. Raises ValueError for a model that the extension does not have."""
+    """The preview of a node's values and plots.Nodes, Blender's own that are nearest; drawn where
+    the values are new. Raises ValueError for a model that the extension does not have."""
     from . import plots  # NumPy's formulas, when they are first looked at
 
     model_name, _ = nodes.identity(node)
@@ -36,7 +36,7 @@ def picture(node):
         *((n, tuple(np.ravel(v))) for n, v in values.items() if v is not None),
     )
     if key not in _places:
-        pixels, roughness = plots.draw(model_name, values)
+        pixels, near = plots.draw(model_name, values)
         if len(_previews) < _KEPT:
             name = f"plot {len(_previews)}"
             _previews.new(name)
@@ -47,9 +47,23 @@ def picture(node):
         # Four bytes a pixel, as one integer.
         packed = np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)).view(np.int32)
         preview.image_pixels.foreach_set(packed.ravel())
-        _places[key] = (name, roughness)
-    name, roughness = _places[key]
-    return _previews[name], roughness
+        _places[key] = (name, near)
+    name, near = _places[key]
+    return _previews[name], near
+
+
+def _legend(near):
+    if near.glossy is not None:
+        yield say("Grey: the nearest Glossy, roughness {value}", value=f"{near.glossy:.2f}")
+    if node := near.principled:
+        percent = f"{100 * node.error:.2g}" if node.error < 1 else f"{100 * node.error:.0f}"
+        yield say("Dashed: the nearest Principled, off by {percent} % here", percent=percent)
+        yield say(
+            "Its roughness {roughness}, metallic {metallic}, IOR {ior}",
+            roughness=f"{node.roughness:.2f}",
+            metallic=f"{node.metallic:.2f}",
+            ior=f"{node.ior:.2f}",
+        )
 
 
 def draw_plots(layout, material):
@@ -57,15 +71,14 @@ def draw_plots(layout, material):
         column = layout.column(align=True)
         column.label(text=node.label or node.name, icon="MATERIAL", translate=False)
         try:
-            preview, roughness = picture(node)
+            preview, near = picture(node)
         except ValueError as error:
             said = say("This extension does not have this model", more=str(error))
             column.label(text=iface(said), icon="ERROR", translate=False)
             continue
         column.template_icon(icon_value=preview.icon_id, scale=12.0)
         column.label(text="Above: light from 45\u00b0, and where it goes")
-        if roughness is not None:
-            said = say("Grey: the nearest Glossy, roughness {value}", value=f"{roughness:.2f}")
+        for said in _legend(near):
             column.label(text=iface(said), translate=False)
         column.label(text="Below: under a lamp; reflected share, 0\u00b0 to 90\u00b0")
         _, linked = _values(node)

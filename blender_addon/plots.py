@@ -8,10 +8,12 @@ screen shows of a colour.
 """
 
 import functools
+from dataclasses import dataclass
 
 import numpy as np
 
 from . import brdfc, color
+from .principled import Nearest, nearest_principled
 
 #: Pixels of a side.
 SIZE = 320
@@ -21,6 +23,15 @@ INCIDENCE = 45.0
 _SAMPLES, _VIEWS = 256, 13
 _HALF = SIZE // 2
 _PAPER, _GRID, _INK = 0.13, 0.28, 0.55
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Blender's own nodes whose lobes are nearest to one, or None."""
+
+    #: The roughness of the Glossy node.
+    glossy: float | None = None
+    principled: Nearest | None = None
 
 
 def values_in_range(model, values):
@@ -102,13 +113,33 @@ def _polar_grid():
     return np.hypot(x, y), np.arctan2(x, y)
 
 
-def _line(radius, angle, curve):
-    """How much of each pixel a curve over _angles() covers, 0 to 1, in a line of two pixels."""
-    at = np.interp(angle, _angles(), curve)
-    slope = np.interp(angle, _angles(), np.gradient(curve, _angles()))
+@functools.cache
+def _pixels_among_angles():
+    """Where the angle of each pixel lies among _angles(): the one below, and how far beyond it."""
+    angles, (_, angle) = _angles(), _polar_grid()
+    below = np.clip(np.searchsorted(angles, angle) - 1, 0, len(angles) - 2)
+    share = (angle - angles[below]) / (angles[below + 1] - angles[below])
+    return below, np.clip(share, 0, 1)
+
+
+def _in_pixels(curve):
+    """A curve over _angles() at the angles of the pixels."""
+    below, share = _pixels_among_angles()
+    return curve[below] + share * np.diff(curve)[below]
+
+
+def _line(curve, dashed=False):
+    """How much of each pixel a curve over _angles() covers, 0 to 1, in a line of two pixels; and
+    the curve at each."""
+    radius, angle = _polar_grid()
+    at, slope = _in_pixels(curve), _in_pixels(np.gradient(curve, _angles()))
     off = np.abs(radius - at) / np.sqrt(1 + (slope / np.maximum(radius, 0.02)) ** 2)
     # Steep flanks of a narrow lobe would draw a line beyond its tip.
-    return np.clip(1.8 - off * _HALF * 0.94, 0, 1) * (radius < curve.max() + 1.5 / _HALF)
+    ink = np.clip(1.8 - off * _HALF * 0.94, 0, 1) * (radius < curve.max() + 1.5 / _HALF)
+    if dashed:  # by the way along the curve, which on flanks is the radius
+        along = np.where(np.abs(slope) > radius, radius, radius * angle)
+        ink *= along * 16 % 1 < 0.6
+    return ink, at
 
 
 def _polar(model, values):
@@ -122,23 +153,28 @@ def _polar(model, values):
     lobes = slice_of(model, values, _angles())
     mirror = model.mirror(_slice(np.radians(-INCIDENCE)), **values)
     peak = lobes.max()
+    near = Nodes()
     if peak > 0:
+        # Of a node with an ideal mirror there is no curve.
+        node = None if mirror.any() else nearest_principled(lobes, _angles(), INCIDENCE)
         lobes = 0.95 * lobes / peak
         if glossy := nearest_glossy(lobes.mean(axis=1)):
-            shade = 0.5 * _line(radius, angle, np.minimum(glossy[1], 1.0))
+            shade = 0.5 * _line(np.minimum(glossy[1], 1.0))[0]
             picture = np.maximum(picture, (shade * upper)[..., None])
+        near = Nodes(glossy[0] if glossy else None, node)
         for c in range(3):
-            inside = (radius < np.interp(angle, _angles(), lobes[:, c])) & upper
-            ink = np.maximum(_line(radius, angle, lobes[:, c]) * upper, 0.35 * inside)
+            line, at = _line(lobes[:, c])
+            ink = np.maximum(line, 0.35 * (radius < at)) * upper
             picture[..., c] = np.maximum(picture[..., c], ink)
-    else:
-        glossy = None
+            if node:
+                dashes, _ = _line(np.minimum(0.95 * node.curve[:, c] / peak, 1.0), dashed=True)
+                picture[..., c] = np.maximum(picture[..., c], 0.85 * dashes * upper)
     # Ideal reflection has no width: a ray as long as its share.
     ray = (np.abs(angle - np.radians(INCIDENCE)) * radius < 0.01)[..., None] & (
         radius[..., None] < 0.95 * mirror
     )
     picture[ray] = 1.0
-    return picture, glossy[0] if glossy else None
+    return picture, near
 
 
 @functools.cache
@@ -217,14 +253,14 @@ def _albedo(model, values):
 
 def draw(model_name, values):
     """The picture of a model with a node's values: (SIZE, SIZE, 4), 0 to 1 as a screen shows it,
-    the first row the lowest; and the roughness of the Glossy node whose lobe is nearest, or None.
+    the first row the lowest; and the Nodes whose lobes are nearest.
 
     Raises ValueError for a model that this extension does not have.
     """
     model = brdfc.model(model_name)
     known = values_in_range(model, values)
-    above, roughness = _polar(model, known)
+    above, near = _polar(model, known)
     below = np.concatenate([_lit_ball(model, known), _albedo(model, known)], axis=1)
     picture = np.ones((SIZE, SIZE, 4))
     picture[..., :3] = np.concatenate([below, above], axis=0)
-    return picture, roughness
+    return picture, near

@@ -99,6 +99,7 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
         ("glossy", {"Roughness": 0.0, "Color": (0.5, 0.5, 0.5)}, {"lambertian_specular"}, 1e-6),
         ("principled", {"Roughness": 0.4}, {"ashikhmin_shirley"}, 0.15),
         ("principled", {"Roughness": 0.0}, {"coupled"}, 0.1),
+        ("principled", {"Roughness": 0.4, "IOR": 1.0}, {"lambert"}, 1e-6),
         (
             "principled",
             {"Roughness": 0.3, "Metallic": 1.0},

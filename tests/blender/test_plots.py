@@ -38,8 +38,8 @@ def pixels_of(preview):
 def shown(panel, extension, model, **values):
     material = extension.api.new_material(model, **values)
     (node,) = extension.nodes.group_nodes(material)
-    preview, roughness = panel.picture(node)
-    return pixels_of(preview), roughness
+    preview, near = panel.picture(node)
+    return pixels_of(preview), near
 
 
 def peak_angle(picture):
@@ -134,10 +134,121 @@ def test_the_nearest_glossy_node_is_as_rough_as_its_own_lobe(plots, extension, p
         found, curve = plots.nearest_glossy(3 * plots.glossy_slice(roughness**2, theta))
         assert found == pytest.approx(roughness, abs=1e-9)
         np.testing.assert_allclose(curve, 3 * plots.glossy_slice(roughness**2, theta))
-    smooth = shown(panel, extension, "cook_torrance", m=0.1)[1]
-    rough = shown(panel, extension, "cook_torrance", m=0.4)[1]
+    smooth = shown(panel, extension, "cook_torrance", m=0.1)[1].glossy
+    rough = shown(panel, extension, "cook_torrance", m=0.4)[1].glossy
     assert smooth**2 == pytest.approx(0.1, abs=0.03) and smooth < rough
-    assert shown(panel, extension, "fresnel_conductor")[1] is None
+    assert shown(panel, extension, "fresnel_conductor")[1] == plots.Nodes()
+
+
+@pytest.fixture(scope="module")
+def principled(extension):
+    return import_module(f"{extension.package}.principled")
+
+
+@pytest.fixture(scope="module")
+def node_curve(principled, plots):
+    """f cos of a Principled node over the angles of a plot: test_convert.py holds that formula to
+    what Cycles renders."""
+
+    def curve(color, roughness, metallic, ior):
+        f0 = ((ior - 1) / (ior + 1)) ** 2
+        native = principled.Native("principled", color, roughness, metallic=metallic, f0=f0)
+        light = plots._slice(np.radians(-plots.INCIDENCE))
+        return principled.node_slice(native, plots._slice(plots._angles()), light)
+
+    return curve
+
+
+def misplaced(plots, curve, expected):
+    """Part of the area of a curve, by the trapezoid rule."""
+    area = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
+    off = area(np.abs(curve - expected), plots._angles(), axis=0).sum()
+    return off / area(expected, plots._angles(), axis=0).sum()
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        ((1.0, 0.6, 0.2), 0.3, 1.0, 1.5),  # metals
+        ((0.9, 0.5, 0.1), 0.72, 1.0, 1.5),
+        ((0.8, 0.7, 0.6), 0.08, 1.0, 1.5),
+        ((0.9, 0.1, 0.3), 0.2, 0.0, 1.5),  # plastics
+        ((0.2, 0.3, 0.8), 0.55, 0.0, 1.8),
+        ((0.9, 0.5, 0.1), 0.45, 0.5, 1.5),
+    ],
+)
+def test_the_nearest_principled_node_is_the_one_that_is_drawn(plots, node_curve, node):
+    color, roughness, metallic, ior = node
+    curve = node_curve(*node)
+    found = plots.nearest_principled(curve, plots._angles(), plots.INCIDENCE)
+    assert found.error < 0.01 and misplaced(plots, found.curve, curve) < 0.01
+    assert (found.ior, found.metallic) == (ior, pytest.approx(metallic, abs=0.051))
+    assert found.roughness == pytest.approx(roughness, rel=0.01)
+    np.testing.assert_allclose(found.color, color, atol=0.02)
+
+
+def test_a_matte_surface_is_a_principled_node(extension, panel, plots, empty):
+    rho = (0.8, 0.4, 0.1)
+    near = shown(panel, extension, "lambert", rho=rho)[1].principled
+    assert near.error < 1e-6 and (near.metallic, near.ior) == (0, 1)
+    np.testing.assert_allclose(near.color, rho, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [
+        ("ward", {"ks": 0.6, "ax": 0.2, "ay": 0.2}),
+        ("cook_torrance", {}),
+        ("ashikhmin_shirley", {}),
+        ("oren_nayar", {}),
+        ("phong_material", {}),
+    ],
+)
+def test_no_principled_node_beside_it_is_nearer(plots, node_curve, model, values):
+    """And its error is what it says: by the squares of what is off, each angle for what it stands
+    for. A node beside it may be nearer by as much as the search is coarse."""
+    curve = plots.slice_of(plots.brdfc.model(model), values, plots._angles())
+    near = plots.nearest_principled(curve, plots._angles(), plots.INCIDENCE)
+    assert near.error == pytest.approx(misplaced(plots, near.curve, curve), rel=0.01)
+    area = np.gradient(plots._angles())
+
+    def squares(**change):
+        node = {k: getattr(near, k) for k in ("color", "roughness", "metallic", "ior")} | change
+        node["color"] = tuple(np.clip(node["color"], 0, 1))
+        return area @ ((node_curve(**node) - curve) ** 2).sum(axis=1)
+
+    least = squares()
+    assert least == pytest.approx(area @ ((near.curve - curve) ** 2).sum(axis=1), rel=1e-9)
+    beside = [{"roughness": min(near.roughness * f, 1)} for f in (0.7, 0.95, 1.05, 1.4)]
+    beside += [{"metallic": float(np.clip(near.metallic + d, 0, 1))} for d in (-0.3, 0.3)]
+    beside += [{"color": np.array(near.color) + d} for d in (-0.1, -0.03, 0.03, 0.1)]
+    beside += [{"ior": near.ior + d} for d in (-0.2, 0.5) if near.ior + d >= 1]
+    for change in beside:
+        assert least < 1.02 * squares(**change), change
+
+
+def test_the_curve_of_the_principled_node_is_dashed(extension, panel, plots, empty):
+    """Where it is beyond the model's own it is ink on paper, with gaps."""
+    picture, near = shown(panel, extension, "cook_torrance", m=0.3)
+    red = picture[picture.shape[0] // 2 :, :, 0]
+    model = plots.brdfc.model("cook_torrance")
+    values = plots.values_in_range(model, {"m": 0.3})
+    curve = plots.slice_of(model, values, plots._angles())
+    radius, angle = plots._polar_grid()
+
+    def over_peak(c):
+        return np.interp(angle, plots._angles(), 0.95 * c[:, 0] / curve.max())
+
+    node, own = over_peak(near.principled.curve), over_peak(curve)
+    on = (np.abs(radius - node) < 0.003) & (radius > own + 0.03)
+    inked = red[on] > 0.7
+    assert on.sum() > 20 and 0.3 < inked.mean() < 0.9
+    assert near.principled.error > 0.1
+
+
+def test_where_a_mirror_is_there_is_no_principled_node(extension, panel, empty):
+    for model in ("coupled", "fresnel_dielectric"):
+        assert shown(panel, extension, model)[1].principled is None
 
 
 def test_glossy_is_ggx_with_the_light_that_facets_reflect(plots):
@@ -188,6 +299,8 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
     panel.draw_plots(layout, material)
     assert "picture 12" in layout.log
     assert any("Glossy, roughness" in line for line in layout.log)
+    assert any("Principled, off by 1" in line for line in layout.log)
+    assert any("Its roughness 0.58, metallic 1.00, IOR 1.50" in line for line in layout.log)
     assert not any("default" in line for line in layout.log)
     value = node.id_data.nodes.new("ShaderNodeValue")
     node.id_data.links.new(value.outputs[0], extension.nodes.sockets(node)["m"])

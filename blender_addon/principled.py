@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Principled node that is nearest to a curve in the plane of incidence. No bpy in here.
+
+A node without coat, sheen and the like: roughness, metallic, IOR and base colour. The first three
+are searched on a grid, the colour follows from least squares; what is found is evaluated by the
+formulas of native_bsdf.py, and its error is that of these.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import native_bsdf
+from .native_bsdf import Native
+
+#: What is searched. Roughness is searched again between its neighbours.
+_ROUGHNESS = np.geomspace(1, 0.03, 28)
+_METALLIC = np.linspace(0, 1, 5)
+#: The first is that of which nothing is known, as of a metal.
+_IOR = np.array([1.5, 1.0, 1.2, 1.35, 1.8, 2.4, 3.5])
+_F0 = ((_IOR - 1) / (_IOR + 1)) ** 2
+
+
+#: Share of a curve's square that being in part a metal, or another IOR, must be worth.
+_PLAIN = 2e-5
+
+
+@dataclass(frozen=True)
+class Nearest:
+    roughness: float
+    metallic: float
+    ior: float
+    color: tuple
+    #: f cos of the node over the angles of the curve, (N, 3).
+    curve: np.ndarray
+    #: Part of the curve's area that lies elsewhere.
+    error: float
+
+
+def node_slice(native, wi, wo):
+    """f cos of a node for one direction wo (3,) and those of wi (N, 3)."""
+    views = wo[None], np.zeros(len(wi), int)
+    return native_bsdf.f_cos(native, wi, np.broadcast_to(wo, wi.shape), views)
+
+
+class Search:
+    """For curves over directions wi (N, 3) in the plane of wo, in the order of their angles."""
+
+    def __init__(self, wi, wo, angles):
+        self._wi, self._wo = wi, wo
+        self._area = np.gradient(angles)
+        half = native_bsdf.half(wi, wo)
+        cosine = half @ wo
+        self._base = np.maximum(wi[:, 2], 0) / np.pi
+        self._edge = (1 - np.clip(cosine, 0, 1)) ** 5
+        self._fresnel = np.stack([native_bsdf.dielectric(f0, cosine) for f0 in _F0])
+        # Albedos of facets: all of it, seen from wo and on average, and through each boundary.
+        knots = np.linspace(_ROUGHNESS[-1], 1, 12)
+        mu = native_bsdf._MU
+        each = np.stack([np.sqrt(1 - mu**2), np.zeros(len(mu)), mu], -1)
+        seen, mean, taken = [], [], []
+        for r in knots:
+            alpha = (r * r, r * r)
+            seen.append(native_bsdf.facet_albedo(wo[None], alpha, False)[0])
+            mean.append(native_bsdf.facet_albedo(each, alpha, False) @ native_bsdf._SHARE)
+            taken.append(
+                native_bsdf.facet_albedo(
+                    wo[None],
+                    alpha,
+                    False,
+                    lambda c: np.stack([native_bsdf.dielectric(f0, c) for f0 in _F0], -1),
+                )[0]
+            )
+        self._albedos = knots, np.column_stack([seen, mean, taken])
+        self._coarse = self._parts(_ROUGHNESS)
+
+    def _parts(self, roughness):
+        """By roughness: curves that a node is a sum of, as rows, weighed by the root of the area
+        that each angle stands for; their products; albedos (seen, mean, those by index)."""
+        wo = np.broadcast_to(self._wo, self._wi.shape)
+        rows = []
+        for r in roughness:
+            lobe = native_bsdf.facets(self._wi, wo, (r * r, r * r))
+            metal = np.stack([(1 - self._edge) * lobe, self._edge * lobe])
+            rows.append(np.concatenate([self._base[None], metal, self._fresnel * lobe]))
+        rows = np.stack(rows) * np.sqrt(self._area)
+        knots, albedos = self._albedos
+        found = np.stack([np.interp(roughness, knots, column) for column in albedos.T], -1)
+        return roughness, rows, rows @ rows.transpose(0, 2, 1), found
+
+    def _around(self, roughness, factor, count):
+        """_parts() from a roughness times a factor to it over the factor."""
+        grid = roughness * np.geomspace(factor, 1 / factor, count)
+        return self._parts(np.clip(grid, _ROUGHNESS[-1], _ROUGHNESS[0]))
+
+    def _best(self, parts, curve, metallic, which):
+        """Roughness, metallic, index of refraction and colour with the least sum of squares, among
+        `metallic` and the indices `which` of _F0."""
+        roughness, rows, products, albedos = parts
+        onto = rows @ (curve * np.sqrt(self._area)[:, None])  # (roughness, rows, 3)
+        # Axes: roughness, index, metallic, channel.
+        seen, mean = (albedos[:, i, None, None, None] for i in (0, 1))
+        taken = albedos[:, 2:][:, which, None, None]
+        m = metallic[None, None, :, None]
+        matte = (1 - m) * (1 - taken)
+
+        def product(i, j):
+            """Of two rows, of which 3 stands for the boundary's."""
+            if i != 3 and j != 3:
+                return products[:, i, j, None, None, None]
+            at = 3 + which
+            if i == j:
+                return products[:, at, at, None, None]
+            return products[:, at, i if j == 3 else j, None, None]
+
+        def along(i):
+            return onto[:, 3 + which, None] if i == 3 else onto[:, i, None, None]
+
+        def dot(a, b):
+            return sum(x * y * product(i, j) for i, x in a.items() for j, y in b.items())
+
+        # The node is color * slope + rest. What facets send to and fro hangs on the colour: thrice.
+        color = np.full((1, 1, 1, 3), 0.8)
+        for _ in range(3):
+            average = (20 * color + 1) / 21
+            more = 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
+            slope, rest = {0: matte, 1: m * more}, {2: m * more, 3: 1 - m}
+            square = dot(slope, slope)
+            with_curve = sum(x * along(i) for i, x in slope.items()) - dot(slope, rest)
+            color = np.clip(with_curve / np.maximum(square, 1e-30), 0, 1)
+        node = {i: color * slope.get(i, 0) + rest.get(i, 0) for i in range(4)}
+        off = dot(node, node) - 2 * sum(x * along(i) for i, x in node.items())
+        off = off.sum(-1)
+        # A curve in one plane leaves much open. Of nodes that are as near the plain one is taken.
+        plain = 4 * m[..., 0] * (1 - m[..., 0]) + (which != 0)[None, :, None]
+        off = off + _PLAIN * np.sum(curve**2 * self._area[:, None]) * plain
+        r, f, k = np.unravel_index(np.argmin(off), off.shape)
+        return float(roughness[r]), float(metallic[k]), int(which[f]), color[r, f, k]
+
+    def nearest(self, curve):
+        """The node that is Nearest to a curve (N, 3), which is not 0 everywhere."""
+        every, metallic = np.arange(len(_F0)), _METALLIC
+        r, m, _, _ = self._best(self._coarse, curve, metallic, every)
+        metallic = np.unique(np.clip(m + np.linspace(-0.25, 0.25, 11), 0, 1))
+        step = (_ROUGHNESS[0] / _ROUGHNESS[1]) ** 2
+        r, m, index, _ = self._best(self._around(r, step, 25), curve, metallic, every)
+        finest = self._around(r, step ** (1 / 12), 9)
+        r, m, index, color = self._best(finest, curve, np.array([m]), np.array([index]))
+        color = tuple(float(c) for c in color)
+        native = Native("principled", color, r, metallic=m, f0=float(_F0[index]))
+        found = node_slice(native, self._wi, self._wo)
+        off = self._area @ np.abs(found - curve)
+        error = float(off.sum() / (self._area @ curve).sum())
+        return Nearest(r, m, float(_IOR[index]), color, found, error)
+
+
+@functools.cache
+def _search(incidence, angles):
+    theta = np.frombuffer(angles)
+    light = np.radians(incidence)
+    wi = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], -1)
+    return Search(wi, np.array([-np.sin(light), 0.0, np.cos(light)]), theta)
+
+
+def nearest_principled(curve, angles, incidence):
+    """The node that is Nearest to f cos (N, 3) at these angles, in radians, of light from the
+    angle -incidence, in degrees; None for a curve that is 0."""
+    if not curve.any():
+        return None
+    return _search(incidence, angles.tobytes()).nearest(curve)
