@@ -58,7 +58,7 @@ class LightTracer {
     Color power = ray.power;
     Hit hit;
     for (int scatterings = 1; scatterings <= settings_.max_bounces + 1; ++scatterings) {
-      if (!tracer_.intersect(origin, direction, false, hit)) return;
+      if (!tracer_.intersect({origin, direction}, false, hit)) return;
       const Surface& surface = surfaces_[std::size_t(hit.material)];
       const Brdf<double>& brdf = surface.at(hit.u, hit.v, scratch.of(hit.material));
       const Vector bitangent = cross(hit.normal, hit.tangent);
@@ -104,7 +104,7 @@ class LightTracer {
       Vector origin, direction;
       const double film_x = x + random.uniform(), film_y = y + random.uniform();
       camera_ray(scene_.camera, settings_, film_x, film_y, origin, direction);
-      const bool found = tracer_.intersect(origin, direction, true, hit);
+      const bool found = tracer_.intersect({origin, direction}, true, hit);
       Color light(0);
       lights.meet(origin, direction, found ? hit.distance : kInfinity, {}, nullptr, true,
                   [&](const Color& radiance, double) { light += radiance; });
@@ -140,7 +140,7 @@ class LightTracer {
     if (!c.orthographic) weight *= distance / (depth * depth * depth);  // 1 / (d^2 cos^3 a)
     const Color value = power * f * weight;
     if (!(max_component(value) > 0)) return;
-    if (tracer_.occluded(Tracer::leave(hit.p, hit.geometric, to_camera), to_camera, distance * (1 - 0x1p-18))) return;
+    if (tracer_.occluded({Tracer::leave(hit.p, hit.geometric, to_camera), to_camera, distance * (1 - 0x1p-18)})) return;
     film.sum[std::size_t(row) * std::size_t(film.width) + std::size_t(column)] += value;
   }
 

@@ -150,8 +150,7 @@ double Lights::weight(std::size_t i, const Vector& p, const Vector& normal) cons
   return known.luminance / std::max(distance2, known.area * kInvPi);
 }
 
-bool Lights::chances(const Vector& p, const Vector& normal, std::vector<double>& chance) const {
-  chance.resize(count_);
+bool Lights::chances(const Vector& p, const Vector& normal, std::span<double> chance) const {
   double sum = 0;
   for (std::size_t i = 0; i < scene_.lights.size(); ++i) sum += chance[i] = weight(i, p, normal);
   if (sampled_environment_) sum += chance.back() = environment_weight_;
@@ -163,7 +162,7 @@ bool Lights::chances(const Vector& p, const Vector& normal, std::vector<double>&
   return true;
 }
 
-LightSample Lights::sample(const Vector& p, const Vector& normal, const std::vector<double>& chance, double choice,
+LightSample Lights::sample(const Vector& p, const Vector& normal, std::span<const double> chance, double choice,
                            double u1, double u2, double u3) const {
   std::size_t i = 0;
   while (i + 1 < chance.size() && choice >= chance[i]) choice -= chance[i++];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "reference/scene.h"
@@ -57,27 +58,28 @@ class Lights {
   std::size_t count() const { return count_; }
 
   /// Chance of each light for a point with this geometric normal, about in proportion to what it can contribute;
-  /// 0 only for a light that is wholly below the surface or shows its back. False if no light can contribute.
-  bool chances(const Vec3<double>& p, const Vec3<double>& normal, std::vector<double>& chance) const;
+  /// 0 only for a light that is wholly below the surface or shows its back. False if no light can contribute. There are
+  /// count() of them.
+  bool chances(const Vec3<double>& p, const Vec3<double>& normal, std::span<double> chance) const;
 
-  LightSample sample(const Vec3<double>& p, const Vec3<double>& normal, const std::vector<double>& chance,
-                     double choice, double u1, double u2, double u3) const;
+  LightSample sample(const Vec3<double>& p, const Vec3<double>& normal, std::span<const double> chance, double choice,
+                     double u1, double u2, double u3) const;
 
   /// Calls found(radiance, pdf) for every light that a ray from p meets before `distance`; `chance` as given to
   /// sample() at p, nullptr for the camera or after a mirror (pdf is 0 then). Lamps do not hide each other.
   template <class Found> void meet(const Vec3<double>& p, const Vec3<double>& direction, double distance,
-                                   const Vec3<double>& normal, const std::vector<double>* chance, bool from_camera,
+                                   const Vec3<double>& normal, const double* chance, bool from_camera,
                                    const Found& found) const {
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       const Light& light = scene_.lights[i];
       if (from_camera && !light.camera_visible) continue;
       const double pdf = pdf_of_hit(i, p, direction, distance);
-      if (pdf > 0) found(light.radiance, chance ? pdf * (*chance)[i] : 0.0);
+      if (pdf > 0) found(light.radiance, chance ? pdf * chance[i] : 0.0);
     }
     if (distance == kInfinity) {
       double pdf = 0;
       const Rgb<double> radiance = environment(direction, normal, chance && sampled_environment_ ? &pdf : nullptr);
-      if (max_component(radiance) > 0) found(radiance, pdf > 0 ? pdf * (*chance)[scene_.lights.size()] : 0.0);
+      if (max_component(radiance) > 0) found(radiance, pdf > 0 ? pdf * chance[scene_.lights.size()] : 0.0);
     }
   }
 

@@ -33,9 +33,10 @@ struct Progress {
 struct RenderOptions {
   RenderSettings settings;
   Origin origin = Origin::Camera;
-  int threads = 0;                                ///< 0: all cores
-  double max_seconds = 0;                         ///< 0: no limit; else stops early, after at least one sample a pixel
-  const std::atomic<bool>* cancel = nullptr;      ///< set from anywhere: stop soon and keep what is done
+  int threads = 0;                            ///< 0: all cores
+  double max_seconds = 0;                     ///< 0: no limit; else stops early, after at least one sample a pixel
+  int wave = 0;                               ///< paths followed together; 0: as many as is fast. Changes no picture
+  const std::atomic<bool>* cancel = nullptr;  ///< set from anywhere: stop soon and keep what is done
   std::function<void(const Progress&)> progress;  ///< called now and then, from the calling thread
 };
 

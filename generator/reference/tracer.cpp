@@ -17,18 +17,32 @@ Vector unit(const Vector& v) { return v * (1 / sqrt(dot(v, v))); }
 template <class A> Vector to_vector(const A& a) { return {a[0], a[1], a[2]}; }
 std::array<float, 3> to_floats(const Vector& v) { return {float(v.x), float(v.y), float(v.z)}; }
 
-RTCRay make_ray(const Vector& p, const Vector& d, double distance) {
-  RTCRay ray;
-  ray.org_x = float(p.x), ray.org_y = float(p.y), ray.org_z = float(p.z);
-  ray.dir_x = float(d.x), ray.dir_y = float(d.y), ray.dir_z = float(d.z);
-  ray.tnear = 0;
-  ray.tfar = float(distance);
-  ray.time = 0;
-  ray.mask = ~0u;
-  ray.id = 0;
-  ray.flags = 0;
-  return ray;
+constexpr std::size_t kPacket = 8;
+
+void put(const Ray& from, RTCRay& to) {
+  to.org_x = float(from.origin.x), to.org_y = float(from.origin.y), to.org_z = float(from.origin.z);
+  to.dir_x = float(from.direction.x), to.dir_y = float(from.direction.y), to.dir_z = float(from.direction.z);
+  to.tfar = float(from.distance);
+  to.tnear = to.time = 0;
+  to.mask = ~0u;
+  to.id = to.flags = 0;
 }
+void put(const Ray& from, RTCRay8& to, std::size_t k) {
+  to.org_x[k] = float(from.origin.x), to.org_y[k] = float(from.origin.y), to.org_z[k] = float(from.origin.z);
+  to.dir_x[k] = float(from.direction.x), to.dir_y[k] = float(from.direction.y), to.dir_z[k] = float(from.direction.z);
+  to.tfar[k] = float(from.distance);
+  to.tnear[k] = to.time[k] = 0;
+  to.mask[k] = ~0u;
+  to.id[k] = to.flags[k] = 0;
+}
+
+/// Which rays of a packet count: the first `count`.
+struct alignas(32) Valid {
+  int lanes[kPacket];
+  explicit Valid(std::size_t count) {
+    for (std::size_t k = 0; k < kPacket; ++k) lanes[k] = k < count ? -1 : 0;
+  }
+};
 
 }  // namespace
 
@@ -81,26 +95,76 @@ Tracer::~Tracer() {
   if (device_) rtcReleaseDevice(device_);
 }
 
-bool Tracer::intersect(const Vector& p, const Vector& direction, bool from_camera, Hit& hit) const {
+void Tracer::intersect(std::span<const Ray> rays, bool from_camera, std::span<Meeting> meetings) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  RTCRayHit query;
-  query.ray = make_ray(p, direction, kInfinity);
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.primID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(from_camera ? camera_scene_ : scene_, &context, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  if (from_camera) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  const RTCScene scene = from_camera ? camera_scene_ : scene_;
+  for (std::size_t i = 0; i < rays.size(); i += kPacket) {
+    const std::size_t count = std::min(kPacket, rays.size() - i);
+    if (count == 1) {
+      RTCRayHit query;
+      put(rays[i], query.ray);
+      query.hit.geomID = query.hit.primID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      rtcIntersect1(scene, &context, &query);
+      meetings[i] = {query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v};
+      break;
+    }
+    const Valid valid(count);
+    RTCRayHit8 query;
+    for (std::size_t k = 0; k < kPacket; ++k) {
+      put(rays[i + std::min(k, count - 1)], query.ray, k);
+      query.hit.geomID[k] = query.hit.primID[k] = query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    }
+    rtcIntersect8(valid.lanes, scene, &context, &query);
+    for (std::size_t k = 0; k < count; ++k)
+      meetings[i + k] = {query.hit.geomID[k], query.hit.primID[k], query.hit.u[k], query.hit.v[k]};
+  }
+}
 
-  const Part& part = parts_[query.hit.geomID];
-  const auto& triangle = part.mesh->triangles[query.hit.primID];
+void Tracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> hidden) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  for (std::size_t i = 0; i < rays.size(); i += kPacket) {
+    const std::size_t count = std::min(kPacket, rays.size() - i);
+    if (count == 1) {
+      RTCRay query;
+      put(rays[i], query);
+      rtcOccluded1(scene_, &context, &query);
+      hidden[i] = query.tfar < 0;
+      break;
+    }
+    const Valid valid(count);
+    RTCRay8 query;
+    for (std::size_t k = 0; k < kPacket; ++k) put(rays[i + std::min(k, count - 1)], query, k);
+    rtcOccluded8(valid.lanes, scene_, &context, &query);
+    for (std::size_t k = 0; k < count; ++k) hidden[i + k] = query.tfar[k] < 0;
+  }
+}
+
+bool Tracer::intersect(const Ray& ray, bool from_camera, Hit& hit) const {
+  Meeting meeting;
+  intersect({&ray, 1}, from_camera, {&meeting, 1});
+  return at(ray, meeting, hit);
+}
+
+bool Tracer::occluded(const Ray& ray) const {
+  std::uint8_t hidden;
+  occluded({&ray, 1}, {&hidden, 1});
+  return hidden;
+}
+
+bool Tracer::at(const Ray& ray, const Meeting& meeting, Hit& hit) const {
+  if (meeting.part == RTC_INVALID_GEOMETRY_ID) return false;
+  const Part& part = parts_[meeting.part];
+  const auto& triangle = part.mesh->triangles[meeting.triangle];
   const Vector a = to_vector(part.vertices[triangle[0]]), b = to_vector(part.vertices[triangle[1]]),
                c = to_vector(part.vertices[triangle[2]]);
-  const double wb = query.hit.u, wc = query.hit.v, wa = 1 - wb - wc;
+  const double wb = meeting.u, wc = meeting.v, wa = 1 - wb - wc;
   hit.material = part.material;
   // From the corners, not along the ray: so that the point is in the plane of the triangle.
   hit.p = a * wa + b * wb + c * wc;
-  hit.distance = length(hit.p - p);
+  hit.distance = length(hit.p - ray.origin);
   hit.geometric = unit(cross(b - a, c - a));
   hit.normal = hit.geometric;
   if (!part.normals.empty())
@@ -113,7 +177,7 @@ bool Tracer::intersect(const Vector& p, const Vector& direction, bool from_camer
   } else {
     hit.u = hit.v = 0;
   }
-  hit.inside = dot(hit.geometric, direction) > 0;
+  hit.inside = dot(hit.geometric, ray.direction) > 0;
   if (hit.inside) {
     hit.geometric = -hit.geometric;
     hit.normal = -hit.normal;
@@ -129,14 +193,6 @@ Sphere Tracer::bounds() const {
   rtcGetSceneBounds(camera_scene_, &b);
   const Vector low{b.lower_x, b.lower_y, b.lower_z}, high{b.upper_x, b.upper_y, b.upper_z};
   return {(low + high) * 0.5, length(high - low) * (0.5 * (1 + 1e-6))};
-}
-
-bool Tracer::occluded(const Vector& p, const Vector& direction, double distance) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  RTCRay ray = make_ray(p, direction, distance);
-  rtcOccluded1(scene_, &context, &ray);
-  return ray.tfar < 0;
 }
 
 }  // namespace brdfc::reference

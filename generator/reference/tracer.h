@@ -5,6 +5,8 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
 
 #include "reference/lights.h"
 #include "reference/scene.h"
@@ -14,6 +16,17 @@ namespace brdfc::reference {
 struct Sphere {
   Vec3<double> centre;
   double radius = 0;
+};
+
+struct Ray {
+  Vec3<double> origin, direction;  ///< direction is a unit vector
+  double distance = kInfinity;     ///< what lies further away does not count
+};
+
+/// Where a ray ends: a triangle and weights of its second and third corner.
+struct Meeting {
+  std::uint32_t part, triangle;
+  float u, v;
 };
 
 /// A point on a surface as seen along a ray. Unit vectors, both normals on the viewer's side.
@@ -33,10 +46,15 @@ class Tracer {
   Tracer(const Tracer&) = delete;
   Tracer& operator=(const Tracer&) = delete;
 
-  /// Nearest triangle, or false. `direction` is a unit vector.
-  bool intersect(const Vec3<double>& p, const Vec3<double>& direction, bool from_camera, Hit& hit) const;
-  /// Is anything nearer than `distance`?
-  bool occluded(const Vec3<double>& p, const Vec3<double>& direction, double distance) const;
+  /// What each ray meets first. Rays are traced in packets, which change nothing of what is found.
+  void intersect(std::span<const Ray> rays, bool from_camera, std::span<Meeting> meetings) const;
+  /// The point of a meeting, or false if there is none.
+  bool at(const Ray& ray, const Meeting& meeting, Hit& hit) const;
+  /// For each ray whether it meets anything.
+  void occluded(std::span<const Ray> rays, std::span<std::uint8_t> hidden) const;
+  /// The same for one ray alone.
+  bool intersect(const Ray& ray, bool from_camera, Hit& hit) const;
+  bool occluded(const Ray& ray) const;
   /// A sphere that holds all triangles.
   Sphere bounds() const;
   /// `p` moved off its surface by a few units in the last place of float, to the side of `direction`.

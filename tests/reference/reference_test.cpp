@@ -356,6 +356,39 @@ TEST(Reference, PictureDoesNotDependOnThreads) {
   EXPECT_NE(a.mean.rgb, render(s, other).rendering.mean.rgb);
 }
 
+/// busy_scene() with what bends, absorbs, mirrors and lets through, a texture, and a wall for the camera alone.
+Scene crowded_scene() {
+  Scene s = busy_scene();
+  s.materials.push_back(material("glass", {{"density", 0.7}}));
+  s.materials.push_back(material("radziszewski_alda", {{"n", 20.0}, {"around", "refraction"}}));
+  s.materials.push_back(material("fresnel_conductor", {}));
+  auto picture = std::make_shared<Image>(2, 2);
+  picture->rgb = {0.9f, 0.1f, 0.1f, 0.1f, 0.9f, 0.1f, 0.1f, 0.1f, 0.9f, 0.8f, 0.8f, 0.8f};
+  s.materials[2].textures["rho"] = picture;
+  for (int i = 0; i < 3; ++i) s.objects.push_back(object(make_sphere(0.4, 32, 16, true), {-1.0 + i, -0.3, 0.5}, 4 + i));
+  s.objects.push_back(object(make_box({0.5, 0.5, 1.5}), {-1.6, -0.6, 0.75}, 2));
+  s.objects.back().camera_only = true;
+  return s;
+}
+
+// One path at a time is traced by single rays, many together by packets: both find the same to the last bit.
+TEST(Reference, PictureDoesNotDependOnHowManyPathsAreFollowedTogether) {
+  const Scene s = crowded_scene();
+  for (const bool scaled : {false, true}) {
+    RenderOptions o = options(40, 6, 8);
+    o.settings.scale_radiance = scaled;
+    o.settings.pattern = scaled ? Pattern::Jittered : Pattern::Random;
+    const Rendering together = render(s, o).rendering;
+    EXPECT_GT(total(together).mean, 0);
+    for (const int wave : {1, 7}) {
+      o.wave = wave;
+      const Rendering few = render(s, o).rendering;
+      EXPECT_EQ(few.mean.rgb, together.mean.rgb) << wave;
+      EXPECT_EQ(few.variance->rgb, together.variance->rgb) << wave;
+    }
+  }
+}
+
 TEST(Reference, VarianceLayerIsRight) {
   // Spread of many small renderings against what one of them says.
   const Scene s = busy_scene();

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/path_tracer.h"
+
+#include <cmath>
+
+#include "model/horizon.h"
+#include "model/sampling.h"
+#include "reference/film.h"
+
+namespace brdfc::reference {
+namespace {
+
+using Vector = Vec3<double>;
+using Color = Rgb<double>;
+
+/// Dimensions of a bounce: which term, which lobe, its direction, and for each side which lamp, where, and where else.
+constexpr std::uint64_t kDimensions = 9;
+
+}  // namespace
+
+PathTracer::PathTracer(const Scene& scene, const RenderOptions& options)
+    : scene_(scene),
+      settings_(options.settings),
+      strategy_(options.settings.strategy),
+      points_(options.settings.pattern, options.settings.spp),
+      tracer_(scene),
+      lights_(scene, strategy_ == Strategy::Light) {
+  surfaces_.reserve(scene.materials.size());
+  for (const Material& m : scene.materials) surfaces_.emplace_back(m);
+}
+
+PathTracer::Wave PathTracer::make_wave() const { return Wave(surfaces_); }
+
+void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Color> light) const {
+  wave.paths.clear();
+  wave.paths.reserve(starts.size());
+  wave.active.clear();
+  wave.chances.resize(2 * lights_.count() * starts.size());
+  for (const auto& [x, y, sample] : starts) {
+    Path& path = wave.paths.emplace_back(
+        PathSampler(points_, std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, sample));
+    const auto film = path.random.two(0);
+    camera_ray(scene_.camera, settings_, x + film[0], y + film[1], path.ray.origin, path.ray.direction);
+    wave.active.push_back(&path);
+  }
+
+  for (int bounce = 0; !wave.active.empty(); ++bounce) {
+    const std::size_t count = wave.active.size();
+    wave.rays.clear();
+    for (const Path* path : wave.active) wave.rays.push_back(path->ray);
+    wave.meetings.resize(count);
+    tracer_.intersect(wave.rays, bounce == 0, wave.meetings);
+
+    wave.hits.resize(count);
+    wave.places.assign(surfaces_.size() + 1, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      Hit& hit = wave.hits[i];
+      const bool found = tracer_.at(wave.rays[i], wave.meetings[i], hit);
+      collect(*wave.active[i], found ? hit.distance : kInfinity, bounce == 0);
+      if (!found) hit.material = -1;
+      ++wave.places[std::size_t(hit.material + 1)];
+    }
+    if (bounce > settings_.max_bounces) break;
+
+    int place = -wave.places[0];
+    for (int& p : wave.places) place += std::exchange(p, place);
+    wave.order.resize(std::size_t(place));
+    for (std::size_t i = 0; i < count; ++i)
+      if (const int material = wave.hits[i].material; material >= 0)
+        wave.order[std::size_t(wave.places[std::size_t(material + 1)]++)] = int(i);
+
+    wave.shadows.clear();
+    wave.shadow_rays.clear();
+    wave.next.clear();
+    for (const int i : wave.order) {
+      Path* path = wave.active[std::size_t(i)];
+      if (scatter(*path, wave.hits[std::size_t(i)], bounce, wave)) wave.next.push_back(path);
+    }
+    wave.hidden.resize(wave.shadows.size());
+    tracer_.occluded(wave.shadow_rays, wave.hidden);
+    for (std::size_t i = 0; i < wave.shadows.size(); ++i)
+      if (!wave.hidden[i]) wave.shadows[i].path->light += wave.shadows[i].light;
+    std::swap(wave.active, wave.next);
+  }
+  for (std::size_t i = 0; i < starts.size(); ++i) light[i] = wave.paths[i].light;
+}
+
+void PathTracer::collect(Path& path, double distance, bool from_camera) const {
+  lights_.meet(path.ray.origin, path.ray.direction, distance, path.normal, path.sampled, from_camera,
+               [&](const Color& radiance, double light_pdf) {
+                 if (!path.sampled || light_pdf == 0)
+                   path.light += path.throughput * radiance;
+                 else if (strategy_ != Strategy::Light)
+                   path.light += path.throughput * radiance * power_heuristic(path.scattered_pdf, light_pdf);
+               });
+}
+
+bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) const {
+  PathSampler& random = path.random;
+  Color& throughput = path.throughput;
+  const Vector direction = path.ray.direction;
+  const std::uint64_t dimension = 1 + kDimensions * std::uint64_t(bounce);
+  const Surface& surface = surfaces_[hit.material];
+  const Brdf<double>& brdf = surface.at(hit.u, hit.v, wave.scratch.of(hit.material));
+  if (hit.inside && surface.has_medium()) {
+    const Color left = brdf.transmittance(hit.distance);
+    surface.check("transmittance", direction, -direction, left);
+    throughput = throughput * left;
+  }
+  // The frame of a model of two sides has its z outside.
+  const double side = hit.inside && (surface.has_transmit() || surface.scatters_through()) ? -1 : 1;
+  const Vector bitangent = cross(hit.normal, hit.tangent);
+  const auto to_local = [&](const Vector& w) {
+    return Vector{dot(w, hit.tangent), dot(w, bitangent), side * dot(w, hit.normal)};
+  };
+  Vector wo =
+      raise_to_horizon(Vector{-dot(direction, hit.tangent), -dot(direction, bitangent), -dot(direction, hit.normal)});
+  wo.z *= side;
+  Color mirror(0), transmit(0);
+  if (surface.has_mirror()) {
+    mirror = brdf.mirror(wo);
+    surface.check("mirror", {-wo.x, -wo.y, wo.z}, wo, mirror);
+  }
+  if (surface.has_transmit()) {
+    transmit = brdf.transmit(wo);
+    surface.check("transmit", refract(wo, brdf.ior()), wo, transmit);
+  }
+  const double delta_chance =
+      surface.has_mirror() || surface.has_transmit() ? surface.delta_chance(mirror + transmit, wo.z) : 0;
+  // What crossing does to radiance.
+  double crossing = 1;
+  if (settings_.scale_radiance) {
+    const double squared_index = sqr(brdf.ior());
+    crossing = wo.z > 0 ? 1 / squared_index : squared_index;
+  }
+
+  const std::size_t lights = lights_.count();
+  double* const first = wave.chances.data() + 2 * lights * std::size_t(&path - wave.paths.data());
+  const auto chances = [&](bool far) { return std::span<double>(first + far * lights, lights); };
+  std::array<bool, 2> lit{};
+  if (surface.has_scatter() && !lights_.empty())
+    for (int far = 0; far <= int(surface.scatters_through()); ++far) {
+      const Vector facing = far ? -hit.geometric : hit.geometric;
+      lit[far] = lights_.chances(hit.p, facing, chances(far));
+      if (lit[far])
+        direct(path, throughput * (far ? crossing : 1), hit, facing, surface, brdf, to_local, wo, far, 1 - delta_chance,
+               chances(far), dimension + 3 + 3 * std::uint64_t(far), wave);
+    }
+
+  // Drawn in any case, so that a stream's place does not depend on the material.
+  const double choose = random.one(dimension), lobe = random.one(dimension + 1);
+  const auto way = random.two(dimension + 2);
+  const Vector u{lobe, way[0], way[1]};
+  Vector wi;
+  path.sampled = nullptr;
+  if (choose < delta_chance) {
+    const double share = luminance(mirror) / luminance(mirror + transmit);
+    if (choose < delta_chance * share) {
+      wi = {-wo.x, -wo.y, wo.z};
+      throughput = throughput * mirror / (delta_chance * share);
+    } else {
+      wi = refract(wo, brdf.ior());
+      throughput = throughput * transmit / (delta_chance * (1 - share));
+    }
+  } else {
+    const Sample<double> s = brdf.sample(wo, u);
+    surface.check("sample weight", s.wi, wo, s.weight);
+    if (!(s.pdf > 0)) {
+      if (s.pdf == 0) return false;
+      surface.bad_value("sample pdf", s.wi, wo, Color(s.pdf));
+    }
+    wi = s.wi;
+    throughput = throughput * s.weight / (1 - delta_chance);
+    path.scattered_pdf = s.pdf * (1 - delta_chance);
+    const bool far = wi.z * wo.z < 0;
+    if (lit[far]) path.sampled = chances(far).data();
+  }
+  const bool crosses = wi.z * wo.z < 0;
+  if (crosses) throughput = throughput * crossing;
+  path.normal = crosses ? -hit.geometric : hit.geometric;
+  Vector& out = path.ray.direction;
+  out = normalize(hit.tangent * wi.x + bitangent * wi.y + hit.normal * (side * wi.z));
+  if (!(dot(out, path.normal) > 0)) return false;
+  const double brightest = max_component(throughput);
+  if (!(brightest > 0)) return false;
+  if (bounce + 1 >= kRouletteStart && brightest < 1) {
+    if (random.uniform() >= brightest) return false;
+    throughput = throughput / brightest;
+  }
+  path.ray.origin = Tracer::leave(hit.p, hit.geometric, out);
+  return true;
+}
+
+template <class ToLocal> void PathTracer::direct(Path& path, const Color& throughput, const Hit& hit,
+                                                 const Vector& facing, const Surface& surface, const Brdf<double>& brdf,
+                                                 const ToLocal& to_local, const Vector& wo, bool far,
+                                                 double rest_chance, std::span<const double> chance,
+                                                 std::uint64_t dimension, Wave& wave) const {
+  const double choice = path.random.one(dimension);
+  const auto place = path.random.two(dimension + 1);
+  const LightSample s =
+      lights_.sample(hit.p, facing, chance, choice, place[0], place[1], path.random.one(dimension + 2));
+  if (!(s.pdf > 0) || !(dot(s.wi, facing) > 0)) return;
+  if (strategy_ == Strategy::Brdf && !s.delta) return;
+  const Vector wi = to_local(s.wi);
+  if (far ? !(wi.z * wo.z < 0) : !(wi.z * wo.z > 0)) return;
+  const auto [f, pdf] = brdf.evaluate(wi, wo);
+  surface.check("f", wi, wo, f);
+  const Color value = f * s.radiance * std::abs(wi.z);
+  if (!(max_component(value) > 0)) return;
+  const double weight = s.delta ? 1 : power_heuristic(s.pdf, pdf * rest_chance);
+  wave.shadows.push_back({&path, throughput * (value * (weight / s.pdf))});
+  // A little short of a lamp, which may lie in a surface.
+  wave.shadow_rays.push_back({Tracer::leave(hit.p, hit.geometric, s.wi), s.wi, s.distance * (1 - 0x1p-18)});
+}
+
+}  // namespace brdfc::reference
