@@ -3,12 +3,15 @@
 """What the papers say of their models in words, as curves: drawn with the Python package `brdfc`.
 
     python script/landmarks.py crescents CHOICE FILE.json   a scene, with that choice of `below`
-    python script/landmarks.py page PICTURES DOCS           DOCS/gallery/landmarks.md, its pictures
+    python script/landmarks.py page TOOL PICTURES DOCS      DOCS/gallery/landmarks.md, its pictures
 
-PICTURES holds the reference renderer's mirror.png and lose.png of those scenes.
+TOOL is the program brdfc. PICTURES holds the reference renderer's mirror.png and lose.png of those
+scenes.
 """
 
+import io
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -22,6 +25,11 @@ from markdown_table import heading, line
 #: Normal reflectance of polish in the coupled paper.
 R0 = 0.05
 SHARPNESS = (4, 12, 25, 100)
+#: Of Suffern's figure 25.6: patterns, views in degrees from the normal, rays of a disk; exponents.
+PATTERNS = ("random", "regular", "jittered", "multi_jittered", "hammersley")
+TURNED_VIEWS, RAYS = (45, 85), 256
+EXPONENTS = (1, 10, 100, 1000, 100000)
+SHARE_VIEWS = (45, 80, 85, 89, 89.9)
 ROOT = Path(__file__).resolve().parent.parent
 #: Pixels of the longer side of the crescents, and between the two pictures.
 SIZE, GAP = 240, 6
@@ -61,6 +69,68 @@ def anisotropy(model, view, samples=20000, **values):
         np.sqrt(np.average(x[near] ** 2, weights=weight[near])) for x in (wi[:, 1], wi @ along)
     ]
     return spread[0] / spread[1]
+
+
+def glossy_rays(tool, degrees, below, e=1, pattern="hammersley", count=65536):
+    """Directions that the glossy reflector draws, seen along the mirror direction r, the normal
+    above: (count, 2), of which (0, 0) is r; and which of them lie below the surface."""
+    theta = np.radians(degrees)
+    sine, cosine = float(np.sin(theta)), float(np.cos(theta))
+    command = [tool, "sample", "glossy_reflector", f"e={e}", f"below={below}"]
+    command += ["--pattern", pattern, "--count", str(count), "--wo", f"{sine!r},0,{cosine!r}"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    wi = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, usecols=(0, 1, 2))
+    return np.stack([wi[:, 1], wi[:, 0] * cosine + wi[:, 2] * sine], axis=-1), wi[:, 2] <= 0
+
+
+def share_below(tool, degrees, e):
+    """Share of the rays that lie below the surface."""
+    return glossy_rays(tool, degrees, "lose", e)[1].mean()
+
+
+def turned_rays(tool, degrees, pattern):
+    """Rays as drawn and as turned, on the disk, and which are turned."""
+    drawn, below = glossy_rays(tool, degrees, "lose", pattern=pattern, count=RAYS)
+    turned, _ = glossy_rays(tool, degrees, "mirror", pattern=pattern, count=RAYS)
+    return drawn, turned, below
+
+
+def to_nearest(points, which):
+    """Distances on the disk from some of these points to the nearest other one."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points).query(points[which], 2)[0][:, 1]
+
+
+def draw_turned(tool, out):
+    """The disks; returns for the last view by pattern how many rays are turned, and the median of
+    their distances to the nearest one before and after."""
+    size = (9, 3.75)
+    figure, rows = plt.subplots(2, len(PATTERNS), figsize=size, dpi=90, layout="constrained")
+    x = np.linspace(-1, 1, 401)
+    found = {}
+    for degrees, axes in zip(TURNED_VIEWS, rows, strict=True):
+        horizon = -np.cos(np.radians(degrees)) * np.sqrt(1 - x * x)
+        for pattern, a in zip(PATTERNS, axes, strict=True):
+            drawn, turned, below = turned_rays(tool, degrees, pattern)
+            a.fill_between(x, -np.sqrt(1 - x * x), horizon, color="#cdeef2", lw=0)
+            a.add_patch(plt.Circle((0, 0), 1, fill=False, color="0.5", lw=0.7))
+            a.scatter(*drawn[~below].T, s=3, color="k", lw=0)
+            a.scatter(*drawn[below].T, s=3, color="0.6", lw=0)
+            a.scatter(*turned[below].T, s=9, facecolors="none", edgecolors="r", lw=0.6)
+            a.plot(0, 0, "+", color="tab:blue", ms=6)
+            a.set(xlim=(-1.03, 1.03), ylim=(-1.03, 1.03), aspect="equal")
+            a.axis("off")
+            if a in rows[0]:
+                a.set_title(pattern.replace("_", "-"), fontsize=9)
+            found[pattern] = (
+                int(below.sum()),
+                np.median(to_nearest(drawn, below)),
+                np.median(to_nearest(turned, below)),
+            )
+        axes[0].text(-1.12, 0, f"{degrees}°", fontsize=9, ha="right", va="center")
+    save(figure, out)
+    return found
 
 
 def save(figure, out):
@@ -126,6 +196,10 @@ def draw_anisotropy(out):
     return found
 
 
+def share_cells(tool, e):
+    return [f"{100 * share_below(tool, v, e):.1f} %" for v in SHARE_VIEWS]
+
+
 def crescents(choice, file):
     """The scene of the crescents, smaller, with that choice for what falls below the horizon."""
     scene = json.loads((ROOT / "scenes" / "gl-fig12.json").read_text(encoding="utf-8"))
@@ -153,17 +227,18 @@ def main():
     if len(sys.argv) == 4 and sys.argv[1] == "crescents":
         crescents(*sys.argv[2:])
         return
-    if len(sys.argv) != 4 or sys.argv[1] != "page":
+    if len(sys.argv) != 5 or sys.argv[1] != "page":
         sys.exit(__doc__)
-    pictures, folder = Path(sys.argv[2]), Path(sys.argv[3]) / "gallery"
+    tool, pictures, folder = sys.argv[2], Path(sys.argv[3]), Path(sys.argv[4]) / "gallery"
     beside((pictures / "mirror.png", pictures / "lose.png"), folder / "landmark-crescents.jpg")
     draw_coupled(folder / "landmark-coupled.png")
     found = draw_anisotropy(folder / "landmark-anisotropy.png")
+    turned = draw_turned(tool, folder / "landmark-turned.png")
     views = (0, 45, 70, 80, 86)
     text = [
         "# What papers say, as curves",
         "",
-        "`script/landmarks` made this page from the [Python package](../python.md).",
+        "`script/landmarks` made this page from the [Python package](../python.md) and the tool.",
         "",
         "## Shirley, Smits, Hu and Lafortune 1997: R and SPDF",
         "",
@@ -200,6 +275,34 @@ def main():
         "to the other side of the mirror direction; right without those rays (`below=lose`). The",
         "crescents stay and the outermost rim darkens: they come of the part of the lobe that lies",
         "above the surface, not of turned rays.",
+        "",
+        "## Suffern 2007: where turned rays go",
+        "",
+        f"![{RAYS} rays on the disk around r, two views, five patterns](landmark-turned.png)",
+        "",
+        f"Figure 25.6: {RAYS} rays of the glossy reflector, e = 1, seen along the mirror direction",
+        "r, the cross, with the normal above, for a viewer 45 and 85 degrees from it. Grey dots in",
+        "the shade lie below the surface; red circles are where they are turned to, through r.",
+        "`build/brdfc sample glossy_reflector e=1 --pattern NAME --count 256 --wo X,Y,Z` draws",
+        "them. Shares below the surface, of 65536 rays, by exponent:",
+        "",
+        *heading("e", *(f"{v}°" for v in SHARE_VIEWS)),
+        *(line(e, *share_cells(tool, e)) for e in EXPONENTS),
+        "",
+        "At e = 1 it is (1 - cos) / 2. The book has it as roughly half at grazing incidence for",
+        "all exponents: that is so at 90 degrees, and for sharp lobes only very near it.",
+        "",
+        "It also warns that turning undoes the even spread of a pattern. How much depends on the",
+        "pattern. At 85 degrees, the rays below, and the median distance from one of them to the",
+        "nearest other ray, before and after it is turned; the radius of the disk is 1:",
+        "",
+        *heading("pattern", "rays below", "before", "after"),
+        *(line(p, n, f"{a:.3f}", f"{b:.3f}") for p, (n, a, b) in turned.items()),
+        "",
+        "Regular points come in pairs opposite to each other, so each turned ray is traced twice;",
+        "nearly so those of Hammersley, where a number and the next one lie half a turn apart.",
+        "Towards the silhouette these patterns know half as much as they cost. Jittered and",
+        "multi-jittered rays end up little more even than random ones.",
     ]
     (folder / "landmarks.md").write_text("\n".join(text) + "\n", encoding="utf-8")
 

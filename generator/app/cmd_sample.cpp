@@ -6,6 +6,7 @@
 #include "app/commands.h"
 #include "core/csv.h"
 #include "measure/bound_model.h"
+#include "reference/patterns.h"
 
 namespace brdfc::app {
 namespace {
@@ -28,6 +29,7 @@ void add_sample_command(CLI::App& app) {
     std::vector<double> wo;
     int count = 0;
     std::uint64_t seed = 0;
+    std::string pattern = "random";
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd =
@@ -41,6 +43,11 @@ void add_sample_command(CLI::App& app) {
   CLI::Option* count =
       cmd->add_option("--count", o->count, "Draw so many samples from own random numbers")->check(CLI::PositiveNumber);
   cmd->add_option("--seed", o->seed, "Seed of the random numbers")->needs(count);
+  cmd->add_option("--pattern", o->pattern,
+                  "How they are placed, as those of a pixel are by the reference renderer: random, regular, jittered,\n"
+                  "multi_jittered or hammersley")
+      ->check(CLI::IsMember(reference::pattern_names()))
+      ->needs(count);
   cmd->add_option("--wo", o->wo, "View direction x,y,z")->delimiter(',')->expected(3)->needs(count);
   cmd->callback([o] {
     const Model& model = find_model(o->model);
@@ -56,9 +63,19 @@ void add_sample_command(CLI::App& app) {
       wo = wo / len;
       std::mt19937_64 random(o->seed);
       const auto uniform = [&] { return double(random() >> 11) * 0x1p-53; };
+      const reference::PatternPoints points(reference::pattern_named(o->pattern), o->count);
       for (int i = 0; i < o->count; ++i) {
-        const double u1 = uniform(), u2 = uniform(), u3 = uniform();
-        write_sample(bound, fmt::format("sample {}", i + 1), wo, {u1, u2, u3}, out);
+        Vec3<double> u;
+        if (points.pattern() == reference::Pattern::Random) {
+          const double u1 = uniform(), u2 = uniform(), u3 = uniform();
+          u = {u1, u2, u3};
+        } else {
+          reference::PathSampler sampler(points, o->seed, 0, i);
+          const double lobe = sampler.one(0);
+          const auto [x, y] = sampler.two(1);
+          u = {lobe, x, y};
+        }
+        write_sample(bound, fmt::format("sample {}", i + 1), wo, u, out);
       }
     } else {
       CsvReader in(std::cin, "stdin", {"wo_x", "wo_y", "wo_z", "u1", "u2", "u3"});

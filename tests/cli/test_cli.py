@@ -185,6 +185,11 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
         (["sample", "lambert", "--count", "0", "--wo", "0,0,1"], ["--count"]),
         (["sample", "lambert", "--count", "3"], ["--wo"]),
         (["sample", "lambert", "--count", "3", "--wo", "0,0,2"], ["--wo", "unit vector"]),
+        (["sample", "lambert", "--pattern", "regular"], ["--count"]),
+        (
+            ["sample", "lambert", "--count", "3", "--wo", "0,0,1", "--pattern", "blue"],
+            ["--pattern", "blue", "multi_jittered", "hammersley"],
+        ),
         (["sample", "lambert", "--seed", "3"], ["--count"]),
         (["albedo", "lambert", "--count", "1"], ["--count"]),
         (["check", "lambert", "--all"], ["--all"]),
@@ -228,6 +233,23 @@ def test_sample_is_reproducible_and_its_seed_matters():
     args = ["sample", "radziszewski_alda", "--count", "20", "--wo", "0,0.6,0.8", "--seed"]
     first, again, other = (run(*args, seed).stdout for seed in ("1", "1", "2"))
     assert first == again != other
+
+
+def test_sample_takes_a_pattern():
+    """Regular points are the middles of cells, whatever the seed; random ones are as without a
+    pattern; jittered ones are spread over lambert's heights."""
+    args = ["sample", "lambert", "--count", "16", "--wo", "0,0.6,0.8"]
+    cells = [((i + 0.5) / 4, (j + 0.5) / 4) for i in range(4) for j in range(4)]
+    text = "\n".join([SAMPLE_HEADER, *(f"0,0.6,0.8,0.5,{x},{y}" for x, y in cells)])
+    expected = sorted(run("sample", "lambert", stdin=text + "\n").stdout.split())
+    regular = run(*args, "--seed", "7", "--pattern", "regular").stdout
+    assert sorted(regular.split()) == expected
+    assert run(*args, "--pattern", "random").stdout == run(*args).stdout
+    one, other = (rows(run(*args, "--pattern", "jittered", "--seed", s)) for s in ("1", "2"))
+    assert one != other
+    # One in each cell, of which there are four of each height.
+    for found in (one, other):
+        assert sorted(int(4 * r["wi_z"] ** 2) for r in found) == sorted([0, 1, 2, 3] * 4)
 
 
 def test_sample_takes_random_numbers_from_stdin():
