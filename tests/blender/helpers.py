@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import zipfile
@@ -96,6 +97,38 @@ def open_image_io():
     import OpenImageIO
 
     return OpenImageIO
+
+
+#: As `blender --background FILE --engine CYCLES --render-output PICTURE --render-frame FRAME` does,
+#: which a module has not, on a machine of a farm: Blender's factory settings.
+FACTORY_RENDER = """
+import sys
+import bpy
+blend, frame, folder = sys.argv[1:]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.open_mainfile(filepath=blend)
+assert not [a for a in bpy.context.preferences.addons if "brdfc" in a.module]
+assert not [m for m in sys.modules if "brdfc" in m]
+assert not bpy.app.autoexec_fail
+scene = bpy.context.scene
+scene.render.engine = "CYCLES"
+scene.render.filepath = folder + "/####"
+scene.frame_start = scene.frame_end = int(frame)
+bpy.ops.render.render(animation=True)
+"""
+
+
+def render_without_the_extension(blend, frame, folder):
+    """The picture of a saved file's frame by a Blender of its own that has nothing installed."""
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "nothing")}
+    done = subprocess.run(
+        [sys.executable, "-c", FACTORY_RENDER, blend, str(frame), folder],
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return read_picture(folder / f"{frame:04}.exr")
 
 
 def render_passes(scene):

@@ -5,7 +5,6 @@ import contextlib
 import hashlib
 import json
 import math
-import os
 import re
 import subprocess
 import sys
@@ -850,32 +849,11 @@ def test_warnings_reach_nested_groups(extension, empty):
 # Saved files
 
 
-FACTORY_RENDER = """
-import sys
-import bpy
-blend, picture = sys.argv[1:]
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.ops.wm.open_mainfile(filepath=blend)
-assert not [a for a in bpy.context.preferences.addons if "brdfc" in a.module]
-assert not [m for m in sys.modules if "brdfc" in m]
-scene = bpy.context.scene
-scene.render.filepath = picture
-bpy.ops.render.render(write_still=True)
-"""
-
-
 def test_saved_file_renders_without_the_extension(every_form, tmp_path):
-    expected, picture = every_form.picture, tmp_path / "picture.exr"
+    expected = every_form.picture
     assert (expected[6:10, :, :3].max(axis=(0, 2)) > 0.01).all()
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "nothing")}
-    done = subprocess.run(
-        [sys.executable, "-c", FACTORY_RENDER, every_form.blend, picture],
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert np.array_equal(helpers.read_picture(picture), expected)
+    found = helpers.render_without_the_extension(every_form.blend, 1, tmp_path)
+    assert np.array_equal(found, expected)
 
 
 # Menus, panels, operators

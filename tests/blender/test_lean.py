@@ -111,6 +111,36 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     )
 
 
+def test_a_farm_renders_a_lean_file_and_its_moving_lamp(
+    extension, empty, kept_program, monkeypatch, tmp_path
+):
+    monkeypatch.setenv("BRDFC_TOOL", str(kept_program))
+    extension.api.enable_osl(empty)
+    material = extension.api.new_material("ward", "aimed", ax=0.3, ay=0.1)
+    helpers.sphere_scene(empty, material, size=24, samples=16)
+    lamp = bpy.data.objects.new("Key", bpy.data.lights.new("Key", "POINT"))
+    lamp.data.energy, lamp.data.shadow_soft_size = 20000, 0.3
+    empty.collection.objects.link(lamp)
+    for frame, x in ((1, -3), (5, 3)):
+        lamp.location = (x, -4, 2)
+        lamp.keyframe_insert("location", frame=frame)
+    empty.frame_set(1)
+    extension.api.see_lamps(empty)
+    assert extension.api.bake(extension.api.plan()) == 1
+    expected = {}
+    for frame in (1, 5):
+        empty.frame_set(frame)
+        expected[frame] = helpers.render(empty)
+    left, right = (
+        picture[:, :12, :3].sum() / picture[..., :3].sum() for picture in expected.values()
+    )
+    assert left > 0.55 and right < 0.45, "the lamp goes from left to right"
+    path = tmp_path / "lean.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    found = helpers.render_without_the_extension(path, 5, tmp_path)
+    assert np.array_equal(found, expected[5])
+
+
 def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
     api, nodes = extension.api, extension.nodes
     material = used["coupled"]
