@@ -137,6 +137,12 @@ setup_tools() {
   setup_env tools 3.11 || die "Python 3.11 was not found"
 }
 
+# setup_farm: Dask, for renders on several machines.
+setup_farm() {
+  find_python 3.11 >/dev/null || install_packages python3.11 python3.11-venv
+  setup_env farm 3.11 || die "Python 3.11 was not found"
+}
+
 # ---- build -----------------------------------------------------------------------------------------------
 
 build_preset() { # build_preset PRESET [TARGET...]

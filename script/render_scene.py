@@ -30,6 +30,7 @@ import sys
 import tempfile
 import time
 import tomllib
+import uuid
 import zipfile
 from pathlib import Path
 
@@ -122,7 +123,7 @@ def for_eyes(scene, path, view):
         raise UsageError(f"view: {error}") from error
 
 
-def render_once(bpy, loader, job, repetition):
+def render_once(bpy, loader, job, repetition, threads=None):
     """Loads and renders one job. Returns its times and, from the first repetition, a description.
 
     Compiling, building the BVH and the like happen in every render. They are told apart from
@@ -138,9 +139,12 @@ def render_once(bpy, loader, job, repetition):
     samples = job["spp"] or scene.cycles.samples
     if job["seed"] is not None:
         scene.cycles.seed = job["seed"]
+    if threads:
+        scene.render.threads_mode, scene.render.threads = "FIXED", threads
     one_cpu, one_wall = timed_render(bpy, 1) if job["timed"] else (None, None)
     out = Path(job["out"]).resolve()
-    partial = out.with_name(f".{out.stem}.partial{out.suffix}")
+    # Of a name of its own: a farm may try the same twice at once.
+    partial = out.with_name(f".{out.stem}.{uuid.uuid4().hex}{out.suffix}")
     scene.cycles.use_denoising = job["denoise"]
     if out.suffix in PICTURES:
         for_eyes(scene, out, job["view"])
@@ -258,6 +262,8 @@ def read_jobs(options):
 def run(options):
     """Renders every job, repetitions taking turns, and returns their records."""
     jobs = read_jobs(options)
+    if options.threads is not None and options.threads < 1:
+        raise UsageError(f"--threads: expected a whole number from 1, got {options.threads}")
     extension = Path(options.extension).resolve()
     if not extension.is_file():
         raise UsageError(f"{extension}: no such file")
@@ -272,7 +278,7 @@ def run(options):
                 if repetition >= job["repeat"]:
                     continue
                 try:
-                    taken, record = render_once(bpy, loader, job, repetition)
+                    taken, record = render_once(bpy, loader, job, repetition, options.threads)
                 except (ValueError, loader.pack.PackError) as error:
                     raise UsageError(str(error)) from error
                 times[index].append(taken)
@@ -310,6 +316,7 @@ def main():
     )
     parser.add_argument("--spp", type=int, help="samples a pixel; default: as the scene says")
     parser.add_argument("--seed", type=int, help="random numbers; default: as the scene says")
+    parser.add_argument("--threads", type=int, help="threads of Cycles; default: all")
     parser.add_argument("--repeat", type=int, default=1, help="renders a job; times are medians")
     options = parser.parse_args()
     try:

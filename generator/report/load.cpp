@@ -272,6 +272,15 @@ std::optional<double> FormReport::relative_l1() const {
   return worst;
 }
 
+std::map<std::string, std::string> load_links(const fs::path& folder) {
+  const fs::path file = folder / "links.json";
+  std::map<std::string, std::string> links;
+  if (!fs::exists(file)) return links;
+  const nlohmann::json content = reference::read_json(file);
+  for (const auto& [name, address] : JsonView(content, file.string()).members()) links[name] = address.text();
+  return links;
+}
+
 std::vector<SceneReport> load_report(const fs::path& folder) {
   if (!fs::is_directory(folder)) input_error("{}: not a folder", folder.string());
   std::vector<fs::path> folders;

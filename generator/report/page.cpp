@@ -467,7 +467,8 @@ void put_provenance(std::string& out, const std::vector<SceneReport>& scenes) {
 }  // namespace
 
 std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews,
-                        const std::vector<ConformanceTable>& closures) {
+                        const std::vector<ConformanceTable>& closures,
+                        const std::map<std::string, std::string>& links) {
   std::string out;
   put(out,
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
@@ -477,6 +478,15 @@ std::string report_html(const std::vector<SceneReport>& scenes, const std::vecto
   std::size_t forms = 0;
   for (const SceneReport& s : scenes) forms += s.forms.size();
   out += "<h1>Error against run time</h1>\n";
+  if (!links.empty()) {
+    out += "<p class=\"soft\">The same scenes in";
+    const char* separator = " ";
+    for (const auto& [name, address] : links) {
+      put(out, "{}<a href=\"{}\">{}</a>", separator, escaped(address), escaped(name));
+      separator = ", ";
+    }
+    out += ".</p>\n";
+  }
   put_verdict(out, scenes);
   if (scenes.size() == 1)
     put_chart(out, scenes.front());

@@ -35,6 +35,9 @@
 //
 // A file flip.json beside it, if there is one, holds {"FORM": mean FLIP of its picture against the reference, ...}.
 //
+// A file links.json in the folder itself, if there is one, holds {"TEXT": "../demo-5.0/index.html", ...}: pages of the
+// same scenes in other versions of Blender, which the page links on its top.
+//
 // CPU times of different forms are comparable when images with the same index were rendered in turns in one
 // process; the cost of a form is the median over the images of its time divided by the time of "glossy": of the images
 // for "convergence" with one number of samples where those took longer, and of none where "glossy" took less than
@@ -152,9 +155,13 @@ struct Previews {
 /// Writes the PNG files of one scene into folder/scene.
 Previews write_previews(const std::filesystem::path& folder, const SceneReport&);
 
+/// Addresses of other pages by what they are called; none without links.json in the folder. Throws InputError naming
+/// file and key.
+std::map<std::string, std::string> load_links(const std::filesystem::path& folder);
+
 /// The page's text; `previews` in the order of `scenes`.
 std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews,
-                        const std::vector<ConformanceTable>& closures);
+                        const std::vector<ConformanceTable>& closures, const std::map<std::string, std::string>& links);
 std::string report_json(const std::vector<SceneReport>& scenes);
 std::string report_csv(const std::vector<SceneReport>& scenes);
 

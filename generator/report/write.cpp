@@ -114,7 +114,7 @@ std::vector<SceneReport> write_report(const fs::path& folder) {
   write_text(folder / "report.json", report_json(scenes));
   write_text(folder / "report.csv", report_csv(scenes));
   const fs::path beside = fs::weakly_canonical(folder).parent_path() / "conformance";
-  write_text(folder / "index.html", report_html(scenes, previews, load_conformance(beside)));
+  write_text(folder / "index.html", report_html(scenes, previews, load_conformance(beside), load_links(folder)));
   return scenes;
 }
 

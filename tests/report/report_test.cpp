@@ -165,6 +165,25 @@ TEST_F(ReportTest, WritesPageJsonAndCsv) {
     EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << ": a temporary file was left";
 }
 
+TEST_F(ReportTest, LinksOtherVersionsOfBlender) {
+  load();
+  EXPECT_TRUE(load_links(folder_).empty());
+  std::ofstream(folder_ / "links.json") << json{{"Blender 5.0", "../demo-5.0/index.html"}, {"<x>", "a\"b"}};
+  write_report(folder_);
+  std::ifstream in(folder_ / "index.html");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_THAT(page, HasSubstr("<a href=\"../demo-5.0/index.html\">Blender 5.0</a>"));
+  EXPECT_THAT(page, HasSubstr("<a href=\"a&quot;b\">&lt;x&gt;</a>"));
+
+  std::ofstream(folder_ / "links.json") << json{{"Blender 5.0", 5}};
+  try {
+    load_links(folder_);
+    FAIL() << "a number was accepted for an address";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("links.json: Blender 5.0"));
+  }
+}
+
 TEST_F(ReportTest, NamesInTheChartLieBesideEachOther) {
   for (const char* form : {"sampled", "planned", "aimed", "twin"}) {
     runs_["runs"].push_back(runs_["runs"][1]);

@@ -3,9 +3,11 @@
 
 import json
 
-import demo_render
+import demo_matrix
+import gallery_check
 import gallery_models
 import gallery_pages
+import numpy as np
 import OpenImageIO as oiio
 import pytest
 
@@ -21,13 +23,13 @@ SCENE = {
     [("auto", ["exact"]), ("unit", ["glossy", "exact"]), ("all", ["glossy", "exact", "sampled"])],
 )
 def test_forms_that_are_rendered(wanted, expected):
-    assert [f.name for f in demo_render.forms_of(SCENE, MODELS, {}, wanted)] == expected
+    assert [f.name for f in demo_matrix.forms_of(SCENE, MODELS, {}, wanted)] == expected
 
 
 def test_pictures_are_made_smaller_and_never_larger():
-    small = demo_render.smaller(SCENE, 100, 16)["settings"]
+    small = demo_matrix.smaller(SCENE, 100, 16)["settings"]
     assert small == {"width": 100, "height": 50, "spp": 16, "seed": 1}
-    assert demo_render.smaller(SCENE, 1000, 1000)["settings"] == SCENE["settings"]
+    assert demo_matrix.smaller(SCENE, 1000, 1000)["settings"] == SCENE["settings"]
 
 
 def scene(name, passed):
@@ -128,3 +130,42 @@ def test_a_model_s_page_says_what_its_schema_claims():
     assert gallery_models.claims(MODEL) == (
         "Light and view may be exchanged and some parameters and views gain light."
     )
+
+
+def noisy(rng, factor=1.0):
+    """A picture of bright and dark parts, with noise."""
+    light = np.linspace(0.1, 2, 40 * 30)[:, None].repeat(3, 1).reshape(30, 40, 3)
+    return light * factor * rng.gamma(4, 1 / 4, light.shape)
+
+
+def test_the_gallery_check_lets_noise_pass_and_no_more():
+    rng = np.random.default_rng(1)
+    reference = noisy(rng)
+    off, noise = gallery_check.judge(noisy(rng), reference, 0)
+    assert abs(off) < 4 * noise and 0.005 < noise < 0.05
+    darker = noisy(rng, 0.8)
+    assert gallery_check.judge(darker, reference, 0.2)[0] < -0.1, "within the stated error"
+    red = noisy(rng)
+    red[..., 0] *= 1.2
+    bad, nothing = noisy(rng), np.zeros_like(reference)
+    bad[3, 4, 1] = np.nan
+    for picture, message in (
+        (darker, "in Blender -"),
+        (red, "of the reference's light in R"),
+        (bad, "1 bad values"),
+        (nothing, "is black"),
+    ):
+        with pytest.raises(gallery_check.CheckError, match=message):
+            gallery_check.judge(picture, reference, 0)
+
+
+def test_a_scene_states_the_error_of_its_worst_form():
+    forms = [{"error": {"relative_l1": 0.02}}, {"error": {"relative_l1": None}}, {"error": None}]
+    record = {"materials": {"a": forms[1:], "b": forms, "node": [{"representation": "glossy"}]}}
+    assert gallery_check.stated_error(record) == 0.02
+    assert gallery_check.stated_error({"materials": {}}) == 0
+
+
+def test_scenes_that_the_check_may_leave_out_exist():
+    for name in gallery_check.LIKE_OTHERS:
+        assert (gallery_check.RENDER_SCENE.parents[1] / "scenes" / f"{name}.json").is_file()

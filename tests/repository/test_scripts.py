@@ -23,7 +23,7 @@ MODELS = {
 )
 def test_a_scene_is_rendered_in_the_forms_that_people_get(used, expected):
     scene = {"materials": {name: {"model": name} for name in used}}
-    made = script("demo_render").forms_of(scene, MODELS, {})
+    made = script("demo_matrix").forms_of(scene, MODELS, {})
     assert [form.name for form in made] == [form.representation for form in made] == expected
 
 

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where tasks run: here, one after the other, or on the workers of a Dask scheduler. Both take
+tasks, also while others run, and give back each with its record."""
+
+import heapq
+import itertools
+import logging
+import sys
+import time
+import uuid
+from collections import defaultdict
+
+import demo_tasks
+from demo_tasks import TaskError, run_task
+
+#: What a worker offers once: it runs one task at a time.
+RESOURCE = "render"
+#: Seconds: for a scheduler to answer; between looks at who works.
+ANSWER, LOOK = 10, 10
+
+
+class Here:
+    """Tasks one after the other, each with all cores."""
+
+    workers = 1
+
+    def __init__(self):
+        self.queue = []
+
+    def add(self, tasks):
+        for task in tasks:
+            heapq.heappush(self.queue, (task.order, task.name, task))
+
+    def __iter__(self):
+        while self.queue:
+            task = heapq.heappop(self.queue)[-1]
+            yield task, run_task(task)
+
+
+def run_on_worker(task):
+    """Runs on a worker, with the cores that it states."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    cores = worker.state.total_resources.get("cores")
+    return run_task(task, cores and int(cores), worker.address)
+
+
+class Farm:
+    """Tasks on the workers that offer RESOURCE. Dask runs a task of a worker that is lost again
+    elsewhere, and gives up at the fourth loss."""
+
+    def __init__(self, address, say):
+        import cloudpickle
+        from distributed import Client
+
+        # Workers know nothing of these files: their code is sent along.
+        for module in (demo_tasks, sys.modules[__name__]):
+            cloudpickle.register_pickle_by_value(module)
+        # What it would print where a scheduler is gone is said below, in a line.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        self.address, self.say, self.alone = address, say, False
+        self.count = itertools.count()
+        try:
+            self.client = Client(address, timeout=ANSWER)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise TaskError(
+                f"no scheduler answers at {address} ({error}); `script/farm scheduler` starts one"
+            ) from error
+        self.running = {}
+        self.look()
+
+    def look(self):
+        """Counts the workers that take tasks, and says so when there is none."""
+        known = self.client.scheduler_info(n_workers=-1)["workers"].values()
+        self.workers = sum(w["resources"].get(RESOURCE, 0) >= 1 for w in known)
+        if not self.workers and not self.alone:
+            others = f", {len(known)} that take no renders" if known else ""
+            start = f"script/farm worker {self.address}"
+            self.say(f"waiting for workers (there are none{others}): `{start}` starts one")
+        self.alone = not self.workers
+
+    def gone(self):
+        return TaskError(
+            f"the scheduler at {self.address} is gone; what is done is kept, and the same command "
+            "goes on from there with another one"
+        )
+
+    def add(self, tasks):
+        for task in tasks:
+            future = self.client.submit(
+                # Dask sends code along for what has no name to import it by, as a lambda.
+                lambda task=task: run_on_worker(task),
+                key=f"{task.name}-{uuid.uuid4().hex}",
+                pure=False,
+                resources={RESOURCE: 1},
+                # Scenes in their order, and what was added first of each.
+                priority=-(task.order[0] * 10**6 + next(self.count)),
+            )
+            self.running[future] = task
+
+    def __iter__(self):
+        from concurrent.futures import CancelledError
+
+        from distributed import KilledWorker, wait
+
+        while self.running:
+            try:
+                done, _ = wait(list(self.running), timeout=LOOK, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                self.look()
+                continue
+            except CancelledError as error:
+                raise self.gone() from error
+            self.look()
+            for future in done:
+                task = self.running.pop(future)
+                try:
+                    record = future.result()
+                except KilledWorker as error:
+                    raise TaskError(
+                        f"{task.name}: given up, its workers were lost or killed again and again: "
+                        f"{demo_tasks.shown(task.command)}"
+                    ) from error
+                except CancelledError as error:
+                    raise self.gone() from error
+                yield task, record
+
+
+class Progress:
+    """A line a task, with the time left: that of tasks of the same kind so far, by their work."""
+
+    def __init__(self, say):
+        self.say, self.total, self.done = say, 0, 0
+        self.left = defaultdict(float)  #: work by kind
+        self.spent = defaultdict(lambda: [0.0, 0.0])  #: seconds and work by kind
+
+    def expect(self, kind, count, work):
+        self.total += count
+        self.left[kind] += count * work
+
+    def finish(self, task, record, workers):
+        self.done += 1
+        self.left[task.kind] -= task.work
+        spent = self.spent[task.kind]
+        spent[0] += record["wall_seconds"]
+        spent[1] += task.work
+        where = f" on {record['worker']}" if workers > 1 else ""
+        self.say(
+            f"[{self.done}/{self.total}] {task.name}: {record['wall_seconds']:.1f} s{where}"
+            f"{self.time_left(workers)}"
+        )
+
+    def time_left(self, workers):
+        if self.done >= self.total or not workers:
+            return ""
+        seconds = 0.0
+        for kind, work in self.left.items():
+            if work > 1e-9:
+                if kind not in self.spent:
+                    return ""  # nothing is known of these yet
+                seconds += work * self.spent[kind][0] / self.spent[kind][1]
+        left = time.strftime("%H:%M:%S", time.gmtime(seconds / workers))
+        return f"; about {left} left"

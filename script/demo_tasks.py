@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A task of the report: one command, what it needs, and the record that it leaves.
+
+Workers of a farm are sent this file as it is, so it takes the standard library alone. A record is
+written last, by the machine that ran the command: whoever finds one with the right key need not run
+it again, also where the program that wanted it was stopped meanwhile.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import shutil
+import socket
+import subprocess
+import time
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class TaskError(Exception):
+    """What went wrong, and where to look; for the terminal."""
+
+
+@dataclass(frozen=True)
+class Task:
+    name: str  #: unique: scene, a slash, what is made of it
+    kind: str  #: plan, reference, blender or convergence
+    command: tuple
+    #: SHA-256 of all that the outputs depend on.
+    key: str
+    #: Folder of record, log and job list.
+    folder: Path
+    outputs: tuple
+    #: Files that have to be the same where the task runs: SHA-256 by path.
+    programs: tuple
+    #: Option of the command for a number of threads, if it has one.
+    threads: str = ""
+    #: The command prints a list of records as JSON.
+    prints_records: bool = False
+    #: Pixels times samples, or what else the time grows with, within a kind.
+    work: float = 1
+    #: What comes first.
+    order: tuple = ()
+
+    def file(self, suffix):
+        return self.folder / f"{self.name.split('/')[1]}{suffix}"
+
+
+def digest(*parts):
+    """SHA-256 over texts and the contents of files, with their order and lengths."""
+    total = hashlib.sha256()
+    for part in parts:
+        data = part.read_bytes() if isinstance(part, Path) else str(part).encode()
+        total.update(f"{len(data)}:".encode() + data)
+    return total.hexdigest()
+
+
+def read_json(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def write_json(path, value):
+    # Of a name of its own: two machines may write the same file.
+    beside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    beside.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
+    beside.replace(path)
+
+
+def shown(command):
+    """A command as a person would type it in the root of the repository."""
+    short = []
+    for word in command:
+        path = Path(str(word))
+        inside = path.is_absolute() and path.is_relative_to(ROOT)
+        short.append(str(path.relative_to(ROOT)) if inside else str(word))
+    return shlex.join(short)
+
+
+def kept(task):
+    """The record of a task that was done before, if its outputs are still there."""
+    try:
+        record = read_json(task.file(".json"))
+    except (OSError, ValueError):
+        return None
+    there = record.get("key") == task.key and all(Path(o).is_file() for o in task.outputs)
+    return record if there else None
+
+
+def processor(cores):
+    info = Path("/proc/cpuinfo")
+    for line in info.read_text().splitlines() if info.exists() else []:
+        if line.startswith("model name"):
+            model = line.split(":", 1)[1].strip()
+            break
+    else:
+        model = platform.processor() or platform.machine()
+    return f"{model}, {cores or os.cpu_count()} threads"
+
+
+def check_programs(task, where):
+    """Raises TaskError unless this machine has what the task needs."""
+    for path, expected in task.programs:
+        if not Path(path).exists():
+            raise TaskError(
+                f"{task.name}: {where} lacks {path}; a worker needs this checkout at the same "
+                "path, with its .env and build"
+            )
+        if expected and digest(Path(path)) != expected:
+            raise TaskError(f"{task.name}: {where} has another {path} than this machine")
+
+
+def run_task(task, cores=None, where=None):
+    """Runs the task's command unless that was done, with so many threads; returns its record."""
+    if record := kept(task):
+        return record
+    where = where or socket.gethostname()
+    check_programs(task, where)
+    command = [str(word) for word in task.command]
+    if cores and task.threads:
+        command += [task.threads, str(cores)]
+    # Where a worker is killed, what it started must not go on beside the next attempt.
+    tied = ["setpriv", "--pdeathsig", "KILL"] if shutil.which("setpriv") else []
+    log = task.file(".log")
+    start = time.perf_counter()
+    with log.open("w", encoding="utf-8") as errors:
+        done = subprocess.run([*tied, *command], stdout=subprocess.PIPE, stderr=errors, text=True)
+    seconds = time.perf_counter() - start
+    if done.returncode != 0:
+        last = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-5:]
+        raise TaskError(
+            f"{task.name}: failed on {where} with status {done.returncode}: {shown(command)}\n"
+            + "".join(f"    {line}\n" for line in last)
+            + f"    its log: {shown([log])}"
+        )
+    record = {
+        "key": task.key,
+        "command": shown(task.command),
+        "wall_seconds": seconds,
+        "worker": where,
+        "processor": processor(cores),
+    }
+    if task.prints_records:
+        record["records"] = json.loads(done.stdout)
+    if missing := [o for o in task.outputs if not Path(o).is_file()]:
+        raise TaskError(f"{task.name}: {where} wrote no {missing[0]}: {shown(command)}")
+    write_json(task.file(".json"), record)
+    return record

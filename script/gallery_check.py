@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether every scene still loads and renders, and as bright in Blender as by the reference
+renderer: small pictures, one of each, in the form that `auto` takes.
+
+    python script/gallery_check.py --tool TOOL --python PYTHON --extension ZIP --out DIR SCENE...
+
+Two pictures of one scene differ by noise alone, so the spread of their difference over the pixels
+tells how far its mean may be from 0. Where it is further, and further than the stated error of the
+scene's forms, the check fails: exit status 1.
+"""
+
+import argparse
+import json
+import math
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from demo_matrix import RENDER_SCENE, smaller
+from demo_tasks import read_json, shown, write_json
+
+#: Pixels along the longer side; samples of both pictures. Most of the time goes into compiling
+#: shaders: fewer would save little.
+SIZE, BLENDER_SPP, REFERENCE_SPP = 40, 64, 128
+#: Scenes of models and shapes that others have too; a fourth of the time goes into them.
+LIKE_OTHERS = {
+    "all-models",  # as-fig8
+    "as-fig3",
+    "as-fig5-high",
+    "as-fig5-low",
+    "as-fig6",
+    "gl-fig13-random",
+    "gl-fig13-regular",
+    "ra-fig5-grazing",
+    "sh-fig4-low",
+}
+#: Standard errors. Pictures do not change from run to run; new ones may be a little unlucky.
+FAR = 5
+
+
+class CheckError(Exception):
+    """What is wrong with a scene, in a line."""
+
+
+def checked_run(command, **options):
+    done = subprocess.run([str(c) for c in command], text=True, capture_output=True, **options)
+    if done.returncode != 0:
+        raise CheckError(f"failed: {shown(command)}\n{done.stderr.strip()[-2000:]}")
+    return done.stdout
+
+
+def resolve(tool, source, out):
+    """The scene as both renderers read it, small; its folder."""
+    folder = out / source.stem
+    checked_run([tool, "scene", source, "--out", folder])
+    small = smaller(read_json(folder / "scene.json"), SIZE)
+    small["settings"]["spp"] = BLENDER_SPP
+    write_json(folder / "scene.json", small)
+    return folder
+
+
+def render_in_blender(options, folders):
+    """One picture a scene, all in one process; records by scene."""
+    jobs = [
+        {
+            "name": f.name,
+            "scene": str(f / "scene.json"),
+            "out": str(f / "blender.exr"),
+            "representation": "auto",
+            "timed": False,
+        }
+        for f in folders
+    ]
+    write_json(options.out / "jobs.json", jobs)
+    command = [options.python, RENDER_SCENE, "--extension", options.extension]
+    records = json.loads(checked_run([*command, "--jobs", options.out / "jobs.json"]))
+    return {r["name"]: r for r in records}
+
+
+def render_reference(tool, folder):
+    command = [tool, "render", folder / "scene.json", "--out", folder / "reference.exr"]
+    checked_run([*command, "--spp", REFERENCE_SPP, "--threads", 1])
+
+
+def read_picture(path):
+    """R, G and B as double precision."""
+    picture = oiio.ImageBuf(str(path))
+    pixels = picture.get_pixels(oiio.FLOAT)
+    if picture.has_error or pixels is None:
+        raise CheckError(f"{path}: {picture.geterror()}")
+    names = list(picture.spec().channelnames)
+    layer = next((n[:-1] for n in names if n.endswith("R") and not n.startswith("variance")), "")
+    return pixels[..., [names.index(f"{layer}{c}") for c in "RGB"]].astype(float)
+
+
+def stated_error(record):
+    """The largest of a scene's forms, as a part of the light."""
+    groups = [g for of_material in record["materials"].values() for g in of_material]
+    return max(((g.get("error") or {}).get("relative_l1") or 0 for g in groups), default=0)
+
+
+def judge(picture, reference, error):
+    """(how much brighter than the reference, its standard error), of the channel where that is
+    most; raises CheckError where it is too much, or where a picture can't be right."""
+    for name, pixels in (("Blender's picture", picture), ("the reference", reference)):
+        if not np.isfinite(pixels).all():
+            raise CheckError(f"{name} has {np.count_nonzero(~np.isfinite(pixels))} bad values")
+        if pixels.max() <= 0:
+            raise CheckError(f"{name} is black")
+    if picture.shape != reference.shape:
+        raise CheckError(f"{picture.shape} and {reference.shape} pixels")
+    difference = (picture - reference).reshape(-1, 3)
+    mean = reference.mean()
+    # What single precision rounds is in no spread.
+    noise = difference.std(0, ddof=1) / math.sqrt(len(difference)) / mean + 1e-6
+    off = difference.mean(0) / mean
+    worst = np.argmax(np.abs(off) / noise)
+    if (np.abs(off) > FAR * noise + error).any():
+        raise CheckError(
+            f"in Blender {100 * off[worst]:+.2f} % of the reference's light in {'RGB'[worst]}, "
+            f"where noise is {100 * noise[worst]:.2f} % and its forms state {100 * error:.2f} %"
+        )
+    return off[worst], noise[worst]
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scenes", nargs="+", type=Path, help="scenes/NAME.json")
+    parser.add_argument("--tool", required=True, type=Path)
+    parser.add_argument("--python", required=True, type=Path, help="a Python that has bpy")
+    parser.add_argument("--extension", required=True, type=Path)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--few", action="store_true", help="leaves out scenes that are like others")
+    options = parser.parse_args()
+    if options.few:
+        options.scenes = [s for s in options.scenes if s.stem not in LIKE_OTHERS]
+    options.out.mkdir(parents=True, exist_ok=True)
+    failed, seen = [], {}
+    try:
+        with ThreadPoolExecutor(2) as pool:  # of processes
+            folders = list(
+                pool.map(lambda s: resolve(options.tool, s, options.out), options.scenes)
+            )
+            blender = pool.submit(render_in_blender, options, folders)
+            for folder in folders:
+                render_reference(options.tool, folder)
+            records = blender.result()
+    except CheckError as error:
+        sys.exit(f"gallery_check: {error}")
+    for folder in folders:
+        try:
+            pictures = [read_picture(folder / f"{n}.exr") for n in ("blender", "reference")]
+            seen[folder.name] = judge(*pictures, stated_error(records[folder.name]))
+        except CheckError as error:
+            failed.append(folder.name)
+            print(f"    {folder.name}: {error}", file=sys.stderr)
+    if failed:
+        sys.exit(f"gallery_check: {len(failed)} of {len(folders)} scenes are wrong: {failed}")
+    worst = max(seen, key=lambda name: abs(seen[name][0]) / seen[name][1])
+    off, noise = (100 * x for x in seen[worst])
+    middle = 100 * np.median([n for _, n in seen.values()])
+    print(
+        f"    {len(seen)} scenes render as bright as their references; median noise "
+        f"{middle:.2f} %, furthest {worst}: {off:+.2f} % at a noise of {noise:.2f} %"
+    )
+
+
+if __name__ == "__main__":
+    main()
