@@ -106,7 +106,7 @@ class LightTracer {
       camera_ray(scene_.camera, settings_, film_x, film_y, origin, direction);
       const bool found = tracer_.intersect({origin, direction}, true, hit);
       Color light(0);
-      lights.meet(origin, direction, found ? hit.distance : kInfinity, {}, nullptr, true,
+      lights.meet(origin, direction, found ? hit.distance : kInfinity, lights.place(direction), {}, nullptr, true,
                   [&](const Color& radiance, double) { light += radiance; });
       out.add(light);
     }

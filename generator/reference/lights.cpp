@@ -58,7 +58,7 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(
   while (!small.empty() && !large.empty()) {
     const int s = small.back(), l = large.back();
     small.pop_back();
-    cells_[s].keep = weight[s];
+    cells_[s].keep = float(weight[s]);
     cells_[s].other = l;
     weight[l] -= 1 - weight[s];
     if (weight[l] < 1) {
@@ -73,13 +73,8 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(
 Vec3<double> EnvironmentSampler::sample(double u1, double u2, double u3, double& pdf, double& u, double& v) const {
   pdf = u = v = 0;
   if (cells_.empty()) return {0, 0, 1};
-  const double scaled = u1 * double(cells_.size());
-  const std::size_t slot = std::min(std::size_t(scaled), cells_.size() - 1);
-  const unsigned cell = unsigned(scaled - double(slot) < cells_[slot].keep ? slot : std::size_t(cells_[slot].other));
+  const unsigned cell = this->cell(u1);
   const int x = int(cell % unsigned(width_)), y = int(cell / unsigned(width_));
-  // The colour there is asked for next: its memory is fetched while the direction is computed.
-  __builtin_prefetch(image_.pixel(x, y));
-  __builtin_prefetch(image_.pixel(x, std::min(y + 1, height_ - 1)));
   const double top = y == 0 ? 1.0 : z_[y - 1];
   const double z = top + (z_[y] - top) * u3;
   u = (x + u2) / width_;
@@ -89,10 +84,26 @@ Vec3<double> EnvironmentSampler::sample(double u1, double u2, double u3, double&
   return {s * cos(phi), s * sin(phi), z};
 }
 
-double EnvironmentSampler::pdf(double u, double v) const {
-  if (cells_.empty()) return 0;
+std::size_t EnvironmentSampler::cell_at(double u, double v) const {
   const int x = std::clamp(int(u * width_), 0, width_ - 1), y = std::clamp(int((1 - v) * height_), 0, height_ - 1);
-  return cells_[std::size_t(y) * width_ + x].density;
+  return std::size_t(y) * width_ + x;
+}
+
+double EnvironmentSampler::pdf(double u, double v) const { return cells_.empty() ? 0 : cells_[cell_at(u, v)].density; }
+
+void EnvironmentSampler::fetch(double u, double v) const {
+  const std::size_t cell = cell_at(u, v);
+  if (!cells_.empty()) __builtin_prefetch(&cells_[cell]);
+  __builtin_prefetch(&image_.rgb[3 * cell]);
+}
+
+void EnvironmentSampler::fetch_cell(double u1) const {
+  const unsigned cell = this->cell(u1);
+  __builtin_prefetch(&cells_[cell]);
+  // The colour is between this row and one of its neighbours.
+  const int x = int(cell % unsigned(width_)), y = int(cell / unsigned(width_));
+  for (int row = std::max(y - 1, 0); row <= std::min(y + 1, height_ - 1); ++row)
+    __builtin_prefetch(image_.pixel(x, row));
 }
 
 Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_(scene.lights.size()) {
@@ -122,16 +133,23 @@ Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_
   if (sampled_environment_) ++count_;
 }
 
-Rgb<double> Lights::environment(const Vector& direction, const Vector& normal, double* pdf) const {
+std::array<double, 2> Lights::place(const Vector& direction) const {
+  if (!image_) return {};
+  double u, v;
+  direction_to_equirectangular(direction, u, v);
+  image_->fetch(u, v);
+  return {u, v};
+}
+
+Rgb<double> Lights::environment(const Vector& direction, const std::array<double, 2>& place, const Vector& normal,
+                                double* pdf) const {
   const Environment& e = scene_.environment;
   if (!e.image) {
     if (pdf) *pdf = dot(direction, normal) > 0 ? 1 / (2 * kPi) : 0.0;
     return e.color;
   }
-  double u, v;
-  direction_to_equirectangular(direction, u, v);
-  if (pdf) *pdf = image_->pdf(u, v);
-  return e.radiance(u, v);
+  if (pdf) *pdf = image_->pdf(place[0], place[1]);
+  return e.radiance(place[0], place[1]);
 }
 
 double Lights::weight(std::size_t i, const Vector& p, const Vector& normal) const {

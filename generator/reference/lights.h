@@ -2,6 +2,8 @@
 // Sampling of everything that shines: lamps and the environment.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <span>
 #include <vector>
@@ -31,16 +33,29 @@ class EnvironmentSampler {
   Vec3<double> sample(double u1, double u2, double u3, double& pdf, double& u, double& v) const;
   /// Density of the direction at that place.
   double pdf(double u, double v) const;
+  /// Images are larger than caches. These fetch what will be read soon: pdf() and the colour at a place; and, in two
+  /// steps, each some time after the other, sample() with this u1.
+  void fetch(double u, double v) const;
+  void fetch_slot(double u1) const { __builtin_prefetch(&cells_[slot(u1 * double(cells_.size()))]); }
+  void fetch_cell(double u1) const;
   /// Mean luminance over all directions.
   double mean() const { return mean_; }
 
  private:
-  /// What is read together lies together: images are larger than caches.
+  /// What is read together lies together.
   struct Cell {
     double density = 0;  // per solid angle
-    double keep = 1;     // chance to stay, of Vose's alias table
+    float keep = 1;      // chance to stay, of Vose's alias table
     int other = 0;       // cell to go to otherwise
   };
+  std::size_t slot(double scaled) const { return std::min(std::size_t(scaled), cells_.size() - 1); }
+  /// The cell that u1 chooses.
+  unsigned cell(double u1) const {
+    const double scaled = u1 * double(cells_.size());
+    const std::size_t s = slot(scaled);
+    return unsigned(scaled - double(s) < cells_[s].keep ? s : std::size_t(cells_[s].other));
+  }
+  std::size_t cell_at(double u, double v) const;
   const Image& image_;
   int width_, height_;
   std::vector<Cell> cells_;  // empty if the image is black
@@ -65,11 +80,19 @@ class Lights {
   LightSample sample(const Vec3<double>& p, const Vec3<double>& normal, std::span<const double> chance, double choice,
                      double u1, double u2, double u3) const;
 
+  /// Is the environment an image that is sampled?
+  bool samples_image() const { return image_ && sampled_environment_; }
+  const EnvironmentSampler& image() const { return *image_; }
+  /// Where in the environment's image a ray ends that leaves the scene, as direction_to_equirectangular() gives it; what
+  /// is there will be read soon.
+  std::array<double, 2> place(const Vec3<double>& direction) const;
+
   /// Calls found(radiance, pdf) for every light that a ray from p meets before `distance`; `chance` as given to
-  /// sample() at p, nullptr for the camera or after a mirror (pdf is 0 then). Lamps do not hide each other.
+  /// sample() at p, nullptr for the camera or after a mirror (pdf is 0 then). Lamps do not hide each other. `place` is
+  /// that of the direction, where the ray leaves the scene.
   template <class Found> void meet(const Vec3<double>& p, const Vec3<double>& direction, double distance,
-                                   const Vec3<double>& normal, const double* chance, bool from_camera,
-                                   const Found& found) const {
+                                   const std::array<double, 2>& place, const Vec3<double>& normal,
+                                   const double* chance, bool from_camera, const Found& found) const {
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       const Light& light = scene_.lights[i];
       if (from_camera && !light.camera_visible) continue;
@@ -78,7 +101,7 @@ class Lights {
     }
     if (distance == kInfinity) {
       double pdf = 0;
-      const Rgb<double> radiance = environment(direction, normal, chance && sampled_environment_ ? &pdf : nullptr);
+      const Rgb<double> radiance = environment(direction, place, normal, chance && sampled_environment_ ? &pdf : nullptr);
       if (max_component(radiance) > 0) found(radiance, pdf > 0 ? pdf * chance[scene_.lights.size()] : 0.0);
     }
   }
@@ -95,7 +118,8 @@ class Lights {
 
   double weight(std::size_t i, const Vec3<double>& p, const Vec3<double>& normal) const;
   /// Radiance from the environment, and where asked for the density of sampling that direction.
-  Rgb<double> environment(const Vec3<double>& direction, const Vec3<double>& normal, double* pdf) const;
+  Rgb<double> environment(const Vec3<double>& direction, const std::array<double, 2>& place,
+                          const Vec3<double>& normal, double* pdf) const;
   LightSample sample_light(std::size_t i, const Vec3<double>& p, double u1, double u2) const;
   /// Density of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
   double pdf_of_hit(std::size_t i, const Vec3<double>& p, const Vec3<double>& direction, double distance) const;

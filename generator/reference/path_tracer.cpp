@@ -15,6 +15,22 @@ using Color = Rgb<double>;
 
 /// Dimensions of a bounce: which term, which lobe, its direction, and for each side which lamp, where, and where else.
 constexpr std::uint64_t kDimensions = 9;
+constexpr std::uint64_t dimension_of(int bounce) { return 1 + kDimensions * std::uint64_t(bounce); }
+
+/// Random numbers of a direction towards a light.
+struct LightChoice {
+  double choice, u1, u2, u3;
+  LightChoice(PathSampler& random, int bounce, bool far) {
+    const std::uint64_t dimension = dimension_of(bounce) + 3 + 3 * std::uint64_t(far);
+    choice = random.one(dimension);
+    const auto place = random.two(dimension + 1);
+    u1 = place[0], u2 = place[1];
+    u3 = random.one(dimension + 2);
+  }
+};
+
+/// Paths ahead of the one that scatters, whose memory is fetched.
+constexpr std::size_t kAhead = 8;
 
 }  // namespace
 
@@ -55,11 +71,14 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
     wave.places.assign(surfaces_.size() + 1, 0);
     for (std::size_t i = 0; i < count; ++i) {
       Hit& hit = wave.hits[i];
-      const bool found = tracer_.at(wave.rays[i], wave.meetings[i], hit);
-      collect(*wave.active[i], found ? hit.distance : kInfinity, bounce == 0);
-      if (!found) hit.material = -1;
+      if (!tracer_.at(wave.rays[i], wave.meetings[i], hit)) {
+        hit.material = -1;
+        hit.distance = kInfinity;
+        hit.environment = lights_.place(wave.rays[i].direction);
+      }
       ++wave.places[std::size_t(hit.material + 1)];
     }
+    for (std::size_t i = 0; i < count; ++i) collect(*wave.active[i], wave.hits[i], bounce == 0);
     if (bounce > settings_.max_bounces) break;
 
     int place = -wave.places[0];
@@ -72,9 +91,13 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
     wave.shadows.clear();
     wave.shadow_rays.clear();
     wave.next.clear();
-    for (const int i : wave.order) {
-      Path* path = wave.active[std::size_t(i)];
-      if (scatter(*path, wave.hits[std::size_t(i)], bounce, wave)) wave.next.push_back(path);
+    const std::size_t scattering = wave.order.size();
+    for (std::size_t k = 0; k < scattering; ++k) {
+      if (k + 2 * kAhead < scattering) fetch(wave, k + 2 * kAhead, bounce, &EnvironmentSampler::fetch_slot);
+      if (k + kAhead < scattering) fetch(wave, k + kAhead, bounce, &EnvironmentSampler::fetch_cell);
+      const std::size_t i = std::size_t(wave.order[k]);
+      Path* path = wave.active[i];
+      if (scatter(*path, wave.hits[i], bounce, wave)) wave.next.push_back(path);
     }
     wave.hidden.resize(wave.shadows.size());
     tracer_.occluded(wave.shadow_rays, wave.hidden);
@@ -85,8 +108,19 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
   for (std::size_t i = 0; i < starts.size(); ++i) light[i] = wave.paths[i].light;
 }
 
-void PathTracer::collect(Path& path, double distance, bool from_camera) const {
-  lights_.meet(path.ray.origin, path.ray.direction, distance, path.normal, path.sampled, from_camera,
+void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce,
+                       void (EnvironmentSampler::*what)(double) const) const {
+  if (!lights_.samples_image()) return;
+  const std::size_t i = std::size_t(wave.order[place]);
+  const Surface& surface = surfaces_[std::size_t(wave.hits[i].material)];
+  if (!surface.has_scatter()) return;
+  PathSampler ahead = wave.active[i]->random;
+  for (int far = 0; far <= int(surface.scatters_through()); ++far)
+    (lights_.image().*what)(LightChoice(ahead, bounce, far).u1);
+}
+
+void PathTracer::collect(Path& path, const Hit& hit, bool from_camera) const {
+  lights_.meet(path.ray.origin, path.ray.direction, hit.distance, hit.environment, path.normal, path.sampled, from_camera,
                [&](const Color& radiance, double light_pdf) {
                  if (!path.sampled || light_pdf == 0)
                    path.light += path.throughput * radiance;
@@ -99,7 +133,7 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
   PathSampler& random = path.random;
   Color& throughput = path.throughput;
   const Vector direction = path.ray.direction;
-  const std::uint64_t dimension = 1 + kDimensions * std::uint64_t(bounce);
+  const std::uint64_t dimension = dimension_of(bounce);
   const Surface& surface = surfaces_[hit.material];
   const Brdf<double>& brdf = surface.at(hit.u, hit.v, wave.scratch.of(hit.material));
   if (hit.inside && surface.has_medium()) {
@@ -144,7 +178,7 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
       lit[far] = lights_.chances(hit.p, facing, chances(far));
       if (lit[far])
         direct(path, throughput * (far ? crossing : 1), hit, facing, surface, brdf, to_local, wo, far, 1 - delta_chance,
-               chances(far), dimension + 3 + 3 * std::uint64_t(far), wave);
+               chances(far), bounce, wave);
     }
 
   // Drawn in any case, so that a stream's place does not depend on the material.
@@ -194,12 +228,9 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
 template <class ToLocal> void PathTracer::direct(Path& path, const Color& throughput, const Hit& hit,
                                                  const Vector& facing, const Surface& surface, const Brdf<double>& brdf,
                                                  const ToLocal& to_local, const Vector& wo, bool far,
-                                                 double rest_chance, std::span<const double> chance,
-                                                 std::uint64_t dimension, Wave& wave) const {
-  const double choice = path.random.one(dimension);
-  const auto place = path.random.two(dimension + 1);
-  const LightSample s =
-      lights_.sample(hit.p, facing, chance, choice, place[0], place[1], path.random.one(dimension + 2));
+                                                 double rest_chance, std::span<const double> chance, int bounce, Wave& wave) const {
+  const LightChoice u(path.random, bounce, far);
+  const LightSample s = lights_.sample(hit.p, facing, chance, u.choice, u.u1, u.u2, u.u3);
   if (!(s.pdf > 0) || !(dot(s.wi, facing) > 0)) return;
   if (strategy_ == Strategy::Brdf && !s.delta) return;
   const Vector wi = to_local(s.wi);

@@ -37,8 +37,10 @@ class PathTracer {
   struct Path;
   struct Shadow;
 
-  /// Adds the light that the path's ray meets on its way to `distance`.
-  void collect(Path& path, double distance, bool from_camera) const;
+  /// Adds the light that the path's ray meets on its way.
+  void collect(Path& path, const Hit& hit, bool from_camera) const;
+  /// Lets the environment's image fetch what the light samples of a path will read, which is at a place in the order.
+  void fetch(const Wave& wave, std::size_t place, int bounce, void (EnvironmentSampler::*what)(double) const) const;
   /// Where a path goes from a point of a surface, or false if it ends there; light from the lamps is promised to
   /// `wave.shadows`.
   bool scatter(Path& path, const Hit& hit, int bounce, Wave& wave) const;
@@ -48,7 +50,7 @@ class PathTracer {
   template <class ToLocal> void direct(Path& path, const Rgb<double>& throughput, const Hit& hit,
                                        const Vec3<double>& facing, const Surface& surface, const Brdf<double>& brdf,
                                        const ToLocal& to_local, const Vec3<double>& wo, bool far, double rest_chance,
-                                       std::span<const double> chance, std::uint64_t dimension, Wave& wave) const;
+                                       std::span<const double> chance, int bounce, Wave& wave) const;
   /// 1 where one strategy alone finds light.
   double power_heuristic(double mine, double other) const {
     if (strategy_ != Strategy::Mis) return 1;
