@@ -2,16 +2,18 @@
 // Pieces of sampling that several models share.
 #pragma once
 
+#include <utility>
+
 #include "model/model.h"
 
 namespace brdfc::inline model {
 
-/// iterate(), ended early where numbers can tell that nothing changes any more.
+/// iterate() for Newton's steps on the last of the state, ended early where numbers can tell that nothing changes any
+/// more. A step of 1e-10 leaves doubles nothing but rounding, among whose values it might wander for long.
 template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
   for (int i = 0; i < count; ++i) {
-    const std::array<T, N> next = step(state);
-    if (next == state) break;
-    state = next;
+    const std::array<T, N> last = std::exchange(state, step(state));
+    if (std::same_as<T, double> ? abs(state[N - 1] - last[N - 1]) <= T(1e-10) * abs(state[N - 1]) : state == last) break;
   }
   return state;
 }
