@@ -13,7 +13,8 @@ namespace brdfc::inline model {
 template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
   for (int i = 0; i < count; ++i) {
     const std::array<T, N> last = std::exchange(state, step(state));
-    if (std::same_as<T, double> ? abs(state[N - 1] - last[N - 1]) <= T(1e-10) * abs(state[N - 1]) : state == last) break;
+    if (std::same_as<T, double> ? abs(state[N - 1] - last[N - 1]) <= T(1e-10) * abs(state[N - 1]) : state == last)
+      break;
   }
   return state;
 }

@@ -83,16 +83,16 @@ class Lights {
   /// Is the environment an image that is sampled?
   bool samples_image() const { return image_ && sampled_environment_; }
   const EnvironmentSampler& image() const { return *image_; }
-  /// Where in the environment's image a ray ends that leaves the scene, as direction_to_equirectangular() gives it; what
-  /// is there will be read soon.
+  /// Where in the environment's image a ray ends that leaves the scene, as direction_to_equirectangular() gives it;
+  /// what is there will be read soon.
   std::array<double, 2> place(const Vec3<double>& direction) const;
 
   /// Calls found(radiance, pdf) for every light that a ray from p meets before `distance`; `chance` as given to
   /// sample() at p, nullptr for the camera or after a mirror (pdf is 0 then). Lamps do not hide each other. `place` is
   /// that of the direction, where the ray leaves the scene.
   template <class Found> void meet(const Vec3<double>& p, const Vec3<double>& direction, double distance,
-                                   const std::array<double, 2>& place, const Vec3<double>& normal,
-                                   const double* chance, bool from_camera, const Found& found) const {
+                                   const std::array<double, 2>& place, const Vec3<double>& normal, const double* chance,
+                                   bool from_camera, const Found& found) const {
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       const Light& light = scene_.lights[i];
       if (from_camera && !light.camera_visible) continue;
@@ -101,7 +101,8 @@ class Lights {
     }
     if (distance == kInfinity) {
       double pdf = 0;
-      const Rgb<double> radiance = environment(direction, place, normal, chance && sampled_environment_ ? &pdf : nullptr);
+      const Rgb<double> radiance =
+          environment(direction, place, normal, chance && sampled_environment_ ? &pdf : nullptr);
       if (max_component(radiance) > 0) found(radiance, pdf > 0 ? pdf * chance[scene_.lights.size()] : 0.0);
     }
   }
@@ -118,8 +119,8 @@ class Lights {
 
   double weight(std::size_t i, const Vec3<double>& p, const Vec3<double>& normal) const;
   /// Radiance from the environment, and where asked for the density of sampling that direction.
-  Rgb<double> environment(const Vec3<double>& direction, const std::array<double, 2>& place,
-                          const Vec3<double>& normal, double* pdf) const;
+  Rgb<double> environment(const Vec3<double>& direction, const std::array<double, 2>& place, const Vec3<double>& normal,
+                          double* pdf) const;
   LightSample sample_light(std::size_t i, const Vec3<double>& p, double u1, double u2) const;
   /// Density of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
   double pdf_of_hit(std::size_t i, const Vec3<double>& p, const Vec3<double>& direction, double distance) const;

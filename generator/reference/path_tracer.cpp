@@ -120,8 +120,8 @@ void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce,
 }
 
 void PathTracer::collect(Path& path, const Hit& hit, bool from_camera) const {
-  lights_.meet(path.ray.origin, path.ray.direction, hit.distance, hit.environment, path.normal, path.sampled, from_camera,
-               [&](const Color& radiance, double light_pdf) {
+  lights_.meet(path.ray.origin, path.ray.direction, hit.distance, hit.environment, path.normal, path.sampled,
+               from_camera, [&](const Color& radiance, double light_pdf) {
                  if (!path.sampled || light_pdf == 0)
                    path.light += path.throughput * radiance;
                  else if (strategy_ != Strategy::Light)
@@ -225,10 +225,10 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
   return true;
 }
 
-template <class ToLocal> void PathTracer::direct(Path& path, const Color& throughput, const Hit& hit,
-                                                 const Vector& facing, const Surface& surface, const Brdf<double>& brdf,
-                                                 const ToLocal& to_local, const Vector& wo, bool far,
-                                                 double rest_chance, std::span<const double> chance, int bounce, Wave& wave) const {
+template <class ToLocal>
+void PathTracer::direct(Path& path, const Color& throughput, const Hit& hit, const Vector& facing,
+                        const Surface& surface, const Brdf<double>& brdf, const ToLocal& to_local, const Vector& wo,
+                        bool far, double rest_chance, std::span<const double> chance, int bounce, Wave& wave) const {
   const LightChoice u(path.random, bounce, far);
   const LightSample s = lights_.sample(hit.p, facing, chance, u.choice, u.u1, u.u2, u.u3);
   if (!(s.pdf > 0) || !(dot(s.wi, facing) > 0)) return;

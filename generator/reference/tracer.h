@@ -35,9 +35,9 @@ struct Hit {
   Vec3<double> geometric, normal, tangent;
   double u = 0, v = 0;  ///< texture coordinates
   double distance = kInfinity;
-  int material = 0;                      ///< path tracing: -1 where a ray leaves the scene
+  int material = 0;                     ///< path tracing: -1 where a ray leaves the scene
   std::array<double, 2> environment{};  ///< there: its place in the environment's image
-  bool inside = false;  ///< seen from behind: the object's own normal points away from the viewer
+  bool inside = false;                  ///< seen from behind: the object's own normal points away from the viewer
 };
 
 class Tracer {
