@@ -8,6 +8,7 @@ from .i18n import say
 #: True, conductors alone; False, all others alone.
 _ROLES = {
     "index": (lambda s, v: s.index_d, False),
+    "dispersion": (lambda s, v: s.dispersion, False),
     "reflectance": (lambda s, v: tuple(v.reflectance), None),
     "tint": (lambda s, v: tuple(v.reflectance), True),
 }

@@ -21,13 +21,22 @@ double swapped(const Case& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   return measure::relative(c.wide->eval(a, b) * Wide(n2o), c.wide->eval(b, a) * Wide(n2i));
 }
 
-/// Of delta terms, along the path of light towards wo. Nothing beyond the critical angle.
+/// Of delta terms, along the path of light towards wo, of each channel along its own. Nothing beyond the critical
+/// angle.
 std::optional<double> swapped_path(const Model& model, const Case& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   const Vec3<Wide> to = normalize(Vec3<Wide>::from(wo));
-  Vec3<Wide> from{-to.x, -to.y, to.z};
-  if ((wi.z > 0) != (wo.z > 0)) from = refract(to, c.wide->ior());
-  if (from.z == 0) return std::nullopt;
-  return measure::relative(measure::value_of(model, *c.wide, from, to), measure::value_of(model, *c.wide, to, from));
+  const std::array<Wide, 3> iors = c.wide->channel_iors();
+  std::optional<double> worst;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    Vec3<Wide> from{-to.x, -to.y, to.z};
+    if ((wi.z > 0) != (wo.z > 0)) from = refract(to, iors[channel]);
+    if (from.z == 0) continue;
+    const Rgb<Wide> alone(Wide(channel == 0), Wide(channel == 1), Wide(channel == 2));
+    const double d = measure::relative(measure::value_of(model, *c.wide, from, to) * alone,
+                                       measure::value_of(model, *c.wide, to, from) * alone);
+    worst = std::max(worst.value_or(d), d);
+  }
+  return worst;
 }
 
 void reciprocal(const Trial& t, Verdict& verdict) {

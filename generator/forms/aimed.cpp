@@ -105,8 +105,7 @@ class AimedText {
         "    float lamp_disk[{0}], lamp_solid_angle[{0}];\n"
         "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}], lobe_extent[{0}];\n"
         "    color lobe_value[{0}], lobe_colour[{0}], covered = 0.0, covered_before = 0.0;\n"
-        "    float ray_x, ray_y, ray_z, on_lamp_x = 0.0, on_lamp_y = 0.0, on_lamp_z = 0.0;\n"
-        "    float lamp_met = 0.0, density_under = 0.0;\n    int lamps = 0, lobes = 0;\n"
+        "    float ray_x, ray_y, ray_z, lamp_met = 0.0, density_under = 0.0;\n    int lamps = 0, lobes = 0;\n"
         "    for (int lamp = 0; lamp < {0}; lamp++)\n"
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);
@@ -158,9 +157,6 @@ class AimedText {
                          steps.less.statements) +
            indented(steps.send.statements, 3) + "            lobes++;\n        } else {\n" +
            indented(steps.rest.statements, 3) + "        }\n    }\n";
-    out +=
-        "    if (lamp_met > 0.0) {\n"
-        "        ray_x = on_lamp_x;\n        ray_y = on_lamp_y;\n        ray_z = on_lamp_z;\n    }\n";
     // Each joins the sum from the left: Cycles walks it without a stack. The weight is a colour: see kPoolNode.
     std::string ramp;
     for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);

@@ -132,60 +132,40 @@ template <class T> T pdf_under(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
   return select(dot(lobe.towards, wi) > lobe.cosEnd, T(1) / lobe.extent, T(0));
 }
 
-/// Where a direction meets the plane of a lamp.
-template <class T> struct Crossing {
-  T reach;   ///< times the direction: there; not above 0 where it goes the other way
-  T x, y;    ///< in units of the half axes
-  T radius;  ///< less than 1 on the lamp
-  T width;   ///< of the seam (kSeam), in units of length
+/// What a direction that was drawn is to a lamp.
+template <class T> struct Against {
+  T meets;        ///< 1 on the lamp, else 0
+  T in_seam;      ///< 1 near its edge, on either side
+  Vec3<T> moved;  ///< in the seam the direction at its border, on the same side, else the direction itself
 };
 
-/// The width of the seam about the edge of a lamp, outside and inside. The rest is drawn as a lobe 1e-3 wide, which in
-/// the seam lies partly on the lamp and partly beside it.
-inline constexpr double kSeam = 5e-3;
-
-template <class T> Crossing<T> crossing(const LampPatch<T>& patch, const Vec3<T>& wi) {
+/// The rest is drawn as a lobe 1e-3 wide, which in a seam about the edge of a lamp lies partly on the lamp and partly
+/// beside it. What reaches over of a direction beside the lamp light sampling would find rarely, and make of what
+/// little is left there a dot as bright as the lamp, or as dark; what reaches over of a direction on the lamp would be
+/// lost. At the seam's border, outside or inside, the lobe meets next to the same light without that.
+template <class T> Against<T> against(const LampPatch<T>& patch, const Vec3<T>& drawn) {
+  constexpr double kSeam = 5e-3;
+  const auto disk = patch.disk > T(0.5);
   const Vec3<T> normal = cross(patch.across, patch.along);
-  const T facing = dot(normal, wi);
-  Crossing<T> c;
-  c.reach = dot(normal, patch.centre) / select(abs(facing) > tiny<T>(), facing, tiny<T>());
-  const Vec3<T> offset = wi * c.reach - patch.centre;
-  c.x = dot(offset, patch.across) / dot(patch.across, patch.across);
-  c.y = dot(offset, patch.along) / dot(patch.along, patch.along);
-  c.radius = select(patch.disk > T(0.5), sqrt(c.x * c.x + c.y * c.y), maximum(abs(c.x), abs(c.y)));
-  c.width = T(kSeam) * c.reach * length(normal) / maximum(abs(facing), tiny<T>());
-  return c;
-}
-
-/// The direction `ray`, moved out of the seam beside a lamp if it lies there: light sampling finds the lamp by what
-/// reaches over of it rarely, and where it does, what little is left beside the lamp would be as bright as the lamp, or
-/// as dark. Beside the seam it meets next to the same light without.
-template <class T> Vec3<T> beside(const LampPatch<T>& patch, const Vec3<T>& ray) {
-  const Crossing<T> c = crossing(patch, ray);
-  const auto disk = patch.disk > T(0.5);
-  const T seam_x = T(1) + c.width / length(patch.across), seam_y = T(1) + c.width / length(patch.along);
-  const T seam = maximum(seam_x, seam_y);
-  const auto past_x = abs(c.x) > T(1);
-  const auto touches = c.reach > T(0) && c.radius > T(1) &&
-                       select(disk, c.radius / seam, maximum(abs(c.x) / seam_x, abs(c.y) / seam_y)) < T(1);
-  const T round = seam / maximum(c.radius, tiny<T>());
-  const T out_x = select(past_x, select(c.x > T(0), seam_x, -seam_x), c.x),
-          out_y = select(past_x, c.y, select(c.y > T(0), seam_y, -seam_y));
-  const Vec3<T> moved = normalize(patch.at(select(disk, c.x * round, out_x), select(disk, c.y * round, out_y)));
-  return select(touches && moved.z * ray.z > T(0), moved, ray);
-}
-
-/// The direction `ray`, which meets the lamp, moved off the edge: what reaches over the edge would be lost, as nothing
-/// of the rest reaches back (beside()).
-template <class T> Vec3<T> within(const LampPatch<T>& patch, const Vec3<T>& ray) {
-  const Crossing<T> c = crossing(patch, ray);
-  const auto disk = patch.disk > T(0.5);
-  const T end_x = maximum(T(1) - c.width / length(patch.across), T(0)),
-          end_y = maximum(T(1) - c.width / length(patch.along), T(0));
-  const T round = minimum(minimum(end_x, end_y) / maximum(c.radius, tiny<T>()), T(1));
-  const T in_x = minimum(maximum(c.x, -end_x), end_x), in_y = minimum(maximum(c.y, -end_y), end_y);
-  const Vec3<T> moved = normalize(patch.at(select(disk, c.x * round, in_x), select(disk, c.y * round, in_y)));
-  return select(moved.z * ray.z > T(0), moved, ray);
+  const T facing = dot(normal, drawn), slant = select(abs(facing) > tiny<T>(), facing, tiny<T>());
+  const T reach = dot(normal, patch.centre) / slant;
+  const Vec3<T> offset = drawn * reach - patch.centre;
+  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
+  const T x = dot(offset, patch.across) / a2, y = dot(offset, patch.along) / b2;
+  const T radius = select(disk, sqrt(x * x + y * y), maximum(abs(x), abs(y)));
+  const auto on = reach > T(0) && radius < T(1);
+  // The seam's width in the plane of the lamp, and where it ends, in units of the half axes.
+  const T width = T(kSeam) * reach * sqrt(a2 * b2) / maximum(abs(facing), tiny<T>()) * select(on, T(-1), T(1));
+  const T end_x = maximum(T(1) + width / sqrt(a2), T(0)), end_y = maximum(T(1) + width / sqrt(b2), T(0));
+  const T round = select(on, minimum(end_x, end_y), maximum(end_x, end_y)) / maximum(radius, tiny<T>());
+  const auto off_x = abs(x) > select(on, end_x, T(1)), off_y = (on && abs(y) > end_y) || (!on && !off_x);
+  const auto beyond =
+      select(disk, round, minimum(end_x / maximum(abs(x), tiny<T>()), end_y / maximum(abs(y), tiny<T>()))) < T(1);
+  const auto near = (on && beyond) || (!on && reach > T(0) && !beyond);
+  const Vec3<T> moved = normalize(patch.at(select(disk, x * round, select(off_x, select(x > T(0), end_x, -end_x), x)),
+                                           select(disk, y * round, select(off_y, select(y > T(0), end_y, -end_y), y))));
+  const auto moves = near && moved.z * drawn.z > T(0);
+  return {select(on, T(1), T(0)), select(moves, T(1), T(0)), select(moves, moved, drawn)};
 }
 
 /// `room`: see room_beside(). v1, v2: numbers in [0, 1) that choose a point of the lamp.
@@ -237,12 +217,6 @@ AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const
   const T profile = aimed_profile(pow(maximum(dot(towards, lamp.wi), lamp.lobe.cosEnd), lamp.lobe.exponent));
   lamp.emphasis = select(usable, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
   return lamp;
-}
-
-/// 1 where a direction meets the lamp, else 0.
-template <class T> T meets(const LampPatch<T>& patch, const Vec3<T>& wi) {
-  const Crossing<T> c = crossing(patch, wi);
-  return select(c.reach > T(0) && c.radius < T(1), T(1), T(0));
 }
 
 /// What the drawn direction carries of a lamp of this solid angle, which it meets with this density: the power
@@ -299,14 +273,17 @@ template <class T> struct Met {
   Rgb<T> before = Rgb<T>(T(0));   ///< the same of the lobes before that one's; none where it meets no lamp
   T solid_angle{0};               ///< of the lamp that it meets, else 0
   T density{0};                   ///< sum of pdf_under()
+  Vec3<T> ray;                    ///< where the rest goes: the drawn direction, or beside it; see against()
 };
 template <class T> Met<T> meet(Met<T> met, const LampPatch<T>& patch, const AimedLobe<T>& lobe, const T& solid_angle,
                                const Rgb<T>& value, const Vec3<T>& drawn) {
-  const auto here = meets(patch, drawn) > T(0);
+  const Against<T> lamp = against(patch, drawn);
+  const auto here = lamp.meets > T(0);
+  met.ray = select(here || (lamp.in_seam > T(0) && met.solid_angle <= T(0)), lamp.moved, met.ray);
   met.solid_angle = select(here, solid_angle, met.solid_angle);
   met.before = select(here, met.covered, met.before);
   // On the lamp the lobe is not quite level. Its height is in the emphasis: were it in the rest, light sampling would
-  // find it there, as rarely and as bright as in a seam (beside()). Below the surface nothing is taken off.
+  // find it there, as rarely and as bright as in a seam. Below the surface nothing is taken off.
   met.covered += value * select(here || drawn.z <= T(0), T(0), evaluate(lobe, drawn));
   met.density = met.density + pdf_under(lobe, drawn);
   return met;

@@ -92,18 +92,15 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("drawn", sample_under(kept_lobe("chosen"), Expr::input("u_1"), Expr::input("u_2")));
   });
   const Met<Expr> before{Rgb<Expr>::input("covered"), Rgb<Expr>::input("covered_before"), Expr::input("lamp_met"),
-                         Expr::input("density_under")};
+                         Expr::input("density_under"), input3("ray")};
   steps.meet = record_step([&](Program& p) {
-    const LampPatch<Expr> of_earlier = kept_patch("earlier");
-    const Met<Expr> met = meet(before, of_earlier, earlier, Expr::input("lamp_solid_angle[earlier]"),
+    const Met<Expr> met = meet(before, kept_patch("earlier"), earlier, Expr::input("lamp_solid_angle[earlier]"),
                                Rgb<Expr>::input("lobe_value[earlier]"), input3("drawn"));
     p.output("covered_before", met.before);  // from what was covered before this one is added
     p.output("covered", met.covered);
     p.output("lamp_met", met.solid_angle);
     p.output("density_under", met.density);
-    p.output("ray", beside(of_earlier, input3("ray")));
-    const auto here = meets(of_earlier, input3("drawn")) > Expr(0);
-    p.output("on_lamp", select(here, within(of_earlier, input3("drawn")), input3("on_lamp")));
+    p.output("ray", met.ray);
   });
   const auto record_rest = [&](const Expr& count, const Met<Expr>& met) {
     return record_step([&](Program& p) {

@@ -30,15 +30,11 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
   const Toss<double> tossed = toss(u.x, count);
   out.drawn = tossed.lobe < 0 ? draw(brdf, !base.empty(), wo, {tossed.u, u.y, u.z})
                               : sample_under(out.lobes[std::size_t(tossed.lobe)], u.y, u.z);
-  out.wi = out.drawn;
-  Vec3<double> on_lamp = out.drawn;
   Met<double> met;
-  for (std::size_t k = 0; k < out.lobes.size(); ++k) {
+  met.ray = out.drawn;
+  for (std::size_t k = 0; k < out.lobes.size(); ++k)
     met = meet(met, *of[k], out.lobes[k], solid_angles[k], out.values[k], out.drawn);
-    if (meets(*of[k], out.drawn) > 0) on_lamp = within(*of[k], out.drawn);
-    out.wi = beside(*of[k], out.wi);
-  }
-  if (met.solid_angle > 0) out.wi = on_lamp;
+  out.wi = met.ray;
   const Excess<double> drawn = excess_at(out.drawn);
   const Rest<double> left = rest(drawn.value, drawn.density, count, met);
   out.rest = left.colour * left.weight;

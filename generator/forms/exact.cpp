@@ -45,6 +45,11 @@ class Exact final : public OslForm {
       const Rgb<Expr> left = named("medium", medium(brdf, Expr::input("side"), Expr::input("path_length")));
       for (Closure<Expr>& c : *sum) c.weight = c.weight * left;
     }
+    // Without dispersion one refraction bends all channels, and the others have no weight, whatever the view.
+    std::erase_if(*sum, [](const Closure<Expr>& c) {
+      std::array<double, 3> weight;
+      return c.kind == ClosureKind::Refraction && c.weight.is_constant(&weight) && weight == std::array{0.0, 0.0, 0.0};
+    });
     return *sum;
   }
 };

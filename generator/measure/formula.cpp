@@ -20,6 +20,10 @@ std::string formula_of(const Model& model, const ParamValues& fixed) {
   program.output("mirror", brdf->mirror(wo));
   program.output("transmit", brdf->transmit(wo));
   program.output("ior", brdf->ior());
+  if (model.has_transmit()) {
+    const std::array<Expr, 3> iors = brdf->channel_iors();
+    program.output("channel_iors", Vec3<Expr>{iors[0], iors[1], iors[2]});
+  }
   return fingerprint(program);
 }
 

@@ -48,6 +48,8 @@ const char* name_of(Optical what) {
       return "";
     case Optical::Index:
       return "index";
+    case Optical::Dispersion:
+      return "dispersion";
     case Optical::IndexRed:
       return "index_r";
     case Optical::IndexGreen:

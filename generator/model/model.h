@@ -12,7 +12,8 @@
 //
 // Transmission. A model that lets light through separates two media, and z is the normal that leaves the object: a
 // direction with z < 0 lies inside. Then wo may be on either side; mirror(wo) reflects on its side, transmit(wo) is the
-// weight of the delta term in the direction of ideal refraction, ior() the index inside over the one outside. One whose
+// weight of the delta term in the direction of ideal refraction, channel by channel where they are bent apart
+// (channel_iors()), ior() the index inside over the one outside. One whose
 // scatters_through() holds has f, pdf and samples for wi on either side as well, cosines are absolute, and the albedo
 // integrates over the sphere. Weights and f count energy: a lossless boundary has albedo 1 from both sides, and f is
 // reciprocal up to the squared index, f(wi, wo) n(wo)^2 = f(wo, wi) n(wi)^2. Radiance is not scaled by it, as in
@@ -41,7 +42,8 @@ enum class ParamKind { Number, Color, Choice };
 /// What a parameter says of the substance a surface is made of (model/optical.h).
 enum class Optical {
   None,
-  Index,  ///< n at the line d, of what lets light through
+  Index,       ///< n at the line d, of what lets light through
+  Dispersion,  ///< 20 over Abbe's number, likewise
   IndexRed,
   IndexGreen,
   IndexBlue,
@@ -153,6 +155,8 @@ template <class T> class Brdf {
   virtual Rgb<T> transmit(const Vec3<T>& wo) const = 0;
   /// Refractive index inside over the one outside; 1 where nothing is let through.
   virtual T ior() const = 0;
+  /// The same for ideal refraction of red, green and blue, which a model may bend apart.
+  virtual std::array<T, 3> channel_iors() const = 0;
   /// Share of the light left after a distance inside.
   virtual Rgb<T> transmittance(const T& distance) const = 0;
   /// Does f join directions on different sides, with the choices bound?
@@ -362,6 +366,12 @@ concept HasTransmit = requires(const M& m, const Vec3<double>& w) {
   m.transmit(w);
   m.ior();
 };
+/// Bends channels apart where disperses() holds.
+template <class M>
+concept HasDispersion = HasTransmit<M> && requires(const M& m) {
+  m.disperses();
+  m.channel_iors();
+};
 template <class M>
 concept HasMedium = requires(const M& m, double distance) {
   m.transmittance(distance);
@@ -432,6 +442,12 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
     else
       return T(1);
   }
+  std::array<T, 3> channel_iors() const override {
+    if constexpr (HasDispersion<M<double>>)
+      return m_.channel_iors();
+    else
+      return {ior(), ior(), ior()};
+  }
   Rgb<T> transmittance(const T& distance) const override {
     if constexpr (HasMedium<M<double>>)
       return m_.transmittance(distance);
@@ -469,9 +485,20 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
   ClosureSum<T> delta_terms(const Vec3<T>& wo) const {
     ClosureSum<T> sum;
     if constexpr (HasMirror<M<double>>) sum.emplace_back(ClosureKind::Reflection, mirror(wo));
-    if constexpr (kTransmits) {
-      sum.emplace_back(ClosureKind::Refraction, transmit(wo));
-      sum.back().ior = select(wo.z > T(0), m_.ior(), T(1) / m_.ior());
+    const auto refract_by = [&](const T& ior, const Rgb<T>& weight) {
+      sum.emplace_back(ClosureKind::Refraction, weight);
+      sum.back().ior = select(wo.z > T(0), ior, T(1) / ior);
+    };
+    if constexpr (HasDispersion<M<double>>) {
+      // One for each channel where they part, else one for all, in green's place.
+      const Rgb<T> weight = transmit(wo), none(T(0));
+      const std::array<T, 3> iors = m_.channel_iors();
+      const auto parted = m_.disperses();
+      refract_by(iors[0], select(parted, weight * Rgb<T>(T(1), T(0), T(0)), none));
+      refract_by(iors[1], select(parted, weight * Rgb<T>(T(0), T(1), T(0)), weight));
+      refract_by(iors[2], select(parted, weight * Rgb<T>(T(0), T(0), T(1)), none));
+    } else if constexpr (kTransmits) {
+      refract_by(m_.ior(), transmit(wo));
     }
     return sum;
   }

@@ -164,6 +164,9 @@ ParamValues parameters_of(const ModelInfo& info, const Substance& s, const ToRgb
       case Optical::Index:
         if (!conductor) out[p.name] = std::clamp(s.index_d(), p.min, p.max);
         break;
+      case Optical::Dispersion:
+        if (!conductor) out[p.name] = std::clamp(kDispersion / s.abbe(), p.min, p.max);
+        break;
       case Optical::Reflectance:
         if (p.kind == ParamKind::Color)
           out[p.name] = v.reflectance;

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "model/dispersion.h"
 #include "model/fresnel.h"
 #include "model/model.h"
 #include "model/spectrum.h"
@@ -33,8 +34,6 @@ inline constexpr double kNeededMin = 400, kNeededMax = 700;
 /// The k from which on a substance is a conductor: it lets no light through that one could see.
 inline constexpr double kConductor = 0.01;
 
-/// Fraunhofer's lines in nm, by which glass is told.
-inline constexpr double kLineC = 656.2725, kLineD = 587.5618, kLineF = 486.1327;
 /// The largest n or k that a file may have.
 inline constexpr double kMaxIndex = 100;
 

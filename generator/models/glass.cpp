@@ -5,13 +5,13 @@
 // Graphics 1997, section 2. Stable form of the Fresnel equations: model/fresnel.h.
 //
 // a is given as what is left of white light after one unit of length, attenuation = exp(-a / density).
-#include "model/fresnel.h"
+#include "model/dispersion.h"
 #include "model/sampling.h"
 
 namespace brdfc {
 
 template <class T> struct Glass {
-  T index, density;
+  T index, dispersion, density;
   Rgb<T> attenuation;
 
   static ModelInfo info() {
@@ -30,6 +30,7 @@ template <class T> struct Glass {
   template <class Visitor> void parameters(const Visitor& v) {
     v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"}.as(
                  Optical::Index));
+    v(dispersion, dispersion_spec());
     v(attenuation, ColorSpec{"attenuation",
                              "Attenuation",
                              {0.5, 0.9, 0.7},
@@ -38,9 +39,11 @@ template <class T> struct Glass {
   }
 
   T ior() const { return index; }
+  auto disperses() const { return dispersion > T(0); }
+  std::array<T, 3> channel_iors() const { return dispersed(index, dispersion); }
 
-  Rgb<T> mirror(const Vec3<T>& wo) const { return Rgb<T>(fresnel_dielectric(wo, index).reflected); }
-  Rgb<T> transmit(const Vec3<T>& wo) const { return Rgb<T>(fresnel_dielectric(wo, index).refracted); }
+  Rgb<T> mirror(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).reflected; }
+  Rgb<T> transmit(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).refracted; }
 
   Rgb<T> transmittance(const T& distance) const {
     const T d = named("depth", density * distance);

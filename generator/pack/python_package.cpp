@@ -182,6 +182,7 @@ std::string optics_module() {
   out += fmt::format("GRAZING = {}\nNEEDED = ({}, {})\nCONDUCTOR = {}\nMAX_INDEX = {}\n", python_number(kGrazing),
                      python_number(kNeededMin), python_number(kNeededMax), python_number(kConductor),
                      python_number(kMaxIndex));
+  out += fmt::format("DISPERSION = {}\n", python_number(kDispersion));
   out += fmt::format("LINE_C, LINE_D, LINE_F = {}, {}, {}\n", python_number(kLineC), python_number(kLineD),
                      python_number(kLineF));
   out +=

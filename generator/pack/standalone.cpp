@@ -134,8 +134,13 @@ std::vector<Function> functions_of(const Model& model) {
   if (model.has_mirror()) delta("Weight of ideal reflection.", "mirror", &Brdf<Expr>::mirror);
   if (model.has_transmit()) {
     delta("Weight of ideal refraction; 0 beyond the critical angle.", "transmit", &Brdf<Expr>::transmit);
-    functions.push_back({"Refractive index inside over the one outside.", "float", "ior", "", "    float value;\n",
-                         statements(model, [](const Brdf<Expr>& brdf, Program& p) { p.output("value", brdf.ior()); }),
+    functions.push_back({"Refractive index inside over the one outside, by channel.", "color", "ior", "",
+                         "    color value;\n",
+                         statements(model,
+                                    [](const Brdf<Expr>& brdf, Program& p) {
+                                      const std::array<Expr, 3> n = brdf.channel_iors();
+                                      p.output("value", Rgb<Expr>(n[0], n[1], n[2]));
+                                    }),
                          "value"});
   }
   if (model.has_medium())

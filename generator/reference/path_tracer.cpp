@@ -162,11 +162,10 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
   const double delta_chance =
       surface.has_mirror() || surface.has_transmit() ? surface.delta_chance(mirror + transmit, wo.z) : 0;
   // What crossing does to radiance.
-  double crossing = 1;
-  if (settings_.scale_radiance) {
-    const double squared_index = sqr(brdf.ior());
-    crossing = wo.z > 0 ? 1 / squared_index : squared_index;
-  }
+  const auto crossing_by = [&](double ior) {
+    return !settings_.scale_radiance ? 1 : wo.z > 0 ? 1 / sqr(ior) : sqr(ior);
+  };
+  double crossing = crossing_by(brdf.ior());
 
   const std::size_t lights = lights_.count();
   double* const first = wave.chances.data() + 2 * lights * std::size_t(&path - wave.paths.data());
@@ -193,8 +192,11 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
       wi = {-wo.x, -wo.y, wo.z};
       throughput = throughput * mirror / (delta_chance * share);
     } else {
-      wi = refract(wo, brdf.ior());
       throughput = throughput * transmit / (delta_chance * (1 - share));
+      const Bent bent = bend(brdf.channel_iors(), throughput, (choose / delta_chance - share) / (1 - share));
+      wi = refract(wo, bent.ior);
+      crossing = crossing_by(bent.ior);
+      throughput = bent.throughput;
     }
   } else {
     const Sample<double> s = brdf.sample(wo, u);

@@ -16,6 +16,21 @@ namespace brdfc::reference {
 
 inline constexpr int kRouletteStart = 3;  ///< scatterings before a path may be ended by chance
 
+/// Where ideal refraction goes, and with what.
+struct Bent {
+  double ior;
+  Rgb<double> throughput;
+};
+/// Where channels are bent apart one of them is followed, as often as it carries light. u in [0, 1).
+inline Bent bend(const std::array<double, 3>& iors, const Rgb<double>& throughput, double u) {
+  if (iors[0] == iors[1] && iors[1] == iors[2]) return {iors[1], throughput};
+  const auto& [r, g, b] = throughput;
+  const double all = r + g + b, at = u * all;
+  if (at < r) return {iors[0], {all, 0, 0}};
+  if (at < r + g) return {iors[1], {0, all, 0}};
+  return {iors[2], {0, 0, b > 0 ? all : 0}};
+}
+
 /// A material ready to be evaluated, with what is known about it beforehand.
 class Surface {
  public:

@@ -96,6 +96,11 @@ class Substance:
         spread = float(self.n.at(_optics.LINE_F) - self.n.at(_optics.LINE_C))
         return (self.index_d - 1) / spread if spread else math.inf
 
+    @property
+    def dispersion(self) -> float:
+        """20 over Abbe's number, as the parameter `dispersion` of glass has it."""
+        return _optics.DISPERSION / self.abbe
+
     def values(self, to_rgb: ToRgb) -> Values:
         """What stands for it in three channels; see generator/model/optical.h."""
         xyz = self.xyz()

@@ -87,7 +87,7 @@ struct Scene {
 };
 
 /// Lamps by the mirror direction and off it, large, small, and covering one another's lobes, but not nearer each other
-/// than their seams (beside()).
+/// than their seams (against()).
 Scene scene_for(const Vec3<double>& wo) {
   const Vec3<double> mirror = reflect(wo), beside = normalize(mirror + Vec3<double>{0.05, 0.12, 0.1});
   Scene scene;
@@ -253,9 +253,14 @@ TEST(Aimed, NothingOfTheRestReachesOverTheEdgeOfALamp) {
     const double x = 1.1 * (2 * measure::uniform(random) - 1), y = 1.1 * (2 * measure::uniform(random) - 1);
     const Vec3<double> w = normalize(lamp.at(x, y));
     const bool on = meets(lamp, w);
-    const Vec3<double> to = on ? within(lamp, w) : beside(lamp, w);
+    const Against<double> met = against(lamp, w);
+    ASSERT_EQ(met.meets > 0, on) << i;
+    const Vec3<double> to = met.moved;
     ++near[on];
     moved[on] += length(to - w) > 1e-9;
+    if (length(to - w) > 1e-9) {
+      ASSERT_GT(met.in_seam, 0) << i;
+    }
     const auto same_side = [&](const Vec3<double>& d) { return meets(lamp, d) == on; };
     ASSERT_TRUE(around(to, 3e-3, same_side)) << i << ": " << x << " " << y;
     ASSERT_LT(length(to - w), 1e-2) << i;

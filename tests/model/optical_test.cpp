@@ -139,5 +139,55 @@ TEST(Substances, SetWhatAModelHas) {
   EXPECT_NEAR(got.b, expected[2], 1e-3);
 }
 
+/// Against what was measured, where the channels stand.
+TEST(Dispersion, CauchysSeriesIsThatOfGlassWaterAndGems) {
+  for (const char* name : {"bk7", "f2", "sf11", "silica", "water", "sapphire", "diamond"}) {
+    const Substance s = find_substance(name, ".");
+    const std::array<double, 3> n = dispersed(s.index_d(), kDispersion / s.abbe());
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::printf("%s at %.1f nm: %.5f, measured %.5f\n", name, kChannelNm[c], n[c], s.n.at(kChannelNm[c]));
+      EXPECT_NEAR(n[c], s.n.at(kChannelNm[c]), 0.15 * (s.n.at(kLineF) - s.n.at(kLineC))) << name << " " << c;
+    }
+    EXPECT_LT(n[0], n[1]) << name;
+    EXPECT_LT(n[1], n[2]) << name;
+  }
+}
+
+TEST(Dispersion, WithoutItAllChannelsHaveTheIndex) {
+  for (const double index : {0.1, 1.0, 1.5, 10.0}) EXPECT_EQ(dispersed(index, 0.0), (std::array{index, index, index}));
+  // At the end of what is accepted no index is 0.
+  for (const double n : dispersed(0.1, 2.0)) EXPECT_GT(n, 0);
+}
+
+TEST(Dispersion, EachChannelIsRefractedByItsIndex) {
+  for (const char* name : {"glass", "fresnel_dielectric"}) {
+    const Model& m = find_model(name);
+    const Vec3<double> wo = direction(0.6, 0.2);
+    for (const double dispersion : {0.0, 0.8}) {
+      const auto brdf = m.make_double({{"ior", 1.7}, {"dispersion", dispersion}});
+      const std::array<double, 3> n = brdf->channel_iors();
+      const ClosureSum<double> sum = *brdf->exact(wo);
+      ASSERT_EQ(sum.size(), 4u);
+      Rgb<double> all(0);
+      for (std::size_t c = 0; c < 3; ++c) {
+        EXPECT_EQ(sum[c + 1].kind, ClosureKind::Refraction);
+        EXPECT_EQ(sum[c + 1].ior, n[c]);
+        all += sum[c + 1].weight;
+      }
+      const Rgb<double> through = brdf->transmit(wo);
+      EXPECT_THAT((std::array{all.r, all.g, all.b}), testing::ElementsAre(through.r, through.g, through.b));
+      EXPECT_EQ(sum[1].weight.r > 0, dispersion > 0);
+      EXPECT_EQ(sum[1].weight.g, 0);
+      EXPECT_EQ(sum[2].weight.r > 0, dispersion == 0);
+      EXPECT_EQ(sum[3].weight.b > 0, dispersion > 0);
+      // By Fresnel's equations for that channel alone.
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto alone = m.make_double({{"ior", n[c]}});
+        EXPECT_DOUBLE_EQ((std::array{through.r, through.g, through.b}[c]), alone->transmit(wo).g);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace brdfc

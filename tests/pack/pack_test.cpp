@@ -148,7 +148,8 @@ TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
   // burley_diffuse_bsdf, diffuse_ramp and a mirror
   EXPECT_EQ(bytes("coupled", forms::form("exact")), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
   EXPECT_EQ(bytes("lambert", forms::form("exact")), std::pair(kDiffuse, 0));
-  EXPECT_EQ(bytes("glass", forms::form("exact")), std::pair(kMirror + 16 + 24 + kNode, 0));
+  // A mirror and a refraction for each channel.
+  EXPECT_EQ(bytes("glass", forms::form("exact")), std::pair(kMirror + 3 * (16 + 24 + kNode), 0));
   // A lamp's lobe is one of the sum. A direction through the surface is one of three closures, times a weight.
   EXPECT_EQ(bytes("lambert", forms::form("sampled")), std::pair(kLobe, 0));
   EXPECT_EQ(bytes("phong", forms::form("aimed")), std::pair(kLobe, kLobe + kNode));
@@ -250,6 +251,18 @@ TEST(Shader, ABlackDiffuseBaseRemovesTheDiffuseLobe) {
   const forms::Recording without = forms::form("sampled")->recordings(m, black)[0];
   EXPECT_LT(without.operations, with.operations);
   EXPECT_EQ(std::count(without.inputs.begin(), without.inputs.end(), "rd"), 0);
+}
+
+TEST(Shader, WithoutDispersionOneRefractionIsLeft) {
+  for (const char* name : {"glass", "fresnel_dielectric"}) {
+    const Model& m = find_model(name);
+    const auto refractions = [&](const ParamValues& fixed) {
+      return count(forms::form("exact")->write(m, empty_table(m), {fixed}).source, "* refraction(");
+    };
+    EXPECT_EQ(refractions({}), 3u) << name;
+    EXPECT_EQ(refractions({{"dispersion", 0.5}}), 3u) << name;
+    EXPECT_EQ(refractions({{"dispersion", 0.0}}), 1u) << name;
+  }
 }
 
 TEST(Shader, TextOnlyHoldsTheLibraryItCalls) {
