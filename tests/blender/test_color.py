@@ -126,7 +126,11 @@ def test_a_rendered_patch_has_one_colour(extension, empty, color, space):
 def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
     glass, file = extension.api.new_material("glass"), tmp_path / "own.csv"
     file.write_text("wl,n\n0.35,1.54\n0.9,1.51\n", encoding="utf-8")
-    assert extension.api.set_substance(glass, str(file)) == {"ior": pytest.approx(1.527, abs=1e-3)}
+    assert extension.api.set_substance(glass, str(file)) == {
+        "ior": pytest.approx(1.527, abs=1e-3),
+        # 20 (n_F - n_C) / (n_d - 1) of a straight line.
+        "dispersion": pytest.approx(20 * 0.03 / 0.55 * (0.65627 - 0.48613) / 0.527, rel=1e-2),
+    }
     before = extension.api.get_parameters(glass)
     for name, expected in (
         ("gold", "glass has no parameter that says which metal"),

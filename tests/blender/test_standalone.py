@@ -170,7 +170,8 @@ def shader_around(folder, model, parameters):
                 f"if (show == {show}) shown = {call(model, function, ['wo'], parameters)};"
             )
     if has(header, model, "ior"):
-        lines.append(f"if ({call(model, 'ior', [], parameters)} <= 0) shown = -1;")
+        lines.append(f"color n = {call(model, 'ior', [], parameters)};")
+        lines.append("if (min(n[0], min(n[1], n[2])) <= 0) shown = -1;")
     if has(header, model, "transmittance"):
         left = call(model, "transmittance", ["0.0"], parameters)
         lines.append(f"if ({left} != color(1.0)) shown = -1;")

@@ -203,7 +203,13 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     gold = optical("gold")
     of_channels = [found["a"]["parameters"][f"{q}_{c}"] for q in "nk" for c in "rgb"]
     assert of_channels == pytest.approx([*gold["n"], *gold["k"]])
-    assert found["b"]["parameters"] == {"ior": 1.5, "density": 0}
+    assert found["b"]["parameters"] == {"ior": 1.5, "dispersion": 0, "density": 0}
+    # 20 over Abbe's number.
+    assert resolved(b={"model": "fresnel_dielectric", "optical": "sf11"}).returncode == 0
+    found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]
+    flint = optical("sf11")
+    assert found["b"]["parameters"]["dispersion"] == pytest.approx(20 / flint["abbe"])
+    assert flint["abbe"] == pytest.approx(25.68, abs=0.05), "as the maker's catalogue has it"
     for change, expected in (
         ({"optical": "mithril"}, "materials.a.optical: expected a file NAME.csv or one of"),
         ({"optical": "none.csv"}, "materials.a.optical: "),
