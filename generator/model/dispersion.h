@@ -23,7 +23,8 @@ inline NumberSpec dispersion_spec() {
                     2,
                     0,
                     1,
-                    "How far colours are bent apart: 20 over Abbe's number. Crown glass 0.3, diamond 0.36, flint 0.8"}
+                    "How far colours are bent apart: 20 over Abbe's number. Crown glass 0.3, diamond 0.36, flint 0.8. "
+                    "Costs noise"}
       .as(Optical::Dispersion);
 }
 
