@@ -68,7 +68,7 @@ SCENE = {
 
 
 def run_brdfc(brdfc, folder, args):
-    """Seconds and picture mean; seconds are those of the rendering alone, as with Mitsuba."""
+    """Seconds and picture mean; seconds are those of tracing alone: with Mitsuba, too, the scene is ready before."""
     scene = {**SCENE, "settings": SCENE["settings"] | {"width": args.size, "height": args.size}}
     (folder / "scene.json").write_text(json.dumps(scene))
     resolve = [brdfc, "scene", folder / "scene.json", "--out", folder / "resolved"]
@@ -80,7 +80,7 @@ def run_brdfc(brdfc, folder, args):
     import mitsuba as mi
 
     bitmap = mi.Bitmap(str(out))
-    seconds = float(bitmap.metadata()["brdfc:seconds"])
+    seconds = float(bitmap.metadata()["brdfc:seconds_tracing"])
     names = [field.name for field in bitmap.struct_()]
     wanted = [names.index(c) for c in "RGB"]
     return seconds, float(np.array(bitmap)[..., wanted].mean())

@@ -69,6 +69,6 @@ void in_arena(int threads, const std::function<void()>& f);
 
 /// RenderResult::rendering's.
 nlohmann::json render_metadata(const Scene& scene, const RenderSettings& settings, int least, int most, int threads,
-                               double seconds);
+                               const RenderClock& clock);
 
 }  // namespace brdfc::reference

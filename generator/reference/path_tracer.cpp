@@ -51,19 +51,19 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
   wave.paths.clear();
   wave.paths.reserve(starts.size());
   wave.active.clear();
+  wave.rays.clear();
   wave.chances.resize(2 * lights_.count() * starts.size());
   for (const auto& [x, y, sample] : starts) {
     Path& path = wave.paths.emplace_back(
         PathSampler(points_, std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, sample));
     const auto film = path.random.two(0);
-    camera_ray(scene_.camera, settings_, x + film[0], y + film[1], path.ray.origin, path.ray.direction);
+    Ray& ray = wave.rays.emplace_back();
+    camera_ray(scene_.camera, settings_, x + film[0], y + film[1], ray.origin, ray.direction);
     wave.active.push_back(&path);
   }
 
   for (int bounce = 0; !wave.active.empty(); ++bounce) {
     const std::size_t count = wave.active.size();
-    wave.rays.clear();
-    for (const Path* path : wave.active) wave.rays.push_back(path->ray);
     wave.meetings.resize(count);
     tracer_.intersect(wave.rays, bounce == 0, wave.meetings);
 
@@ -78,7 +78,7 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
       }
       ++wave.places[std::size_t(hit.material + 1)];
     }
-    for (std::size_t i = 0; i < count; ++i) collect(*wave.active[i], wave.hits[i], bounce == 0);
+    for (std::size_t i = 0; i < count; ++i) collect(*wave.active[i], wave.rays[i], wave.hits[i], bounce == 0);
     if (bounce > settings_.max_bounces) break;
 
     int place = -wave.places[0];
@@ -91,19 +91,21 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
     wave.shadows.clear();
     wave.shadow_rays.clear();
     wave.next.clear();
+    wave.next_rays.clear();
     const std::size_t scattering = wave.order.size();
     for (std::size_t k = 0; k < scattering; ++k) {
       if (k + 2 * kAhead < scattering) fetch(wave, k + 2 * kAhead, bounce, &EnvironmentSampler::fetch_slot);
       if (k + kAhead < scattering) fetch(wave, k + kAhead, bounce, &EnvironmentSampler::fetch_cell);
       const std::size_t i = std::size_t(wave.order[k]);
       Path* path = wave.active[i];
-      if (scatter(*path, wave.hits[i], bounce, wave)) wave.next.push_back(path);
+      if (scatter(*path, wave.rays[i].direction, wave.hits[i], bounce, wave)) wave.next.push_back(path);
     }
     wave.hidden.resize(wave.shadows.size());
     tracer_.occluded(wave.shadow_rays, wave.hidden);
     for (std::size_t i = 0; i < wave.shadows.size(); ++i)
       if (!wave.hidden[i]) wave.shadows[i].path->light += wave.shadows[i].light;
     std::swap(wave.active, wave.next);
+    std::swap(wave.rays, wave.next_rays);
   }
   for (std::size_t i = 0; i < starts.size(); ++i) light[i] = wave.paths[i].light;
 }
@@ -119,8 +121,8 @@ void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce,
     (lights_.image().*what)(LightChoice(ahead, bounce, far).u1);
 }
 
-void PathTracer::collect(Path& path, const Hit& hit, bool from_camera) const {
-  lights_.meet(path.ray.origin, path.ray.direction, hit.distance, hit.environment, path.normal, path.sampled,
+void PathTracer::collect(Path& path, const Ray& ray, const Hit& hit, bool from_camera) const {
+  lights_.meet(ray.origin, ray.direction, hit.distance, hit.environment, path.normal, path.sampled,
                from_camera, [&](const Color& radiance, double light_pdf) {
                  if (!path.sampled || light_pdf == 0)
                    path.light += path.throughput * radiance;
@@ -129,10 +131,9 @@ void PathTracer::collect(Path& path, const Hit& hit, bool from_camera) const {
                });
 }
 
-bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) const {
+bool PathTracer::scatter(Path& path, const Vector& direction, const Hit& hit, int bounce, Wave& wave) const {
   PathSampler& random = path.random;
   Color& throughput = path.throughput;
-  const Vector direction = path.ray.direction;
   const std::uint64_t dimension = dimension_of(bounce);
   const Surface& surface = surfaces_[hit.material];
   const Brdf<double>& brdf = surface.at(hit.u, hit.v, wave.scratch.of(hit.material));
@@ -214,8 +215,7 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
   const bool crosses = wi.z * wo.z < 0;
   if (crosses) throughput = throughput * crossing;
   path.normal = crosses ? -hit.geometric : hit.geometric;
-  Vector& out = path.ray.direction;
-  out = normalize(hit.tangent * wi.x + bitangent * wi.y + hit.normal * (side * wi.z));
+  const Vector out = normalize(hit.tangent * wi.x + bitangent * wi.y + hit.normal * (side * wi.z));
   if (!(dot(out, path.normal) > 0)) return false;
   const double brightest = max_component(throughput);
   if (!(brightest > 0)) return false;
@@ -223,7 +223,7 @@ bool PathTracer::scatter(Path& path, const Hit& hit, int bounce, Wave& wave) con
     if (random.uniform() >= brightest) return false;
     throughput = throughput / brightest;
   }
-  path.ray.origin = Tracer::leave(hit.p, hit.geometric, out);
+  wave.next_rays.push_back({Tracer::leave(hit.p, hit.geometric, out), out});
   return true;
 }
 

@@ -38,12 +38,12 @@ class PathTracer {
   struct Shadow;
 
   /// Adds the light that the path's ray meets on its way.
-  void collect(Path& path, const Hit& hit, bool from_camera) const;
+  void collect(Path& path, const Ray& ray, const Hit& hit, bool from_camera) const;
   /// Lets the environment's image fetch what the light samples of a path will read, which is at a place in the order.
   void fetch(const Wave& wave, std::size_t place, int bounce, void (EnvironmentSampler::*what)(double) const) const;
-  /// Where a path goes from a point of a surface, or false if it ends there; light from the lamps is promised to
-  /// `wave.shadows`.
-  bool scatter(Path& path, const Hit& hit, int bounce, Wave& wave) const;
+  /// Puts into `wave.next_rays` where a path goes that came along `direction`, or returns false if it ends there. Light
+  /// from the lamps is promised to `wave.shadows`.
+  bool scatter(Path& path, const Vec3<double>& direction, const Hit& hit, int bounce, Wave& wave) const;
   /// Light from one sampled direction on the side that `facing` points to, `throughput` being the
   /// path's, on that side.
   /// `far`: not the viewer's side.
@@ -70,7 +70,6 @@ class PathTracer {
 /// A path on its way.
 struct PathTracer::Path {
   PathSampler random;
-  Ray ray;
   Vec3<double> normal;              // at the last scattering, on the side of the ray
   double scattered_pdf = 0;         // of the direction, if another strategy could have found it
   const double* sampled = nullptr;  // the chances with which it could
@@ -92,7 +91,7 @@ class PathTracer::Wave {
   std::vector<Path> paths;
   std::vector<double> chances;  // for each path, of the lights on the viewer's side of a surface and on the other
   std::vector<Path*> active, next;
-  std::vector<Ray> rays;
+  std::vector<Ray> rays, next_rays;  // of `active` and `next`
   std::vector<Meeting> meetings;
   std::vector<Hit> hits;
   std::vector<int> order;  // of the hits, by material

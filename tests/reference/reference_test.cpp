@@ -602,7 +602,8 @@ TEST_F(ImageTest, RenderedMetadata) {
   EXPECT_EQ(m["seed"], 7);
   EXPECT_EQ(m["samples"], 3);
   EXPECT_EQ(m["version"], BRDFC_VERSION);
-  EXPECT_GT(m["seconds"].get<double>(), 0);
+  EXPECT_GT(m["seconds_tracing"].get<double>(), 0);
+  EXPECT_GT(m["seconds"].get<double>(), m["seconds_tracing"].get<double>());
 }
 
 TEST_F(ImageTest, FailureLeavesTheOldFile) {
