@@ -68,7 +68,7 @@ SCENE = {
 
 
 def run_brdfc(brdfc, folder, args):
-    """Seconds and picture mean; seconds are those of tracing alone: with Mitsuba, too, the scene is ready before."""
+    """Seconds of tracing and picture mean; with Mitsuba, too, the scene is ready before."""
     scene = {**SCENE, "settings": SCENE["settings"] | {"width": args.size, "height": args.size}}
     (folder / "scene.json").write_text(json.dumps(scene))
     resolve = [brdfc, "scene", folder / "scene.json", "--out", folder / "resolved"]

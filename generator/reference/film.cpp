@@ -39,9 +39,10 @@ void in_arena(int threads, const std::function<void()>& f) {
 
 nlohmann::json render_metadata(const Scene& scene, const RenderSettings& settings, int least, int most, int threads,
                                const RenderClock& clock) {
-  return {{"scene", scene.name}, {"scene_hash", scene.hash}, {"seed", settings.seed},
-          {"samples", least},    {"samples_max", most},      {"max_bounces", settings.max_bounces},
-          {"threads", threads},  {"seconds", clock.seconds()}, {"seconds_tracing", clock.tracing()}, {"version", BRDFC_VERSION}};
+  return {{"scene", scene.name},     {"scene_hash", scene.hash},   {"seed", settings.seed},
+          {"samples", least},        {"samples_max", most},        {"max_bounces", settings.max_bounces},
+          {"threads", threads},      {"seconds", clock.seconds()}, {"seconds_tracing", clock.tracing()},
+          {"version", BRDFC_VERSION}};
 }
 
 }  // namespace brdfc::reference

@@ -122,8 +122,8 @@ void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce,
 }
 
 void PathTracer::collect(Path& path, const Ray& ray, const Hit& hit, bool from_camera) const {
-  lights_.meet(ray.origin, ray.direction, hit.distance, hit.environment, path.normal, path.sampled,
-               from_camera, [&](const Color& radiance, double light_pdf) {
+  lights_.meet(ray.origin, ray.direction, hit.distance, hit.environment, path.normal, path.sampled, from_camera,
+               [&](const Color& radiance, double light_pdf) {
                  if (!path.sampled || light_pdf == 0)
                    path.light += path.throughput * radiance;
                  else if (strategy_ != Strategy::Light)

@@ -42,7 +42,8 @@ struct RenderOptions {
 
 struct RenderResult {
   /// Metadata: scene, scene_hash, seed, samples (least over the pixels), samples_max, seconds, seconds_tracing
-  /// (without what comes before the first path), max_bounces, threads, version. The variance layer is absent if a pixel has less than two samples.
+  /// (without what comes before the first path), max_bounces, threads, version. The variance layer is absent if a pixel
+  /// has less than two samples.
   Rendering rendering;
   int samples = 0;  ///< least over the pixels
   double seconds = 0;
