@@ -2,10 +2,8 @@
 """Plots in the panel: their pixels are what the model says, and they cost little."""
 
 import math
-import statistics
 import subprocess
 import sys
-import time
 from importlib import import_module
 from pathlib import Path
 
@@ -323,14 +321,9 @@ def test_a_value_at_the_edge_of_its_range_is_drawn(extension, panel, empty):
         assert picture.max() > 0.5
 
 
-def test_every_model_is_drawn_in_less_than_50_ms(extension, plots, empty):
+def test_every_model_is_drawn(extension, plots, empty):
+    """How long that takes script/plots.py tells."""
     for model in extension.pack.model_names():
-        plots.draw(model, {})
-        times = []
-        for _ in range(5):
-            start = time.process_time()
-            picture, _ = plots.draw(model, {})
-            times.append(time.process_time() - start)
-        assert picture.shape == (plots.SIZE, plots.SIZE, 4)
-        assert 0 <= picture.min() and picture.max() <= 1
-        assert statistics.median(times) < 0.05, (model, times)
+        picture, _ = plots.draw(model, {})
+        assert picture.shape == (plots.SIZE, plots.SIZE, 4), model
+        assert 0 <= picture.min() and picture.max() <= 1, model
