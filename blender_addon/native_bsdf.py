@@ -59,6 +59,11 @@ def schlick(color, cosine):
     return np.asarray(color) + (1 - np.asarray(color)) * (1 - np.clip(cosine, 0, 1)[..., None]) ** 5
 
 
+def mean_schlick(color):
+    """The mean of schlick() over all angles, by their cosines."""
+    return (20 * color + 1) / 21
+
+
 def _shadow(w, alpha, beckmann):
     """Smith's Lambda."""
     slope = ((alpha[0] * w[..., 0]) ** 2 + (alpha[1] * w[..., 1]) ** 2) / w[..., 2] ** 2
@@ -118,15 +123,24 @@ def facet_albedo(wo, alpha, beckmann, reflectance=None):
     return (weight.reshape(*weight.shape, *[1] * (color.ndim - 2)) * color).mean(1)
 
 
+def mean_facet_albedo(alpha):
+    """The mean over all views, by their cosines, of facet_albedo() of GGX."""
+    views = np.stack([np.sqrt(1 - _MU**2), np.zeros(len(_MU)), _MU], -1)
+    return (facet_albedo(views, alpha, False) * _SHARE).sum()
+
+
+def sent_to_and_fro(average, mean, seen):
+    """What light between facets adds, as a factor. `average`: mean reflectance of a facet; `mean`
+    and `seen`: albedo of facets that reflect all, on average and from the viewer."""
+    return 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
+
+
 def _multiscatter(wo, native, average):
     """What to and fro between facets adds, as a factor (n, 3); `average`: mean reflectance."""
     if not native.multiscatter or native.beckmann:
         return np.ones((len(wo), 3))
-    mu = np.stack([np.sqrt(1 - _MU**2), np.zeros(len(_MU)), _MU], -1)
-    mean = (facet_albedo(mu, native.alpha, False) * _SHARE).sum()
     seen = facet_albedo(wo, native.alpha, False)[:, None]
-    average = np.asarray(average)
-    return 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
+    return sent_to_and_fro(np.asarray(average), mean_facet_albedo(native.alpha), seen)
 
 
 def _grooves(cosine):
@@ -169,7 +183,7 @@ def f_cos(native, wi, wo, views):
         taken, scale = dielectric(native.f0, each[:, 2]), 1.0
     else:
         taken = facet_albedo(each, native.alpha, False, lambda c: dielectric(native.f0, c))
-        scale = _multiscatter(each, native, (20 * color + 1) / 21)[which]
+        scale = _multiscatter(each, native, mean_schlick(color))[which]
     base = matte(wi, wo, color, native.diffuse_roughness) * (1 - taken)[which][:, None]
     plastic = base + lobe * dielectric(native.f0, cosine)[:, None]
     metal = lobe * schlick(color, cosine) * scale

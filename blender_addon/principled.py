@@ -21,7 +21,6 @@ _METALLIC = np.linspace(0, 1, 5)
 _IOR = np.array([1.5, 1.0, 1.2, 1.35, 1.8, 2.4, 3.5])
 _F0 = ((_IOR - 1) / (_IOR + 1)) ** 2
 
-
 #: Share of a curve's square that being in part a metal, or another IOR, must be worth.
 _PLAIN = 2e-5
 
@@ -57,13 +56,11 @@ class Search:
         self._fresnel = np.stack([native_bsdf.dielectric(f0, cosine) for f0 in _F0])
         # Albedos of facets: all of it, seen from wo and on average, and through each boundary.
         knots = np.linspace(_ROUGHNESS[-1], 1, 12)
-        mu = native_bsdf._MU
-        each = np.stack([np.sqrt(1 - mu**2), np.zeros(len(mu)), mu], -1)
         seen, mean, taken = [], [], []
         for r in knots:
             alpha = (r * r, r * r)
             seen.append(native_bsdf.facet_albedo(wo[None], alpha, False)[0])
-            mean.append(native_bsdf.facet_albedo(each, alpha, False) @ native_bsdf._SHARE)
+            mean.append(native_bsdf.mean_facet_albedo(alpha))
             taken.append(
                 native_bsdf.facet_albedo(
                     wo[None],
@@ -123,8 +120,7 @@ class Search:
         # The node is color * slope + rest. What facets send to and fro hangs on the colour: thrice.
         color = np.full((1, 1, 1, 3), 0.8)
         for _ in range(3):
-            average = (20 * color + 1) / 21
-            more = 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
+            more = native_bsdf.sent_to_and_fro(native_bsdf.mean_schlick(color), mean, seen)
             slope, rest = {0: matte, 1: m * more}, {2: m * more, 3: 1 - m}
             square = dot(slope, slope)
             with_curve = sum(x * along(i) for i, x in slope.items()) - dot(slope, rest)
