@@ -14,18 +14,15 @@ from pathlib import Path
 
 import flip_evaluator
 import numpy as np
-import OpenImageIO as oiio
+from pictures import read_rgb
 
 
 def read(path):
     """R, G, B of an EXR. FLIP knows no negative radiance: what rounding left below 0 becomes 0."""
-    picture = oiio.ImageBuf(str(path))
-    pixels = picture.get_pixels(oiio.FLOAT)
-    if picture.has_error or pixels is None:
-        sys.exit(f"flip: {path}: {picture.geterror()}")
-    names = list(picture.spec().channelnames)
-    layer = next((n[:-1] for n in names if n.endswith("R") and not n.startswith("variance")), "")
-    return np.maximum(pixels[..., [names.index(f"{layer}{c}") for c in "RGB"]], 0)
+    try:
+        return np.maximum(read_rgb(path), 0)
+    except OSError as error:
+        sys.exit(f"flip: {error}")
 
 
 def main():

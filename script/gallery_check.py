@@ -19,9 +19,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 from demo_matrix import RENDER_SCENE, smaller
 from demo_tasks import read_json, shown, write_json
+from pictures import read_rgb
 
 #: Pixels along the longer side; samples of both pictures. Most of the time goes into compiling
 #: shaders: fewer would save little.
@@ -86,17 +86,6 @@ def render_reference(tool, folder):
     checked_run([*command, "--spp", REFERENCE_SPP, "--threads", 1])
 
 
-def read_picture(path):
-    """R, G and B as double precision."""
-    picture = oiio.ImageBuf(str(path))
-    pixels = picture.get_pixels(oiio.FLOAT)
-    if picture.has_error or pixels is None:
-        raise CheckError(f"{path}: {picture.geterror()}")
-    names = list(picture.spec().channelnames)
-    layer = next((n[:-1] for n in names if n.endswith("R") and not n.startswith("variance")), "")
-    return pixels[..., [names.index(f"{layer}{c}") for c in "RGB"]].astype(float)
-
-
 def stated_error(record):
     """The largest of a scene's forms, as a part of the light."""
     groups = [g for of_material in record["materials"].values() for g in of_material]
@@ -155,9 +144,11 @@ def main():
         sys.exit(f"gallery_check: {error}")
     for folder in folders:
         try:
-            pictures = [read_picture(folder / f"{n}.exr") for n in ("blender", "reference")]
+            pictures = [
+                read_rgb(folder / f"{n}.exr").astype(float) for n in ("blender", "reference")
+            ]
             seen[folder.name] = judge(*pictures, stated_error(records[folder.name]))
-        except CheckError as error:
+        except (CheckError, OSError) as error:
             failed.append(folder.name)
             print(f"    {folder.name}: {error}", file=sys.stderr)
     if failed:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import OpenImageIO as oiio
 from markdown_table import heading, line
+from pictures import read_rgb
 from time_page import PICTURES
 
 CONFIG = Path(__file__).resolve().parents[1] / "data" / "color" / "config.ocio"
@@ -78,10 +79,10 @@ def jobs(costs, out):
 
 def pixels(path):
     """The picture (height, width, 3), linear."""
-    picture = oiio.ImageBuf(str(path))
-    if picture.has_error:
-        sys.exit(f"{path}: {picture.geterror()}")
-    return picture.get_pixels(oiio.FLOAT)[..., :3]
+    try:
+        return read_rgb(path)
+    except OSError as error:
+        sys.exit(str(error))
 
 
 def page(out, docs):
