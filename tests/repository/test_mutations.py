@@ -16,13 +16,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from support import ROOT, TOOL
 
-ROOT = Path(__file__).resolve().parents[2]
 BLENDER_PYTHON = Path(
     os.environ.get("BRDFC_BLENDER_PYTHON", ROOT / ".env" / "blender-4.5" / "bin" / "python")
 )
-TOOL = Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve()
-
 pytestmark = pytest.mark.full
 
 
@@ -97,7 +95,7 @@ def run_in_blender(zip_file, tests):
     command = [BLENDER_PYTHON, "-m", "pytest", "-q", "--show-capture=no", f"--junitxml={report}"]
     command += ["tests/blender/test_physics.py", "-k", expression]
     environment = os.environ | {
-        "BRDFC_TOOL": str(TOOL),
+        "BRDFC_TOOL": TOOL,
         "BRDFC_EXTENSION_ZIP": str(zip_file),
         "BRDFC_ANSWERS": str(zip_file.parents[1] / "answers"),
     }
@@ -195,7 +193,7 @@ MODEL_FAULTS = {
 @pytest.fixture(scope="module")
 def faulty_program():
     """The unit tests, linked with faulty models."""
-    build = TOOL.parent
+    build = Path(TOOL).parent
     commands = subprocess.run(
         ["ninja", "-C", build, "-t", "commands", "brdfc_tests"],
         capture_output=True,
@@ -242,4 +240,4 @@ def test_fault_in_a_model_is_caught(faulty_program, tmp_path, fault):
         return result["failures"]
 
     assert failed(faulty_program) > 0
-    assert failed(TOOL.parent / "brdfc_tests") == 0
+    assert failed(Path(TOOL).parent / "brdfc_tests") == 0

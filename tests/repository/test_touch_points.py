@@ -2,18 +2,12 @@
 """A new model is one file, one row of cases and one row of docs; all else that names every model is
 made by a script or a build."""
 
-import json
-import os
 import re
 import subprocess
-from pathlib import Path
 
 import pytest
+from support import LISTED, MODELS, ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-TOOL = Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve()
-LISTED = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
-MODELS = [model["name"] for model in LISTED]
 #: Models that are delta terms alone have no fit and no noise to measure.
 SCATTERING = [m["name"] for m in LISTED if m["representations"] != ["exact"]]
 #: Files with a row for each, and how a row begins.

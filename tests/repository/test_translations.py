@@ -3,14 +3,12 @@
 one that can be translated."""
 
 import json
-import os
 import subprocess
-from pathlib import Path
 
 import pytest
 import texts
+from support import TOOL
 
-TOOL = Path(os.environ.get("BRDFC_TOOL", texts.ROOT / "build" / "brdfc")).resolve()
 FOLDER = texts.ADDON / "translations"
 LOCALES = sorted(path.stem for path in FOLDER.glob("*.json"))
 #: The form that Blender's own nodes are, which packs have where it was asked for.

@@ -6,13 +6,11 @@ import os
 import subprocess
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 #: Absolute: some tests run it elsewhere.
 TOOL = str(Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve())
-MODELS = [
-    m["name"]
-    for m in json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
-]
+LISTED = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
+MODELS = [model["name"] for model in LISTED]
 
 
 def scene(**changes):
