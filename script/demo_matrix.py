@@ -172,10 +172,14 @@ class Scene:
         if self.options.forms == "all":
             key.append(self._plan().key)
             self.forms = [*self.forms, *planned_forms(self.folder, self.scene)]
+        if self.options.convergence:
+            # Beside the scene, so that its meshes and images are found.
+            write_json(self.folder / "convergence.json", smaller(self.scene, CONVERGENCE_SIZE))
         tasks = []
         for version in self.options.blender:
             tasks += [self._blender(version, s, key) for s in range(1, self.options.seeds + 1)]
             if self.options.convergence:
+                (self.folder_of(version) / "convergence").mkdir(exist_ok=True)
                 tasks += [
                     self._convergence(version, s, key) for s in range(1, CONVERGENCE_SEEDS + 1)
                 ]
@@ -188,8 +192,7 @@ class Scene:
         versions = len(self.options.blender)
         out = {"blender": (versions * self.options.seeds, forms * samples(self.settings, self.spp))}
         if self.options.convergence:
-            small = smaller(self.scene, CONVERGENCE_SIZE)["settings"]
-            work = forms * samples(small, sum(CONVERGENCE_SPP))
+            work = forms * samples(self._small_settings(), sum(CONVERGENCE_SPP))
             out["convergence"] = (versions * CONVERGENCE_SEEDS, work)
         return out
 
@@ -217,13 +220,11 @@ class Scene:
             (f"{form.name} {seed}", "scene.json", f"{form.name}-{seed}.exr", form, self.spp)
             for form in self.forms
         ]
-        return self._jobs("blender", version, seed, jobs, [*key, self.forms, self.spp])
+        key = [*key, self.forms, self.spp]
+        return self._jobs("blender", version, seed, jobs, key, self.settings)
 
     def _convergence(self, version, seed, key):
         """A smaller picture in every form with more and more samples."""
-        # Beside the scene, so that its meshes and images are found.
-        write_json(self.folder / "convergence.json", smaller(self.scene, CONVERGENCE_SIZE))
-        (self.folder_of(version) / "convergence").mkdir(exist_ok=True)
         jobs = [
             (
                 f"{form.name}, {spp} samples, {seed}",
@@ -236,11 +237,15 @@ class Scene:
             for form in self.forms
         ]
         key = [*key, self.forms, CONVERGENCE_SPP, CONVERGENCE_SIZE]
-        return self._jobs("convergence", version, seed, jobs, key)
+        return self._jobs("convergence", version, seed, jobs, key, self._small_settings())
 
-    def _jobs(self, kind, version, seed, jobs, key):
+    def _small_settings(self):
+        return smaller(self.scene, CONVERGENCE_SIZE)["settings"]
+
+    def _jobs(self, kind, version, seed, jobs, key, settings):
         """A process of Blender for jobs in their order. Each is (name, scene, picture, form,
-        samples), the picture's file in the folder of that version."""
+        samples), the picture's file in the folder of that version. `settings`: those of the
+        scene."""
         options, out = self.options, self.folder_of(version)
         listed = [
             {
@@ -258,7 +263,6 @@ class Scene:
         python = python_of(version)
         file = out / "tasks" / f"{kind}-{seed}-jobs.json"
         write_json(file, listed)
-        settings = read_json(Path(listed[0]["scene"]))["settings"]
         stamp = python.parents[1] / ".stamp"
         sums = options.sums
         return Task(
