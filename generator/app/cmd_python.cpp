@@ -34,11 +34,9 @@ void run(const fs::path& out) {
   for (const auto& [name, module] : files) write(package / name, module);
   const fs::path project = data / "python" / "pyproject.toml";
   std::string text = pack::read_text(project);
-  pack::stamp(text, project, "version", "@version@", BRDFC_VERSION);
-  const std::string tool = "brdfc-tool ==";  // of the same version, which the extra asks for
-  const std::size_t at = text.find(tool + "@version@");
-  if (at == std::string::npos) input_error("{}: expected a requirement \"{}@version@\"", project.string(), tool);
-  text.replace(at, tool.size() + std::string("@version@").size(), tool + BRDFC_VERSION);
+  pack::stamp(text, project, "version", pack::quoted("@version@"), pack::quoted(BRDFC_VERSION));
+  pack::stamp(text, project, "tool", R"(["brdfc-tool ==@version@"])",
+              fmt::format(R"(["brdfc-tool =={}"])", BRDFC_VERSION));
   write(out / "pyproject.toml", text);
   write(out / "LICENSE", pack::read_text(data / "LICENSE"));
   std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; pip wheel " << out.string()

@@ -36,10 +36,10 @@ std::string slug(const std::string& name) {
 
 void stamp(std::string& manifest, const fs::path& path, const char* key, const std::string& before,
            const std::string& after) {
-  const std::string line = fmt::format("\n{} = \"{}\"\n", key, before);
+  const std::string line = fmt::format("\n{} = {}\n", key, before);
   const std::size_t at = manifest.find(line);
-  if (at == std::string::npos) input_error("{}: expected the line {} = \"{}\"", path.string(), key, before);
-  manifest.replace(at, line.size(), fmt::format("\n{} = \"{}\"\n", key, after));
+  if (at == std::string::npos) input_error("{}: expected the line {} = {}", path.string(), key, before);
+  manifest.replace(at, line.size(), fmt::format("\n{} = {}\n", key, after));
 }
 
 std::string read_text(const fs::path& path) {
@@ -70,11 +70,12 @@ std::map<std::string, std::string> addon_files(const fs::path& folder, const std
   }
   std::string& manifest = files[kManifest] = read_text(folder / kManifest);
   const fs::path path = folder / kManifest;
-  stamp(manifest, path, "version", "@version@", BRDFC_VERSION);
+  stamp(manifest, path, "version", quoted("@version@"), quoted(BRDFC_VERSION));
   if (!cut.empty()) {
     const std::string id = extension_id(cut);
-    stamp(manifest, path, "id", kId, id);
-    stamp(manifest, path, "name", kName, fmt::format("{} ({})", kName, id.substr(std::string(kId).size() + 1)));
+    stamp(manifest, path, "id", quoted(kId), quoted(id));
+    stamp(manifest, path, "name", quoted(kName),
+          quoted(fmt::format("{} ({})", kName, id.substr(std::string(kId).size() + 1))));
   }
   return files;
 }

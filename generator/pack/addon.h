@@ -18,8 +18,10 @@ std::map<std::string, std::string> addon_files(const std::filesystem::path& fold
 /// The extension's id: brdfc_shaders, and where `cut`, the name of a file, is not empty what of it an id may have.
 std::string extension_id(const std::string& cut);
 
-/// Gives a key another value in the text of the TOML file at `path`, which has that one. Throws InputError if it has
-/// not.
+/// A string as TOML writes it.
+inline std::string quoted(const std::string& text) { return '"' + text + '"'; }
+/// Gives a key another value in the text of the TOML file at `path`, which has that one on a line; values as TOML
+/// writes them. Throws InputError if it has not.
 void stamp(std::string& text, const std::filesystem::path& path, const char* key, const std::string& before,
            const std::string& after);
 
