@@ -51,4 +51,23 @@ template <class T> DielectricRgb<T> fresnel_dielectric(const Vec3<T>& wo, const 
   return {{r.reflected, g.reflected, b.reflected}, {r.refracted, g.refracted, b.refracted}};
 }
 
+/// What models of a smooth boundary around a dielectric have in common: ideal reflection and refraction, shared out by
+/// Fresnel's equations.
+template <class T> struct DielectricBoundary {
+  T index, dispersion;
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"}.as(
+                 Optical::Index));
+    v(dispersion, dispersion_spec());
+  }
+
+  T ior() const { return index; }
+  auto disperses() const { return dispersion > T(0); }
+  std::array<T, 3> channel_iors() const { return dispersed(index, dispersion); }
+
+  Rgb<T> mirror(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).reflected; }
+  Rgb<T> transmit(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).refracted; }
+};
+
 }  // namespace brdfc::inline model

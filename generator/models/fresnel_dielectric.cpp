@@ -8,9 +8,7 @@
 
 namespace brdfc {
 
-template <class T> struct FresnelDielectric {
-  T index, dispersion;
-
+template <class T> struct FresnelDielectric : DielectricBoundary<T> {
   static ModelInfo info() {
     return {.name = "fresnel_dielectric",
             .label = "Fresnel Dielectric",
@@ -23,19 +21,6 @@ template <class T> struct FresnelDielectric {
             .properties = {.lossless = true, .positive = false, .smooth = false},
             .params = {}};
   }
-
-  template <class Visitor> void parameters(const Visitor& v) {
-    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"}.as(
-                 Optical::Index));
-    v(dispersion, dispersion_spec());
-  }
-
-  T ior() const { return index; }
-  auto disperses() const { return dispersion > T(0); }
-  std::array<T, 3> channel_iors() const { return dispersed(index, dispersion); }
-
-  Rgb<T> mirror(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).reflected; }
-  Rgb<T> transmit(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).refracted; }
 };
 
 BRDFC_MODEL(FresnelDielectric)

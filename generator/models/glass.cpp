@@ -10,8 +10,8 @@
 
 namespace brdfc {
 
-template <class T> struct Glass {
-  T index, dispersion, density;
+template <class T> struct Glass : DielectricBoundary<T> {
+  T density;
   Rgb<T> attenuation;
 
   static ModelInfo info() {
@@ -28,22 +28,13 @@ template <class T> struct Glass {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(index, NumberSpec{"ior", "IOR", 1.5, 0.1, 10, 1, 2.5, "Refractive index inside over the one outside"}.as(
-                 Optical::Index));
-    v(dispersion, dispersion_spec());
+    DielectricBoundary<T>::parameters(v);
     v(attenuation, ColorSpec{"attenuation",
                              "Attenuation",
                              {0.5, 0.9, 0.7},
                              "Share of the light that is left after one unit of length inside, at density 1"});
     v(density, NumberSpec{"density", "Density", 1, 0, 1e6, 0, 10, "Multiplies the absorption per length"}.by_factors());
   }
-
-  T ior() const { return index; }
-  auto disperses() const { return dispersion > T(0); }
-  std::array<T, 3> channel_iors() const { return dispersed(index, dispersion); }
-
-  Rgb<T> mirror(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).reflected; }
-  Rgb<T> transmit(const Vec3<T>& wo) const { return fresnel_dielectric(wo, channel_iors()).refracted; }
 
   Rgb<T> transmittance(const T& distance) const {
     const T d = named("depth", density * distance);
