@@ -86,10 +86,15 @@ template <class T> T aimed_profile(const T& lobe) {
   return lobe * select(position < T(kLevel), maximum(flank, T(0)), level);
 }
 
+/// aimed_profile() of a lobe at this cosine from its centre.
+template <class T> T profile_of(const AimedLobe<T>& lobe, const T& cosAlpha) {
+  return aimed_profile(pow(maximum(cosAlpha, lobe.cosEnd), lobe.exponent));
+}
+
 /// f cos of the lobe of an aimed closure.
 template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
   const T cosAlpha = dot(lobe.towards, wi), rise = dot(lobe.half, wi);
-  const T profile = aimed_profile(pow(maximum(cosAlpha, lobe.cosEnd), lobe.exponent));
+  const T profile = profile_of(lobe, cosAlpha);
   return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
 }
 
@@ -214,7 +219,7 @@ AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const
   // Over the lobe's height: its profile at the point, which is even about the lamp's centre, but its slope over the
   // whole lamp. Where f slopes, too, the quotient of both at one point, times the slope where light sampling meets the
   // lamp, is not f on average.
-  const T profile = aimed_profile(pow(maximum(dot(towards, lamp.wi), lamp.lobe.cosEnd), lamp.lobe.exponent));
+  const T profile = profile_of(lamp.lobe, dot(towards, lamp.wi));
   lamp.emphasis = select(usable, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
   return lamp;
 }
