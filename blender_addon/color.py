@@ -69,6 +69,22 @@ def working_space():
     return _open_color_io().GetCurrentConfig().getColorSpace("scene_linear").getName()
 
 
+def set_working_space(name):
+    """Makes a space of that name the working space of the open file. What is in it keeps its look.
+    ValueError that lists the names, or says which Blender has a choice."""
+    if name == working_space():
+        return
+    if not hasattr(bpy.data, "colorspace"):
+        raise ValueError(
+            f"expected {working_space()!r}, the working space of Blender {bpy.app.version_string}: "
+            f"{name!r} needs Blender 5.0 or later"
+        )
+    known = bpy.data.colorspace.bl_rna.properties["working_space"].enum_items.keys()
+    if name not in known:
+        raise ValueError(f"expected one of {', '.join(known)}, got {name!r}")
+    bpy.ops.wm.set_working_color_space(working_space=name, convert_colors=True)
+
+
 def to_xyz(rgb):
     """CIE XYZ, white D65, of linear colours (..., 3) of the working space."""
     return _converted(rgb, ("scene_linear", _INTERCHANGE), (_XYZ, False))

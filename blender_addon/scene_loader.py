@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from . import api, lamps, nodes, pack
+from . import api, color, lamps, nodes, pack
 
 #: Representation name that stands for Blender's own Glossy node, to compare run times with.
 GLOSSY = "glossy"
@@ -455,6 +455,12 @@ def load_scene(path, representation=None, name=None, native=None):
     except ValueError as error:
         raise ValueError(f"{path}: not JSON: {error}") from error
     view = _View(data, str(path))
+    if view.has("working_space"):
+        space = view.get("working_space")
+        try:
+            color.set_working_space(space.text())
+        except ValueError as error:
+            raise ValueError(f"{path}: {space.path}: {error}") from error
     scene = bpy.data.scenes.new(
         name or (view.get("name").text() if view.has("name") else path.stem)
     )

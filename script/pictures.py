@@ -1,16 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rendered pictures as arrays. Needs OpenImageIO."""
 
+from pathlib import Path
+
+import numpy as np
 import OpenImageIO as oiio
+
+REC709 = "lin_rec709_scene"
+CONFIG = Path(__file__).resolve().parents[1] / "data" / "color" / "config.ocio"
 
 
 def read_rgb(path):
-    """R, G and B of a picture (height, width, 3), linear as an EXR has them, whatever the name of
-    its layer and whether or not there is one of the variance. Raises OSError naming the file."""
+    """R, G and B of a picture (height, width, 3), whatever the name of its layer and whether or not
+    there is one of the variance: as an EXR has them or, where it says that they are in another
+    space, in linear Rec.709. Raises OSError naming the file."""
     picture = oiio.ImageBuf(str(path))
     pixels = picture.get_pixels(oiio.FLOAT)
     if picture.has_error or pixels is None:
         raise OSError(f"{path}: {picture.geterror()}")
     names = list(picture.spec().channelnames)
     layer = next((n[:-1] for n in names if n.endswith("R") and not n.startswith("variance")), "")
-    return pixels[..., [names.index(f"{layer}{c}") for c in "RGB"]]
+    pixels = pixels[..., [names.index(f"{layer}{c}") for c in "RGB"]]
+    space = picture.spec().get_string_attribute("colorInteropID") or REC709
+    if space == REC709:
+        return pixels
+    colors = oiio.ImageBuf(np.ascontiguousarray(pixels))
+    colors = oiio.ImageBufAlgo.colorconvert(colors, space, REC709, colorconfig=str(CONFIG))
+    if colors.has_error:
+        raise OSError(f"{path}: {colors.geterror()}")
+    return colors.get_pixels(oiio.FLOAT)

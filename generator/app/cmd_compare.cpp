@@ -21,8 +21,8 @@ void keep_evidence(const std::filesystem::path& folder, const reference::Renderi
   reference::write_rendering(folder / "picture.exr", picture);
   reference::write_rendering(folder / "reference.exr", reference);
   reference::write_image(folder / "p-values.exr", test.p);
-  reference::write_preview(folder / "picture.png", picture.mean, 0);
-  reference::write_preview(folder / "reference.png", reference.mean, 0);
+  reference::write_preview(folder / "picture.png", picture, 0);
+  reference::write_preview(folder / "reference.png", reference, 0);
   reference::write_display(folder / "difference.png", reference::difference_image(picture.mean, reference.mean, 0.1));
   reference::write_display(folder / "p-values.png", test.p);
 }
@@ -61,6 +61,7 @@ void add_compare_command(CLI::App& app) {
       ->needs(test);
   command->callback([options] {
     const std::string name_a = options->files.front(), name_b = options->files.back();
+    const reference::Rendering b = reference::read_rendering(name_b);
     std::vector<reference::Rendering> pictures;
     for (std::size_t i = 0; i + 1 < options->files.size(); ++i) {
       pictures.push_back(reference::read_rendering(options->files[i]));
@@ -68,9 +69,10 @@ void add_compare_command(CLI::App& app) {
           pictures.back().mean.height != pictures.front().mean.height)
         input_error("{}: expected {} x {} pixels as in {}", options->files[i], pictures.front().mean.width,
                     pictures.front().mean.height, name_a);
+      reference::to_working_space_of(pictures.back(), b);
       inject(pictures.back(), options->inject);
     }
-    const reference::Rendering a = report::mean_of(pictures), b = reference::read_rendering(name_b);
+    const reference::Rendering a = report::mean_of(pictures);
     const reference::Comparison c = reference::compare(a, b, name_a, name_b);
     std::optional<report::WelchTest> t;
     if (options->test) {

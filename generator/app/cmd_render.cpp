@@ -165,7 +165,7 @@ void add_render_command(CLI::App& app) {
     result.rendering.metadata["pattern"] = reference::pattern_names()[std::size_t(r.settings.pattern)];
     reference::write_rendering(out, result.rendering);
     if (!options->preview.empty())
-      reference::write_preview(options->preview, result.rendering.mean, options->exposure, options->view);
+      reference::write_preview(options->preview, result.rendering, options->exposure, options->view);
     const std::string summary =
         fmt::format("{} has {} of {} samples a pixel", out.string(), result.samples, r.settings.spp);
     if (result.cancelled) throw CheckFailed("interrupted: " + summary);

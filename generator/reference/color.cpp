@@ -59,6 +59,14 @@ void convert(const ocio::ConstProcessorRcPtr& processor, Image& image) {
 
 struct ColorConfig::Impl {
   ocio::ConstConfigRcPtr config;
+
+  ocio::ConstColorSpaceRcPtr find(const std::string& space, const ColorConfig& of) const {
+    const ocio::ConstColorSpaceRcPtr found = config->getColorSpace(space.c_str());
+    if (!found)
+      input_error("{} has no colour space '{}', expected one of {}", of.file().string(), space,
+                  fmt::join(of.spaces(), ", "));
+    return found;
+  }
 };
 
 ColorConfig::ColorConfig(const fs::path& file) : file_(file), impl_(std::make_unique<Impl>()) {
@@ -77,7 +85,18 @@ ColorConfig::ColorConfig(const fs::path& file) : file_(file), impl_(std::make_un
   }
 }
 
+ColorConfig::ColorConfig(fs::path file, std::unique_ptr<Impl> impl) : file_(std::move(file)), impl_(std::move(impl)) {}
+ColorConfig::ColorConfig(ColorConfig&&) noexcept = default;
 ColorConfig::~ColorConfig() = default;
+
+const std::array<WorkingSpace, 3>& working_spaces() {
+  static const std::array<WorkingSpace, 3> spaces{{
+      {"Linear Rec.709", "lin_rec709_scene", {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f}},
+      {"Linear Rec.2020", "lin_rec2020_scene", {0.708f, 0.292f, 0.170f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.3290f}},
+      {"ACEScg", "lin_ap1_scene", {0.713f, 0.293f, 0.165f, 0.830f, 0.128f, 0.044f, 0.32168f, 0.33767f}},
+  }};
+  return spaces;
+}
 
 const ColorConfig& ColorConfig::current() {
   static const ColorConfig config = [] {
@@ -110,10 +129,20 @@ std::vector<std::string> ColorConfig::views() const {
   return out;
 }
 
+ColorConfig ColorConfig::with_working_space(const std::string& space) const {
+  auto impl = std::make_unique<Impl>();
+  const ocio::ConfigRcPtr config = impl_->config->createEditableCopy();
+  config->setRole(ocio::ROLE_SCENE_LINEAR, impl_->find(space, *this)->getName());
+  impl->config = config;
+  return {file_, std::move(impl)};
+}
+
+std::string ColorConfig::working_space() const {
+  return impl_->config->getColorSpace(ocio::ROLE_SCENE_LINEAR)->getName();
+}
+
 void ColorConfig::to_scene_linear(Image& image, const std::string& space) const {
-  const ocio::ConstColorSpaceRcPtr found = impl_->config->getColorSpace(space.c_str());
-  if (!found)
-    input_error("{} has no colour space '{}', expected one of {}", file_.string(), space, fmt::join(spaces(), ", "));
+  const ocio::ConstColorSpaceRcPtr found = impl_->find(space, *this);
   if (found->isData()) return;
   convert(impl_->config->getProcessor(found->getName(), ocio::ROLE_SCENE_LINEAR), image);
 }

@@ -24,6 +24,7 @@ namespace {
 
 constexpr int kMaxSide = 65536;
 constexpr std::size_t kMaxPixels = std::size_t(1) << 30;
+constexpr OIIO::TypeDesc kChromaticities(OIIO::TypeDesc::FLOAT, 8);
 
 struct Channels {
   int r = -1, g = -1, b = -1;
@@ -146,6 +147,30 @@ OIIO::ImageSpec exr_spec(int width, int height, std::vector<std::string> names) 
   return spec;
 }
 
+/// The working space that a file says its colours are in; empty if it says none.
+std::string stated_working_space(const OIIO::ImageSpec& spec, const fs::path& path) {
+  std::array<float, 8> chromaticities;
+  const bool known = spec.getattribute("chromaticities", kChromaticities, chromaticities.data());
+  const std::string id = spec.get_string_attribute("colorInteropID");
+  if (id.empty() && !known) return "";
+  const auto same = [](float a, float b) { return std::abs(a - b) < 1e-4f; };
+  std::vector<std::string> names;
+  for (const WorkingSpace& s : working_spaces()) {
+    if (id.empty() ? std::ranges::equal(chromaticities, s.chromaticities, same) : id == s.interop_id) return s.name;
+    names.push_back(s.name);
+  }
+  if (!id.empty())
+    input_error("{}: its colours are in '{}', expected one of {}", path.string(), id, fmt::join(names, ", "));
+  input_error("{}: its colours have the chromaticities {}, expected those of one of {}", path.string(),
+              fmt::join(chromaticities, " "), fmt::join(names, ", "));
+}
+
+/// The current configuration with the working space of a rendering.
+ColorConfig config_of(const Rendering& r) {
+  const ColorConfig& current = ColorConfig::current();
+  return current.with_working_space(r.working_space.empty() ? current.working_space() : r.working_space);
+}
+
 void check_finite(const Image& image, const std::string& name) {
   std::size_t bad = 0, first = 0;
   for (std::size_t i = 0; i < image.rgb.size(); ++i)
@@ -191,6 +216,7 @@ Rendering read_rendering(const fs::path& path) {
   const Channels variance{channel_index(file.spec, "variance.R"), channel_index(file.spec, "variance.G"),
                           channel_index(file.spec, "variance.B")};
   if (variance.r >= 0 && variance.g >= 0 && variance.b >= 0) rendering.variance = file.extract(variance);
+  rendering.working_space = stated_working_space(file.spec, path);
   const std::string prefix = "brdfc:";
   for (const auto& attribute : file.spec.extra_attribs) {
     const std::string name = attribute.name().string();
@@ -212,6 +238,11 @@ void write_rendering(const fs::path& path, const Rendering& rendering) {
   if (rendering.variance) names.insert(names.end(), {"variance.R", "variance.G", "variance.B"});
   const Image& mean = rendering.mean;
   OIIO::ImageSpec spec = exr_spec(mean.width, mean.height, names);
+  for (const WorkingSpace& s : working_spaces())
+    if (s.name == rendering.working_space) {
+      spec.attribute("colorInteropID", s.interop_id);
+      spec.attribute("chromaticities", kChromaticities, s.chromaticities.data());
+    }
   for (const auto& [key, value] : rendering.metadata.items()) {
     const std::string name = "brdfc:" + key;
     if (value.is_string())
@@ -234,7 +265,18 @@ void write_rendering(const fs::path& path, const Rendering& rendering) {
   write_file(path, spec, data);
 }
 
-Image read_image(const fs::path& path, const std::string& space) {
+void to_working_space_of(Rendering& rendering, const Rendering& other) {
+  if (rendering.working_space == other.working_space) return;
+  const ColorConfig to = config_of(other);
+  const std::string from = config_of(rendering).working_space();
+  if (from != to.working_space()) {
+    to.to_scene_linear(rendering.mean, from);
+    rendering.variance.reset();
+  }
+  rendering.working_space = other.working_space;
+}
+
+Image read_image(const fs::path& path, const ColorConfig& colors, const std::string& space) {
   const File file = read_file(path);
   const Channels channels = find_channels(file.spec);
   if (channels.r < 0)
@@ -243,7 +285,7 @@ Image read_image(const fs::path& path, const std::string& space) {
   Image image = file.extract(channels);
   check_finite(image, path.string());
   const bool encoded = space == "auto" ? !file.spec.format.is_floating_point() : space != "linear";
-  if (encoded) ColorConfig::current().to_scene_linear(image, space == "auto" || space == "srgb" ? "sRGB" : space);
+  if (encoded) colors.to_scene_linear(image, space == "auto" || space == "srgb" ? "sRGB" : space);
   return image;
 }
 
@@ -320,11 +362,11 @@ void write_display(const fs::path& path, const Image& display) {
   write_file(path, spec, display.rgb);
 }
 
-void write_preview(const fs::path& path, const Image& linear, double exposure, const std::string& view) {
-  Image display = linear;
+void write_preview(const fs::path& path, const Rendering& rendering, double exposure, const std::string& view) {
+  Image display = rendering.mean;
   const double gain = std::exp2(exposure);
   for (float& v : display.rgb) v = float(gain * v);
-  ColorConfig::current().to_display(display, view);
+  config_of(rendering).to_display(display, view);
   write_display(path, display);
 }
 

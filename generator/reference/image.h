@@ -12,6 +12,8 @@
 
 namespace brdfc::reference {
 
+class ColorConfig;
+
 /// Linear RGB pixels. Row 0 is the top row. rgb.size() == 3 * width * height.
 struct Image {
   int width = 0, height = 0;
@@ -31,6 +33,8 @@ struct Image {
 struct Rendering {
   Image mean;
   std::optional<Image> variance;
+  /// Of working_spaces(), by name; empty: that of ColorConfig::current().
+  std::string working_space;
   /// Flat object of strings and numbers, stored as EXR attributes "brdfc:<key>".
   nlohmann::json metadata = nlohmann::json::object();
 };
@@ -43,15 +47,22 @@ std::string ending(const std::filesystem::path& path);
 void write_beside(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);
 
 /// Reads a rendering: channels R, G, B (plain, or of the first layer that has them, such as Blender's
-/// "Combined") and "variance.R/G/B" if present. Throws InputError naming the file.
+/// "Combined") and "variance.R/G/B" if present; the working space, if the attribute colorInteropID or, without it,
+/// chromaticities says it. Throws InputError naming the file, also for an attribute of a space that is not among
+/// working_spaces().
 Rendering read_rendering(const std::filesystem::path& path);
-/// Writes float EXR with the variance as layer "variance" and the metadata as attributes.
+/// Writes float EXR with the variance as layer "variance" and, as attributes, the metadata and the working space if it
+/// is said.
 void write_rendering(const std::filesystem::path& path, const Rendering& rendering);
 
+/// Converts a rendering to the working space of another one, if they differ. Variances don't tell how channels vary
+/// together: there they are lost. Throws InputError if the configuration has no such space.
+void to_working_space_of(Rendering& rendering, const Rendering& other);
+
 /// Reads an image for use as texture or environment, as scene-linear colours; grey is repeated. `space`: "linear", as
-/// stored; a colour space of ColorConfig::current(), where "srgb" is "sRGB"; "auto", sRGB for integer pixels and linear
+/// stored; a colour space of the configuration, where "srgb" is "sRGB"; "auto", sRGB for integer pixels and linear
 /// for floating point. Throws InputError naming the file, also for values that are not finite.
-Image read_image(const std::filesystem::path& path, const std::string& space = "auto");
+Image read_image(const std::filesystem::path& path, const ColorConfig&, const std::string& space = "auto");
 /// Writes float EXR without metadata: equal pixels give equal files.
 void write_image(const std::filesystem::path& path, const Image& image);
 
@@ -76,7 +87,7 @@ nlohmann::json to_json(const Comparison& c);
 Image difference_image(const Image& a, const Image& b, double scale = 0.25);
 
 /// Writes 8 bits: colours are multiplied by 2^exposure and shown through a view transform of ColorConfig::current().
-void write_preview(const std::filesystem::path& path, const Image& linear, double exposure = 0,
+void write_preview(const std::filesystem::path& path, const Rendering& rendering, double exposure = 0,
                    const std::string& view = "Standard");
 /// Writes 8 bits from values that are already display-referred, in [0, 1].
 void write_display(const std::filesystem::path& path, const Image& display);

@@ -240,6 +240,7 @@ RenderResult render_from_lamps(const Scene& scene, const RenderOptions& options)
   result.cancelled = clock.cancelled();
   result.rendering.mean = std::move(mean);
   result.rendering.variance = std::move(variance);
+  result.rendering.working_space = scene.working_space;
   result.rendering.metadata = render_metadata(scene, settings, result.samples, result.samples, threads, clock);
   return result;
 }

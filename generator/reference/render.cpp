@@ -112,6 +112,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
   result.samples = least;
   result.rendering.mean = std::move(mean);
   if (least > 1) result.rendering.variance = std::move(variance);
+  result.rendering.working_space = scene.working_space;
   result.rendering.metadata = render_metadata(scene, settings, least, most, threads, clock);
   return result;
 }

@@ -75,11 +75,12 @@ class Loader {
 
   Scene load() {
     const JsonView root(json_, path_.string());
-    root.only(
-        {"$schema", "name", "description", "settings", "camera", "materials", "objects", "lights", "environment"});
+    root.only({"$schema", "name", "description", "working_space", "settings", "camera", "materials", "objects",
+               "lights", "environment"});
     scene_.name = root.at("name").text();
     scene_.resolved["name"] = scene_.name;
     if (const auto description = root.find("description")) scene_.description = description->text();
+    if (const auto space = root.find("working_space")) read_working_space(*space);
     read_camera(root.at("camera"));
     read_materials(root.at("materials"));
     scene_.resolved["objects"] = json::array();
@@ -126,6 +127,19 @@ class Loader {
     }
   }
 
+  void read_working_space(const JsonView& j) {
+    std::vector<std::string> names;
+    for (const WorkingSpace& s : working_spaces()) names.push_back(s.name);
+    scene_.resolved["working_space"] = scene_.working_space = j.choice(names);
+    try {
+      with_working_space_.emplace(ColorConfig::current().with_working_space(scene_.working_space));
+    } catch (const InputError& e) {
+      j.error(e.what());
+    }
+  }
+
+  const ColorConfig& colors() const { return with_working_space_ ? *with_working_space_ : ColorConfig::current(); }
+
   void read_settings(const JsonView& j) {
     j.only({"width", "height", "spp", "seed", "max_bounces", "scale_radiance", "pattern", "strategy"});
     RenderSettings& s = scene_.settings;
@@ -171,7 +185,7 @@ class Loader {
   std::shared_ptr<const Image> read_texture(const JsonView& j, json& resolved) {
     Image image;
     if (j.json().is_string()) {
-      image = read_file(j, [](const fs::path& f) { return read_image(f); });
+      image = read_file(j, [&](const fs::path& f) { return read_image(f, colors()); });
     } else if (j.has("procedural")) {
       j.at("procedural").choice({"checker"});
       j.only({"procedural", "a", "b", "cells"});
@@ -183,11 +197,11 @@ class Loader {
       if (const auto v = j.find("colorspace")) {
         space = v->text();
         std::vector<std::string> known{"auto", "linear", "srgb"};
-        for (const std::string& name : ColorConfig::current().spaces()) known.push_back(name);
+        for (const std::string& name : colors().spaces()) known.push_back(name);
         if (std::find(known.begin(), known.end(), space) == known.end())
           v->fail(fmt::format("one of {}", fmt::join(known, ", ")));
       }
-      image = read_file(j.at("image"), [space](const fs::path& f) { return read_image(f, space); });
+      image = read_file(j.at("image"), [&](const fs::path& f) { return read_image(f, colors(), space); });
     }
     std::string name;
     auto kept = keep(std::move(image), name);
@@ -209,7 +223,7 @@ class Loader {
   ParamValues optical_parameters(const JsonView& j, const ModelInfo& info) const {
     try {
       const Substance substance = find_substance(j.text(), path_.parent_path());
-      return parameters_of(info, substance, [](const Xyz& xyz) { return ColorConfig::current().from_xyz(xyz); });
+      return parameters_of(info, substance, [&](const Xyz& xyz) { return colors().from_xyz(xyz); });
     } catch (const InputError& e) {
       j.error(e.what());
     }
@@ -468,7 +482,7 @@ class Loader {
       Image image;
       if (j->has("image")) {
         j->only({"image", "strength"});
-        image = read_file(j->at("image"), [](const fs::path& f) { return read_image(f); });
+        image = read_file(j->at("image"), [&](const fs::path& f) { return read_image(f, colors()); });
         for (const float x : image.rgb)
           if (x < 0) j->at("image").error("the image has negative values");
       } else {
@@ -501,6 +515,7 @@ class Loader {
   fs::path path_;
   json json_;
   bool materials_alone_ = false;
+  std::optional<ColorConfig> with_working_space_;
   Scene scene_;
 };
 

@@ -111,6 +111,7 @@ struct Environment {
 
 struct Scene {
   std::string name, description;
+  std::string working_space;  ///< of working_spaces(), by name, if the file asks for one
   RenderSettings settings;
   Camera camera;
   std::vector<Material> materials;

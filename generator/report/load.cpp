@@ -74,6 +74,7 @@ FormImages read_form(const fs::path& folder, const JsonView& view, const SceneRe
   for (const JsonView& image : images.elements()) {
     form.images.push_back(image.text());
     pictures.push_back(read_picture(folder, image));
+    reference::to_working_space_of(pictures.back(), scene.reference);
     const reference::Image& mean = pictures.back().mean;
     if (mean.width != scene.width || mean.height != scene.height)
       image.error(fmt::format("expected an image of {} x {} pixels, this one has {} x {}", scene.width, scene.height,
@@ -132,13 +133,14 @@ void set_costs(std::vector<FormReport>& forms) {
   }
 }
 
-ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view) {
+ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view, const SceneReport& scene) {
   ConvergencePoint point;
   point.spp = view.at("spp").integer(1, kMostCount);
   const JsonView images = view.at("images");
   std::vector<Rendering> pictures;
   for (const JsonView& image : images.elements()) {
     pictures.push_back(read_picture(folder, image));
+    reference::to_working_space_of(pictures.back(), scene.reference);
     if (pictures.back().mean.width != pictures.front().mean.width ||
         pictures.back().mean.height != pictures.front().mean.height)
       image.fail("an image of the size of the others");
@@ -239,7 +241,7 @@ SceneReport load_scene(const fs::path& folder) {
       const auto form =
           std::find_if(scene.forms.begin(), scene.forms.end(), [&](const FormReport& f) { return f.form == name; });
       if (form == scene.forms.end()) point.at("form").fail("the name of a form among the runs");
-      form->convergence.push_back(read_convergence(folder, point));
+      form->convergence.push_back(read_convergence(folder, point, scene));
     }
     for (FormReport& form : scene.forms) {
       std::sort(form.convergence.begin(), form.convergence.end(),

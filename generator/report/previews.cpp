@@ -61,16 +61,16 @@ Previews write_previews(const fs::path& folder, const SceneReport& scene) {
   out.difference_at = round_up_125(largest);
 
   out.reference = scene.scene + "/reference.png";
-  reference::write_preview(folder / out.reference, reference, out.exposure);
+  reference::write_preview(folder / out.reference, scene.reference, out.exposure);
   for (const FormReport& form : scene.forms) {
     const std::string stem = scene.scene + "/" + form.form;
     out.forms.push_back({stem + ".png", stem + "-difference.png", form.test ? stem + "-p-values.png" : "",
                          form.equal_time_images > 0 ? stem + "-equal-time.png" : ""});
-    reference::write_preview(folder / out.forms.back().picture, form.picture.mean, out.exposure);
+    reference::write_preview(folder / out.forms.back().picture, form.picture, out.exposure);
     reference::write_display(folder / out.forms.back().difference,
                              reference::difference_image(form.picture.mean, reference, out.difference_at / mean));
     if (form.equal_time_images > 0)
-      reference::write_preview(folder / out.forms.back().equal_time, form.equal_time_picture.mean, out.exposure);
+      reference::write_preview(folder / out.forms.back().equal_time, form.equal_time_picture, out.exposure);
     if (form.test) reference::write_display(folder / out.forms.back().p_values, form.test->p);
   }
   return out;

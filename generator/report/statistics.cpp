@@ -24,6 +24,7 @@ Rendering mean_of(std::span<const Rendering> renderings) {
       throw std::invalid_argument("renderings differ in size");
   const double n = double(renderings.size());
   Rendering out;
+  out.working_space = renderings.front().working_space;
   out.mean = Image(first.width, first.height);
   out.variance = Image(first.width, first.height);
   for (std::size_t i = 0; i < first.rgb.size(); ++i) {

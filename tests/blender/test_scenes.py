@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from helpers import read_picture, render
+from helpers import open_image_io, read_picture, render
 
 DRIVER = Path(__file__).parents[2] / "script" / "render_scene.py"
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -482,6 +482,76 @@ def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_p
     assert done.returncode == 0, done.stderr
     one, two = (read_picture(p)[..., 0].ravel() for p in pictures)
     assert np.corrcoef(one, two)[0, 1] < 0.4
+
+
+def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, tool, tmp_path):
+    """Gold, which Rec.709 does not hold, and a texture, as the reference has them; then a scene
+    that names no space, in the one that Blender starts with."""
+    write_exr(tmp_path / "green.exr", np.broadcast_to([0.18, 0.4, 0.05], (2, 2, 3)))
+    texture = {"texture": {"image": "green.exr", "colorspace": "Linear Rec.709"}}
+    content = {
+        "name": "s",
+        "settings": {"width": 32, "height": 32, "spp": 64, "max_bounces": 3},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -6, 3],
+            "look_at": [0, 0, 0.7],
+            "fov_y_degrees": 30,
+        },
+        "materials": {
+            "green": {"model": "lambert", "parameters": {"rho": texture}},
+            "gold": {"model": "fresnel_conductor", "optical": "gold"},
+        },
+        "objects": [
+            {"name": "floor", "shape": {"type": "quad", "size": [40, 40]}, "material": "green"},
+            {"name": "ball", "shape": {"type": "sphere"}, "material": "gold"},
+        ],
+        "environment": {"color": [1, 1, 1]},
+    }
+    spaces = ("Linear Rec.709", "Linear Rec.2020", "ACEScg", None)
+    jobs, pairs = [], []
+    for space in spaces:
+        folder = tmp_path / str(space)
+        source = tmp_path / f"{space}.json"
+        named = {} if space is None else {"working_space": space}
+        source.write_text(json.dumps(content | named))
+        tool("scene", source, "--out", folder)
+        pairs.append((folder / "blender.exr", folder / "reference.exr"))
+        jobs.append({"scene": str(folder / "scene.json"), "out": str(pairs[-1][0]), "timed": False})
+        tool("render", source, "--out", pairs[-1][1], "--spp", "256")
+    (tmp_path / "jobs.json").write_text(json.dumps(jobs))
+    done = drive(extension_zip, "--jobs", tmp_path / "jobs.json")
+    if not hasattr(bpy.data, "colorspace"):
+        assert done.returncode == 2
+        expected = (
+            "scene.json: working_space: expected 'Linear Rec.709', the working space of Blender"
+        )
+        assert expected in done.stderr and "'Linear Rec.2020' needs Blender 5.0" in done.stderr
+        assert pairs[0][0].exists(), "its own is none that it lacks"
+        return
+    assert done.returncode == 0, done.stderr
+    oiio = open_image_io()
+    pixels = [
+        [oiio.ImageBuf(str(p)).get_pixels()[..., :3].mean((0, 1), float) for p in pair]
+        for pair in pairs
+    ]
+    for blender, reference in pixels:
+        np.testing.assert_allclose(blender, reference, rtol=2e-3)
+    np.testing.assert_array_equal(pixels[3][0], pixels[0][0])
+    # What the file says and what the scene said are the same, or compare would convert.
+    off = [json.loads(tool("compare", *pair, "--json"))["bias"] for pair in pairs]
+    assert np.abs(off).max() < 1e-3
+    assert all(np.abs(pixels[i][0] - pixels[0][0]).max() > 0.02 for i in (1, 2))
+
+
+def test_a_working_space_that_there_is_not_is_an_error(extension, empty, scene_file):
+    expected = (
+        "scene.json: working_space: expected one of Linear Rec.709, Linear Rec.2020, ACEScg, got"
+    )
+    if not hasattr(bpy.data, "colorspace"):
+        expected = "scene.json: working_space: expected 'Linear Rec.709'"
+    with pytest.raises(ValueError, match=expected):
+        extension.scene_loader.load_scene(scene_file(working_space="Rec.77"))
 
 
 @pytest.mark.parametrize(

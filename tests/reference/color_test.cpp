@@ -53,16 +53,21 @@ Eigen::Matrix3d to_xyz(const Eigen::Vector3d& red, const Eigen::Vector3d& green,
   return primaries * Eigen::Vector3d(primaries.inverse() * white).asDiagonal();
 }
 
+/// Bradford's adaptation.
+Eigen::Matrix3d to_d65(const Eigen::Vector3d& white) {
+  Eigen::Matrix3d bradford;
+  bradford << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
+  const Eigen::Vector3d gain = (bradford * xyz(0.3127, 0.3290)).cwiseQuotient(bradford * white);
+  return bradford.inverse() * gain.asDiagonal() * bradford;
+}
+
 TEST(Color, MatricesAreThoseOfThePrimaries) {
   const Eigen::Vector3d d65 = xyz(0.3127, 0.3290), aces_white = xyz(0.32168, 0.33767);
   const Eigen::Matrix3d rec709 = to_xyz(xyz(0.64, 0.33), xyz(0.30, 0.60), xyz(0.15, 0.06), d65);
   const Eigen::Matrix3d rec2020 = to_xyz(xyz(0.708, 0.292), xyz(0.170, 0.797), xyz(0.131, 0.046), d65);
   const Eigen::Matrix3d ap1 = to_xyz(xyz(0.713, 0.293), xyz(0.165, 0.830), xyz(0.128, 0.044), aces_white);
   const Eigen::Matrix3d ap0 = to_xyz(xyz(0.7347, 0.2653), xyz(0, 1), xyz(0.0001, -0.077), aces_white);
-  Eigen::Matrix3d bradford;
-  bradford << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
-  const Eigen::Vector3d gain = (bradford * d65).cwiseQuotient(bradford * aces_white);
-  const Eigen::Matrix3d adaptation = bradford.inverse() * gain.asDiagonal() * bradford;
+  const Eigen::Matrix3d adaptation = to_d65(aces_white);
   const std::pair<const char*, Eigen::Matrix3d> spaces[] = {{"Linear Rec.709", Eigen::Matrix3d::Identity()},
                                                             {"Linear Rec.2020", rec709.inverse() * rec2020},
                                                             {"ACEScg", rec709.inverse() * adaptation * ap1},
@@ -80,6 +85,30 @@ TEST(Color, MatricesAreThoseOfThePrimaries) {
   EXPECT_EQ(data.rgb, pixel(0.2, 5, -1).rgb);
 }
 
+/// What EXR files say of a space is what the configuration converts by.
+TEST(Color, ChromaticitiesAreThoseOfTheWorkingSpaces) {
+  const ColorConfig config = ours();
+  EXPECT_EQ(config.working_space(), working_spaces()[0].name);
+  for (const WorkingSpace& s : working_spaces()) {
+    const ColorConfig other = config.with_working_space(s.interop_id);
+    EXPECT_EQ(other.working_space(), s.name);
+    const auto at = [&](std::size_t i) { return xyz(s.chromaticities[2 * i], s.chromaticities[2 * i + 1]); };
+    const Eigen::Matrix3d matrix = to_d65(at(3)) * to_xyz(at(0), at(1), at(2), at(3));
+    for (int c = 0; c < 3; ++c) {
+      Image image = pixel(c == 0, c == 1, c == 2);
+      config.with_working_space("Linear CIE-XYZ D65").to_scene_linear(image, s.name);
+      for (int i = 0; i < 3; ++i) EXPECT_NEAR(image.rgb[i], matrix(i, c), 1e-6) << s.name;
+    }
+    // White is white, and pixels of the space itself stay as they are.
+    Image image = pixel(1, 1, 1);
+    other.to_scene_linear(image, "sRGB");
+    for (const float v : image.rgb) EXPECT_NEAR(v, 1, 1e-6) << s.name;
+    image = pixel(0.2, 0.5, 0.9);
+    other.to_scene_linear(image, s.name);
+    EXPECT_EQ(image.rgb, pixel(0.2, 0.5, 0.9).rgb) << s.name;
+  }
+}
+
 std::string error_of(const std::function<void()>& act) {
   try {
     act();
@@ -93,6 +122,8 @@ TEST(Color, ErrorsNameTheFileAndWhatWasExpected) {
   const ColorConfig config = ours();
   Image image = pixel(0, 0, 0);
   EXPECT_THAT(error_of([&] { config.to_scene_linear(image, "Rec.77"); }),
+              AllOf(HasSubstr("config.ocio"), HasSubstr("'Rec.77'"), HasSubstr("Linear Rec.709, sRGB")));
+  EXPECT_THAT(error_of([&] { config.with_working_space("Rec.77"); }),
               AllOf(HasSubstr("config.ocio"), HasSubstr("'Rec.77'"), HasSubstr("Linear Rec.709, sRGB")));
   EXPECT_THAT(error_of([&] { config.to_display(image, "Kodak"); }),
               AllOf(HasSubstr("config.ocio"), HasSubstr("'Kodak'"), HasSubstr("Standard, Raw")));

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <memory>
 
+#include "reference/color.h"
 #include "reference/lights.h"
 #include "reference/procedural.h"
 #include "reference/render.h"
@@ -670,13 +671,14 @@ TEST(Compare, DifferencePicture) {
 }
 
 TEST_F(ImageTest, PreviewIsSrgb) {
-  Image image(1, 1);
-  image.rgb = {0.25f, 5, 0};
+  Rendering image;
+  image.mean = Image(1, 1);
+  image.mean.rgb = {0.25f, 5, 0};
   write_preview(folder_ / "p.png", image, 1);
-  const Image back = read_image(folder_ / "p.png");
+  const Image back = read_image(folder_ / "p.png", ColorConfig::current());
   EXPECT_NEAR(back.rgb[0], 0.5, 0.005);
   EXPECT_FLOAT_EQ(back.rgb[1], 1);
-  EXPECT_NEAR(read_image(folder_ / "p.png", "linear").rgb[0], 0.735357, 0.002);
+  EXPECT_NEAR(read_image(folder_ / "p.png", ColorConfig::current(), "linear").rgb[0], 0.735357, 0.002);
   EXPECT_THROW(write_preview(folder_ / "p.png", image, 0, "Filmic"), InputError);
   EXPECT_THROW(write_preview(folder_ / "p.jpg", image), InputError);
 }

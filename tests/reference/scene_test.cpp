@@ -471,6 +471,14 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
     for (const auto& [key, value] : definition["properties"].items()) documented.insert(key);
     EXPECT_EQ(accepted, documented) << c.definition;
   }
+  json scene = valid();
+  for (const json& name : schema["properties"]["working_space"]["enum"]) {
+    scene["working_space"] = name;
+    EXPECT_EQ(load_scene(write(scene.dump())).working_space, name);
+  }
+  scene["working_space"] = "Rec.77";
+  EXPECT_THAT(error_with(scene),
+              HasSubstr("working_space: expected one of Linear Rec.709, Linear Rec.2020, ACEScg, found \"Rec.77\""));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <regex>
 
 #include "core/error.h"
+#include "reference/color.h"
 #include "reference/image.h"
 
 namespace brdfc::report {
@@ -157,7 +158,7 @@ TEST_F(ReportTest, WritesPageJsonAndCsv) {
   EXPECT_THAT(page, HasSubstr("a &lt;ball&gt; &amp; more"));
   for (const char* name : {"ball/reference.png", "ball/exact.png", "ball/exact-difference.png", "ball/glossy.png"}) {
     EXPECT_THAT(page, HasSubstr(fmt::format("src=\"{}\"", name)));
-    const Image preview = reference::read_image(folder_ / name);
+    const Image preview = reference::read_image(folder_ / name, reference::ColorConfig::current());
     EXPECT_EQ(preview.width, kSize);
   }
   EXPECT_THAT(page, testing::Not(HasSubstr("http")));  // self-contained
@@ -248,9 +249,10 @@ TEST_F(ReportTest, ShowsWhatTheClosuresOfEachVersionDo) {
 TEST_F(ReportTest, PreviewsShowThePicturesAndTheSignOfTheDifference) {
   load();
   write_report(folder_);
-  const Image shown = reference::read_image(folder_ / "ball/reference.png");
+  const Image shown = reference::read_image(folder_ / "ball/reference.png", reference::ColorConfig::current());
   EXPECT_NEAR(shown.pixel(kSize / 2, 3)[0], reference().mean.pixel(kSize / 2, 3)[0], 0.01);
-  const Image difference = reference::read_image(folder_ / "ball/glossy-difference.png");
+  const Image difference =
+      reference::read_image(folder_ / "ball/glossy-difference.png", reference::ColorConfig::current());
   double red = 0, blue = 0;
   for (int y = 0; y < kSize; ++y) {
     red += difference.pixel(kSize - 1, y)[0];
