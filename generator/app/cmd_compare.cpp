@@ -61,7 +61,6 @@ void add_compare_command(CLI::App& app) {
       ->needs(test);
   command->callback([options] {
     const std::string name_a = options->files.front(), name_b = options->files.back();
-    const reference::Rendering b = reference::read_rendering(name_b);
     std::vector<reference::Rendering> pictures;
     for (std::size_t i = 0; i + 1 < options->files.size(); ++i) {
       pictures.push_back(reference::read_rendering(options->files[i]));
@@ -69,8 +68,11 @@ void add_compare_command(CLI::App& app) {
           pictures.back().mean.height != pictures.front().mean.height)
         input_error("{}: expected {} x {} pixels as in {}", options->files[i], pictures.front().mean.width,
                     pictures.front().mean.height, name_a);
-      reference::to_working_space_of(pictures.back(), b);
-      inject(pictures.back(), options->inject);
+    }
+    const reference::Rendering b = reference::read_rendering(name_b);
+    for (reference::Rendering& picture : pictures) {
+      reference::to_working_space_of(picture, b);
+      inject(picture, options->inject);
     }
     const reference::Rendering a = report::mean_of(pictures);
     const reference::Comparison c = reference::compare(a, b, name_a, name_b);
