@@ -91,6 +91,18 @@ def is_native(group):
     return "script_inputs" not in group[TAG]
 
 
+def is_fitted(node):
+    """Whether the form of a group node is closures, or Blender's own, fitted to the model; others
+    reflect what the model does, on average."""
+    return is_native(node.node_tree) or identity(node)[1] == "fitted"
+
+
+def source_text(group):
+    """The source of a group's shader, which the file holds; "" of a group that has lost it."""
+    script, _ = _scripts(group)
+    return script.script.as_string() if script is not None and script.script else ""
+
+
 def has_albedo_script(model_name, representation):
     """Whether the Albedo output of a form is a script of its own, which a group has if asked."""
     return pack.representation(model_name, representation).get("albedo_shader") is not None

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel Plots: pictures of plots.py, kept as previews, which no file holds."""
 
+import functools
+
 import bpy
 import bpy.utils.previews
 import numpy as np
 from bpy.types import Panel
 
 from . import color, nodes, pack
-from .i18n import iface, of_error, say
+from .i18n import form_name, iface, of_error, say
 
 #: Pictures that are kept; the oldest gives its place away.
 _KEPT = 16
 _previews = None
-_places = {}  # what is shown, to the name of a preview and the nearest nodes of Blender's
+_places = {}  # what is shown, to the name of a preview and its legend
 
 
 def _values(node):
@@ -23,46 +25,87 @@ def _values(node):
     return values, [name for name, value in values.items() if value is None]
 
 
-def picture(node):
-    """The preview of a node's values and plots.Nodes, Blender's own that are nearest; drawn where
-    the values are new. Raises ValueError for a model that the extension does not have."""
-    from . import plots  # NumPy's formulas, when they are first looked at
+def drawn(node):
+    """plots.draw() of a node's values, with what its form reflects, or without where that can't be
+    told: a file may hold forms of any version."""
+    from . import form_light, plots, shader_text  # NumPy's formulas, when they are first looked at
 
     model_name, _ = nodes.identity(node)
     values, _ = _values(node)
+    form = functools.partial(form_light.scattered, node) if nodes.is_fitted(node) else None
+    try:
+        return plots.draw(model_name, values, form)
+    except shader_text.Unreadable:
+        return plots.draw(model_name, values)
+
+
+def picture(node):
+    """The preview of a node's values and its plots.Legend; drawn where the values are new. Raises
+    ValueError for a model that the extension does not have."""
+    model_name, form = nodes.identity(node)
+    values, _ = _values(node)
     key = (
         model_name,
+        form,
+        node.node_tree[nodes.TAG]["digest"],
         color.working_space(),
         *((n, tuple(np.ravel(v))) for n, v in values.items() if v is not None),
     )
     if key not in _places:
-        pixels, near = plots.draw(model_name, values)
+        pixels, legend = drawn(node)
         if len(_previews) < _KEPT:
             name = f"plot {len(_previews)}"
             _previews.new(name)
         else:
             name, _ = _places.pop(next(iter(_places)))
         preview = _previews[name]
-        preview.image_size = (plots.SIZE, plots.SIZE)
+        preview.image_size = pixels.shape[1::-1]
         # Four bytes a pixel, as one integer.
         packed = np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)).view(np.int32)
         preview.image_pixels.foreach_set(packed.ravel())
-        _places[key] = (name, near)
-    name, near = _places[key]
-    return _previews[name], near
+        _places[key] = (name, legend)
+    name, legend = _places[key]
+    return _previews[name], legend
 
 
-def _legend(near):
-    if near.glossy is not None:
-        yield say("Grey: the nearest Glossy, roughness {value}", value=f"{near.glossy:.2f}")
-    if node := near.principled:
-        percent = f"{100 * node.error:.2g}" if node.error < 1 else f"{100 * node.error:.0f}"
+def _percent(share):
+    return f"{round(100 * share, 2):.2g}" if share < 1 else f"{100 * share:.0f}"
+
+
+def _shares(color):
+    """One percentage, or one of red, green and blue."""
+    texts = [f"{100 * share:.3g}" for share in color]
+    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
+
+
+def _form_said(node, legend):
+    form = form_name(nodes.identity(node)[1])
+    if legend.form is not None:
+        percent = _percent(legend.form)
+        return say("Dotted: the form {form}, off by {percent} % here", form=form, percent=percent)
+    if nodes.is_fitted(node):
+        return say("What the form {form} reflects can't be drawn", form=form)
+    return say("The form {form} reflects what the model does", form=form)
+
+
+def _legend(node, legend):
+    """Sentences, by what they are of: first the material itself."""
+    if legend.mirror is not None:
+        shares = _shares(legend.mirror)
+        yield say("Arrow above: an ideal mirror, {percent} % of the light", percent=shares)
+    if legend.refracted is not None:
+        yield say("Arrow below: refracted, {percent} %", percent=_shares(legend.refracted))
+    yield _form_said(node, legend)
+    if legend.glossy is not None:
+        yield say("Grey: the nearest Glossy, roughness {value}", value=f"{legend.glossy:.2f}")
+    if near := legend.principled:
+        percent = _percent(near.error)
         yield say("Dashed: the nearest Principled, off by {percent} % here", percent=percent)
         yield say(
             "Its roughness {roughness}, metallic {metallic}, IOR {ior}",
-            roughness=f"{node.roughness:.2f}",
-            metallic=f"{node.metallic:.2f}",
-            ior=f"{node.ior:.2f}",
+            roughness=f"{near.roughness:.2f}",
+            metallic=f"{near.metallic:.2f}",
+            ior=f"{near.ior:.2f}",
         )
 
 
@@ -71,14 +114,14 @@ def draw_plots(layout, material):
         column = layout.column(align=True)
         column.label(text=node.label or node.name, icon="MATERIAL", translate=False)
         try:
-            preview, near = picture(node)
+            preview, legend = picture(node)
         except ValueError as error:
             said = say("This extension does not have this model", more=str(error))
             column.label(text=iface(said), icon="ERROR", translate=False)
             continue
         column.template_icon(icon_value=preview.icon_id, scale=12.0)
         column.label(text="Above: light from 45\u00b0, and where it goes")
-        for said in _legend(near):
+        for said in _legend(node, legend):
             column.label(text=iface(said), translate=False)
         column.label(text="Below: under a lamp; reflected share, 0\u00b0 to 90\u00b0")
         _, linked = _values(node)

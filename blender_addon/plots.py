@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of what a material's values do, drawn with the model's formulas on NumPy arrays.
 
-A square of three: above, the light that leaves in the plane of incidence, half of a circle; below
-a ball under a lamp, and the share of the light that is reflected over the angle of the view. Red,
-green and blue are drawn apart, and add up to white. Of Blender nothing is known here but what its
-screen shows of a colour.
+A square of three: above, the light that leaves in the plane of incidence, half of a circle, or all
+of it where light is let through; below a ball under a lamp, and the share of the light that is
+reflected over the angle of the view. Red, green and blue are drawn apart, and add up to white. Of
+Blender nothing is known here but what its screen shows of a colour.
 """
 
 import functools
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import brdfc, color
-from .principled import Nearest, nearest_principled
+from .principled import Nearest, misplaced, nearest_principled
 
 #: Pixels of a side.
 SIZE = 320
@@ -23,15 +23,22 @@ INCIDENCE = 45.0
 _SAMPLES, _VIEWS = 256, 13
 _HALF = SIZE // 2
 _PAPER, _GRID, _INK = 0.13, 0.28, 0.55
+#: Dots of a form's curve: no colour that curves of red, green and blue add up to.
+_DOTS = np.array([1.0, 0.35, 0.75])
 
 
 @dataclass(frozen=True)
-class Nodes:
-    """Blender's own nodes whose lobes are nearest to one, or None."""
+class Legend:
+    """What a picture shows beside the model's own lobes; None for what it does not."""
 
-    #: The roughness of the Glossy node.
+    #: Blender's own nodes whose lobes are nearest: the roughness of the Glossy node, and
     glossy: float | None = None
     principled: Nearest | None = None
+    #: Part of the half circle's light that the material's form sends elsewhere.
+    form: float | None = None
+    #: Shares (r, g, b) of light from INCIDENCE that are ideally reflected and refracted.
+    mirror: tuple | None = None
+    refracted: tuple | None = None
 
 
 def values_in_range(model, values):
@@ -105,76 +112,126 @@ def _angles():
 
 
 @functools.cache
-def _polar_grid():
-    """Radius, 1 at the rim, and angle of the upper half's pixels; the first row is the lowest."""
-    x = (np.arange(SIZE) + 0.5) / _HALF - 1
-    y = (np.arange(_HALF) + 0.5) / _HALF - 0.03
-    x, y = np.meshgrid(x / 0.94, y / 0.94)
-    return np.hypot(x, y), np.arctan2(x, y)
+def _polar_grid(whole=False):
+    """Of the upper half's pixels the radius, 1 at the rim, and the angle; the first row is the
+    lowest. Then pixels of a radius. `whole`: a circle, not the upper half of one."""
+    unit, middle = (0.47 * _HALF, 0.5 * _HALF) if whole else (0.94 * _HALF, 0.03 * _HALF)
+    x, y = np.meshgrid(np.arange(SIZE) + 0.5 - _HALF, np.arange(_HALF) + 0.5 - middle)
+    return np.hypot(x, y) / unit, np.arctan2(x, y), unit
 
 
 @functools.cache
-def _pixels_among_angles():
+def _pixels_among_angles(whole):
     """Where the angle of each pixel lies among _angles(): the one below, and how far beyond it."""
-    angles, (_, angle) = _angles(), _polar_grid()
+    angles, (_, angle, _) = _angles(), _polar_grid(whole)
     below = np.clip(np.searchsorted(angles, angle) - 1, 0, len(angles) - 2)
     share = (angle - angles[below]) / (angles[below + 1] - angles[below])
     return below, np.clip(share, 0, 1)
 
 
-def _in_pixels(curve):
+def _in_pixels(curve, whole):
     """A curve over _angles() at the angles of the pixels."""
-    below, share = _pixels_among_angles()
+    below, share = _pixels_among_angles(whole)
     return curve[below] + share * np.diff(curve)[below]
 
 
-def _line(curve, dashed=False):
+def _line(curve, whole, dash=None):
     """How much of each pixel a curve over _angles() covers, 0 to 1, in a line of two pixels; and
-    the curve at each."""
-    radius, angle = _polar_grid()
-    at, slope = _in_pixels(curve), _in_pixels(np.gradient(curve, _angles()))
+    the curve at each. `dash`: how many dashes a radius has, and which part of them is drawn."""
+    radius, angle, unit = _polar_grid(whole)
+    at, slope = _in_pixels(curve, whole), _in_pixels(np.gradient(curve, _angles()), whole)
     off = np.abs(radius - at) / np.sqrt(1 + (slope / np.maximum(radius, 0.02)) ** 2)
     # Steep flanks of a narrow lobe would draw a line beyond its tip.
-    ink = np.clip(1.8 - off * _HALF * 0.94, 0, 1) * (radius < curve.max() + 1.5 / _HALF)
-    if dashed:  # by the way along the curve, which on flanks is the radius
-        along = np.where(np.abs(slope) > radius, radius, radius * angle)
-        ink *= along * 16 % 1 < 0.6
+    tip = curve.max() + 1.4 / unit
+    ink = np.clip(1.8 - off * unit, 0, 1) * (radius < tip) * (np.abs(angle) <= np.pi / 2)
+    if dash:  # by the way along the curve, which on flanks is the radius
+        steps = np.hypot(np.diff(curve), 0.5 * (curve[1:] + curve[:-1]) * np.diff(_angles()))
+        way = _in_pixels(np.concatenate([[0], np.cumsum(steps)]), whole)
+        along = np.where(np.abs(slope) > radius, radius, way)
+        ink *= along * dash[0] % 1 < dash[1]
     return ink, at
 
 
-def _polar(model, values):
-    radius, angle = _polar_grid()
-    picture = np.full((_HALF, SIZE, 3), _PAPER)
-    upper = np.abs(angle) <= np.pi / 2
-    for ring in (0.25, 0.5, 0.75, 1.0):
-        picture[(np.abs(radius - ring) < 0.004) & upper] = _GRID
-    light = np.abs(angle + np.radians(INCIDENCE)) * radius < 0.006
-    picture[light & (radius < 1)] = _INK
+def _draw_arrow(picture, direction, shares, whole):
+    """An arrow from the middle to the rim, bright as far as the share of each channel."""
+    radius, angle, unit = _polar_grid(whole)
+    along, across = radius * np.cos(angle - direction), np.abs(radius * np.sin(angle - direction))
+    along, across = along * unit, across * unit
+    head = np.clip(0.45 * (unit - along) + 0.5 - across, 0, 1) * (along > unit - 11)
+    shaft = np.clip(1.2 - across, 0, 1) * (along < unit - 10)
+    arrow = _INK * np.maximum(head, shaft) * (along > 0)
+    np.maximum(picture, arrow[..., None], out=picture)
+    for c, share in enumerate(shares):
+        ink = np.clip(2 - across, 0, 1) * (along > 0) * (along < share * unit)
+        np.maximum(picture[..., c], ink, out=picture[..., c])
+
+
+def _complete(model, values):
+    return {name: p.default for name, p in model.parameters.items()} | values
+
+
+def _refraction(model, values):
+    """The angle from the upper normal of light that goes on below, by the parameter `ior`."""
+    sine = np.sin(np.radians(INCIDENCE)) / _complete(model, values).get("ior", 1.0)
+    return np.pi - np.arcsin(np.clip(sine, 0, 1))
+
+
+def _draw_lobes(picture, model, values, form, whole):
+    """Draws what is scattered, over its peak: the model's lobes, the form's and the nearest nodes';
+    returns what the legend says of them."""
+    radius, angle, _ = _polar_grid(whole)
     lobes = slice_of(model, values, _angles())
-    mirror = model.mirror(_slice(np.radians(-INCIDENCE)), **values)
     peak = lobes.max()
-    near = Nodes()
-    if peak > 0:
-        # Of a node with an ideal mirror there is no curve.
-        node = None if mirror.any() else nearest_principled(lobes, _angles(), INCIDENCE)
-        lobes = 0.95 * lobes / peak
-        if glossy := nearest_glossy(lobes.mean(axis=1)):
-            shade = 0.5 * _line(np.minimum(glossy[1], 1.0))[0]
-            picture = np.maximum(picture, (shade * upper)[..., None])
-        near = Nodes(glossy[0] if glossy else None, node)
-        for c in range(3):
-            line, at = _line(lobes[:, c])
-            ink = np.maximum(line, 0.35 * (radius < at)) * upper
-            picture[..., c] = np.maximum(picture[..., c], ink)
-            if node:
-                dashes, _ = _line(np.minimum(0.95 * node.curve[:, c] / peak, 1.0), dashed=True)
-                picture[..., c] = np.maximum(picture[..., c], 0.85 * dashes * upper)
-    # Ideal reflection has no width: a ray as long as its share.
-    ray = (np.abs(angle - np.radians(INCIDENCE)) * radius < 0.01)[..., None] & (
-        radius[..., None] < 0.95 * mirror
-    )
-    picture[ray] = 1.0
-    return picture, near
+    if not peak > 0:
+        return {}
+    light = _slice(np.radians(-INCIDENCE))
+    # Of a node with an ideal mirror there is no curve.
+    mirror = model.mirror(light, **values).any()
+    node = None if mirror else nearest_principled(lobes, _angles(), INCIDENCE)
+    glossy = nearest_glossy(0.95 / peak * lobes.mean(axis=1))
+    if glossy:
+        shade = 0.5 * _line(np.minimum(glossy[1], 1.0), whole)[0]
+        np.maximum(picture, shade[..., None], out=picture)
+    said = {"glossy": glossy[0] if glossy else None, "principled": node}
+    for c in range(3):
+        line, at = _line(0.95 / peak * lobes[:, c], whole)
+        ink = np.maximum(line, 0.35 * (radius < at) * (np.abs(angle) <= np.pi / 2))
+        np.maximum(picture[..., c], ink, out=picture[..., c])
+        if node:
+            dashes, _ = _line(np.minimum(0.95 / peak * node.curve[:, c], 1.0), whole, (16, 0.6))
+            np.maximum(picture[..., c], 0.85 * dashes, out=picture[..., c])
+    if form:
+        curve = form(_complete(model, values), _slice(_angles()), light)
+        said["form"] = misplaced(curve, lobes, np.gradient(_angles()))
+        for channel in np.unique(np.clip(0.95 / peak * curve, 0, 1), axis=1).T:
+            dots, _ = _line(channel, whole, (22, 0.42))
+            on = dots > 0
+            picture[on] += dots[on][:, None] * (_DOTS - picture[on])
+    return said
+
+
+def _polar(model, values, form):
+    light = _slice(np.radians(-INCIDENCE))
+    mirror, refracted = model.mirror(light, **values), model.transmit(light, **values)
+    whole = bool(refracted.any())
+    radius, angle, unit = _polar_grid(whole)
+    picture = np.full((_HALF, SIZE, 3), _PAPER)
+    for ring in (0.25, 0.5, 0.75, 1.0):
+        on = np.abs(radius - ring) * unit < 0.6
+        picture[on if whole else on & (np.abs(angle) <= np.pi / 2)] = _GRID
+    if whole:  # the surface
+        picture[_HALF // 2, np.abs(np.arange(SIZE) + 0.5 - _HALF) < unit] = _INK
+    from_light = np.abs(angle + np.radians(INCIDENCE)) * radius * unit < 0.9
+    picture[from_light & (radius < 1)] = _INK
+    said = _draw_lobes(picture, model, values, form, whole)
+    # What has no width is an arrow.
+    if mirror.any():
+        _draw_arrow(picture, np.radians(INCIDENCE), mirror, whole)
+        said["mirror"] = tuple(mirror.tolist())
+    if refracted.any():
+        _draw_arrow(picture, _refraction(model, values), refracted, whole)
+        said["refracted"] = tuple(refracted.tolist())
+    return picture, Legend(**said)
 
 
 @functools.cache
@@ -251,16 +308,17 @@ def _albedo(model, values):
     return picture
 
 
-def draw(model_name, values):
+def draw(model_name, values, form=None):
     """The picture of a model with a node's values: (SIZE, SIZE, 4), 0 to 1 as a screen shows it,
-    the first row the lowest; and the Nodes whose lobes are nearest.
+    the first row the lowest; and its Legend. `form`: f cos of a form that reflects other light, as
+    a function of complete values, wi (N, 3) and wo (3,).
 
-    Raises ValueError for a model that this extension does not have.
+    Raises ValueError for a model that this extension does not have, and what `form` raises.
     """
     model = brdfc.model(model_name)
     known = values_in_range(model, values)
-    above, near = _polar(model, known)
+    above, legend = _polar(model, known, form)
     below = np.concatenate([_lit_ball(model, known), _albedo(model, known)], axis=1)
     picture = np.ones((SIZE, SIZE, 4))
     picture[..., :3] = np.concatenate([below, above], axis=0)
-    return picture, near
+    return picture, legend

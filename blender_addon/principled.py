@@ -43,6 +43,12 @@ def node_slice(native, wi, wo):
     return native_bsdf.f_cos(native, wi, np.broadcast_to(wo, wi.shape), views)
 
 
+def misplaced(found, curve, area):
+    """Part of a curve's (N, 3) area that in another one lies elsewhere; `area` is what each of its
+    angles stands for."""
+    return float((area @ np.abs(found - curve)).sum() / (area @ curve).sum())
+
+
 class Search:
     """For curves over directions wi (N, 3) in the plane of wo, in the order of their angles."""
 
@@ -146,8 +152,7 @@ class Search:
         color = tuple(float(c) for c in color)
         native = Native("principled", color, r, metallic=m, f0=float(_F0[index]))
         found = node_slice(native, self._wi, self._wo)
-        off = self._area @ np.abs(found - curve)
-        error = float(off.sum() / (self._area @ curve).sum())
+        error = misplaced(found, curve, self._area)
         return Nearest(r, m, float(_IOR[index]), color, found, error)
 
 

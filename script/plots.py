@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel's plots of four models side by side, as docs/plots.png has them, and how long those of
-each model take:
+"""The panel's plots of five materials side by side, as docs/plots.png has them, and how long those
+of each model take, and of its forms that have a curve of their own:
 
 .env/blender-4.5/bin/python script/plots.py build/brdfc_shaders-VERSION.zip docs/plots.png
 """
@@ -14,39 +14,54 @@ from importlib import import_module
 import numpy as np
 import render_scene
 
-#: A rough metal, a lossless kernel, a plastic, a mirror of gold.
-MODELS = ("cook_torrance", "lossless", "phong_material", "fresnel_conductor")
+#: A rough metal, a lossless kernel, a plastic, a matte surface under a mirror, glass; with forms.
+MATERIALS = {
+    "cook_torrance": "fitted",
+    "lossless": "twin",
+    "phong_material": "auto",
+    "coupled": "twin",
+    "glass": "auto",
+}
 #: White pixels between two.
 GAP = 8
 
 
-def drawing_times(plots, models):
-    """Wall seconds of a plot by model, once what all share is there: the least of seven."""
-    times = {}
-    for model in models:
-        plots.draw(model, {})
-        taken = []
-        for _ in range(7):
-            start = time.perf_counter()
-            plots.draw(model, {})
-            taken.append(time.perf_counter() - start)
-        times[model] = min(taken)
-    return times
+def drawing_time(draw):
+    """Wall seconds of a plot, once what all share is there: the least of seven."""
+    draw()
+    taken = []
+    for _ in range(7):
+        start = time.perf_counter()
+        draw()
+        taken.append(time.perf_counter() - start)
+    return min(taken)
 
 
 def main(extension, out):
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as resources:
         bpy, loader = render_scene.start_blender(extension, resources)
-        plots = import_module(loader.__name__.replace("scene_loader", "plots"))
-        pictures = [plots.draw(model, {})[0] for model in MODELS]
-        gap = np.ones((plots.SIZE, GAP, 4))
+        api, nodes, panel = (
+            import_module(loader.__name__.replace("scene_loader", name))
+            for name in ("api", "nodes", "plot_panel")
+        )
+
+        def node_of(model, form):
+            (node,) = nodes.group_nodes(api.new_material(model, form))
+            return node
+
+        pictures = [panel.drawn(node_of(*material))[0] for material in MATERIALS.items()]
+        gap = np.ones((pictures[0].shape[0], GAP, 4))
         row = np.concatenate([x for p in pictures for x in (gap, p)][1:], axis=1)
         image = bpy.data.images.new("plots", row.shape[1], row.shape[0])
         image.pixels.foreach_set(row.astype(np.float32).ravel())
         image.filepath_raw, image.file_format = out, "PNG"
         image.save()
-        for model, seconds in drawing_times(plots, loader.pack.model_names()).items():
-            print(f"{model}: {1000 * seconds:.1f} ms")
+        for model, entry in api.models().items():
+            for form in ("auto", *entry["representations"]):
+                node = node_of(model, form)
+                if form == "auto" or nodes.is_fitted(node):
+                    taken = drawing_time(lambda node=node: panel.drawn(node))
+                    print(f"{model} ({form}): {1000 * taken:.1f} ms")
 
 
 if __name__ == "__main__":

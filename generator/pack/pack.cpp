@@ -221,6 +221,7 @@ Result build_pack(const Options& options) {
   for (const plan::PlannedModel& plan : chosen) formulas.push_back(plan.model);
   for (const auto& [name, data] : python_package(formulas, options.python))
     if (name.ends_with(".py")) members["brdfc/" + name] = data;
+  members["brdfc/_closures.py"] = closures_module();
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;
   manifest["hash"] = sha256(everything);

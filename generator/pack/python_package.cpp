@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 
+#include "closures/closure.h"
 #include "core/error.h"
 #include "model/choices.h"
 #include "model/optical.h"
@@ -241,6 +242,47 @@ std::map<std::string, std::string> python_package(const std::vector<const Model*
   files["models/__init__.py"] =
       std::string(kHead) + "\"\"\"The formulas, a module a model.\"\"\"\n\nNAMES = (\n" + names + ")\n";
   return files;
+}
+
+std::string closures_module() {
+  std::string out = std::string(kHead) + "\"\"\"What closures of Cycles scatter.\"\"\"\n\nimport numpy as np\n\n" +
+                    "from ._formula import rgb\n";
+  for (const auto& [kind, name] :
+       {std::pair{ClosureKind::Diffuse, "diffuse"}, std::pair{ClosureKind::DiffuseRamp, "diffuse_ramp"},
+        std::pair{ClosureKind::PhongRamp, "phong_ramp"}, std::pair{ClosureKind::Ggx, "ggx"},
+        std::pair{ClosureKind::Beckmann, "beckmann"}}) {
+    Recorder recorder(Precision::Double);
+    std::vector<std::string> arguments;
+    const auto vector = [&](const std::string& v) {
+      for (const char* component : {"_x", "_y", "_z"}) arguments.push_back(v + component);
+      return input3(v);
+    };
+    const auto number = [&](const std::string& n) {
+      arguments.push_back(n);
+      return Expr::input(n);
+    };
+    const Vec3<Expr> wi = vector("wi"), wo = vector("wo");
+    Closure<Expr> c(kind, Rgb<Expr>(Expr(1.0)));
+    c.normal = vector("normal");
+    c.turned = true;
+    if (kind == ClosureKind::PhongRamp) c.exponent = number("exponent");
+    for (std::size_t i = 0; has_ramp(kind) && i < kRampSize; ++i) {
+      arguments.push_back(fmt::format("ramp_{}", i));
+      c.ramp[i] = Rgb<Expr>::input(arguments.back());
+    }
+    if (has_facets(kind)) {
+      const Vec3<Expr> along = vector("tangent");
+      c.tangent = normalize(along - c.normal * dot(c.normal, along));
+      c.stretched = Tangent::Surface;
+      c.alpha = number("alpha");
+      c.alpha_across = number("alpha_across");
+    }
+    Program program;
+    program.output("f_cos", evaluate(c, wi, wo));
+    print::NumpyTables none;
+    out += "\n\n" + print::numpy_function(program, name, arguments, none);
+  }
+  return out;
 }
 
 }  // namespace brdfc::pack

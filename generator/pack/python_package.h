@@ -16,4 +16,8 @@ namespace brdfc::pack {
 std::map<std::string, std::string> python_package(const std::vector<const Model*>&,
                                                   const std::filesystem::path& source);
 
+/// A module of f cos(theta_i) of the closures that forms are sums of, a function each, in the names that OSL has for
+/// them: of components of wi, wo and the normal, and of what the closure takes. Directions above the surface.
+std::string closures_module();
+
 }  // namespace brdfc::pack

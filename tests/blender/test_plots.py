@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plots in the panel: their pixels are what the model says, and they cost little."""
 
+import json
 import math
 import subprocess
 import sys
@@ -11,6 +12,9 @@ import bpy
 import helpers
 import numpy as np
 import pytest
+from goniometer import unit
+from helpers import arguments, pairs_csv, read_csv
+from test_fitted import along_sliders
 
 SCRIPTS = Path(__file__).parents[2] / "script"
 
@@ -120,9 +124,9 @@ def test_a_lobe_points_where_the_light_goes_and_a_matte_one_up(extension, panel,
     assert angle == pytest.approx(45, abs=1.5) and length == pytest.approx(0.95, abs=0.03)
     angle, _ = peak_angle(shown(panel, extension, "lambert", rho=1.0)[0])
     assert angle == pytest.approx(0, abs=10)
-    # Ideal reflection: a ray as long as Schlick's share of it.
+    # Ideal reflection: an arrow that is bright as far as its share.
     angle, length = peak_angle(shown(panel, extension, "lambertian_specular", rs=0.7, rd=0.0)[0])
-    assert angle == pytest.approx(45, abs=1.5) and length == pytest.approx(0.95 * 0.7, abs=0.03)
+    assert angle == pytest.approx(45, abs=1.5) and length == pytest.approx(0.7, abs=0.03)
 
 
 def test_the_nearest_glossy_node_is_as_rough_as_its_own_lobe(plots, extension, panel, empty):
@@ -135,7 +139,7 @@ def test_the_nearest_glossy_node_is_as_rough_as_its_own_lobe(plots, extension, p
     smooth = shown(panel, extension, "cook_torrance", m=0.1)[1].glossy
     rough = shown(panel, extension, "cook_torrance", m=0.4)[1].glossy
     assert smooth**2 == pytest.approx(0.1, abs=0.03) and smooth < rough
-    assert shown(panel, extension, "fresnel_conductor")[1] == plots.Nodes()
+    assert shown(panel, extension, "fresnel_conductor")[1].glossy is None
 
 
 @pytest.fixture(scope="module")
@@ -232,7 +236,7 @@ def test_the_curve_of_the_principled_node_is_dashed(extension, panel, plots, emp
     model = plots.brdfc.model("cook_torrance")
     values = plots.values_in_range(model, {"m": 0.3})
     curve = plots.slice_of(model, values, plots._angles())
-    radius, angle = plots._polar_grid()
+    radius, angle, _ = plots._polar_grid()
 
     def over_peak(c):
         return np.interp(angle, plots._angles(), 0.95 * c[:, 0] / curve.max())
@@ -242,6 +246,273 @@ def test_the_curve_of_the_principled_node_is_dashed(extension, panel, plots, emp
     inked = red[on] > 0.7
     assert on.sum() > 20 and 0.3 < inked.mean() < 0.9
     assert near.principled.error > 0.1
+
+
+@pytest.fixture(scope="module")
+def form_light(extension):
+    return import_module(f"{extension.package}.form_light")
+
+
+def of_form(form_light, plots, extension, material, wi, wo):
+    """f cos of a material's form at its own values."""
+    (node,) = extension.nodes.group_nodes(material)
+    model = plots.brdfc.model(extension.nodes.identity(node)[0])
+    values = plots.values_in_range(model, extension.api.get_parameters(material))
+    return form_light.scattered(node, plots._complete(model, values), wi, wo)
+
+
+def of_tool(tool, form, model, values, over, wi, wo):
+    """What the tool says of that: the closures of its own fit."""
+    options = [*(["--twin"] if form == "twin" else []), *over, "--pairs"]
+    text = tool("fit", model, *arguments(values), *options, stdin=pairs_csv(wi, wo))
+    return read_csv(text)[1]
+
+
+#: Views of forms: steep and flat, in the plane of the plots and aside.
+VIEWS = [unit(v) for v in ((-1, 0, 1), (0.1, 0.2, 1), (0.5, -0.8, 0.6), (-0.3, 0.9, 0.1))]
+
+
+def lights(wo):
+    """Directions all over the hemisphere, down to its rim, and near the mirror direction."""
+    rng = np.random.default_rng(1)
+    z, phi = rng.uniform(0.02, 1, 60), rng.uniform(0, 2 * np.pi, 60)
+    around = np.stack([np.cos(phi), np.sin(phi), np.zeros(60)], axis=-1)
+    spread = np.geomspace(0.003, 0.3, 60)[:, None] * rng.normal(size=(60, 3))
+    near = unit(wo * (-1, -1, 1) + spread)
+    wide = np.sqrt(1 - z * z)[:, None] * around + z[:, None] * [0, 0, 1]
+    return np.concatenate([wide, near[near[:, 2] > 0.01]])
+
+
+@pytest.fixture
+def off_the_tool(form_light, plots, extension, tool):
+    """off_the_tool(form, model, values, *options): how far a form's curve is from what the tool
+    says, as a share of the largest value, at worst over VIEWS."""
+
+    def measured(form, model, values, *options):
+        material = extension.api.new_material(model, form, **values)
+        values = {name: extension.api.get_parameters(material)[name] for name in values}
+        wi = [lights(wo) for wo in VIEWS]
+        curves = [
+            of_form(form_light, plots, extension, material, *pair)
+            for pair in zip(wi, VIEWS, strict=True)
+        ]
+        wo = [np.broadcast_to(o, i.shape) for i, o in zip(wi, VIEWS, strict=True)]
+        wi, wo = np.concatenate(wi), np.concatenate(wo)
+        expected = of_tool(tool, form, model, values, options, wi, wo)
+        assert expected.max() > 0.01, model
+        return np.abs(np.concatenate(curves) - expected).max() / expected.max()
+
+    return measured
+
+
+def test_the_curve_of_a_fitted_form_is_that_of_the_tool(off_the_tool, extension, empty):
+    """Its closures in double precision, from tables and numbers of six digits: of every fitted form
+    of the extension at two values of all that is a socket."""
+    for model, name, values in along_sliders(extension):
+        assert off_the_tool("fitted", model, values, "--over", name) < 2e-6, (model, values)
+
+
+#: Values of numbers and colours of a twin: one of each way to be a socket, and a mirror's.
+TWINS = {
+    "phong": {"e": 73.0, "ks": (0.9, 0.6, 0.2)},
+    "cook_torrance": {"m": 0.37, "f0": (0.9, 0.3, 0.05)},
+    "schlick": {"rough": 0.21, "r": (0.7, 0.4, 0.1)},
+    "coupled": {"r0": 0.15, "rm": (0.8, 0.3, 0.5)},
+    "phong_material": {},
+    "ward": {"ks": (0.2, 0.9, 0.5)},
+    "lossless": {"tint": (1.0, 0.7, 0.4)},
+}
+
+
+def test_the_curve_of_a_twin_is_that_of_the_tool(off_the_tool, extension, empty):
+    """Blender's nodes are in single precision."""
+    for model, values in TWINS.items():
+        axis = extension.pack.representation(model, "twin")["axis"]
+        mixed = json.loads(extension.pack.source(model, "twin")[1])["mixed"]
+        over = [*(["--over", axis["name"]] if axis else []), *(["--any", *mixed] if mixed else [])]
+        off = off_the_tool("twin", model, values, *over)
+        print(f"{model}: {off:.2g}")
+        assert off < 2e-5, model
+
+
+def test_a_file_that_is_opened_has_the_same_curves(form_light, plots, extension, empty, tmp_path):
+    wo = VIEWS[0]
+    wi = lights(wo)
+
+    def curves(materials):
+        return [of_form(form_light, plots, extension, m, wi, wo) for m in materials]
+
+    made = [extension.api.new_material("phong", form, e=73.0) for form in ("fitted", "twin")]
+    before, names = curves(made), [m.name for m in made]
+    for material in made:
+        material.use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
+    for old, new in zip(before, curves(bpy.data.materials[n] for n in names), strict=True):
+        assert old.max() > 0.1
+        np.testing.assert_array_equal(new, old)
+
+
+def legend_of(panel, extension, material):
+    layout = helpers.Layout()
+    panel.draw_plots(layout, material)
+    (node,) = extension.nodes.group_nodes(material)
+    preview, legend = panel.picture(node)
+    return layout.log, legend, pixels_of(preview)
+
+
+def inked(picture):
+    """Pixels of dots, which are pink."""
+    above = picture[picture.shape[0] // 2 :]
+    return (above[..., 0] > 0.9) & (above[..., 1] < 0.5) & (np.abs(above[..., 2] - 0.75) < 0.1)
+
+
+def test_a_form_made_for_other_values_has_its_own_curve(
+    panel, plots, extension, tool, use_pack, empty
+):
+    """From the shader that the file holds, of a pack that is no longer there; the error of its
+    curve is what tool and model say."""
+    values = {"ks": (0.9, 0.7, 0.3), "ax": 0.25, "ay": 0.25}
+    use_pack({"ward": {"model": "ward", "parameters": values, "representation": "fitted"}})
+    material = extension.api.new_material("ward", "fitted", **values)
+    extension.pack.use()
+    log, legend, picture = legend_of(panel, extension, material)
+    wi, wo = plots._slice(plots._angles())[1:-1], plots._slice(np.radians(-plots.INCIDENCE))
+    wo = np.broadcast_to(wo, wi.shape)
+    closures = of_tool(tool, "fitted", "ward", values, (), wi, wo)
+    f = helpers.evaluate(tool, "ward", values, wi, wo)
+    area = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
+    off = area(np.abs(closures - f * wi[:, 2:]), plots._angles()[1:-1], axis=0).sum()
+    off /= area(f * wi[:, 2:], plots._angles()[1:-1], axis=0).sum()
+    assert legend.form == pytest.approx(off, rel=0.01) and 0.001 < off < 0.05
+    assert f"Dotted: the form Fitted, off by {100 * off:.2g} % here" in log
+
+
+def test_the_curve_of_a_form_is_dotted(panel, plots, form_light, extension, empty):
+    """A twin without the round flanks that this kernel has: dots with gaps, there and nowhere
+    else."""
+    material = extension.api.new_material("lossless", "twin")
+    on = inked(legend_of(panel, extension, material)[2])
+    wi, wo = plots._slice(plots._angles()), plots._slice(np.radians(-plots.INCIDENCE))
+    curve = of_form(form_light, plots, extension, material, wi, wo).max(axis=1)
+    own = plots.slice_of(plots.brdfc.model("lossless"), {}, plots._angles()).max(axis=1)
+    radius, angle, unit = plots._polar_grid()
+
+    def over_peak(c):
+        return np.interp(angle, plots._angles(), 0.95 * c / own.max())
+
+    away = np.abs(over_peak(curve) - over_peak(own)) > 0.1
+    near = np.abs(radius - over_peak(curve)) * unit < 1
+    assert (near & away).sum() > 50 and 0.2 < on[near & away].mean() < 0.8
+    assert not (on & away & (np.abs(radius - over_peak(own)) < 0.02)).any()
+    # Where it is steep, a line of two pixels covers more of a radius.
+    steep = np.interp(angle, plots._angles(), np.abs(np.gradient(curve, plots._angles())))
+    tilt = np.hypot(1, 0.95 / own.max() * steep / np.maximum(radius, 0.02))
+    assert (np.abs(radius - over_peak(curve)) * unit / tilt)[on].max() < 3
+
+
+def test_forms_that_equal_the_model_have_no_curve(panel, extension, empty):
+    for model, form in (("ward", "aimed"), ("ward", "sampled"), ("lambert", "exact")):
+        material = extension.api.new_material(model, form)
+        log, legend, picture = legend_of(panel, extension, material)
+        assert legend.form is None and not inked(picture).any()
+        assert f"The form {form.capitalize()} reflects what the model does" in log
+    twin = extension.api.new_material("ward", "twin")
+    assert inked(legend_of(panel, extension, twin)[2]).any()
+
+
+def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
+    """A file may hold anything."""
+    material = extension.api.new_material("phong", "fitted")
+    (node,) = extension.nodes.group_nodes(material)
+    (script,) = (n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
+    said = "What the form Fitted reflects can't be drawn"
+    good = script.script.as_string()
+    for text in ("", "shader x(\n)\n{\n  BSDF = diffuse(N);\n}\n", good.replace("exp(", "eval(")):
+        extension.api.set_parameters(material, e=10.0 + len(text) % 97)  # drawn anew
+        script.script.from_string(text)
+        log, legend, _ = legend_of(panel, extension, material)
+        assert said in log and legend.form is None and legend.principled is not None
+    twin = extension.api.new_material("phong", "twin")
+    (group,) = extension.nodes.group_nodes(twin)
+    (end,) = (n for n in group.node_tree.nodes if n.bl_idname == "NodeGroupOutput")
+    glass = group.node_tree.nodes.new("ShaderNodeBsdfGlass")
+    group.node_tree.links.new(glass.outputs[0], end.inputs["BSDF"])
+    assert said.replace("Fitted", "Twin") in legend_of(panel, extension, twin)[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x = __import__(1)",
+        "x = (1 + 2",
+        "x = 1 2",
+        "x = y",
+        "x.y = 1",
+        "x = sin",
+        "x[0] = 1",
+        "for (;;) x = 1",
+        "x = " + "(" * 5000,
+        "x = 1 / 0",
+        "x = 'a'",
+    ],
+)
+def test_what_is_no_fitted_shader_is_unreadable(extension, text):
+    shader_text = import_module(f"{extension.package}.shader_text")
+    source = f"\nshader s(\n)\n{{\n{text}; BSDF = x;\n}}"
+    wi = np.array([[0.0, 0.0, 1.0]])
+    with pytest.raises(shader_text.Unreadable):
+        shader_text.scattered(source, {}, wi, wi[0])
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [
+        ("fresnel_conductor", {}),
+        ("coupled", {"r0": 0.2}),
+        ("lambertian_specular", {"rs": 0.3}),
+        ("fresnel_dielectric", {"ior": 1.8}),
+        ("glass", {"ior": 2.4, "dispersion": 1.0}),
+        ("schlick", {}),
+    ],
+)
+def test_arrows_are_as_bright_as_the_tools_mirror(
+    panel, plots, extension, tool, empty, model, values
+):
+    """And what is let through is the rest of the albedo, for what scatters none."""
+    material = extension.api.new_material(model, **values)
+    log, legend, picture = legend_of(panel, extension, material)
+    values = {k: extension.api.get_parameters(material)[k] for k in values}
+    cosine = math.cos(math.radians(plots.INCIDENCE))
+    albedo, mirror = (x[0] for x in helpers.albedo_and_mirror(tool, model, values, [cosine]))
+    np.testing.assert_allclose(legend.mirror, mirror, rtol=1e-6)
+    assert any(
+        line.startswith(f"Arrow above: an ideal mirror, {100 * mirror[0]:.3g}") for line in log
+    )
+    through = model in ("glass", "fresnel_dielectric")
+    assert (legend.refracted is not None) == through
+    directions = {plots.INCIDENCE: mirror}
+    if through:
+        np.testing.assert_allclose(legend.refracted, albedo - mirror, rtol=1e-6)
+        bent = math.degrees(math.asin(math.sin(math.radians(plots.INCIDENCE)) / values["ior"]))
+        directions[180 - bent] = albedo - mirror
+    radius, angle, unit = plots._polar_grid(through)
+    above = picture[picture.shape[0] // 2 :]
+    for degrees, share in directions.items():
+        off = angle - math.radians(degrees)
+        along, across = radius * np.cos(off) * unit, radius * np.sin(off) * unit
+        for c in range(3):
+            way = (np.abs(across) < 0.6) & (along > 3)
+            bright = way & (along < share[c] * unit - 1)
+            assert (above[bright][:, c] > 0.99).all(), (degrees, c)
+            if model in ("glass", "fresnel_dielectric", "fresnel_conductor"):
+                dim = way & (along > share[c] * unit + 1) & (along < unit - 12)
+                assert (above[dim][:, c] < 0.6).all(), (degrees, c)
+
+
+def test_all_is_reflected_beyond_the_critical_angle(panel, extension, empty):
+    legend = shown(panel, extension, "fresnel_dielectric", ior=0.6)[1]
+    assert legend.mirror == pytest.approx((1, 1, 1)) and legend.refracted is None
 
 
 def test_where_a_mirror_is_there_is_no_principled_node(extension, panel, empty):
