@@ -14,9 +14,13 @@ def scattered(node, values, wi, wo):
     Raises shader_text.Unreadable."""
     group = node.node_tree
     if not nodes.is_native(group):
-        return shader_text.scattered(nodes.source_text(group), values, wi, wo)
-    given = dict.fromkeys((s.identifier for s in node.inputs), np.zeros(3))
-    for name, socket in nodes.sockets(node).items():
-        if name in values:
-            given[socket.identifier] = values[name]
-    return shader_nodes.scattered(group, given, wi, wo)
+        light = shader_text.scattered(nodes.source_text(group), values, wi, wo)
+    else:
+        given = dict.fromkeys((s.identifier for s in node.inputs), np.zeros(3))
+        for name, socket in nodes.sockets(node).items():
+            if name in values:
+                given[socket.identifier] = values[name]
+        light = shader_nodes.scattered(group, given, wi, wo)
+    if not np.isfinite(light).all():
+        raise shader_text.Unreadable("expected numbers, got infinite ones or none")
+    return light

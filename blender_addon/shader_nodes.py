@@ -128,8 +128,8 @@ def scattered(group, given, wi, wo):
 
     Raises Unreadable.
     """
-    (end,) = (node for node in group.nodes if node.bl_idname == "NodeGroupOutput")
     try:
+        (end,) = (node for node in group.nodes if node.bl_idname == "NodeGroupOutput")
         return _Execution(group, given, wi, wo).value(end.inputs["BSDF"])
-    except (ArithmeticError, LookupError, RecursionError, TypeError) as error:
+    except shader_text.FAILURES as error:
         raise Unreadable(str(error)) from error

@@ -20,6 +20,12 @@ class Unreadable(ValueError):
     """A text that is none of these shaders."""
 
 
+#: What goes wrong in one.
+FAILURES = (
+    *(ArithmeticError, AttributeError, LookupError),
+    *(RecursionError, TypeError, ValueError),
+)
+
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[A-Za-z_]\w*)"
     r'|(?P<text>"\w*")|(?P<sign>[-+*/<?:(),\[\]]))'
@@ -258,6 +264,6 @@ def scattered(text, values, wi, wo):
         v |= {name + "(": f for name, f in (_FUNCTIONS | _closures_of(wi, wo)).items()}
         for step in steps:
             step(v)
-    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+        return np.broadcast_to(v["BSDF"], (3, len(wi))).T
+    except FAILURES as error:
         raise Unreadable(str(error)) from error
-    return np.broadcast_to(v["BSDF"], (3, len(wi))).T

@@ -455,6 +455,8 @@ def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
         "x = " + "(" * 5000,
         "x = 1 / 0",
         "x = 'a'",
+        "x = brdfc_table1(1, 2, 0.5)",
+        "float x[2] = {1, 2}; x = brdfc_table1(x, 5, 3.5)",
     ],
 )
 def test_what_is_no_fitted_shader_is_unreadable(extension, text):
