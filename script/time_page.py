@@ -95,17 +95,18 @@ def draw_times(names, found, diffuse, out):
     figure, axes = plt.subplots(figsize=(9, 3.8), dpi=90, layout="constrained")
     top = 3e6
     forms = list(found)
+    apart = 0.8 / len(forms)
     for k, form in enumerate(forms):
         for i, name in enumerate(names):
             values = sorted(found[form].get(name, []))
-            x = [i + (k - (len(forms) - 1) / 2) * 0.2] * len(values)
+            x = [i + (k - (len(forms) - 1) / 2) * apart] * len(values)
             color = COLORS.get(form, "0.4")
             label = form if i == 0 else None
             drawn = [min(v, top) for v in values]
             axes.scatter(x, drawn, s=9, color=color, alpha=0.55, lw=0, label=label)
             if values:
                 middle = min(statistics.median(values), top)
-                axes.plot([x[0] - 0.08, x[0] + 0.08], [middle] * 2, color=color, lw=2)
+                axes.plot([x[0] - 0.4 * apart, x[0] + 0.4 * apart], [middle] * 2, color=color, lw=2)
     axes.axhline(1, color="0.3", lw=0.8)
     nodes = [(i, diffuse[n]) for i, n in enumerate(names) if diffuse.get(n)]
     axes.scatter(*zip(*nodes, strict=True), marker="D", s=16, color="0.3", label="Diffuse node")
@@ -113,7 +114,7 @@ def draw_times(names, found, diffuse, out):
     axes.set_xticks(range(len(names)), [title(n).replace(" ", "\n") for n in names], fontsize=7)
     axes.set_ylabel("CPU time, Glossy node = 1", fontsize=8)
     axes.tick_params(axis="y", labelsize=7)
-    axes.legend(fontsize=7, ncols=6, loc="lower right")
+    axes.legend(fontsize=7, ncols=len(forms) + 1, loc="lower right")
     figure.savefig(out, metadata={"Software": None})
     plt.close(figure)
 
