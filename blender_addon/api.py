@@ -222,19 +222,21 @@ def set_kernel(group, curve):
     _set(group, say("node {name!r}", name=group.name), {"kernel": "table", **values})
 
 
-def set_substance(material, substance, node=None):
+def set_substance(material, substance, node=None, thickness=None):
     """Gives a material of one model, or one node of it, the parameters of a metal, glass or liquid
     of measured refractive index, in the working space of the file: n and k by channel, or the
-    colour that it reflects from above, as the model has them. The others stay.
+    colour that it reflects from above, as the model has them; what k absorbs inside, which is exact
+    after `thickness`, in metres (0.01). The others stay.
 
     `substance`: one of substances(), or a file NAME.csv as refractiveindex.info exports it. Returns
     the parameters that were set. Raises ValueError for another name, a file that can't be read,
-    naming line and what was expected, and a model without such parameters; nothing is changed then.
+    naming line and what was expected, a model without such parameters, and a thickness of what
+    absorbs nothing; nothing is changed then.
     """
     from . import optical
 
     node = node or _the_node(material)
-    values = optical.parameters(nodes.identity(node)[0], optical.find(substance))
+    values = optical.parameters(nodes.identity(node)[0], optical.find(substance), thickness)
     _set(node, say("material {name!r}", name=material.name), values)
     return values
 

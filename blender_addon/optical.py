@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Metals and glass of measured refractive index as parameters of a model, in the working space."""
 
+import bpy
+
 from . import color, pack
 from .i18n import say
 
@@ -15,6 +17,8 @@ _ROLES = {
 for _channel, _letter in enumerate("rgb"):
     _ROLES[f"index_{_letter}"] = (lambda s, v, c=_channel: v.n[c], None)
     _ROLES[f"extinction_{_letter}"] = (lambda s, v, c=_channel: v.k[c], None)
+#: Of those, what absorbs inside takes.
+_INSIDE = ("attenuation", "per_length")
 
 
 def can_have(model_name):
@@ -36,19 +40,57 @@ def find(name):
         raise ValueError(f"{name}: {error.strerror}") from error
 
 
-def parameters(model_name, substance):
-    """The values of those parameters, by name. Raises ValueError where the model has none for such
-    a substance."""
+def _absorption(model_name, substance, metres):
+    """Values by role; ValueError where there is nothing that a thickness could say."""
+    from .brdfc import optics
+
+    absorbs = not substance.conductor and substance.absorbs
+    if metres is not None:
+        low, high = optics.THICKNESSES
+        if not low <= metres <= high:
+            raise ValueError(
+                say(
+                    "Expected a thickness from {low} to {high} m, got {thickness}",
+                    low=f"{low:g}",
+                    high=f"{high:g}",
+                    thickness=f"{metres:g}",
+                )
+            )
+        roles = {p.get("optical") for p in pack.parameters(model_name).values()}
+        if not absorbs or "attenuation" not in roles:
+            raise ValueError(
+                say(
+                    "A thickness says where absorption is exact: {name} absorbs nothing",
+                    name=substance.label if not absorbs else model_name,
+                )
+            )
+    if not absorbs:
+        return {}
+    metres = metres or optics.THICKNESS
+    unit = bpy.context.scene.unit_settings.scale_length
+    left = substance.attenuation(color.from_xyz, metres)
+    return {"attenuation": tuple(left), "per_length": unit / metres}
+
+
+def parameters(model_name, substance, thickness=None):
+    """The values of those parameters, by name. `thickness`: the metres after which absorption is
+    exact. Raises ValueError where the model has none for such a substance, or one is given where
+    nothing is absorbed."""
     values = substance.values(color.from_xyz)
+    of_inside = _absorption(model_name, substance, thickness)
     found = {}
     for name, p in pack.parameters(model_name).items():
         if "optical" not in p:
             continue
-        value_of, conductors = _ROLES[p["optical"]]
-        if p["optical"] == "reflectance" and p["kind"] == "number":
-            value_of, conductors = (lambda s, v: v.luminance), False
-        if conductors in (None, substance.conductor):
-            value = value_of(substance, values)
+        if p["optical"] in _INSIDE:
+            value = of_inside.get(p["optical"])
+        else:
+            value_of, conductors = _ROLES[p["optical"]]
+            if p["optical"] == "reflectance" and p["kind"] == "number":
+                value_of, conductors = (lambda s, v: v.luminance), False
+            right_kind = conductors in (None, substance.conductor)
+            value = value_of(substance, values) if right_kind else None
+        if value is not None:
             single = not isinstance(value, tuple)
             found[name] = (
                 min(max(float(value), p["min"]), p["max"]) if single else tuple(map(float, value))

@@ -123,9 +123,6 @@ def main():
         file = Path(sys.argv[1]) / "database" / "data" / f"{page}.yml"
         text = file.read_text(encoding="utf-8")
         n, k = blocks(text, file)
-        # Glass and water: their absorption is 1e-6 and less, no colour of a surface.
-        if max((float(x) for _, x in k), default=0) < 1e-3:
-            k = []
         out = [f"# {label}", f"# {source}; refractiveindex.info: {page}"]
         for letter, rows in (("n", n), ("k", k)):
             if rows:

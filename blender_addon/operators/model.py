@@ -4,7 +4,7 @@
 import functools
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
 from .. import api, color, nodes
@@ -240,6 +240,15 @@ class BRDFC_OT_substance(OfActiveMaterial, Operator):
         description="What the surface is made of",
         items=lambda self, context: _substances(bpy.app.translations.locale),
     )
+    thickness: FloatProperty(
+        name="Thickness in Metres",
+        description="What absorbs inside has its exact colour after this distance",
+        default=0.01,
+        min=1e-6,
+        max=1e6,
+        precision=4,
+        options={"SKIP_SAVE"},
+    )
     filepath: StringProperty(
         name="File",
         description="Measurements as refractiveindex.info exports them: wl,n and wl,k",
@@ -261,7 +270,8 @@ class BRDFC_OT_substance(OfActiveMaterial, Operator):
             if self.substance == _FILE and not name.endswith(".csv"):
                 raise ValueError(say("{file}: expected a file NAME.csv", file=repr(name)))
             node = model_node(material, self.node) if self.node else None
-            values = api.set_substance(material, name, node)
+            stated = self.properties.is_property_set("thickness")
+            values = api.set_substance(material, name, node, self.thickness if stated else None)
         except ERRORS as error:
             return refused(self, error)
         space = color.working_space()

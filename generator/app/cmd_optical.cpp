@@ -11,14 +11,27 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json describe(const Substance& s) {
+/// Distances over the thickness at which the power law is judged.
+constexpr double kDistances[] = {0.1, 0.5, 2, 10};
+
+Json absorption(const Substance& s, double thickness, const ToRgb& to_rgb) {
+  const Xyz xyz = s.transmittance(thickness);
+  Json off = Json::array();
+  for (const double d : kDistances)
+    off.push_back({{"distance", d * thickness}, {"off", power_law_error(s, thickness, d * thickness, to_rgb)}});
+  return {{"thickness", thickness}, {"xyz", xyz}, {"transmittance", to_rgb(xyz)}, {"power_law", off}};
+}
+
+Json describe(const Substance& s, double thickness) {
   const reference::ColorConfig& config = reference::ColorConfig::current();
-  const OpticalValues v = optical_values(s, [&](const Xyz& xyz) { return config.from_xyz(xyz); });
+  const ToRgb to_rgb = [&](const Xyz& xyz) { return config.from_xyz(xyz); };
+  const OpticalValues v = optical_values(s, to_rgb);
   Json j{{"name", s.name},    {"label", s.label}, {"source", s.source},      {"conductor", s.conductor()},
          {"n", v.n},          {"k", v.k},         {"xyz", s.reflectance(1)}, {"reflectance", v.unclipped},
          {"n_d", s.index_d()}};
   const double abbe = s.abbe();
   j["abbe"] = std::isfinite(abbe) && !s.conductor() ? Json(abbe) : Json();
+  if (!s.conductor()) j["absorption"] = s.absorbs() ? absorption(s, thickness, to_rgb) : Json();
   return j;
 }
 
@@ -35,6 +48,13 @@ void print_text(const Json& j) {
   if (!j["conductor"].get<bool>()) {
     fmt::print("  n_d                         {:.5f}\n", j["n_d"].get<double>());
     if (!j["abbe"].is_null()) fmt::print("  Abbe's number               {:.2f}\n", j["abbe"].get<double>());
+    const Json& a = j["absorption"];
+    if (a.is_null()) return;
+    fmt::print("  {:<27} {}\n", fmt::format("left after {:g} m, r g b", a["thickness"].get<double>()),
+               three(a["transmittance"]));
+    for (const Json& d : a["power_law"])
+      fmt::print("  {:<27} off by {:.2g}\n", fmt::format("power of it for {:g} m", d["distance"].get<double>()),
+                 d["off"].get<double>());
   }
 }
 
@@ -44,21 +64,27 @@ void add_optical_command(CLI::App& app) {
   struct Options {
     std::string name;
     bool json = false;
+    double thickness = kThickness;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "optical",
       "What metals, glass and liquids of measured refractive index n + i k are in the working space:\n"
-      "reflectance seen from above, n and k by channel; of what lets light through n_d and Abbe's number.\n"
+      "reflectance seen from above, n and k by channel; of what lets light through n_d and Abbe's number, and what\n"
+      "k leaves of light after a thickness.\n"
       "The working space is the role scene_linear of the configuration that OCIO names, else Rec.709.");
   cmd->add_option("name", o->name, "One of them, or a file NAME.csv as refractiveindex.info exports it; without: all");
+  cmd->add_option("--thickness", o->thickness,
+                  "Metres after which the absorption of a glass is exact; how far it is off over others is said")
+      ->check(CLI::Range(kThinnest, kThickest))
+      ->capture_default_str();
   cmd->add_flag("--json", o->json, "JSON, also with X, Y, Z over a perfect reflector's under D65");
   cmd->callback([o] {
     Json all = Json::array();
     if (o->name.empty())
-      for (const Substance& s : substances()) all.push_back(describe(s));
+      for (const Substance& s : substances()) all.push_back(describe(s, o->thickness));
     else
-      all.push_back(describe(find_substance(o->name, "")));
+      all.push_back(describe(find_substance(o->name, ""), o->thickness));
     if (o->json) {
       fmt::print("{}\n", (o->name.empty() ? all : all[0]).dump(1));
       return;

@@ -58,6 +58,14 @@ Xyz Substance::reflectance(double cosTheta) const {
   return xyz_of([&](double nm) { return fresnel_conductor(cosTheta, sin2, n.at(nm), k.at(nm)); });
 }
 
+bool Substance::absorbs() const {
+  return xyz_of([this](double nm) { return k.at(nm); })[1] > 0;
+}
+
+Xyz Substance::transmittance(double metres) const {
+  return xyz_of([&](double nm) { return model::transmittance(nm, k.at(nm), metres); });
+}
+
 Substance read_substance(const fs::path& path) {
   const std::string file = path.string();
   std::ifstream in(path);
@@ -144,9 +152,24 @@ OpticalValues optical_values(const Substance& s, const ToRgb& to_rgb) {
   return out;
 }
 
-ParamValues parameters_of(const ModelInfo& info, const Substance& s, const ToRgb& to_rgb) {
+std::array<double, 3> attenuation(const Substance& s, double metres, const ToRgb& to_rgb) {
+  std::array<double, 3> out = to_rgb(s.transmittance(metres));
+  for (double& share : out) share = std::clamp(share, kDarkest, 1.);
+  return out;
+}
+
+double power_law_error(const Substance& s, double thickness, double distance, const ToRgb& to_rgb) {
+  const std::array<double, 3> stated = attenuation(s, thickness, to_rgb), exact = to_rgb(s.transmittance(distance));
+  double most = 0;
+  for (std::size_t c = 0; c < 3; ++c)
+    most = std::max(most, std::abs(std::pow(stated[c], distance / thickness) - exact[c]));
+  return most;
+}
+
+ParamValues parameters_of(const ModelInfo& info, const Substance& s, const ToRgb& to_rgb,
+                          std::optional<double> thickness) {
   const OpticalValues v = optical_values(s, to_rgb);
-  const bool conductor = s.conductor();
+  const bool conductor = s.conductor(), absorbs = !conductor && s.absorbs();
   ParamValues out;
   for (const ParamInfo& p : info.params) switch (p.optical) {
       case Optical::None:
@@ -176,10 +199,21 @@ ParamValues parameters_of(const ModelInfo& info, const Substance& s, const ToRgb
       case Optical::Tint:
         if (conductor) out[p.name] = v.reflectance;
         break;
+      case Optical::Attenuation:
+        if (absorbs) out[p.name] = attenuation(s, thickness.value_or(kThickness), to_rgb);
+        break;
+      case Optical::PerLength:
+        if (absorbs) out[p.name] = std::clamp(1 / thickness.value_or(kThickness), p.min, p.max);
+        break;
     }
   if (out.empty())
     input_error("{} has no parameter that says which {} it is made of", info.name,
                 conductor ? "metal" : "glass or liquid");
+  if (!thickness) return out;
+  if (!absorbs)
+    input_error("a thickness says where absorption is exact: {} has no k to absorb by, or is a metal", s.name);
+  if (std::ranges::none_of(info.params, [](const ParamInfo& p) { return p.optical == Optical::Attenuation; }))
+    input_error("a thickness says where absorption is exact: {} has no parameter for absorption", info.name);
   return out;
 }
 

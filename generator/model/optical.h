@@ -8,6 +8,10 @@
 // is found from the mean amplitude's by Newton steps, and is off the integral over all wavelengths by at most 5e-3
 // between (tests/model/optical_test.cpp prints it).
 //
+// What lets light through may absorb it on the way: exp(-4 pi k d / lambda) after a distance d (Beer's law). Its colour
+// is taken at one thickness, where it is exact. Over other distances a channel has a power of it, as if all its
+// wavelengths were absorbed alike; power_law_error() says how far that is off.
+//
 // No index reflects more than all the light. Where a colour lies outside of the working space, as gold does outside of
 // Rec.709, a channel's R_0 may be above 1: it stops at kBrightest.
 #pragma once
@@ -15,6 +19,7 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +38,14 @@ inline constexpr double kGrazing = 0.1;
 inline constexpr double kNeededMin = 400, kNeededMax = 700;
 /// The k from which on a substance is a conductor: it lets no light through that one could see.
 inline constexpr double kConductor = 0.01;
+
+/// The thickness in metres at which absorption is exact where none is stated: that of catalogues of glass.
+inline constexpr double kThickness = 0.01;
+/// The range of thicknesses: one over it is a density that models accept.
+inline constexpr double kThinnest = 1e-6, kThickest = 1e6;
+/// The least share of a channel that passes that thickness. Colours outside of the working space have none, which no
+/// absorption per length gives.
+inline constexpr double kDarkest = 1e-4;
 
 /// The largest n or k that a file may have.
 inline constexpr double kMaxIndex = 100;
@@ -58,6 +71,10 @@ struct Substance {
   double abbe() const;
   /// Fresnel reflectance, unpolarised; cosTheta in (0, 1].
   Xyz reflectance(double cosTheta) const;
+  /// Whether light is absorbed inside: k is given, and not 0 all over the visible.
+  bool absorbs() const;
+  /// What is left of light after that many metres inside.
+  Xyz transmittance(double metres) const;
 };
 
 /// Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in micrometres and n, then the
@@ -83,9 +100,22 @@ struct OpticalValues {
 };
 OpticalValues optical_values(const Substance&, const ToRgb&);
 
+/// What is left of a channel after that many metres, in [kDarkest, 1].
+std::array<double, 3> attenuation(const Substance&, double metres, const ToRgb&);
+/// How far a channel is off at most after a distance, as a share of the light, where it has the power distance /
+/// thickness of what is left after the thickness; both in metres.
+double power_law_error(const Substance&, double thickness, double distance, const ToRgb&);
+
 /// The parameters of a model that say what its surface is made of (ParamInfo::optical), as the substance has them; the
-/// others are not in it. Throws InputError if the model has none for a substance of that kind.
-ParamValues parameters_of(const ModelInfo&, const Substance&, const ToRgb&);
+/// others are not in it. Absorption is exact at the thickness, in metres, which are the model's units of length.
+/// Throws InputError if the model has none for a substance of that kind, or if a thickness is given to a model or a
+/// substance that absorbs nothing.
+ParamValues parameters_of(const ModelInfo&, const Substance&, const ToRgb&, std::optional<double> thickness = {});
+
+/// Beer's law: what is left after that many metres at the wavelength in nm.
+template <class T> T transmittance(const T& nm, const T& k, const T& metres) {
+  return exp(-(T(4 * kPi) * k / (nm * T(1e-9))) * metres);
+}
 
 /// r at normal incidence.
 template <class T> struct Amplitude { T real, imaginary; };

@@ -53,6 +53,10 @@ const char* name_of(Optical what) {
       return "reflectance";
     case Optical::Tint:
       return "tint";
+    case Optical::Attenuation:
+      return "attenuation";
+    case Optical::PerLength:
+      return "per_length";
   }
   return "";
 }

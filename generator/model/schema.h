@@ -29,6 +29,8 @@ enum class Optical {
   ExtinctionBlue,
   Reflectance,  ///< at normal incidence: a colour, or a number for what is no metal
   Tint,         ///< the same where only a metal has one: glass is told by its index
+  Attenuation,  ///< share of the light that is left after a stated thickness, of what absorbs inside
+  PerLength,    ///< one over that thickness
 };
 /// "index_r"; "" for None.
 const char* name_of(Optical);

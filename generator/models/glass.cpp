@@ -32,8 +32,11 @@ template <class T> struct Glass : DielectricBoundary<T> {
     v(attenuation, ColorSpec{"attenuation",
                              "Attenuation",
                              {0.5, 0.9, 0.7},
-                             "Share of the light that is left after one unit of length inside, at density 1"});
-    v(density, NumberSpec{"density", "Density", 1, 0, 1e6, 0, 10, "Multiplies the absorption per length"}.by_factors());
+                             "Share of the light that is left after one unit of length inside, at density 1"}
+                       .as(Optical::Attenuation));
+    v(density,
+      NumberSpec{"density", "Density", 1, 0, 1e6, 0, 10, "Multiplies the absorption per length"}.by_factors().as(
+          Optical::PerLength));
   }
 
   Rgb<T> transmittance(const T& distance) const {

@@ -184,6 +184,8 @@ std::string optics_module() {
                      python_number(kNeededMin), python_number(kNeededMax), python_number(kConductor),
                      python_number(kMaxIndex));
   out += fmt::format("DISPERSION = {}\n", python_number(kDispersion));
+  out += fmt::format("THICKNESS, DARKEST = {}, {}\n", python_number(kThickness), python_number(kDarkest));
+  out += fmt::format("THICKNESSES = ({}, {})\n", python_number(kThinnest), python_number(kThickest));
   out += fmt::format("LINE_C, LINE_D, LINE_F = {}, {}, {}\n", python_number(kLineC), python_number(kLineD),
                      python_number(kLineF));
   out +=
@@ -210,6 +212,8 @@ std::string optics_module() {
   function("reflectance", {"cosine", "n", "k"}, [](Program& p, const std::vector<Expr>& x) {
     p.output("R", fresnel_conductor(x[0], (Expr(1) - x[0]) * (Expr(1) + x[0]), x[1], x[2]));
   });
+  function("transmittance", {"nm", "k", "metres"},
+           [](Program& p, const std::vector<Expr>& x) { p.output("left", transmittance(x[0], x[1], x[2])); });
   function("normal_amplitude", {"n", "k"}, [](Program& p, const std::vector<Expr>& x) {
     const Amplitude<Expr> r = normal_amplitude(x[0], x[1]);
     p.output("real", r.real);

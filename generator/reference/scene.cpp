@@ -220,10 +220,11 @@ class Loader {
   }
 
   /// Those that a substance sets, in the working space.
-  ParamValues optical_parameters(const JsonView& j, const ModelInfo& info) const {
+  ParamValues optical_parameters(const JsonView& j, const ModelInfo& info, std::optional<double> thickness) const {
     try {
       const Substance substance = find_substance(j.text(), path_.parent_path());
-      return parameters_of(info, substance, [&](const Xyz& xyz) { return colors().from_xyz(xyz); });
+      return parameters_of(
+          info, substance, [&](const Xyz& xyz) { return colors().from_xyz(xyz); }, thickness);
     } catch (const InputError& e) {
       j.error(e.what());
     }
@@ -232,7 +233,7 @@ class Loader {
   void read_materials(const JsonView& j) {
     json& out = scene_.resolved["materials"] = json::object();
     for (const auto& [id, m] : j.members()) {
-      m.only({"model", "optical", "parameters", "representation"});
+      m.only({"model", "optical", "thickness", "parameters", "representation"});
       Material material;
       material.id = id;
       std::vector<std::string> names;
@@ -241,9 +242,13 @@ class Loader {
       const ModelInfo& info = material.model->info();
       json& resolved = out[id] = {{"model", info.name}, {"parameters", json::object()}};
       if (const auto optical = m.find("optical")) {
-        material.values = optical_parameters(*optical, info);
+        std::optional<double> thickness;
+        if (const auto t = m.find("thickness")) thickness = t->number(kThinnest, kThickest);
+        material.values = optical_parameters(*optical, info, thickness);
         for (const auto& [name, value] : material.values)
           resolved["parameters"][name] = std::visit([](const auto& v) { return json(v); }, value);
+      } else if (const auto thickness = m.find("thickness")) {
+        thickness->error("expected \"optical\" beside it, which says what absorbs");
       }
       const ParamValues of_substance = material.values;
       if (const auto parameters = m.find("parameters"))

@@ -27,6 +27,9 @@ from numpy.typing import NDArray
 
 from . import _optics
 
+#: Metres after which absorption is exact where none are stated, and their range.
+THICKNESS, THICKNESSES = _optics.THICKNESS, _optics.THICKNESSES
+
 Array = NDArray[np.float64]
 ToRgb = Callable[[Array], Array]
 
@@ -79,6 +82,23 @@ class Substance:
     def xyz(self, cosine: float = 1.0) -> Array:
         """X, Y and Z of what is reflected, unpolarised, at an angle of that cosine in (0, 1]."""
         return self._mean(lambda n, k: _optics.reflectance(cosine, n, k))
+
+    @property
+    def absorbs(self) -> bool:
+        """Whether light is absorbed inside: k is given, and not 0 all over the visible."""
+        return bool(self._mean(lambda n, k: k)[1] > 0)
+
+    def transmittance(self, metres: float) -> Array:
+        """X, Y and Z of what is left of light after that many metres inside, by Beer's law."""
+        nm = _optics.WAVELENGTHS
+        left = _optics.transmittance(nm, self.k.at(nm), float(metres))
+        return np.broadcast_to(left, nm.shape) @ _optics.WEIGHTS
+
+    def attenuation(self, to_rgb: ToRgb, metres: float = THICKNESS) -> Array:
+        """The same by channel, as glass of a density of one over these metres has it. Over other
+        distances it takes powers of that, which is off where a channel's wavelengths are absorbed
+        unlike: `brdfc optical` says how far."""
+        return np.clip(np.asarray(to_rgb(self.transmittance(metres)), float), _optics.DARKEST, 1)
 
     @property
     def conductor(self) -> bool:

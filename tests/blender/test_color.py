@@ -15,6 +15,7 @@ import pytest
 from helpers import add_camera, add_world, open_image_io, render_passes
 
 CONFIG = Path(bpy.utils.resource_path("LOCAL")) / "datafiles" / "colormanagement" / "config.ocio"
+OBSERVER = Path(__file__).parents[2] / "data" / "color" / "observer.csv"
 ROOM = Path(__file__).parents[2] / "scenes" / "room-coupled.json"
 #: Where a file has no choice, Blender's own.
 SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
@@ -143,6 +144,56 @@ def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
     with pytest.raises(ValueError, match="own.csv line 2: expected 2 numbers, a wavelength in µm"):
         extension.api.set_substance(glass, str(file))
     assert extension.api.get_parameters(glass) == before
+
+
+def test_glass_absorbs_what_k_says(extension, empty, color, tmp_path):
+    """Beer's law at every wavelength, after the stated thickness; density is per Blender unit."""
+    glass, file = extension.api.new_material("glass"), tmp_path / "own.csv"
+    rows = [(0.38, 5e-6), (0.55, 4e-7), (0.7, 8e-6)]
+    k = "".join(f"{um},{value}\n" for um, value in rows)
+    file.write_text(f"wl,n\n0.35,1.54\n0.9,1.51\nwl,k\n{k}", encoding="utf-8")
+    table = np.genfromtxt(OBSERVER, delimiter=",", names=True)
+    weights = np.stack([table[c] * table["d65"] for c in "xyz"], -1)
+    nm = table["nm"]
+    alpha = 4 * np.pi * np.interp(nm, *(np.array(rows).T * [[1000], [1]])) / (nm * 1e-9)
+    for thickness, density in ((None, 100), (0.002, 500)):
+        values = extension.api.set_substance(glass, str(file), thickness=thickness)
+        xyz = np.exp(-alpha / density) @ weights / weights.sum(0)
+        assert values["attenuation"] == pytest.approx(color.from_xyz(xyz), abs=1e-5)
+        assert values["density"] == pytest.approx(density)
+        got = extension.api.get_parameters(glass)
+        assert got["attenuation"] == pytest.approx(values["attenuation"], rel=1e-6)
+    # A unit of a millimetre.
+    bpy.context.scene.unit_settings.scale_length = 0.001
+    assert extension.api.set_substance(glass, str(file))["density"] == pytest.approx(0.1)
+    before = extension.api.get_parameters(glass)
+    for name, thickness, expected in (
+        (str(file), 0.0, "Expected a thickness from 1e-06 to 1e+06 m, got 0"),
+        (
+            "silica",
+            0.01,
+            "A thickness says where absorption is exact: Fused silica absorbs nothing",
+        ),
+    ):
+        with pytest.raises(ValueError, match=re.escape(expected)):
+            extension.api.set_substance(glass, name, thickness=thickness)
+    assert extension.api.get_parameters(glass) == before
+    water = extension.api.new_material("fresnel_dielectric")
+    assert set(extension.api.set_substance(water, "water")) == {"ior", "dispersion"}
+    with pytest.raises(ValueError, match="fresnel_dielectric absorbs nothing"):
+        extension.api.set_substance(water, "water", thickness=1.0)
+
+
+def test_the_button_sets_what_is_absorbed(extension, empty):
+    material = extension.api.new_material("glass")
+    bpy.ops.mesh.primitive_plane_add()
+    bpy.context.object.data.materials.append(material)
+    assert bpy.ops.brdfc.substance(substance="water", thickness=1.0) == {"FINISHED"}
+    values = extension.api.get_parameters(material)
+    red, green, blue = values["attenuation"]
+    assert 0.7 < red < 0.76 and 0.95 < green < blue < 0.98 and values["density"] == 1
+    assert bpy.ops.brdfc.substance(substance="silica") == {"FINISHED"}
+    assert extension.api.get_parameters(material)["attenuation"] == (red, green, blue)
 
 
 def test_the_button_sets_a_metal(extension, empty, tmp_path):

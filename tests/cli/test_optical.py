@@ -141,6 +141,144 @@ def test_a_file_is_a_conductor_or_a_dielectric(tmp_path):
     assert glass["k"] == [0, 0, 0] and glass["n"] == pytest.approx([1.516, 1.518, 1.521], abs=2e-3)
 
 
+def spectrum(rows):
+    """Over the observer's wavelengths in nm: linear in between, constant beyond the ends."""
+    um, values = zip(*rows, strict=True)
+    return lambda nm: np.interp(nm, 1000 * np.array(um), values)
+
+
+def seen(config, space, of_nm):
+    """A spectrum's colour, by a sum over the CIE's tables that is this test's own."""
+    table = np.genfromtxt(ROOT / "data/color/observer.csv", delimiter=",", names=True)
+    weights = np.stack([table[c] * table["d65"] for c in "xyz"], -1)
+    xyz = of_nm(table["nm"]) @ weights / weights.sum(0)
+    return converted(config, XYZ, space, xyz * converted(config, space, XYZ, [1, 1, 1]))
+
+
+#: k of a made-up green glass, over micrometres.
+GREEN = ((0.38, 6e-6), (0.45, 3e-6), (0.52, 4e-7), (0.56, 5e-7), (0.62, 3e-6), (0.7, 8e-6))
+
+
+def green_glass(folder, n=(1.53, 1.51)):
+    file = folder / "green.csv"
+    k = "".join(f"{um},{value}\n" for um, value in GREEN)
+    file.write_text(f"wl,n\n0.3,{n[0]}\n0.8,{n[1]}\nwl,k\n{k}", encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("metres", [0.001, 0.01])
+def test_absorption_is_beers_law_over_the_spectrum(tmp_path, optics, space, metres):
+    """alpha = 4 pi k / lambda, both lengths in metres."""
+    config, file = config_in(tmp_path, space), green_glass(tmp_path)
+    k = spectrum(GREEN)
+
+    def exact(distance):
+        return seen(config, space, lambda nm: np.exp(-4 * np.pi * k(nm) / (nm * 1e-9) * distance))
+
+    told = optical(file, "--thickness", metres, config=config)["absorption"]
+    np.testing.assert_allclose(told["transmittance"], exact(metres), atol=1e-5)
+    assert told["thickness"] == metres and 0.05 < told["xyz"][1] < 0.99
+    # A power of it is exact there alone.
+    stated = np.clip(exact(metres), 1e-4, 1)
+    for row in told["power_law"]:
+        power = stated ** (row["distance"] / metres)
+        assert row["off"] == pytest.approx(np.abs(power - exact(row["distance"])).max(), abs=2e-5)
+    assert len(told["power_law"]) == 4 and max(r["off"] for r in told["power_law"]) > 0.01
+    white = converted(config, space, XYZ, [1, 1, 1])
+    package = optics.read(file)
+    np.testing.assert_allclose(package.transmittance(metres), told["xyz"], rtol=1e-12)
+    left = package.attenuation(lambda xyz: converted(config, XYZ, space, xyz * white), metres)
+    np.testing.assert_allclose(left, stated, atol=1e-5)
+
+
+def test_what_has_k_absorbs(tmp_path, optics):
+    """Water, as G. M. Hale and M. R. Querry measured it: 0.0448 per metre at 550 nm."""
+    found = {s["name"]: s for s in optical()}
+    for name, s in found.items():
+        package = optics.substance(name)
+        assert ("absorption" in s) is not s["conductor"]
+        if not s["conductor"]:
+            assert (s["absorption"] is not None) is package.absorbs is bool(package.k.nm)
+    assert {n for n, s in found.items() if s.get("absorption")} == {"bk7", "f2", "sf11", "water"}
+    water = optics.substance("water")
+    at_550 = optics._optics.transmittance(550.0, float(water.k.at(550.0)), 1.0)
+    assert -np.log(at_550) == pytest.approx(0.0448, abs=1e-4)
+    red, green, blue = optical("water", "--thickness", 1)["absorption"]["transmittance"]
+    assert 0.7 < red < 0.76 and 0.95 < green < blue < 0.98
+    # k of 0 is none.
+    file = tmp_path / "clear.csv"
+    file.write_text("wl,n,k\n0.3,1.5,0\n0.8,1.5,0\n", encoding="utf-8")
+    assert optical(file)["absorption"] is None and not optics.read(file).absorbs
+
+
+def test_a_scene_states_the_thickness(tmp_path):
+    green_glass(tmp_path)
+    path = tmp_path / "s.json"
+
+    def resolved(**material):
+        objects = [{"name": "o", "shape": {"type": "sphere"}, "material": "m"}]
+        path.write_text(json.dumps(scene(materials={"m": material}, objects=objects)))
+        done = run("scene", path, "--out", tmp_path / "out")
+        if done.returncode:
+            assert done.returncode == 2
+            return done.stderr
+        found = json.loads((tmp_path / "out" / "scene.json").read_text())
+        return found["materials"]["m"]["parameters"]
+
+    for metres, options in ((0.01, {}), (0.003, {"thickness": 0.003})):
+        got = resolved(model="glass", optical="green.csv", **options)
+        told = optical(tmp_path / "green.csv", "--thickness", metres)["absorption"]
+        assert got["density"] == pytest.approx(1 / metres)
+        assert got["attenuation"] == pytest.approx(np.clip(told["transmittance"], 1e-4, 1))
+    # A surface alone has nothing inside.
+    assert "attenuation" not in resolved(model="fresnel_dielectric", optical="green.csv")
+    assert set(resolved(model="glass", optical="silica")) == {"ior", "dispersion"}
+    for material, expected in (
+        ({"optical": "silica", "thickness": 1}, "silica has no k to absorb by"),
+        ({"thickness": 1}, 'materials.m.thickness: expected "optical" beside it'),
+        ({"optical": "green.csv", "thickness": 0}, "materials.m.thickness: expected"),
+        (
+            {"optical": "green.csv", "parameters": {"density": 1}},
+            'density: "optical" says what it is',
+        ),
+    ):
+        error = resolved(model="glass", **material)
+        assert isinstance(error, str) and "s.json" in error and expected in error, error
+    error = resolved(model="fresnel_dielectric", optical="green.csv", thickness=1)
+    assert "fresnel_dielectric has no parameter for absorption" in error
+
+
+def test_a_slab_of_the_stated_thickness_has_the_exact_colour(tmp_path):
+    """Seen straight through by the reference renderer; its surfaces reflect R, to and fro."""
+    green_glass(tmp_path, n=(1.5, 1.5))
+    content = scene(
+        camera={
+            "type": "orthographic",
+            "height": 0.01,
+            "position": [0, 0, 1],
+            "look_at": [0, 0, 0],
+            "up": [0, 1, 0],
+        },
+        settings={"width": 4, "height": 4, "spp": 1024, "seed": 1, "max_bounces": 32},
+        materials={"m": {"model": "glass", "optical": "green.csv", "thickness": 0.01}},
+        objects=[{"name": "o", "shape": {"type": "box", "size": [4, 4, 0.01]}, "material": "m"}],
+    )
+    (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+    done = run("render", tmp_path / "s.json", "--out", tmp_path / "s.exr")
+    assert done.returncode == 0, done.stderr
+    import OpenImageIO as oiio
+
+    pixels = oiio.ImageBuf(str(tmp_path / "s.exr")).get_pixels(oiio.FLOAT)[..., :3]
+    found = optical(tmp_path / "green.csv")
+    left = np.array(found["absorption"]["transmittance"])
+    # Through, and what the near side and the far one send back, of a white world.
+    reflected = ((found["n_d"] - 1) / (found["n_d"] + 1)) ** 2
+    inside = (1 - reflected) ** 2 / (1 - (reflected * left) ** 2)
+    expected = inside * left + reflected + inside * reflected * left**2
+    np.testing.assert_allclose(pixels.mean((0, 1)), expected, atol=3e-3)
+
+
 #: What is wrong, and what is said, the file's name left out.
 BAD = {
     "": ": expected a line wl,n and rows below it, found no n",
