@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import importlib
 
+from . import optics
 from ._model import Choice, Color, Model, Number, Parameter, Sample
 from ._version import __version__
 from .models import NAMES
@@ -30,6 +31,7 @@ __all__ = [
     "__version__",
     "model",
     "models",
+    "optics",
 ]
 
 

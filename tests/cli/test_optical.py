@@ -39,7 +39,7 @@ def optics(tmp_path_factory):
     earlier = {n: sys.modules.pop(n) for n in list(sys.modules) if re.match(r"brdfc(\.|$)", n)}
     sys.path.insert(0, str(out))
     try:
-        yield importlib.import_module("brdfc.optics")
+        yield importlib.import_module("brdfc").optics  # an attribute, as users expect
     finally:
         sys.path.remove(str(out))
         for name in [n for n in sys.modules if re.match(r"brdfc(\.|$)", n)]:
