@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import i18n, imports, lamps, operators, plot_panel, ui, update
+from . import console, i18n, imports, lamps, operators, plot_panel, ui, update
 
 
 def _refuse_beside_another():
@@ -27,9 +27,11 @@ def register():
     lamps.register()
     imports.register()
     update.register()
+    console.register()
 
 
 def unregister():
+    console.unregister()
     update.unregister()
     imports.unregister()
     lamps.unregister()

@@ -3,6 +3,7 @@
 
     from bl_ext.user_default.brdfc_shaders import api
     material = api.new_material("coupled", r0=0.05, rm=(0.8, 0.1, 0.1))
+    bpy.data.objects["Cube"].active_material = material
     api.enable_osl(bpy.context.scene)
 
 Names and values are those of the models' schema: numbers, colours as (r, g, b) or one grey
@@ -17,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, convert, lamps, lean, library, nodes, pack, update
+from . import checks, convert, lamp_checks, lamps, lean, library, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
 from .i18n import Sentence, say
 from .lamps import Lamp
@@ -43,18 +44,23 @@ __all__ = [
     "convert_back",
     "convert_materials",
     "enable_osl",
+    "enlarge_lamps",
     "get_parameters",
     "has_twin",
+    "make_local",
     "models",
     "new_material",
     "plan",
     "plan_conversion",
     "prepare_material",
     "remove_library",
+    "scene_warnings",
     "see_lamps",
     "set_kernel",
     "set_parameters",
     "set_substance",
+    "start_bake",
+    "start_plan",
     "substances",
     "switch_representation",
     "update_materials",
@@ -123,8 +129,14 @@ def _for_eevee(node):
     return bool(users) and all(getattr(user, "target", None) == "EEVEE" for user in users)
 
 
+def _must_be_material(given):
+    if not isinstance(given, bpy.types.Material):
+        raise ValueError(say("Expected a material, got {given!r}", given=given))
+
+
 def _the_node(material):
     """The one node of this extension; what only EEVEE shows does not count."""
+    _must_be_material(material)
     ours = [n for n in nodes.group_nodes(material) if not _for_eevee(n)]
     if len(ours) != 1:
         raise ValueError(
@@ -507,3 +519,24 @@ def see_lamps(scene):
 def scene_warnings(scene):
     """What keeps any material of this extension from rendering in a scene."""
     return checks.scene_warnings(scene)
+
+
+def enlarge_lamps(scene):
+    """Gives the lamps of a scene that are too small to be met by chance, by drawn directions and
+    aimed forms that have no slot left, a size: 1 cm, or 0.02 rad of a sun. They shine as before.
+
+    Returns (names of those, names of the lamps of another file, which stay as they are).
+    """
+    return lamp_checks.enlarge(scene)
+
+
+def make_local(material):
+    """Makes a material that is linked from another file this file's own, with the groups that it is
+    made of, so that it aims at the lamps of this file. Returns the local one, which linked objects
+    do not have."""
+    _must_be_material(material)
+    if material.library is not None:
+        material = material.make_local()
+    nodes.make_local(material.node_tree)
+    lamps.follow()
+    return material

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import closure_pool, i18n, nodes, pack, update
+from . import closure_pool, i18n, lamp_checks, nodes, pack, update
 from .i18n import say
 
 BLENDER_MIN = (4, 5, 0)
@@ -17,9 +17,6 @@ OPTIX_RUN = None
 #: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
 #: pixel is about 1e-6 of the distance; an orthographic camera has no direction to help out.
 FAR_PIXEL = 1e-5
-#: Lamps below this size (metres, or radians for a sun) are hit by chance too rarely.
-SMALL_LIGHT = 0.01
-SMALL_SUN = 0.02
 #: Below this, a clamp on indirect light shows in the highlights of Blender's own closures.
 LOW_CLAMP = 10
 #: A brighter one shows earlier: measured (script/conditions) under a sun of irradiance 3, in which
@@ -124,39 +121,6 @@ def _far_orthographic(scene):
     return _pixel_size(scene) < FAR_PIXEL * distance
 
 
-def _is_tiny(light):
-    if light.type == "SUN":
-        return light.angle < SMALL_SUN
-    if light.type == "AREA":
-        sizes = [light.size]
-        if light.shape in {"RECTANGLE", "ELLIPSE"}:
-            sizes.append(light.size_y)
-        return min(sizes) < SMALL_LIGHT
-    return light.shadow_soft_size < SMALL_LIGHT
-
-
-def _is_sizeless(light):
-    if light.type == "SUN":
-        return light.angle == 0
-    return light.type in {"POINT", "SPOT"} and light.shadow_soft_size == 0
-
-
-def sizeless_lamps():
-    """Names of the lamps of the open file that pictures show and no drawn direction meets."""
-    return sorted(
-        {
-            o.name
-            for scene in bpy.data.scenes
-            for o in scene.objects
-            if o.type == "LIGHT" and not o.hide_render and _is_sizeless(o.data)
-        }
-    )
-
-
-def _tiny_lights(scene):
-    return [o.name for o in scene.objects if o.type == "LIGHT" and _is_tiny(o.data)]
-
-
 def _bump_correction(material, scene):
     if material.cycles.use_bump_map_correction:
         return (
@@ -208,36 +172,6 @@ def _clamp_direct(material, scene):
                 "Direct Light is clamped to {clamp}: it darkens highlights of this form; 0 is "
                 "exact",
                 clamp=f"{clamp:g}",
-            ),
-        )
-
-
-def _zero_size_lights(material, scene):
-    if tiny := _tiny_lights(scene):
-        return (
-            "WARNING",
-            say(
-                "Lamps too small for a sampled form ({lamps}): their highlights are noisy or "
-                "missing; enlarge the lamps or use another form",
-                lamps=", ".join(tiny[:3]),
-            ),
-        )
-
-
-def _multiple_importance(material, scene):
-    alone = [
-        o.name
-        for o in scene.objects
-        if o.type == "LIGHT"
-        and not o.hide_render
-        and not getattr(o.data.cycles, "use_multiple_importance_sampling", True)
-    ]
-    if alone:
-        return (
-            "WARNING",
-            say(
-                "Multiple Importance is off for lamps ({lamps}): this form is too dark under them",
-                lamps=", ".join(alone[:3]),
             ),
         )
 
@@ -336,8 +270,8 @@ DECLARED = {
     "path_guiding": _path_guiding,
     "clamp_indirect": _clamp_indirect,
     "clamp_direct": _clamp_direct,
-    "zero_size_lights": _zero_size_lights,
-    "multiple_importance": _multiple_importance,
+    "zero_size_lights": lamp_checks.tiny,
+    "multiple_importance": lamp_checks.multiple_importance,
     "orthographic_far": _far_camera,
     "caustics": _caustics,
     "filter_glossy": _filter_glossy,
@@ -504,10 +438,29 @@ def node_warnings(node, material, scene):
         found.append(Finding("path_guiding", "WARNING", _of(label, said)))
     if form.get("highlight") and (result := _clamp_highlight(node, form, scene)):
         found.append(Finding("clamp_low", result[0], _of(label, result[1])))
+    for code, severity, said in lamp_checks.of_node(node, form, scene):
+        found.append(Finding(code, severity, _of(label, said)))
     for code in declared:
         if code in DECLARED and (result := DECLARED[code](material, scene)):
             found.append(Finding(code, result[0], _of(label, result[1])))
     return found
+
+
+#: Findings of a scene under which models are black.
+UNABLE = {"no_osl", "engine", "eevee_twin", "osl_off", "device"}
+
+
+def _of_scene(ours, material, scene):
+    """The findings of a scene for a material with these nodes: Blender's own run anywhere."""
+    scripted = any(not nodes.is_native(node.node_tree) for node in ours)
+    found = scene_warnings(scene) if scripted else []
+    return _under_eevee(found, ours, material) if is_eevee(scene) else found
+
+
+def why_black(material, scene):
+    """Why a material's models can't run in a scene, a sentence each."""
+    ours = nodes.group_nodes(material)
+    return [f.message for f in _of_scene(ours, material, scene) if f.code in UNABLE]
 
 
 def warnings(material, scene):
@@ -518,11 +471,7 @@ def warnings(material, scene):
     ours = nodes.group_nodes(material)
     if not ours:
         return []
-    # Blender's own nodes run anywhere.
-    scripted = any(not nodes.is_native(node.node_tree) for node in ours)
-    found = scene_warnings(scene) if scripted else []
-    if is_eevee(scene):
-        found = _under_eevee(found, ours, material)
+    found = _of_scene(ours, material, scene)
     for node in ours:
         found += node_warnings(node, material, scene)
     found += _pool_findings(material, scene)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from . import checks, lamps, nodes, pack
+from . import lamp_checks, lamps, nodes, pack
 from .i18n import say
 from .jobs import Job, ProgramJob
 
@@ -58,7 +58,7 @@ def needs(materials):
     what of the lamps of the open file its forms hang on: which have no size, and how many there
     are to aim at."""
     found = {"materials": materials}
-    if sizeless := checks.sizeless_lamps():
+    if sizeless := lamp_checks.sizeless_lamps():
         found["sizeless_lamps"] = sizeless
     if pack.has_aimed():
         found["lamps"] = lamps.count()

@@ -616,6 +616,17 @@ def group_nodes(material):
     return [node for tree in trees for node in tree.nodes if is_ours(node)]
 
 
+def make_local(tree):
+    """Makes the groups and scripts that a tree of this file is made of this file's own."""
+    for node in tree.nodes:
+        for name in ("node_tree", "script"):
+            inner = getattr(node, name, None)
+            if inner is not None and inner.library is not None:
+                inner.make_local()
+        if getattr(node, "node_tree", None) is not None:
+            make_local(node.node_tree)
+
+
 def all_values(node):
     """Value of each parameter by name, as get_value() has it."""
     choices = json.loads(node.node_tree[TAG]["choices"])

@@ -270,7 +270,6 @@ def draw_lamps(layout, material, scene):
     box = layout.box()
     found = lamps.seen(scene)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
-    left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > slots]
     if taken:
         _wrapped(box, say("Free of noise under {lamps}", lamps=", ".join(taken)), "LIGHT")
     else:
@@ -286,13 +285,11 @@ def draw_lamps(layout, material, scene):
             ),
             "ERROR",
         )
-    for lamp in left_out:
-        why = lamp.why or lamps.too_many(slots)
-        _wrapped(box, say("{lamp} may be noisy: {why}", lamp=lamp.name, why=why))
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
 
 
 _DOWNLOAD = ("wm.url_open", button("Get Blender"), {"url": "https://www.blender.org/download/"})
+_ENLARGE = ("brdfc.enlarge_lamps", button("Give Lamps a Size"), {})
 #: The button under a finding of each code: operator, text, properties.
 BUTTONS = {
     "blender_version": _DOWNLOAD,
@@ -305,6 +302,9 @@ BUTTONS = {
     "newer": ("screen.userpref_show", button("Look for Updates"), {"section": "EXTENSIONS"}),
     "bump_correction": ("brdfc.fix_material", button("Set Up Material"), {}),
     "path_guiding": ("brdfc.no_guiding", button("Turn Off Path Guiding"), {}),
+    "lost_lamps": _ENLARGE,
+    "zero_size_lights": _ENLARGE,
+    "linked_lamps": ("brdfc.make_local", button("Make Local"), {}),
 }
 
 

@@ -3,24 +3,31 @@
 
 Its outputs, four vectors a slot, are constants to Cycles. What moves is driven without Python
 expressions, so a saved file renders and animates where neither the extension nor scripts may run.
-A list that is out of date costs noise and nothing else: forms are right whatever it says.
+A list that is out of date costs noise, and the light of lamps without a size that it lacks: forms
+are right otherwise, whatever it says.
 """
 
 from .filling import count, ensure_group, follow, see, seen
 from .handlers import register, unregister
+from .lights import is_sizeless
+from .scenes import lamps_of
 from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
-from .slots import SLOTS, Lamp, part_names, too_many
+from .slots import NO_NEED, SLOTS, Lamp, elsewhere, part_names, too_many
 
 __all__ = [
+    "NO_NEED",
     "SLOTS",
     "Lamp",
     "count",
+    "elsewhere",
     "ensure_group",
     "find_group",
     "follow",
     "is_group",
+    "is_sizeless",
+    "lamps_of",
     "part_names",
     "register",
     "remove_unused_group",

@@ -46,7 +46,8 @@ def of_material(material):
 
 
 def of_light(light):
-    """Energy of a light times its colour; of a dark one that may light up, next to nothing."""
+    """Energy of a light times its colour, negative as it is positive: closures aim at lamps that
+    take light as at others. Of a dark one that may light up, next to nothing."""
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
     if tree := shader_trees.shading(light):
         output = shader_trees.output(tree, "ShaderNodeOutputLight")
@@ -54,6 +55,6 @@ def of_light(light):
         power *= sum(
             _strength(n, "Color", "Strength") for n in nodes if n.bl_idname == "ShaderNodeEmission"
         )
-    if power <= 0 and (animated(light) or (light.node_tree and animated(light.node_tree))):
+    if power == 0 and (animated(light) or (light.node_tree and animated(light.node_tree))):
         return 1e-9
-    return power
+    return abs(power)

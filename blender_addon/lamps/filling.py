@@ -7,6 +7,13 @@ import bpy
 
 from . import scenes, shared_group, slots, world
 
+#: Numbers of a slot.
+_SIZE = 3 * len(slots.PARTS)
+
+
+def _by_slot(numbers):
+    return [numbers[_SIZE * i : _SIZE * (i + 1)] for i in range(slots.SLOTS)]
+
 
 def _arranged(chosen, before):
     """The chosen lamps in the order of slots: each stays where it is if the list has it already, so
@@ -45,11 +52,15 @@ def _worth_aiming(survey):
     return [c for c in survey.candidates if not c.why]
 
 
-def _listed(survey, chosen):
-    """[slots.Lamp] of a survey, those that have a slot first."""
+def _listed(survey, chosen, why=None):
+    """[slots.Lamp] of a survey, those that have a slot first; `why` others have none, where it is
+    not for want of room."""
     taken = {id(c) for c in chosen}
-    return [slots.Lamp(c.name, slot, c.rank) for slot, c in enumerate(chosen, 1)] + [
-        slots.Lamp(c.name, None, c.rank, c.why or slots.too_many(len(chosen)))
+    why = why or slots.too_many(len(chosen))
+    return [
+        slots.Lamp(c.name, slot, c.rank, "", c.sizeless) for slot, c in enumerate(chosen, 1)
+    ] + [
+        slots.Lamp(c.name, None, c.rank, c.why or why, c.sizeless)
         for c in survey.candidates
         if id(c) not in taken
     ]
@@ -70,11 +81,9 @@ def _fill(scene, depsgraph, subject=None, keep=True):
     if group := shared_group.the_one():
         sockets = shared_group.sockets(group)
         now = shared_group.written(group)
-        size = 3 * len(slots.PARTS)
-        before = [now[size * i : size * (i + 1)] for i in range(slots.SLOTS)]
         if keep:
-            chosen = _arranged(chosen, before)
-        empty = (0.0,) * size
+            chosen = _arranged(chosen, _by_slot(now))
+        empty = (0.0,) * _SIZE
         wanted = [v for c in chosen for v in c.values] + [*empty] * (slots.SLOTS - len(chosen))
         for (socket, _), old, new in zip(sockets, now, wanted, strict=True):
             # Only what changed: shaders are compiled anew otherwise, and handlers called again.
@@ -140,12 +149,19 @@ def see(scene):
     return quietly(scene, keep=False)
 
 
-def seen(scene):
-    """What the last look at a scene found: for panels, which change nothing."""
-    if memory.scene == scene.session_uid:
+def seen(scene, group=None):
+    """What the last look at a scene found: for panels, which change nothing. `group`: a shared
+    group of another file, for materials that are linked from there."""
+    looked = memory.scene == scene.session_uid
+    if looked and group is None:
         return memory.lamps
-    survey = scenes.look(scene, scene.view_layers[0].depsgraph)
-    return _listed(survey, _worth_aiming(survey)[: limit_of(scene)])
+    survey = memory.survey if looked else scenes.look(scene, scene.view_layers[0].depsgraph)
+    worth = _worth_aiming(survey)
+    if group is None:
+        return _listed(survey, worth[: limit_of(scene)])
+    there = _by_slot(shared_group.written(group))
+    chosen = [c for c in worth if any(shared_group.all_same(c.values, slot) for slot in there)]
+    return _listed(survey, chosen, slots.elsewhere(group.library))
 
 
 def count():

@@ -12,14 +12,25 @@ from . import emission, slots
 _ASIDE = 0.01
 
 
-def hidden(item):
-    """Whether no picture shows a light's object."""
-    return item.hide_render and not emission.animated(item)
-
-
 def is_lamp(light):
-    """Whether a light gives light of its own."""
+    """Whether a light gives light of its own, or takes it."""
     return not (light.type == "AREA" and light.cycles.is_portal) and emission.of_light(light) > 0
+
+
+def shines(item):
+    """Whether an object is a lamp that pictures show."""
+    return (
+        item.type == "LIGHT"
+        and (not item.hide_render or emission.animated(item))
+        and is_lamp(item.data)
+    )
+
+
+def is_sizeless(light):
+    """Whether no drawn direction meets a light."""
+    if light.type == "SUN":
+        return light.angle == 0
+    return light.type in {"POINT", "SPOT"} and light.shadow_soft_size == 0
 
 
 def _values(light, item, matrix):
@@ -60,7 +71,8 @@ def _irradiance(light, matrix):
 def candidate_of(item, name, light, matrix):
     """A light that stands where `matrix` says: followed by drivers where `item` is its object, None
     where it is a copy."""
-    return slots.Candidate(name, _values(light, item, matrix), _irradiance(light, matrix))
+    values = _values(light, item, matrix)
+    return slots.Candidate(name, values, _irradiance(light, matrix), sizeless=is_sizeless(light))
 
 
 def places_lamps(item, depth=0):

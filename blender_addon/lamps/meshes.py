@@ -82,6 +82,6 @@ def judge(candidate, points):
     distance = np.sqrt(((points - ball.place) ** 2).sum(-1)).min()
     angle = ball.radius / max(distance, 1e-9)
     if angle > _LOOKS_WIDE:
-        candidate.why = say("so large or near that it needs no aiming")
+        candidate.why = slots.NO_NEED
     elif angle > _LOOKS_SMALL and not ball.fills:
         candidate.why = say("a mesh that is neither round nor small")

@@ -45,6 +45,11 @@ def _rendered(scene, found=None):
     return found
 
 
+def lamps_of(scene):
+    """Objects of the lamps that the scene's pictures show."""
+    return [item for item in _rendered(scene) if lights.shines(item)]
+
+
 def _subject(scene, shown, matrices):
     """Points by which lamps are ranked: centres of the four meshes that are nearest to the camera
     and in its view, else of all meshes."""
@@ -84,7 +89,7 @@ def look(scene, depsgraph, subject=None):
     for item in _rendered(scene):
         kind = item.type
         if kind == "LIGHT":
-            if not lights.hidden(item) and lights.is_lamp(item.data):
+            if lights.shines(item):
                 matrix = matrices(item).copy()
                 survey.kinds[item.name_full] = slots.transform_kind(matrix)
                 survey.candidates.append(lights.candidate_of(item, item.name, item.data, matrix))

@@ -21,6 +21,10 @@ def part_names(count):
     return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
 
 
+#: Why a lamp is left out that drawn directions meet.
+NO_NEED = say("so large or near that it needs no aiming")
+
+
 def too_many(slots):
     """Why a lamp is left out that others outshine."""
     if not slots:
@@ -28,15 +32,21 @@ def too_many(slots):
     return say("fainter than the {count} that a material can aim at", count=slots)
 
 
+def elsewhere(library):
+    """Why a material that is linked from another file aims at no lamp of this one."""
+    return say("the material is linked from {file}, whose lamps it aims at", file=library.filepath)
+
+
 @dataclass(frozen=True)
 class Lamp:
     """A lamp of a scene: its slot from 1, or None and why; its irradiance at the subject, which is
-    an estimate to rank lamps by."""
+    an estimate to rank lamps by; whether it has no size, so that only slots show it."""
 
     name: str
     slot: int | None
     irradiance: float
     why: str = ""
+    sizeless: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,7 @@ class Candidate:
     irradiance: object
     why: str = ""
     rank: float = 0.0
+    sizeless: bool = False
     #: Of a mesh: the ball around it; see meshes.judge().
     ball: object = None
 

@@ -35,8 +35,10 @@ from .preferences import (
 )
 from .settings import (
     BRDFC_OT_enable_osl,
+    BRDFC_OT_enlarge_lamps,
     BRDFC_OT_find_lamps,
     BRDFC_OT_fix_material,
+    BRDFC_OT_make_local,
     BRDFC_OT_no_guiding,
 )
 
@@ -60,7 +62,9 @@ _CLASSES = (
     BRDFC_OT_add_library,
     BRDFC_OT_remove_library,
     BRDFC_OT_enable_osl,
+    BRDFC_OT_enlarge_lamps,
     BRDFC_OT_fix_material,
+    BRDFC_OT_make_local,
     BRDFC_OT_no_guiding,
     BRDFC_OT_substance,
     BRDFC_OT_switch,

@@ -88,10 +88,7 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         except ERRORS as error:
             return refused(self, error)
         target = context.object
-        if not target.material_slots:
-            target.data.materials.append(material)
-        else:
-            target.active_material = material
+        target.active_material = material  # Blender makes a slot where there is none
         said = say("{material} assigned to {object}", material=material.name, object=target.name)
         self.report({"INFO"}, rpt(said))
         report_osl(self, context.scene)

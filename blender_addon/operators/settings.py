@@ -61,3 +61,41 @@ class BRDFC_OT_find_lamps(Operator):
             {"INFO"}, rpt(say("Lamps aimed at: {taken} of {all}", taken=taken, all=len(found)))
         )
         return {"FINISHED"}
+
+
+class BRDFC_OT_enlarge_lamps(Operator):
+    bl_idname = "brdfc.enlarge_lamps"
+    bl_label = "Give Lamps a Size"
+    bl_description = (
+        "Give lamps that are too small to be met by chance 1 cm, and suns a little more than a "
+        "degree; they shine as before, with softer shadows"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        done, kept = api.enlarge_lamps(context.scene)
+        if kept:
+            said = say("{lamps}: of another file, and stay as they are", lamps=", ".join(kept))
+            self.report({"WARNING"}, rpt(said))
+        said = say("Lamps that were enlarged: {count}", count=len(done))
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class BRDFC_OT_make_local(OfActiveMaterial, Operator):
+    bl_idname = "brdfc.make_local"
+    bl_label = "Make Local"
+    bl_description = (
+        "Make the active material this file's own, with object and data where they are linked, "
+        "so that it aims at the lamps of this file"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        target = context.object
+        if target.library is not None:
+            target = target.make_local()
+        if target.data.library is not None:
+            target.data.make_local()
+        api.make_local(target.active_material)
+        return {"FINISHED"}

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Says on the console why models are black in a picture: renders without a window show no panel."""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import checks
+
+
+def _materials(scene):
+    """Materials of a scene's objects, and of those that it places copies of."""
+    left, objects = [*scene.objects], {}
+    while left:
+        item = left.pop()
+        if item not in objects:
+            objects[item] = None
+            left += item.instance_collection.all_objects if item.instance_collection else []
+    return {slot.material: None for o in objects for slot in o.material_slots if slot.material}
+
+
+@persistent
+def _before_render(scene, *_):
+    why = {}
+    for material in _materials(scene):
+        for sentence in checks.why_black(material, scene):
+            why.setdefault(sentence, []).append(material.name)
+    for sentence, names in why.items():
+        more = f" and {len(names) - 3} more" if names[3:] else ""
+        print(f"brdfc: {sentence}: {', '.join(names[:3])}{more} will be black")
+
+
+def register():
+    bpy.app.handlers.render_init.append(_before_render)
+
+
+def unregister():
+    bpy.app.handlers.render_init.remove(_before_render)

@@ -1,0 +1,347 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Findings about a scene's lamps, one of a kind; what scripts and consoles are told."""
+
+import inspect
+import math
+import re
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+import helpers
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def add_lamp(scene, kind="POINT", name="Lamp", location=(0, 0, 4), **settings):
+    data = bpy.data.lights.new(name, kind)
+    for key, value in settings.items():
+        setattr(data, key, value)
+    item = bpy.data.objects.new(name, data)
+    item.location = location
+    scene.collection.objects.link(item)
+    return item
+
+
+def ring(scene, count, turn=0.0, **settings):
+    """Equal lamps at equal distances of the origin."""
+    turns = [turn + 2 * math.pi * i / count for i in range(count)]
+    return [
+        add_lamp(scene, name=f"Lamp{i}", location=(3 * math.cos(t), 3 * math.sin(t), 4), **settings)
+        for i, t in enumerate(turns)
+    ]
+
+
+def ball(extension, scene, model="ashikhmin_shirley", form="aimed", **values):
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    extension.api.enable_osl(scene)
+    material = extension.api.new_material(model, form, **values)
+    item = helpers.add_sphere(scene, material)
+    bpy.context.view_layer.objects.active = item
+    bpy.context.view_layer.update()
+    assert extension.api.warnings(material, scene) == []
+    return material
+
+
+def found(extension, material, scene):
+    """{code: message} of the findings, of which there is one of a kind."""
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()  # what a handler changed
+    findings = extension.api.warnings(material, scene)
+    assert len({f.code for f in findings}) == len(findings)
+    return {f.code: f.message for f in findings}
+
+
+def offered(extension, material, scene):
+    layout = helpers.Layout()
+    extension.ui.draw_warnings(layout, material, scene)
+    return [line for line in layout.log if line.startswith("operator")]
+
+
+def light_of(scene, samples=64):
+    """Mean radiance of a small picture."""
+    if scene.camera is None:
+        helpers.add_camera(scene, location=(0, -3, 3), rotation=(np.pi / 4, 0, 0))
+    scene.render.resolution_x = scene.render.resolution_y = 24
+    scene.cycles.samples = samples
+    return helpers.render(scene)[..., :3].mean()
+
+
+# ---- documented code -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/blender.md"])
+def test_documented_code_shows_the_material_in_a_new_file(extension, page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    block = next(b for b in re.findall(r"(?:^    .*\n|^\n)+", text, re.M) if "new_material(" in b)
+    code = "\n".join(line[4:] for line in block.splitlines())
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    scene = bpy.context.scene
+    exec(compile(code, page, "exec"), {})
+    scene.render.resolution_x, scene.render.resolution_y = 32, 18
+    scene.cycles.samples = 16
+    red, green, blue = helpers.render(scene)[6:12, 13:19, :3].mean((0, 1))
+    assert red > 3 * green and red > 3 * blue and red > 0.02
+
+
+def test_documented_code_of_the_module_is_that_of_the_readme(extension):
+    code = [line.strip() for line in extension.api.__doc__.splitlines() if line.startswith("    ")]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(code) == 4 and all(f"    {line}\n" in readme for line in code)
+
+
+def test_every_function_for_scripts_is_exported_and_in_the_table(extension):
+    api = extension.api
+    functions = {
+        name
+        for name, item in inspect.getmembers(api, inspect.isfunction)
+        if item.__module__ == api.__name__ and not name.startswith("_")
+    }
+    assert "scene_warnings" in functions
+    assert functions <= set(api.__all__)
+    page = (ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
+    assert not {name for name in functions - {"has_twin"} if f"`{name}(" not in page}
+
+
+@pytest.mark.parametrize("given", [None, "Material", 3])
+def test_no_material_is_an_error_that_says_so(extension, empty, given):
+    api = extension.api
+    for call in (
+        lambda: api.set_parameters(given, e=20.0),
+        lambda: api.get_parameters(given),
+        lambda: api.switch_representation(given, "sampled"),
+        lambda: api.add_twin(given),
+        lambda: api.make_local(given),
+    ):
+        with pytest.raises(ValueError, match=f"Expected a material, got {given!r}"):
+            call()
+
+
+# ---- lamps that materials do not aim at ----------------------------------------------------------
+
+
+def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(extension, empty):
+    material = ball(extension, empty, "phong", e=10.0)
+    ring(empty, 8, shadow_soft_size=0.0, energy=50)
+    assert found(extension, material, empty) == {}
+    ring(empty, 8, turn=0.3, shadow_soft_size=0.0, energy=50)
+    message = found(extension, material, empty)["lost_lamps"]
+    assert "and 5 more" in message and "fainter than the 8" in message
+    assert offered(extension, material, empty) == ["operator brdfc.enlarge_lamps Give Lamps a Size"]
+    shown = light_of(empty)
+    assert bpy.ops.brdfc.enlarge_lamps() == {"FINISHED"}
+    assert all(o.data.shadow_soft_size > 0 for o in empty.objects if o.type == "LIGHT")
+    assert list(found(extension, material, empty)) == ["not_aimed"], "what is left is noise"
+    # Half of the light was lost. The other half comes as dots: that it comes is shown by lamps that
+    # are large enough for a small picture.
+    for item in empty.objects:
+        if item.type == "LIGHT":
+            item.data.shadow_soft_size = 0.5
+    assert light_of(empty, 256) == pytest.approx(2 * shown, rel=0.1)
+
+
+def test_small_lamps_of_sampled_forms_get_a_size_by_the_same_button(extension, empty):
+    material = ball(extension, empty, form="sampled")
+    lamps = [
+        add_lamp(empty, shadow_soft_size=0.0),
+        add_lamp(empty, "SUN", "Sun", angle=0.0),
+        add_lamp(empty, "AREA", "Area", shape="RECTANGLE", size=1.0, size_y=0.001),
+    ]
+    message = found(extension, material, empty)["zero_size_lights"]
+    assert all(lamp.name in message for lamp in lamps)
+    assert offered(extension, material, empty) == ["operator brdfc.enlarge_lamps Give Lamps a Size"]
+    assert extension.api.enlarge_lamps(empty) == (["Lamp", "Sun", "Area"], [])
+    assert found(extension, material, empty) == {}
+    assert lamps[2].data.size == 1 and extension.api.enlarge_lamps(empty) == ([], [])
+
+
+def test_lamps_that_no_picture_shows_are_no_finding(extension, empty):
+    material = ball(extension, empty, form="sampled")
+    lamp = add_lamp(empty, shadow_soft_size=0.0)
+    assert list(found(extension, material, empty)) == ["zero_size_lights"]
+    lamp.hide_render = True
+    assert found(extension, material, empty) == {}
+    lamp.hide_render = False
+    collection = bpy.data.collections.new("Hidden")
+    empty.collection.children.link(collection)
+    collection.objects.link(lamp)
+    empty.collection.objects.unlink(lamp)
+    assert list(found(extension, material, empty)) == ["zero_size_lights"]
+    collection.hide_render = True
+    assert found(extension, material, empty) == {}
+
+
+def test_bright_lamps_that_are_not_aimed_at_are_one_finding(extension, empty):
+    material = ball(extension, empty)
+    ring(empty, 16, shadow_soft_size=0.2, energy=50)
+    messages = found(extension, material, empty)
+    assert list(messages) == ["not_aimed"]
+    assert "and 5 more" in messages["not_aimed"] and "fainter than the 8" in messages["not_aimed"]
+    for item in list(empty.objects):
+        if item.type == "LIGHT" and int(item.name[4:]) >= 8:
+            item.data.energy = 1
+    assert found(extension, material, empty) == {}, "dim ones drown in the others"
+
+
+def emissive(strength):
+    material = bpy.data.materials.new("Emissive")
+    tree = helpers.empty_tree(material)
+    node = tree.nodes.new("ShaderNodeEmission")
+    node.inputs["Strength"].default_value = strength
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def test_meshes_that_shine(extension, empty):
+    material = ball(extension, empty)
+    add_lamp(empty, energy=100, shadow_soft_size=0.2)
+    mesh = bpy.data.meshes.new("Tube")
+    mesh.from_pydata([(-1, 0, 0), (1, 0, 0), (1, 0.1, 0), (-1, 0.1, 0)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(emissive(0.01))
+    tube = bpy.data.objects.new("Tube", mesh)
+    tube.location = (0, 0, 6)
+    empty.collection.objects.link(tube)
+    assert found(extension, material, empty) == {}, "it is dim"
+    mesh.materials[0] = emissive(20.0)
+    messages = found(extension, material, empty)
+    assert list(messages) == ["not_aimed"]
+    assert messages["not_aimed"].endswith(
+        "Noisy under Tube: a mesh that is neither round nor small"
+    )
+
+
+def test_a_world_that_can_not_be_followed(extension, empty):
+    material = ball(extension, empty)
+    tree, background = helpers.add_world(empty)
+    image = bpy.data.images.new("Sky", 64, 32, float_buffer=True)
+    pixels = np.full((32, 64, 4), 0.1, np.float32)
+    pixels[24, 20] = 5000
+    image.pixels.foreach_set(pixels.ravel())
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    extension.api.see_lamps(empty)
+    assert found(extension, material, empty) == {}
+    node.projection = "MIRROR_BALL"
+    messages = found(extension, material, empty)
+    assert list(messages) == ["not_aimed"]
+    assert "Sky, bright spot 1" in messages["not_aimed"] and "followed" in messages["not_aimed"]
+
+
+def test_lamps_that_take_light_are_aimed_at(extension, empty):
+    """No drawn direction meets one without a size: what it takes is what the closures say."""
+    ball(extension, empty)
+    lamp = add_lamp(empty, location=(1, -2, 4), energy=100, shadow_soft_size=0.0)
+    bpy.context.view_layer.update()
+    given = light_of(empty)
+    helpers.add_world(empty, 5.0)
+    both = light_of(empty, 1024)
+    lamp.data.energy = -100
+    (seen,) = extension.api.see_lamps(empty)
+    assert seen.slot == 1 and seen.irradiance > 0
+    less = light_of(empty, 1024)
+    assert given > 0.01
+    assert both - less == pytest.approx(2 * given, rel=0.02)
+
+
+# ---- materials of another file -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("with_object", [False, True])
+def test_linked_materials_aim_at_their_own_files_lamps(extension, empty, tmp_path, with_object):
+    material = ball(extension, empty)
+    add_lamp(empty, name="There", location=(5, 0, 5), energy=100, shadow_soft_size=0.1)
+    bpy.context.view_layer.update()
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    name = material.name
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    extension.api.enable_osl(scene)
+    with bpy.data.libraries.load(str(path), link=True) as (_, to):
+        to.materials, to.objects = [name], ["Sphere", "There"] if with_object else []
+    if with_object:
+        item, there = to.objects
+        scene.collection.objects.link(item)
+        scene.collection.objects.link(there)
+        material = item.active_material
+        assert found(extension, material, scene) == {}, "its lamp is here too"
+    else:
+        material = to.materials[0]
+        item = helpers.add_sphere(scene, material)
+    bpy.context.view_layer.objects.active = item
+    add_lamp(scene, name="Here", location=(1, -2, 4), energy=100, shadow_soft_size=0.1)
+    message = found(extension, material, scene)["linked_lamps"]
+    assert "Noisy under Here" in message and "library.blend" in message
+    assert offered(extension, material, scene) == ["operator brdfc.make_local Make Local"]
+    bpy.data.lights["Here"].shadow_soft_size = 0.0
+    message = found(extension, material, scene)["linked_lamps"]
+    assert "Light of lamps without a size (Here) is lost" in message
+    assert bpy.ops.brdfc.make_local() == {"FINISHED"}
+    material = bpy.context.object.active_material
+    assert material.library is None
+    assert found(extension, material, scene) == {}
+    (node,) = extension.nodes.group_nodes(material)
+    assert node.node_tree.library is None
+    lamps = import_module(f"{extension.package}.lamps")
+    (shared,) = [
+        n.node_tree for n in node.node_tree.nodes if lamps.is_group(getattr(n, "node_tree", {}))
+    ]
+    assert shared == lamps.find_group() and shared.library is None
+    assert light_of(scene) > 0
+
+
+# ---- physics that a lamp's settings bring out ----------------------------------------------------
+
+
+def test_small_lamps_in_an_ideal_mirror(extension, empty):
+    mirror = ball(extension, empty, "schlick")
+    matte = extension.api.new_material("lambert")
+    lamp = add_lamp(empty, shadow_soft_size=0.1)
+    messages = found(extension, mirror, empty)
+    assert list(messages) == ["small_in_mirror"] and "Lamp" in messages["small_in_mirror"]
+    assert found(extension, matte, empty) == {}
+    for size in (0.0, 0.5):  # a mirror shows no lamp without a size
+        lamp.data.shadow_soft_size = size
+        assert found(extension, mirror, empty) == {}
+
+
+@pytest.mark.parametrize("rays", ["visible_diffuse", "visible_glossy"])
+def test_ray_visibility_of_lamps(extension, empty, rays):
+    material = ball(extension, empty)
+    lamp = add_lamp(empty)
+    assert found(extension, material, empty) == {}
+    setattr(lamp, rays, False)
+    messages = found(extension, material, empty)
+    assert list(messages) == ["ray_visibility"] and "Lamp" in messages["ray_visibility"]
+    lamp.hide_render = True
+    assert found(extension, material, empty) == {}
+
+
+# ---- the console ---------------------------------------------------------------------------------
+
+
+def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch):
+    material = ball(extension, empty)
+    light_of(empty, 1)
+    assert "will be black" not in capsys.readouterr().out
+    empty.cycles.shading_system = False
+    light_of(empty, 1)
+    said = [line for line in capsys.readouterr().out.splitlines() if "will be black" in line]
+    assert said == [f"brdfc: Open Shading Language is off: {material.name} will be black"]
+    empty.cycles.shading_system = True
+    console = import_module(f"{extension.package}.console")
+    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "CUDA")
+    empty.cycles.device = "GPU"
+    console._before_render(empty)
+    assert capsys.readouterr().out == (
+        f"brdfc: CUDA devices can't run these shaders: {material.name} will be black\n"
+    )
+    material.user_clear()
+    bpy.data.objects["Sphere"].data.materials.clear()
+    console._before_render(empty)
+    assert capsys.readouterr().out == ""
