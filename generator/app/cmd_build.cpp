@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "app/commands.h"
+#include "check/check.h"
 #include "core/data_dir.h"
 #include "core/parse.h"
 #include "forms/aimed.h"
@@ -214,6 +215,7 @@ void run(const Options& options) {
                                       {"--fit", options.fit_bases},
                                       {"--twin", options.twin}})
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
+  pack::require_target(options.out);
   const std::filesystem::path addon =
       options.addon.empty() ? data_dir() / "blender_addon" : std::filesystem::path(options.addon);
   const std::filesystem::path costs = addon / "costs.csv";
@@ -245,6 +247,7 @@ void run(const Options& options) {
   } else {
     plan = plan::plan_models(options.models);
   }
+  for (const plan::PlannedModel& p : plan) check::require_vital(*p.model);
   pack::Options pack{options.out, addon, data_dir() / "python" / "brdfc", plan, budget.costs, {}};
   const std::string& cut_to = options.scene.empty() ? options.materials : options.scene;
   pack.cut = std::filesystem::path(cut_to).stem().string();
@@ -266,38 +269,42 @@ void run(const Options& options) {
 void add_build_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* c = app.add_subcommand("build", "Write the Blender extension");
-  c->add_flag("--all", options->all, "Every model");
+  const std::string what = "What (one of them)", forms = "Forms, with --scene or --materials", where = "Where";
+  c->add_flag("--all", options->all, "Every model")->group(what);
+  c->add_option("--model", options->models, "Only these models (repeat for several)")->group(what);
   c->add_option("--scene", options->scene,
                 "Only what the materials of a scene file need: models, forms, parameters that are not constant, "
-                "view angles");
+                "view angles")
+      ->group(what);
   c->add_option("--materials", options->materials,
-                "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses");
-  c->add_flag("--explain", options->json,
-              "With --scene or --materials: what forms there are, what is left out, why and what that saves, as JSON");
-  c->add_option(
-      "--error", options->error,
-      "With --scene or --materials: percent of the light (relative L1 of f cos), as 5%, that a fitted form may be "
-      "off,\n"
-      "where a material of a scene leaves its form open, or beside the sampled form of a .blend; without, no\n"
-      "form is fitted unasked");
+                "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses")
+      ->group(what);
+  c->add_option("--error", options->error,
+                "Percent of the light (relative L1 of f cos), as 5%, that a fitted form may be off, where a material\n"
+                "of a scene leaves its form open, or beside the sampled form of a .blend; without, no form is fitted\n"
+                "unasked")
+      ->group(forms);
   c->add_option("--time", options->time,
-                "With --scene or --materials: what a form may cost, as 1.2x, in CPU time of Blender's Glossy node at\n"
-                "equal samples, where a material leaves its form open; --explain prints what forms cost");
-  c->add_flag(
-      "--fit", options->fit_bases,
-      "With --scene or --materials: closures are fitted to the materials that can have it, as the base of their\n"
-      "aimed forms, which are then less noisy under skies and images; seconds to minutes a material");
-  c->add_flag(
-      "--twin", options->twin,
-      "With --scene or --materials: also twins, Blender's own nodes for where Open Shading Language does not run,\n"
-      "of every material whose parameters are constant");
-  c->add_option("--model", options->models, "Only these models (repeat for several)");
-  c->add_option("--out", options->out, "Folder for the extension and its zip");
-  c->add_option(
-      "--osl", options->osl,
-      "Instead of an extension: every model, or those of --model, as a shader for Blender's Script node, and\n"
-      "its formulas as OSL without closures, into this folder");
-  c->add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`");
+                "What a form may cost, as 1.2x, in CPU time of Blender's Glossy node at equal samples, where a\n"
+                "material leaves its form open; --explain prints what forms cost")
+      ->group(forms);
+  c->add_flag("--fit", options->fit_bases,
+              "Closures are fitted to the materials that can have it, as the base of their aimed forms, which are\n"
+              "then less noisy under skies and images; seconds to minutes a material")
+      ->group(forms);
+  c->add_flag("--twin", options->twin,
+              "Also twins, Blender's own nodes for where Open Shading Language does not run, of every material whose\n"
+              "parameters are constant")
+      ->group(forms);
+  c->add_flag("--explain", options->json, "What forms there are, what is left out, why and what that saves, as JSON")
+      ->group(forms);
+  c->add_option("--out", options->out, "Folder for the extension and its zip")->group(where);
+  c->add_option("--osl", options->osl,
+                "Instead of an extension: every model, or those of --model, as a shader for Blender's Script node,\n"
+                "and its formulas as OSL without closures, into this folder")
+      ->group(where);
+  c->add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`")
+      ->group(where);
   c->callback([options] { run(*options); });
 }
 

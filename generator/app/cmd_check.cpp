@@ -66,7 +66,8 @@ void add_check_command(CLI::App& app) {
                          {"limit", r.limit},
                          {"passed", passed},
                          {"where", r.where},
-                         {"reason", r.reason}});
+                         {"reason", r.reason},
+                         {"declare", r.declare}});
           continue;
         }
         if (skipped) {
@@ -77,6 +78,7 @@ void add_check_command(CLI::App& app) {
         fmt::print("  {:<18} {:>6} {:>7} {:>11.4g} {:>11.4g}  {:<7}  {}\n", r.check, r.cases, r.skipped, r.worst,
                    r.limit, r.result == check::Result::Passed ? "ok" : "FAILED", r.expected);
         if (r.result == check::Result::Failed) fmt::print("    at {}\n", r.where);
+        if (!r.declare.empty()) fmt::print("    say {} if that is meant\n", r.declare);
       }
     }
     if (o->json) fmt::print("{}\n", all.dump(2));

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "pack/addon.h"
 #include "pack/python_package.h"
+#include "pack/target.h"
 
 namespace brdfc::app {
 namespace {
@@ -26,10 +27,10 @@ void write(const fs::path& path, const std::string& text) {
 
 void run(const fs::path& out) {
   const fs::path data = data_dir(), package = out / "brdfc";
-  // Modules of models that are no longer there would be part of a wheel.
-  if (fs::exists(package) && !fs::exists(package / "models"))
-    input_error("{}: expected a folder that this command wrote, or none", package.string());
+  pack::require_package(package);
+  pack::make_folder(out);
   const auto files = pack::python_package(models_named(""), data / "python" / "brdfc");
+  // Modules of models that are no longer there would be part of a wheel.
   fs::remove_all(package);
   for (const auto& [name, module] : files) write(package / name, module);
   const fs::path project = data / "python" / "pyproject.toml";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc sample: directions drawn from a model.
 #include <iostream>
+#include <limits>
 #include <random>
 
 #include "app/commands.h"
@@ -40,8 +41,8 @@ void add_sample_command(CLI::App& app) {
                          "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  CLI::Option* count =
-      cmd->add_option("--count", o->count, "Draw so many samples from own random numbers")->check(CLI::PositiveNumber);
+  CLI::Option* count = cmd->add_option("--count", o->count, "Draw so many samples from own random numbers")
+                           ->check(CLI::Range(1, std::numeric_limits<int>::max()));
   cmd->add_option("--seed", o->seed, "Seed of the random numbers")->needs(count);
   cmd->add_option("--pattern", o->pattern,
                   "How they are placed, as those of a pixel are by the reference renderer: random, regular, jittered,\n"

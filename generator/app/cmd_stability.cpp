@@ -2,6 +2,7 @@
 // brdfc stability: rounding, bad values and sampling, as long as asked.
 #include <algorithm>
 #include <chrono>
+#include <limits>
 
 #include "app/commands.h"
 #include "measure/stability.h"
@@ -23,9 +24,9 @@ void add_stability_command(CLI::App& app) {
       "against double, bad values (NaN, infinite, negative). Exit status 1 if one fails.");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
   cmd->add_option("--points", o->hunt.points, "Places a model at which double is compared with 113 bits")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1L, std::numeric_limits<long>::max()));
   cmd->add_option("--calls", o->calls, "Evaluations and samples over all models that look for bad values")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0L, std::numeric_limits<long>::max()));
   cmd->add_option("--limit", o->limit, "Units of epsilon that a formula may add to its inputs' rounding");
   cmd->add_option("--page", o->page, "Folder for a page of maps of the errors");
   cmd->add_option("--seed", o->hunt.seed, "Seed of parameters and directions");

@@ -95,6 +95,8 @@ Row run(const Check& check, const Trial& trial) {
   try {
     check.judge(trial, verdict);
     verdict.report(row);
+    // Where nothing could be judged nothing is known.
+    if (row.result == Result::Failed && row.cases > 0) row.declare = check.declare;
   } catch (const ValueError& e) {
     verdict.report(row);
     row.result = Result::Failed;
@@ -110,6 +112,17 @@ std::vector<Row> check_model(const Model& model, const Options& options) {
   std::vector<Row> rows;
   for (const Check& check : all_checks(trial.claims())) rows.push_back(run(check, trial));
   return rows;
+}
+
+void require_vital(const Model& model) {
+  const Trial trial(model, {.effort = 0.1});
+  std::vector<std::string> failed;
+  for (const Check& check : all_checks(trial.claims()))
+    if (check.vital && run(check, trial).result == Result::Failed)
+      failed.push_back(fmt::format("{} ({})", check.name, check.expected));
+  if (!failed.empty())
+    throw ValueError(fmt::format("{}: fails {}: run `brdfc check {}`", model.info().name, fmt::join(failed, ", "),
+                                 model.info().name));
 }
 
 }  // namespace brdfc::check

@@ -28,6 +28,9 @@ struct Row {
   Result result = Result::Passed;
   std::string where;   ///< parameters and directions of the worst value
   std::string reason;  ///< why the check was skipped, else empty
+  /// What info() has to declare if a failure is meant, ".smooth = false"; empty where it is a fault whatever is
+  /// declared, and where the check has not failed.
+  std::string declare;
 };
 
 struct Options {
@@ -38,5 +41,9 @@ struct Options {
 /// keep. A property declared absent must visibly be absent somewhere. A value that is NaN, infinite or negative fails
 /// every check that meets it, with model, parameters, directions and value in `where`.
 std::vector<Row> check_model(const Model&, const Options& = {});
+
+/// A glance at what nothing can be built without. Throws ValueError that names the model, the checks that fail and the
+/// command that says more.
+void require_vital(const Model&);
 
 }  // namespace brdfc::check

@@ -127,7 +127,21 @@ struct Check {
   std::function<void(const Trial&, Verdict&)> judge;
   /// Why it does not apply to the model; empty where it does.
   std::string (*inapplicable)(const Trial&) = [](const Trial&) { return std::string(); };
+  bool vital = false;        ///< quick, and nothing can be built of a model that fails it
+  std::string declare = {};  ///< as of a Row that has failed
 };
+/// The check of a property of this name in ModelProperties, as it is claimed.
+inline Check check_of(bool claimed, const std::string& property, Check present, Check absent) {
+  Check check = std::move(claimed ? present : absent);
+  check.declare = fmt::format(".{} = {}", property, !claimed);
+  return check;
+}
+/// The same for a limit, whose claim names the place.
+inline Check check_of(const std::string& claimed, const std::string& property, Check present, Check absent) {
+  Check check = std::move(claimed.empty() ? absent : present);
+  check.declare = fmt::format(".{} = \"{}\"", property, claimed.empty() ? "PARAMETER=VALUE" : "");
+  return check;
+}
 
 /// Reasons not to judge.
 std::string without_lobe(const Trial&);        ///< there are delta terms alone

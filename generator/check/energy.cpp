@@ -93,12 +93,12 @@ const std::vector<AlbedoFound>& Trial::albedos() const {
 }
 
 std::vector<Check> energy_checks(const ModelProperties& claims) {
-  return {claims.conserving
-              ? Check{"conserving", "albedo <= 1 + error", at_most(1), conserving}
-              : Check{"not conserving", "albedo > 1 somewhere", somewhere_at_least(1 + kVisible), gaining},
-          claims.lossless ? Check{"lossless", "|albedo - 1| <= error with colours at 1", at_most(kAlbedo), lossless}
-                          : Check{"not lossless", "albedo differs from 1 somewhere with colours at 1",
-                                  somewhere_at_least(kVisible), lossless},
+  return {check_of(claims.conserving, "conserving", {"conserving", "albedo <= 1 + error", at_most(1), conserving},
+                   {"not conserving", "albedo > 1 somewhere", somewhere_at_least(1 + kVisible), gaining}),
+          check_of(claims.lossless, "lossless",
+                   {"lossless", "|albedo - 1| <= error with colours at 1", at_most(kAlbedo), lossless},
+                   {"not lossless", "albedo differs from 1 somewhere with colours at 1", somewhere_at_least(kVisible),
+                    lossless}),
           {"sampled albedo", "mean weight = albedo by quadrature", at_most(kAlbedo), sampled, without_lobe}};
 }
 

@@ -119,15 +119,16 @@ void histogram(const Trial& t, Verdict& verdict) {
 }  // namespace
 
 std::vector<Check> sampling_checks(const ModelProperties& claims) {
-  return {claims.exact_sampling
-              ? Check{"exact sampling", "the weight does not depend on wi", at_most(kEven), even, without_upper_lobe}
-              : Check{"not exact sampling", "the weight depends on wi somewhere", somewhere_at_least(kVisible), even,
-                      without_upper_lobe},
-          {"sampling variance", "variance of f cos / pdf over its mean squared", at_most(kVariance), variance,
-           without_upper_lobe},
-          {"pdf integral", "integral of pdf + lost samples = 1", at_most(kNormalisation), normalised, without_lobe},
-          {"sample weight", "weight pdf = f cos, sample's pdf = pdf()", at_most(kIdentity), weights, without_lobe},
-          {"chi-square", "p > 0.01 over all cases (Sidak)", at_least(kSignificance), histogram, without_lobe}};
+  return {
+      check_of(claims.exact_sampling, "exact_sampling",
+               {"exact sampling", "the weight does not depend on wi", at_most(kEven), even, without_upper_lobe},
+               {"not exact sampling", "the weight depends on wi somewhere", somewhere_at_least(kVisible), even,
+                without_upper_lobe}),
+      {"sampling variance", "variance of f cos / pdf over its mean squared", at_most(kVariance), variance,
+       without_upper_lobe},
+      {"pdf integral", "integral of pdf + lost samples = 1", at_most(kNormalisation), normalised, without_lobe},
+      {"sample weight", "weight pdf = f cos, sample's pdf = pdf()", at_most(kIdentity), weights, without_lobe, true},
+      {"chi-square", "p > 0.01 over all cases (Sidak)", at_least(kSignificance), histogram, without_lobe}};
 }
 
 }  // namespace brdfc::check

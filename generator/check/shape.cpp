@@ -91,23 +91,24 @@ void mirror(const Trial& t, Verdict& verdict) {
 }  // namespace
 
 std::vector<Check> shape_checks(const ModelProperties& claims) {
-  return {claims.specular_limit.empty()
-              ? Check{"no specular limit", "light leaves elsewhere at every end of a range", at_most(kMirror),
-                      not_mirror, without_upper_lobe}
-              : Check{"specular limit", "share away from ideal reflection at " + claims.specular_limit,
-                      at_most(1 - kMirror), mirror},
-          claims.diffuse_limit.empty()
-              ? Check{"no diffuse limit", "f not constant at any end of a range", at_least(kVisible), not_matte,
-                      without_upper_lobe}
-              : Check{"diffuse limit", "f constant at " + claims.diffuse_limit, at_most(kEven), matte, without_lobe},
+  return {check_of(claims.specular_limit, "specular_limit",
+                   {"specular limit", "share away from ideal reflection at " + claims.specular_limit,
+                    at_most(1 - kMirror), mirror},
+                   {"no specular limit", "light leaves elsewhere at every end of a range", at_most(kMirror), not_mirror,
+                    without_upper_lobe}),
+          check_of(claims.diffuse_limit, "diffuse_limit",
+                   {"diffuse limit", "f constant at " + claims.diffuse_limit, at_most(kEven), matte, without_lobe},
+                   {"no diffuse limit", "f not constant at any end of a range", at_least(kVisible), not_matte,
+                    without_upper_lobe}),
           // A place that is dark counts 1.
-          claims.positive
-              ? Check{"positive", "f > 0 above the surface, underflow aside", at_most(0), positive, without_upper_lobe}
-              : Check{"not positive", "f = 0 somewhere, not by underflow", somewhere_at_least(1), positive,
-                      without_upper_lobe},
-          claims.smooth ? Check{"smooth", "no jump of a derivative of f", at_most(kSmooth), smooth, without_upper_lobe}
-                        : Check{"not smooth", "a derivative of f jumps visibly somewhere", somewhere_at_least(kEdge),
-                                smooth, without_upper_lobe}};
+          check_of(claims.positive, "positive",
+                   {"positive", "f > 0 above the surface, underflow aside", at_most(0), positive, without_upper_lobe},
+                   {"not positive", "f = 0 somewhere, not by underflow", somewhere_at_least(1), positive,
+                    without_upper_lobe}),
+          check_of(claims.smooth, "smooth",
+                   {"smooth", "no jump of a derivative of f", at_most(kSmooth), smooth, without_upper_lobe},
+                   {"not smooth", "a derivative of f jumps visibly somewhere", somewhere_at_least(kEdge), smooth,
+                    without_upper_lobe})};
 }
 
 }  // namespace brdfc::check

@@ -69,12 +69,14 @@ void isotropic(const Trial& t, Verdict& verdict) {
 }  // namespace
 
 std::vector<Check> symmetry_checks(const ModelProperties& claims) {
-  return {claims.reciprocal ? Check{"reciprocal", "f(wi, wo) = f(wo, wi)", at_most(kReciprocity), reciprocal}
-                            : Check{"not reciprocal", "f(wi, wo) differs from f(wo, wi) somewhere",
-                                    somewhere_at_least(kVisible), reciprocal},
-          claims.isotropic ? Check{"isotropic", "f unchanged when both directions turn", at_most(kIdentity), isotropic}
-                           : Check{"not isotropic", "f changes somewhere when both directions turn",
-                                   somewhere_at_least(kVisible), isotropic}};
+  return {
+      check_of(
+          claims.reciprocal, "reciprocal", {"reciprocal", "f(wi, wo) = f(wo, wi)", at_most(kReciprocity), reciprocal},
+          {"not reciprocal", "f(wi, wo) differs from f(wo, wi) somewhere", somewhere_at_least(kVisible), reciprocal}),
+      check_of(
+          claims.isotropic, "isotropic",
+          {"isotropic", "f unchanged when both directions turn", at_most(kIdentity), isotropic},
+          {"not isotropic", "f changes somewhere when both directions turn", somewhere_at_least(kVisible), isotropic})};
 }
 
 }  // namespace brdfc::check

@@ -57,7 +57,9 @@ void values(const Trial& t, Verdict& verdict) {
 }  // namespace
 
 std::vector<Check> value_checks() {
-  return {{"values", "no bad one: f, pdf, weights finite and >= 0, in float and double", at_most(0), values}};
+  Check check{"values", "no bad one: f, pdf, weights finite and >= 0, in float and double", at_most(0), values};
+  check.vital = true;
+  return {check};
 }
 
 }  // namespace brdfc::check

@@ -281,11 +281,11 @@ class Tabulator {
       const auto require_equal = [&](const Rgb<double>& wanted, double error, const char* what) {
         const Rgb<double> got = polynomial_.combine(one, p.colors);
         if (max_abs(wanted - got) <= kTableSettings.same + error + 10 * one.error) return;
-        throw ValueError(
-            fmt::format("{}: albedo at cos_theta_o={}, phi_o={}: ({}, {}, {}) from values at colours 0 and 1"
-                        " by sample(), expected {} ({}, {}, {}) within {:.1e}",
-                        polynomial_.label(values), p.x[0], p.phi, got.r, got.g, got.b, what, wanted.r, wanted.g,
-                        wanted.b, kTableSettings.same + error + 10 * one.error));
+        throw ValueError(fmt::format(
+            "{}: run `brdfc check {}`: albedo at cos_theta_o={:.6g}, phi_o={:.6g}: ({:.6g}, {:.6g}, {:.6g})"
+            " from values at colours 0 and 1 by sample(), expected {} ({:.6g}, {:.6g}, {:.6g}) within {:.1e}",
+            polynomial_.label(values), model_.info().name, p.x[0], p.phi, got.r, got.g, got.b, what, wanted.r, wanted.g,
+            wanted.b, kTableSettings.same + error + 10 * one.error));
       };
       require_equal(direct.scattered[0] + direct.mirror[0], 10 * direct.error,
                     "the albedo at the colours themselves, of degree two at most in each and channel by channel,");

@@ -109,15 +109,16 @@ class Model {
   virtual std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const = 0;
 };
 
-/// Name to model, in alphabetical order.
+/// Name to model, in alphabetical order. Throws InputError if one is declared wrongly (model/registry.h), as the two
+/// functions below do.
 const std::map<std::string, std::unique_ptr<Model>>& models();
 /// Throws InputError that lists the known names.
 const Model& find_model(const std::string& name);
 /// That one, or without a name all of them.
 std::vector<const Model*> models_named(const std::string& name);
 
-/// Called by BRDFC_MODEL; a name taken twice, or a look that is not declared, throws std::logic_error.
-bool register_model(std::unique_ptr<Model>);
+/// Called by BRDFC_MODEL, before main(): nobody could catch what it threw. models() tells what is wrong.
+bool register_model(std::unique_ptr<Model>, const char* file);
 
 namespace detail {
 
@@ -358,10 +359,10 @@ template <template <class> class M> class ModelOf final : public Model {
 
 }  // namespace detail
 
-/// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this.
-#define BRDFC_MODEL(M)                                                                                         \
-  namespace {                                                                                                  \
-  const bool registered_##M = ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>()); \
-  }
+/// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this. It sees the
+/// variable as well: of two models with one class name it would else keep one class for both, without a word.
+#define BRDFC_MODEL(M)                    \
+  bool only_one_model_has_the_class_##M = \
+      ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>(), __FILE_NAME__);
 
 }  // namespace brdfc::inline model

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/nearest.h"
 #include "core/parse.h"
 
 namespace brdfc::inline model {
@@ -94,7 +95,8 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
     if (info.param(name)) continue;
     std::vector<std::string> names;
     for (const ParamInfo& p : info.params) names.push_back(p.name);
-    input_error("{}: unknown parameter '{}': expected one of {}", info.name, name, fmt::join(names, ", "));
+    input_error("{}: unknown parameter '{}': {}expected one of {}", info.name, name, did_you_mean(name, names),
+                fmt::join(names, ", "));
   }
   for (const ParamInfo& p : info.params) {
     const auto it = given.find(p.name);

@@ -85,15 +85,16 @@ enum class Look { Undeclared, Matte, Glossy, Metal, Glass, Special };
 /// "matte", "glossy", ...
 std::string name_of(Look);
 
+/// Initialisers for all, so that info() may leave out what it has nothing to say of.
 struct ModelInfo {
-  std::string name;   ///< identifier
-  std::string label;  ///< for people
+  std::string name = {};   ///< identifier
+  std::string label = {};  ///< for people
   Look look = Look::Undeclared;
-  std::string paper;      ///< citation, "I. Name, J. Name: Title, Journal, year"
-  std::string equations;  ///< "eqs. 10, 14, 16, 19, 20"
-  std::string doc;        ///< one or two sentences
-  ModelProperties properties;
-  std::vector<ParamInfo> params;
+  std::string paper = {};      ///< citation, "I. Name, J. Name: Title, Journal, year"
+  std::string equations = {};  ///< "eqs. 10, 14, 16, 19, 20"
+  std::string doc = {};        ///< one or two sentences
+  ModelProperties properties = {};
+  std::vector<ParamInfo> params = {};
 
   /// nullptr if there is none of that name.
   const ParamInfo* param(const std::string& name) const;

@@ -22,6 +22,7 @@
 #include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/python_package.h"
+#include "pack/target.h"
 #include "pack/zip.h"
 #include "plan/costs.h"
 
@@ -32,6 +33,8 @@ namespace fs = std::filesystem;
 
 /// Whatever the extension's id is: what reads packs knows this folder.
 constexpr const char* kFolder = "brdfc_shaders";
+/// What the manifest says of who wrote it, before the version.
+constexpr const char* kGenerator = "brdfc ";
 
 void write_text(const fs::path& path, const std::string& text) {
   fs::create_directories(path.parent_path());
@@ -98,7 +101,9 @@ forms::Setting setting_of(const plan::PlannedModel& plan, const forms::Form& for
   return setting;
 }
 
-BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs, const fs::path& scratch) {
+/// `whole_table`: of its albedo, where it has one.
+BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTable& whole_table,
+                       const plan::Costs& costs, const fs::path& scratch) {
   const Model& model = *plan.model;
   const ModelInfo& info = model.info();
   BuiltModel built;
@@ -116,10 +121,9 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
   j["fixed"] = values_json(plan.fixed);
   if (!plan.views.all()) j["view_cosines"] = {plan.views.low, plan.views.high};
 
-  measure::AlbedoTable table, whole_table;
+  measure::AlbedoTable table;
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
   if (measure::has_albedo_table(model)) {
-    whole_table = measure::albedo_table_of(model);
     table = measure::fold(whole_table, model, plan.fixed, plan.views);
     const fs::path exr = scratch / (info.name + ".exr");
     measure::write_albedo_exr(table, exr);
@@ -178,26 +182,36 @@ BuiltModel build_model(const plan::PlannedModel& plan, const plan::Costs& costs,
 
 }  // namespace
 
+void require_target(const fs::path& out) {
+  require_replaceable(out / kFolder, "manifest.json", fmt::format("\"generator\": \"{}", kGenerator));
+}
+
 Result build_pack(const Options& options) {
+  require_target(options.out);
   const std::vector<plan::PlannedModel>& chosen = options.models;
   std::map<std::string, std::string> members = addon_files(options.addon, options.cut);
-  std::error_code error;
-  fs::create_directories(options.out, error);
-  if (error || !fs::is_directory(options.out))
-    input_error("{}: expected a folder that can be written", options.out.string());
+  make_folder(options.out);
 
   const Staging staging(options.out);
   std::vector<BuiltModel> built(chosen.size());
   std::mutex mutex;
   int begun = 0;
+  // A thread that waits for parts of a model must not begin another one: recordings belong to their thread.
+  std::vector<measure::AlbedoTable> tables(chosen.size());
+  const auto tabulate = [&](std::size_t i) {
+    const Model& model = *chosen[i].model;
+    if (measure::has_albedo_table(model))
+      tbb::this_task_arena::isolate([&] { tables[i] = measure::albedo_table_of(model); });
+  };
   const auto build = [&](std::size_t i) {
     {
       const std::lock_guard lock(mutex);
       if (options.progress) options.progress(chosen[i].model->info().name, begun++, int(chosen.size()));
     }
-    // A thread that waits for parts of this model must not begin another one: recordings belong to their thread.
-    tbb::this_task_arena::isolate([&] { built[i] = build_model(chosen[i], options.costs, staging.path()); });
+    tbb::this_task_arena::isolate([&] { built[i] = build_model(chosen[i], tables[i], options.costs, staging.path()); });
   };
+  // Tables first: what is wrong with a model shows there, and sooner than in a fit.
+  tbb::parallel_for(std::size_t(0), chosen.size(), tabulate, tbb::simple_partitioner());
   // Fits that are not stored are made one at a time, by all cores; then models side by side, so that what one does in
   // line keeps no core waiting.
   for (const plan::PlannedModel& plan : chosen)
@@ -207,7 +221,7 @@ Result build_pack(const Options& options) {
   Result result;
   // Blender's nodes that join closures take of the pool, too: Mix Shader makes two products and their sum.
   Json manifest = {{"format", 1},
-                   {"generator", std::string("brdfc ") + BRDFC_VERSION},
+                   {"generator", std::string(kGenerator) + BRDFC_VERSION},
                    {"hash", ""},
                    {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
                    {"looks", looks_json()},

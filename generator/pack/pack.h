@@ -42,6 +42,10 @@ struct Result {
   std::vector<Line> lines;
 };
 
+/// Throws InputError if `out` has a folder of the extension's name that this tool did not write: build_pack() deletes
+/// what is in it.
+void require_target(const std::filesystem::path& out);
+
 /// Builds beside the target and renames, so that a target is whole or untouched. The same models give the same
 /// bytes. Throws InputError (paths, names) or ValueError (a model that gives a bad value).
 Result build_pack(const Options&);

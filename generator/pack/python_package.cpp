@@ -11,6 +11,7 @@
 #include "model/choices.h"
 #include "model/optical.h"
 #include "pack/addon.h"
+#include "pack/target.h"
 #include "print/numpy.h"
 
 namespace brdfc::pack {
@@ -21,9 +22,9 @@ namespace fs = std::filesystem;
 using print::python_number;
 using print::python_string;
 
-constexpr const char* kHead =
-    "# SPDX-License-Identifier: GPL-3.0-or-later\n"
-    "# Made by brdfc " BRDFC_VERSION " of the formulas in C++: changes belong there.\n";
+constexpr const char* kMadeBy = "# Made by brdfc ";
+const std::string kHead = std::string("# SPDX-License-Identifier: GPL-3.0-or-later\n") + kMadeBy +
+                          BRDFC_VERSION " of the formulas in C++: changes belong there.\n";
 
 std::string color(const std::array<double, 3>& c) {
   return fmt::format("({}, {}, {})", python_number(c[0]), python_number(c[1]), python_number(c[2]));
@@ -178,7 +179,7 @@ std::string tuple_of(const std::vector<double>& numbers) {
 
 /// What optics.py works with: the observer, the substances, and the formulas.
 std::string optics_module() {
-  std::string out = std::string(kHead) + print::python_docstring({"Optical constants, and formulas over them."}, 0);
+  std::string out = kHead + print::python_docstring({"Optical constants, and formulas over them."}, 0);
   out += "\nimport numpy as np\n\nfrom ._formula import table\n\n";
   out += fmt::format("GRAZING = {}\nNEEDED = ({}, {})\nCONDUCTOR = {}\nMAX_INDEX = {}\n", python_number(kGrazing),
                      python_number(kNeededMin), python_number(kNeededMax), python_number(kConductor),
@@ -236,21 +237,22 @@ std::map<std::string, std::string> python_package(const std::vector<const Model*
   for (const fs::directory_entry& entry : fs::directory_iterator(source))
     if (entry.path().extension() == ".py" || entry.path().extension() == ".typed")
       files[entry.path().filename().string()] = read_text(entry.path());
-  files["_version.py"] = std::string(kHead) + "__version__ = " + python_string(BRDFC_VERSION) + "\n";
+  files["_version.py"] = kHead + "__version__ = " + python_string(BRDFC_VERSION) + "\n";
   files["_optics.py"] = optics_module();
   std::string names;
   for (const Model* model : models) {
     files["models/" + model->info().name + ".py"] = module_of(*model);
     names += "    " + python_string(model->info().name) + ",\n";
   }
-  files["models/__init__.py"] =
-      std::string(kHead) + "\"\"\"The formulas, a module a model.\"\"\"\n\nNAMES = (\n" + names + ")\n";
+  files["models/__init__.py"] = kHead + "\"\"\"The formulas, a module a model.\"\"\"\n\nNAMES = (\n" + names + ")\n";
   return files;
 }
 
+void require_package(const fs::path& folder) { require_replaceable(folder, "_version.py", kMadeBy); }
+
 std::string closures_module() {
-  std::string out = std::string(kHead) + "\"\"\"What closures of Cycles scatter.\"\"\"\n\nimport numpy as np\n\n" +
-                    "from ._formula import rgb\n";
+  std::string out =
+      kHead + "\"\"\"What closures of Cycles scatter.\"\"\"\n\nimport numpy as np\n\n" + "from ._formula import rgb\n";
   for (const auto& [kind, name] :
        {std::pair{ClosureKind::Diffuse, "diffuse"}, std::pair{ClosureKind::DiffuseRamp, "diffuse_ramp"},
         std::pair{ClosureKind::PhongRamp, "phong_ramp"}, std::pair{ClosureKind::Ggx, "ggx"},

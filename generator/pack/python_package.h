@@ -16,6 +16,9 @@ namespace brdfc::pack {
 std::map<std::string, std::string> python_package(const std::vector<const Model*>&,
                                                   const std::filesystem::path& source);
 
+/// Throws InputError if there is something in the folder that is not this package as written before.
+void require_package(const std::filesystem::path& folder);
+
 /// A module of f cos(theta_i) of the closures that forms are sums of, a function each, in the names that OSL has for
 /// them: of components of wi, wo and the normal, and of what the closure takes. Directions above the surface.
 std::string closures_module();

@@ -33,7 +33,8 @@ std::string shown(const std::string& key) {
 
 nlohmann::json read_json(const std::filesystem::path& path) {
   const std::string name = path.string();
-  if (!std::filesystem::is_regular_file(path)) input_error("{}: no such file", name);
+  if (!std::filesystem::exists(path)) input_error("{}: no such file", name);
+  if (!std::filesystem::is_regular_file(path)) input_error("{}: not a file", name);
   if (std::filesystem::file_size(path) > kMaxBytes) input_error("{}: expected a JSON file of at most 64 MiB", name);
   std::ifstream in(path, std::ios::binary);
   std::stringstream text;

@@ -54,7 +54,7 @@ class Condition {
  public:
   explicit Condition(bool literal) : literal_(literal) {}
   static Condition of_node(int id);
-  operator bool() const = delete;
+  operator bool() const = delete;  // no if, no ?: on data; write select(condition, a, b)
   bool is_literal() const { return id_ < 0; }
   bool literal() const { return literal_; }
   int id() const;

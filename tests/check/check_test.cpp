@@ -113,6 +113,29 @@ TEST(Checks, AreTheSameNumberForEveryModelAndHaveALimit) {
   EXPECT_EQ(numbers.size(), 1u);
 }
 
+/// A property may be declared absent, and what every model must keep may not.
+TEST(Checks, SayWhatToDeclareIfAFailureIsMeant) {
+  const detail::ModelOf<Faulty<kModest>::Type> modest;
+  const detail::ModelOf<Faulty<kShadow>::Type> shadow;
+  const detail::ModelOf<Faulty<kPdf>::Type> pdf;
+  EXPECT_EQ(row_of(modest, "not conserving").declare, ".conserving = true");
+  EXPECT_EQ(row_of(modest, "no diffuse limit").declare, ".diffuse_limit = \"PARAMETER=VALUE\"");
+  EXPECT_EQ(row_of(shadow, "diffuse limit").declare, ".diffuse_limit = \"\"");
+  EXPECT_EQ(row_of(pdf, "exact sampling").declare, ".exact_sampling = false");
+  EXPECT_EQ(row_of(pdf, "chi-square").result, Result::Failed);
+  EXPECT_EQ(row_of(pdf, "chi-square").declare, "");
+  EXPECT_EQ(row_of(pdf, "positive").declare, "") << "which holds";
+  const detail::ModelOf<Faulty<kNegative>::Type> negative;
+  EXPECT_EQ(row_of(negative, "conserving").declare, "") << "a value that is bad is no gain";
+}
+TEST(Checks, AGlanceNamesTheModelAndTheCommandThatSaysMore) {
+  require_vital(detail::ModelOf<Faulty<kNone>::Type>());
+  require_vital(detail::ModelOf<Faulty<kModest>::Type>());
+  EXPECT_EQ(message([] { require_vital(detail::ModelOf<Faulty<kNegative>::Type>()); }),
+            "faulty: fails values (no bad one: f, pdf, weights finite and >= 0, in float and double): run `brdfc check "
+            "faulty`");
+}
+
 TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
   const detail::ModelOf<Faulty<kNegative>::Type> negative;
   const detail::ModelOf<Faulty<kNan>::Type> nan;

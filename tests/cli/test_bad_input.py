@@ -295,6 +295,28 @@ def test_a_place_that_takes_no_files(arguments, tmp_path):
     refused(run(*arguments, cwd=tmp_path), "/proc/brdfc")
 
 
+@pytest.mark.parametrize("command", [("build", "--model", "lambert"), ("python",)])
+def test_a_folder_that_is_a_file(command, tmp_path):
+    file = tmp_path / "file"
+    file.write_text("mine")
+    refused(run(*command, "--out", file), file, "expected a folder that can be written")
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize("path", [".", "/dev/null"])
+def test_a_scene_that_is_no_file(path, tmp_path):
+    refused(run("render", path, "--out", "a.exr", cwd=tmp_path), path, "not a file")
+
+
+def test_a_pack_is_not_built_over_what_is_not_one(tmp_path):
+    """Said before the plan, which may take minutes."""
+    mine = tmp_path / "brdfc_shaders" / "mine.txt"
+    mine.parent.mkdir()
+    mine.write_text("mine")
+    refused(run("build", "--scene", "nowhere.json", "--out", tmp_path), mine.parent)
+    assert contents(tmp_path) == {"brdfc_shaders/mine.txt": b"mine"}
+
+
 def test_output_that_nobody_takes():
     with open("/dev/full", "w") as full:
         done = subprocess.run([TOOL, "list"], stdout=full, stderr=subprocess.PIPE, text=True)

@@ -170,7 +170,8 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["eval", "phng"], ["'phng'", *MODELS]),
+        (["eval", "phng"], ["'phng'", "did you mean phong?", *MODELS]),
+        (["eval", "phong", "kz=1"], ["'kz'", "did you mean ks?"]),
         (["eval", "lambert", "rh=1"], ["lambert", "'rh'", "rho"]),
         (["eval", "lambert", "rho=2"], ["lambert", "rho", "[0, 1]", "2"]),
         (["eval", "lambert", "rho=nan"], ["lambert", "rho"]),
@@ -183,6 +184,7 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
         (["evil"], ["unknown command", "'evil'"]),
         (["eval", "lambert", "--frob"], ["--frob"]),
         (["sample", "lambert", "--count", "0", "--wo", "0,0,1"], ["--count"]),
+        (["sample", "lambert", "--count", "-1", "--wo", "0,0,1"], ["--count", "1 to 2147483647"]),
         (["sample", "lambert", "--count", "3"], ["--wo"]),
         (["sample", "lambert", "--count", "3", "--wo", "0,0,2"], ["--wo", "unit vector"]),
         (["sample", "lambert", "--pattern", "regular"], ["--count"]),

@@ -244,11 +244,11 @@ def test_documentation_has_equation_paper_and_every_parameter(brdfc, name):
 
 
 def test_the_tool_does_not_overwrite_a_folder_of_another_kind(tmp_path):
-    (tmp_path / "brdfc").mkdir()
-    (tmp_path / "brdfc" / "mine.txt").write_text("mine")
+    (tmp_path / "brdfc" / "models").mkdir(parents=True)
+    (tmp_path / "brdfc" / "models" / "mine.py").write_text("mine")
     done = subprocess.run([TOOL, "python", "--out", tmp_path], capture_output=True, text=True)
     assert done.returncode == 2 and str(tmp_path / "brdfc") in done.stderr
-    assert (tmp_path / "brdfc" / "mine.txt").read_text() == "mine"
+    assert (tmp_path / "brdfc" / "models" / "mine.py").read_text() == "mine"
 
 
 def test_the_same_bytes_each_time(folder, tmp_path):

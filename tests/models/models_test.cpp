@@ -115,26 +115,6 @@ TEST(Registry, EveryModelHasACaseAndARowOfTheDocsAndNoneIsLeftOver) {
     EXPECT_TRUE(in_docs.count(name)) << "docs/models.md needs a table row starting with | `" << name << "`";
 }
 
-TEST(Registry, NamesAreTakenOnceAndLooksAreDeclared) {
-  struct Again : Model {
-    ModelInfo own = find_model("lambert").info();
-    const ModelInfo& info() const override { return own; }
-    bool has_scatter() const override { return true; }
-    bool has_mirror() const override { return false; }
-    bool has_exact() const override { return false; }
-    std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override { return nullptr; }
-    std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override { return nullptr; }
-    std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override { return nullptr; }
-    std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { return nullptr; }
-  };
-  EXPECT_THROW(register_model(std::make_unique<Again>()), std::logic_error);
-  auto plain = std::make_unique<Again>();
-  plain->own.name = "plain";
-  plain->own.look = Look::Undeclared;
-  EXPECT_THROW(register_model(std::move(plain)), std::logic_error);
-  EXPECT_EQ(models().count("plain"), 0u);
-}
-
 class ModelCase : public testing::TestWithParam<Case> {
  protected:
   const Model& model() const { return find_model(GetParam().model); }

@@ -442,6 +442,26 @@ TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   EXPECT_EQ(files, 2);  // the zip and the folder: nothing half-written
 }
 
+TEST_F(PackFiles, NothingIsDeletedThatThisToolDidNotWrite) {
+  const fs::path folder = temp.path() / "brdfc_shaders";
+  fs::create_directory(folder);
+  build_pack(options(temp.path()));  // empty: nobody's
+  build_pack(options(temp.path()));  // its own
+  for (const char* manifest : {"", "{\"generator\": \"other 1.0\"}"}) {
+    fs::remove_all(folder);
+    fs::create_directory(folder);
+    std::ofstream(folder / "mine.txt") << "mine";
+    if (*manifest) std::ofstream(folder / "manifest.json") << manifest;
+    EXPECT_THAT([&] { build_pack(options(temp.path())); },
+                ThrowsMessage<InputError>(testing::AllOf(HasSubstr(folder.string()), HasSubstr("manifest.json"))));
+    EXPECT_EQ(read(folder / "mine.txt"), "mine");
+  }
+  fs::remove_all(folder);
+  std::ofstream(folder) << "mine";
+  EXPECT_THROW(build_pack(options(temp.path())), InputError);
+  EXPECT_EQ(read(folder), "mine");
+}
+
 TEST_F(PackFiles, AnOutputThatIsAFileIsAnErrorThatNamesIt) {
   const fs::path file = temp.path() / "file";
   std::ofstream(file) << "x";

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import re
+import shlex
 import shutil
 import subprocess
 from pathlib import Path
@@ -210,3 +211,69 @@ def test_a_new_form_is_listed_built_and_measured(tool, tmp_path):
     assert forms["phong"]["warnings"] == ["bump_correction"]
     shader = (pack / forms["phong"]["shader"]).read_text(encoding="utf-8")
     assert "weight_0 * brdfc_diffuse(frame_n)" in shader
+
+
+@pytest.fixture
+def compiled(tool, tmp_path):
+    """Compiles a text in place of the example, as the build does: the object and what the compiler
+    said."""
+    build = tool.parent
+    commands = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
+    (entry,) = (c for c in commands if c["file"].endswith("models/minnaert.cpp"))
+    words = shlex.split(entry["command"])
+    words[words.index("-c") + 1] = source = str(tmp_path / "draft.cpp")
+
+    def compile_text(text, name):
+        Path(source).write_text(text, encoding="utf-8")
+        words[words.index("-o") + 1] = str(tmp_path / name)
+        done = subprocess.run(
+            [*words, "-O0"], cwd=entry["directory"], capture_output=True, text=True
+        )
+        return tmp_path / name, done.stderr
+
+    return compile_text
+
+
+def test_two_classes_of_one_name_do_not_link(compiled):
+    """They would be one, and one of the two models destroyed."""
+    _, text = example_of("add-a-model.md")
+    one, _ = compiled(text, "one.o")
+    two, _ = compiled(text.replace('"minnaert"', '"other"'), "two.o")
+    three, _ = compiled(text.replace("Minnaert", "Other"), "three.o")
+
+    def link(*objects):
+        return subprocess.run(
+            ["ld", "-r", "-o", "/dev/null", *objects], capture_output=True, text=True
+        )
+
+    assert link(one, three).returncode == 0
+    done = link(one, two)
+    assert done.returncode != 0
+    assert "multiple definition" in done.stderr
+    assert "only_one_model_has_the_class_Minnaert" in done.stderr
+    page = (ROOT / "docs" / "add-a-model.md").read_text(encoding="utf-8")
+    assert "only_one_model_has_the_class_Minnaert" in page
+
+
+def test_a_first_draft_compiles(compiled):
+    """Without what info() has nothing to say of, and with a direction that eval() does not need."""
+    _, text = example_of("add-a-model.md")
+    for left_out in (".label", ".paper", ".equations", ".doc", ".properties"):
+        text = re.sub(rf"^ *\{left_out} = .*,(?: *//.*)?\n", "", text, flags=re.M)
+        assert left_out not in text
+    text = re.sub(r",\n *\.params = {}", "", text).replace("{.name", "{.name")
+    text = text.replace("return select(above(wi, wo), rho", "return select(wi.z > T(0), rho")
+    text = text.replace("maximum(wi.z * wo.z,", "maximum(wi.z,")
+    path, said = compiled(text, "draft.o")
+    assert path.exists() and said == ""
+
+
+def test_an_if_on_data_says_what_to_write(compiled):
+    _, text = example_of("add-a-model.md")
+    place = "    return select(above(wi, wo), rho"
+    assert place in text
+    path, said = compiled(
+        text.replace(place, f"    if (c < T(0)) return Rgb<T>(T(0));\n{place}"), "if.o"
+    )
+    assert not path.exists()
+    assert "select(condition, a, b)" in said

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Models that are declared wrongly.
+#include "model/registry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace brdfc {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+struct Declared : Model {
+  explicit Declared(ModelInfo info) : own(std::move(info)) {}
+  const ModelInfo& info() const override { return own; }
+  bool has_scatter() const override { return true; }
+  bool has_mirror() const override { return false; }
+  bool has_exact() const override { return false; }
+  std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override { return nullptr; }
+  std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override { return nullptr; }
+  std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override { return nullptr; }
+  std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { return nullptr; }
+  ModelInfo own;
+};
+
+/// A first draft, which leaves out what there is nothing to say of: that compiles without a warning.
+ModelInfo draft() {
+  ModelInfo info{.name = "draft", .look = Look::Matte};
+  ParamInfo k;
+  k.name = "k";
+  info.params = {k};
+  return info;
+}
+void add(Registry& registry, const ModelInfo& info, const char* file = "draft.cpp") {
+  registry.add(std::make_unique<Declared>(info), file);
+}
+/// What asking for the models then says.
+std::string complaint(const ModelInfo& info) {
+  Registry registry;
+  add(registry, info);
+  try {
+    registry.models();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Registry, TakesADraft) { EXPECT_EQ(complaint(draft()), ""); }
+
+TEST(Registry, NamesBothFilesOfANameThatIsTakenTwice) {
+  Registry registry;
+  add(registry, draft(), "one.cpp");
+  add(registry, draft(), "two.cpp");
+  EXPECT_THAT([&] { registry.models(); },
+              ThrowsMessage<InputError>("two.cpp: two models are named draft, the other in one.cpp"));
+}
+
+TEST(Registry, NamesFileModelAndWhatWasExpected) {
+  ModelInfo info = draft();
+  info.name = "Draft 2";
+  EXPECT_THAT(complaint(info), AllOf(HasSubstr("draft.cpp: model name 'Draft 2'"), HasSubstr("lower-case")));
+  info = draft();
+  info.look = Look::Undeclared;
+  EXPECT_THAT(complaint(info), AllOf(HasSubstr("draft.cpp: draft"), HasSubstr(".look = Look::")));
+  info = draft();
+  info.params.push_back(info.params[0]);
+  EXPECT_THAT(complaint(info), HasSubstr("draft.cpp: draft: two parameters are named k"));
+  info = draft();
+  info.params[0].soft_max = 11;
+  EXPECT_THAT(complaint(info), HasSubstr("draft: k: the slider's range"));
+  info = draft();
+  info.params[0].min = -1;
+  info.params[0].by_factors = true;
+  EXPECT_THAT(complaint(info), HasSubstr("draft: k: a number that goes by factors"));
+}
+
+TEST(Registry, TellsAllThatIsWrongAtOnce) {
+  Registry registry;
+  ModelInfo info = draft();
+  info.name = "";
+  add(registry, info, "one.cpp");
+  add(registry, info, "two.cpp");
+  EXPECT_THAT([&] { registry.models(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("one.cpp: model name ''"),
+                                                                          HasSubstr("; two.cpp: model name ''"))));
+}
+
+TEST(Registry, GuessesWhatWasMeant) {
+  for (const char* word : {"wrad", "Ward", "war", "wards", "waard"})
+    EXPECT_THAT([&] { find_model(word); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr("did you mean ward? expected one of"), HasSubstr(word))))
+        << word;
+  for (const std::string& word : {std::string("xyzzy"), std::string(), std::string(1 << 24, 'w')})
+    EXPECT_THAT([&] { find_model(word); }, ThrowsMessage<InputError>(testing::Not(HasSubstr("did you mean"))))
+        << word[0];
+}
+
+}  // namespace
+}  // namespace brdfc
