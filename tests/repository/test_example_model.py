@@ -277,3 +277,21 @@ def test_an_if_on_data_says_what_to_write(compiled):
     )
     assert not path.exists()
     assert "select(condition, a, b)" in said
+
+
+def test_a_name_taken_twice_is_an_error_of_every_command(tool):
+    """Said by main(), which is not there yet when models register."""
+    _, text = example_of("add-a-model.md")
+    twice = tool.parents[1] / "generator" / "models" / "twice.cpp"
+    twice.write_text(text.replace("Minnaert", "Twice"), encoding="utf-8")
+    try:
+        run("cmake", "--build", tool.parent, "--target", "brdfc")
+        for command in (["list"], ["check", "ward"]):
+            done = subprocess.run([tool, *command], capture_output=True, text=True)
+            assert done.returncode == 2
+            (line,) = done.stderr.splitlines()
+            assert line.startswith("brdfc: ") and "two models are named minnaert" in line
+            assert "minnaert.cpp" in line and "twice.cpp" in line
+    finally:
+        twice.unlink()
+        run("cmake", "--build", tool.parent, "--target", "brdfc")
