@@ -163,7 +163,7 @@ TEST_F(SceneTest, NamesMissingKeys) {
 TEST_F(SceneTest, RefusesBrokenJson) {
   const std::string text = valid().dump();
   EXPECT_THAT(error_of(folder_ / "none.json"), HasSubstr("no such file"));
-  EXPECT_THAT(error_of(folder_), HasSubstr("no such file"));
+  EXPECT_THAT(error_of(folder_), HasSubstr("not a file"));
   EXPECT_THAT(error_of(write("")), HasSubstr("not valid JSON"));
   EXPECT_THAT(error_of(write(text.substr(0, 100))), AllOf(HasSubstr("not valid JSON"), HasSubstr("line 1")));
   EXPECT_THAT(error_of(write(text + "x")), HasSubstr("not valid JSON"));
