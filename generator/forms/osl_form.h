@@ -23,7 +23,7 @@ struct ShaderText {
   std::vector<std::string> terms = {};  ///< closures, the sum of which is BSDF
 
   /// Records once for each combination of choices that what is fixed admits, together with what is fixed. Returns the
-  /// closures, which are the same for all, and counts the operations of the longest.
+  /// closures, which are the same for all that have any, and counts the operations of the longest.
   std::vector<RecordedClosure> record(ChoiceSwitch&,
                                       const std::function<Recording(const Choices&, const ParamValues&)>& recording);
   /// Declares what recorded statements assign of the closures, makes them terms and counts what they take.

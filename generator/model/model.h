@@ -91,7 +91,8 @@ class Model {
   virtual bool has_scatter() const = 0;
   virtual bool has_mirror() const = 0;
   virtual bool has_exact() const = 0;
-  /// The kinds of a base's closures, and what they are turned and stretched by, are the same for all choices.
+  /// The kinds of a base's closures, and what they are turned and stretched by, are the same for all choices
+  /// that have any.
   virtual bool has_base() const { return false; }
   virtual bool has_transmit() const { return false; }
   /// Does the inside absorb?

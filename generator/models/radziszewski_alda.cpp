@@ -8,23 +8,18 @@
 // Errata. Eqs. 17 and 19 integrate to 1/2, because eq. 8 has R_y = 0.5 integral f dx: f_theta needs a factor 2.
 // In eq. 19 P_5 must take nbar = n_phi sin theta_i sin theta_r, not n_phi.
 //
-// Stable forms. With phi(z) = (1 - e^-z) / z, m = 2 ln cosh n, d = m |x - y| / 2,
-//   E = m (x - y)^2 phi(d)^2 / 4 + e^-d [(x + y)/2 phi(m (x + y)/2) + (2 - x - y)/2 phi(m (2 - x - y)/2)],
-//   f_theta = 2 (tanh^2 n / m) e^-2d / E^2:
-// eq. 17 with its denominator written as a sum of non-negative terms, scaled so that nothing over- or underflows
-// from n = 0 to 1e8 (the printed form breaks at n = 25).
-// f_phi: with k = 2 nbar + 1, q = 1/k, P_5(nbar) / k^5 = a^5 + 5 a^3 b^2 + (15/8) a b^4, a = (1+q)/2, b = (1-q)/2.
-// omega_r: the direction of ideal reflection, of ideal refraction, or back to wo. Refraction: simply evaluating the
-// lobe around the refracted direction would lose nothing seen from one side, but is neither reciprocal nor lossless
-// from the other. Instead both directions are carried to the thin side (outside, for the index is at least 1) by
-// Snell's law and the lobe is evaluated there, times the squared index where the light is on the dense side, whose
-// solid angles are so much smaller. Beyond the critical angle nothing comes from outside: there the reflection lobe,
-// its heights stretched, x = cos^2 theta / X with X = 1 - 1/ior^2, shares the light among these directions alone. So
-// all is lossless seen from both sides, and reciprocal up to the squared index.
+// Stable forms. f_theta: see latitudinal_lobe.h. f_phi: with k = 2 nbar + 1, q = 1/k, P_5(nbar) / k^5 = a^5 + 5 a^3 b^2
+// + (15/8) a b^4, a = (1+q)/2, b = (1-q)/2. omega_r: the direction of ideal reflection, of ideal refraction, or back to
+// wo. Refraction: simply evaluating the lobe around the refracted direction would lose nothing seen from one side, but
+// is neither reciprocal nor lossless from the other. Instead both directions are carried to the thin side (outside, for
+// the index is at least 1) by Snell's law and the lobe is evaluated there, times the squared index where the light is
+// on the dense side, whose solid angles are so much smaller. Beyond the critical angle nothing comes from outside:
+// there the reflection lobe, its heights stretched, x = cos^2 theta / X with X = 1 - 1/ior^2, shares the light among
+// these directions alone. So all is lossless seen from both sides, and reciprocal up to the squared index.
 //
 // Sampling phi: tan psi = sqrt(k) tan(dphi/2) turns the density into (cos^2 psi + q sin^2 psi)^5 / (pi P_5/k^5),
 // bounded for every k; its CDF is a trigonometric polynomial, inverted by safeguarded Newton steps.
-#include "model/sampling.h"
+#include "model/latitudinal_lobe.h"
 
 namespace brdfc {
 
@@ -84,51 +79,10 @@ template <class T> struct RadziszewskiAlda {
     }
   }
 
-  /// (1 - e^-z) / z for z >= 0.
-  static T phi1(const T& z) {
-    const T guarded = maximum(z, T(1e-6));
-    return select(z < T(1e-6), T(1) - z / T(2) * (T(1) - z / T(3)), -expm1(-guarded) / guarded);
-  }
-
-  /// sinh^2 n for n <= 1, of 1 for larger n.
-  static T sinh2(const T& n) {
-    const T sinh = stable_sinh(minimum(n, T(1)));
-    return named("sinh2", sinh * sinh);
-  }
-
-  /// m = 2 ln cosh n: log1p(sinh^2 n) for small n, where the other form loses everything.
-  static T log_cosh2(const T& n) {
-    const T large = maximum(n, T(1));
-    return named(
-        "m", select(n < T(1), log1p(sinh2(n)), T(2) * (large + log1p(exp(T(-2) * large)) - T(0.69314718055994530942))));
-  }
-
-  /// tanh^2 n / m, 1 at n = 0. For small n as s / (log1p(s) (1 + s)), s = sinh^2 n, where the errors of s cancel.
-  static T tanh2_over_m(const T& n, const T& m) {
-    const T s = maximum(sinh2(n), tiny<T>());
-    const T e = expm1(T(-2) * maximum(n, T(1)));
-    const T tanh = -e / (T(2) + e);
-    return named("tanh2_over_m", select(n < T(1), s / (log1p(s) * (T(1) + s)), tanh * tanh / maximum(m, T(0.5))));
-  }
-
   T ior() const { return index; }
   bool scatters_through() const { return around == Refraction; }
 
-  /// Latitudinal lobe, eq. 17; 1/2 its integral over x is 1.
-  T f_theta(const Vec3<T>& wi, const Vec3<T>& wr) const {
-    const T nt = latitudinal_n();
-    const T m = log_cosh2(nt);
-    // (x + y) / 2 and (2 - x - y) / 2, whose sum is 1 whatever rounding does to the directions' lengths.
-    const T z2 = wi.z * wi.z + wr.z * wr.z, r2 = sin2_theta(wi) + sin2_theta(wr);
-    const T s = named("s", z2 / (z2 + r2)), t = named("t", r2 / (z2 + r2));
-    // From the cosines near the horizon and from the sines near the normal: what is small keeps its digits.
-    const T x_minus_y =
-        select(s < t, (wi.z - wr.z) * (wi.z + wr.z), (wr.x - wi.x) * (wr.x + wi.x) + (wr.y - wi.y) * (wr.y + wi.y));
-    const T d = named("d", m * abs(x_minus_y) / T(2));
-    const T decay = named("decay", exp(-d));
-    const T E = named("E", m * sqr(x_minus_y * phi1(d)) / T(4) + decay * (s * phi1(m * s) + t * phi1(m * t)));
-    return named("f_theta", T(2) * tanh2_over_m(nt, m) * sqr(decay / E));
-  }
+  T f_theta(const Vec3<T>& wi, const Vec3<T>& wr) const { return latitudinal_lobe(latitudinal_n(), wi, wr); }
 
   /// P_5(nbar) / k^5 with q = 1/k.
   static T p5_over_k5(const T& q) {
