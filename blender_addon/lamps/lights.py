@@ -38,13 +38,18 @@ def _values(light, item, matrix):
     if light.type == "SUN":
         return slots.numbers(slots.SUN, place, turn, scale, (slots.Driven(light, "angle"), 0.0))
     if light.type in {"POINT", "SPOT"}:
-        return slots.numbers(
-            slots.BALL, place, turn, scale, (slots.Driven(light, "shadow_soft_size"), 0.0)
-        )
+        kind, cone = slots.BALL, 0.0
+        if light.type == "SPOT":
+            kind = slots.Driven(light, "spot_blend", 0.45, slots.BALL)
+            cone = slots.Driven(light, "spot_size")
+        radius = slots.Driven(light, "shadow_soft_size")
+        return slots.numbers(kind, place, turn, scale, (radius, cone))
     round_ = light.shape in {"DISK", "ELLIPSE"}
     other = "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
     sizes = slots.Driven(light, "size"), slots.Driven(light, other)
-    return slots.numbers(slots.ELLIPSE if round_ else slots.RECTANGLE, place, turn, scale, sizes)
+    kind = slots.ELLIPSE if round_ else slots.RECTANGLE
+    spread = slots.Driven(light, "spread", -0.5 / math.pi, kind + 0.5)
+    return slots.numbers(spread, place, turn, scale, sizes)
 
 
 def _irradiance(light, matrix):

@@ -102,8 +102,8 @@ def _read(curve):
         return None
     channel = variable.type == "TRANSFORMS"
     path = target.transform_type if channel else target.data_path
-    factor = curve.modifiers[0].coefficients[1] if curve.modifiers else 1.0
-    return slots.Driven(target.id, path, factor)
+    added, factor = curve.modifiers[0].coefficients if curve.modifiers else (0.0, 1.0)
+    return slots.Driven(target.id, path, factor, added)
 
 
 def write(socket, value):
@@ -122,10 +122,10 @@ def write(socket, value):
         target.rotation_mode = "QUATERNION"
     else:
         drivers.point_at(variable, value.of, value.path)
-    if value.factor != 1.0:
+    if (value.factor, value.added) != (1.0, 0.0):
         # 4.5 gives a driver's curve this modifier, later versions two keys on the diagonal.
         modifier = curve.modifiers[0] if curve.modifiers else curve.modifiers.new("GENERATOR")
-        modifier.coefficients = (0.0, value.factor)
+        modifier.coefficients = (value.added, value.factor)
 
 
 def same(a, b):
@@ -136,6 +136,7 @@ def same(a, b):
             and isinstance(b, slots.Driven)
             and (a.of, a.path) == (b.of, b.path)
             and math.isclose(a.factor, b.factor, rel_tol=1e-5)
+            and math.isclose(a.added, b.added, rel_tol=1e-5, abs_tol=1e-6)
         )
     # Sockets hold single precision.
     return a is not None and b is not None and math.isclose(a, b, rel_tol=1e-5, abs_tol=1e-6)

@@ -52,11 +52,12 @@ class Lamp:
 @dataclass(frozen=True)
 class Driven:
     """A number that Blender keeps current: a channel of an object's transform in the world, or
-    a property of a data-block; times a factor."""
+    a property of a data-block; times a factor, and something added."""
 
     of: bpy.types.ID
     path: str
     factor: float = 1.0
+    added: float = 0.0
 
     @property
     def is_channel(self):
@@ -78,8 +79,8 @@ class Candidate:
 
 
 def numbers(kind, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):
-    """The twelve numbers of a slot, in the order of PARTS."""
-    return (*place, *turn, *scale, float(kind), *sizes)
+    """The twelve numbers of a slot, in the order of PARTS. A kind may be a Driven one."""
+    return (*place, *turn, *scale, kind if isinstance(kind, Driven) else float(kind), *sizes)
 
 
 def turned(direction):

@@ -85,8 +85,8 @@ class AimedText {
     const AimedSteps& steps = aimed_steps(0);
     if (lamps_ == 0) return operations_ + steps.alone.operations;
     int all = operations_ + steps.rest.operations;
-    for (const Recording* r :
-         {&steps.above, &steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
+    for (const Recording* r : {&steps.beam, &steps.above, &steps.room, &steps.aim, &steps.less, &steps.send,
+                               &steps.toss, &steps.under, &steps.meet})
       all += r->operations;
     return all;
   }
@@ -114,15 +114,36 @@ class AimedText {
         "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
         "        float wi_x, wi_y, wi_z, lobe_height, lamp_emphasis;\n"
         "        if (lamp < lamps) {\n"
-        "            vector centre_here, across_here, along_here;\n            float disk_here, lobe_room = 1.0;\n"
+        "            vector centre_here, across_here, along_here, beam_here;\n"
+        "            float disk_here, beam_edge, beam_blend, lobe_room = 1.0;\n"
         "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], "
         "centre_here, across_here,\n"
-        "                           along_here, disk_here) == 0)\n"
+        "                           along_here, disk_here, beam_here, beam_edge, beam_blend) == 0)\n"
         "                continue;\n"
         "            lamp_centre[lobes] = brdfc_local(centre_here, frame_t, frame_b, frame_n);\n"
         "            lamp_across[lobes] = brdfc_local(across_here, frame_t, frame_b, frame_n);\n"
         "            lamp_along[lobes] = brdfc_local(along_here, frame_t, frame_b, frame_n);\n"
         "            lamp_disk[lobes] = disk_here;\n";
+    // A lamp's numbers are vectors of OSL, a recording's are three each.
+    const auto each = [&](const char* statement) {
+      for (const char* what : {"centre", "across", "along"})
+        for (int i = 0; i < 3; ++i) out += fmt::format(fmt::runtime(statement), what, "xyz"[i], i);
+    };
+    for (const char* part : {"shining", "lit"})
+      out += fmt::format(
+          "            float {0}_centre_x, {0}_centre_y, {0}_centre_z, {0}_across_x, {0}_across_y, {0}_across_z;\n"
+          "            float {0}_along_x, {0}_along_y, {0}_along_z, {0}_disk;\n",
+          part);
+    each("            shining_{0}_{1} = lamp_{0}[lobes][{2}];\n");
+    out +=
+        "            shining_disk = disk_here;\n"
+        "            if (beam_edge > 0.0) {\n"
+        "                vector beam_local = brdfc_local(beam_here, frame_t, frame_b, frame_n);\n"
+        "                float beam_x = beam_local[0], beam_y = beam_local[1], beam_z = beam_local[2];\n";
+    out += indented(steps.beam.statements, 4);
+    for (const char* what : {"centre", "across", "along"})
+      out += fmt::format("                lamp_{0}[lobes] = vector(lit_{0}_x, lit_{0}_y, lit_{0}_z);\n", what);
+    out += "                lamp_disk[lobes] = lit_disk;\n            }\n";
     if (!through_)
       out += "            float lamp_above;\n" + indented(steps.above.statements, 3) +
              "            if (lamp_above <= 0.0)\n                continue;\n";
@@ -235,7 +256,7 @@ class Aimed final : public OslForm {
                                     const Setting& setting) const override {
     const AimedRecording r = record_aimed(model, values, 4, setting.base, setting.views);
     const AimedSteps& s = aimed_steps(4);
-    return {r.base, r.draw, r.value, s.room, s.aim, s.less, s.send, s.rest};
+    return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.less, s.send, s.rest};
   }
 
  protected:
@@ -256,12 +277,16 @@ void Aimed::write_closures(ShaderText& text) const {
   Shader& shader = text.shader;
   ChoiceSwitch by_choice(model.info(), setting.fixed);
   AimedText lamps(model.info(), setting.fixed, setting.max_lamps, model.has_through());
+  bool always = true;
   const auto base = text.record(by_choice, [&](const Choices& choices, const ParamValues& values) {
     const AimedRecording r = record_aimed(model, values, 0, setting.base, setting.views);
     lamps.add(choices, r, text.arrays);
+    always = always && !r.base.closures.empty();
     return r.base;
   });
   text.declare(base);
+  if (!always)
+    for (std::size_t c = 0; c < base.size(); ++c) text.statements += fmt::format("    weight_{} = 0.0;\n", c);
   shader.facets = false;  // none that is seen by more than the camera
   text.statements += block(by_choice.print(0), 1);
   text.scale(base, setting.base == AimedBase::Fitted ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)
@@ -280,7 +305,16 @@ void Aimed::write_closures(ShaderText& text) const {
   shader.lamp_bytes = aimed ? pool_bytes(ClosureKind::PhongRamp) + kPoolNode : 0;
   if (aimed) text.terms.push_back("aimed");
   // As a colour: see kPoolNode.
-  if (!model.has_through()) text.statements += "    color rest_followed = rest_weight;\n";
+  if (!model.has_through()) {
+    text.statements += "    color rest_followed = rest_weight;\n";
+    std::string of_base;
+    for (std::size_t c = 0; c < base.size(); ++c)
+      of_base += fmt::format("{}weight_{} != color(0.0)", c > 0 ? " || " : "", c);
+    if (!base.empty())
+      text.statements +=
+          fmt::format("    if ({}) {{\n        rest_followed *= {};\n        rest_colour /= {};\n    }}\n", of_base,
+                      number(kRestFollowed), number(kRestFollowed));
+  }
   const char* ray = model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, {}, I, frame_n)"
                                         : "rest_followed * brdfc_ray_coloured({}, I, rest_colour)";
   text.terms.push_back(

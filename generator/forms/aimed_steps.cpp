@@ -48,14 +48,26 @@ const AimedSteps& aimed_steps(int indent) {
   };
   const AimedLobe<Expr> earlier = kept_lobe("earlier");
   const LampPatch<Expr> patch = kept_patch("lobes");
+  const LampPatch<Expr> shining{input3("shining_centre"), input3("shining_across"), input3("shining_along"),
+                                Expr::input("shining_disk")};
   const Expr lobes = Expr::input("lobes");
+  steps.beam = record_step([&](Program& p) {
+    const LampBeam<Expr> beam{input3("beam"), Expr::input("beam_edge"), Expr::input("beam_blend")};
+    const LitPart<Expr> lit = lit_part(patch, beam);
+    for (const auto& [name, part] : {std::pair{"shining", lit.mean}, {"lit", lit.lamp}}) {
+      p.output(fmt::format("{}_centre", name), part.centre);
+      p.output(fmt::format("{}_across", name), part.across);
+      p.output(fmt::format("{}_along", name), part.along);
+      p.output(fmt::format("{}_disk", name), part.disk);
+    }
+  });
   steps.above = record_step([&](Program& p) { p.output("lamp_above", highest(patch)); });
   steps.room = record_step([&](Program& p) {
     p.output("lobe_room", minimum(Expr::input("lobe_room"), room_beside(patch.centre, earlier)));
   });
   steps.aim = record_step([&](Program& p) {
     const AimedLamp<Expr> lamp =
-        aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
+        aim_at(patch, shining, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
     p.output("wi", lamp.wi);
     p.output("to_lamp", lamp.lobe.towards);
     p.output("to_half", lamp.lobe.half);

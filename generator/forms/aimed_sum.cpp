@@ -5,23 +5,25 @@ namespace brdfc::forms {
 
 AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
                    const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
-                   const std::vector<std::array<double, 2>>& v) {
+                   const std::vector<std::array<double, 2>>& v, const std::vector<LampBeam<double>>& beams) {
   const auto excess_at = [&](const Vec3<double>& wi) {
     return excess(brdf, !base.empty(), evaluate(base, wi, wo), wi, wo);
   };
   AimedSum out;
-  std::vector<const LampPatch<double>*> of;
+  std::vector<LampPatch<double>> of;
   std::vector<double> solid_angles;
   for (std::size_t i = 0; i < patches.size(); ++i) {
-    if (!brdf.scatters_through() && highest(patches[i]) <= 0) continue;
+    LitPart<double> lit{patches[i], patches[i]};
+    if (!beams.empty() && beams[i].edge > 0) lit = lit_part(patches[i], beams[i]);
+    if (!brdf.scatters_through() && highest(lit.lamp) <= 0) continue;
     double room = 1;
-    for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(patches[i].centre, earlier));
-    const AimedLamp<double> lamp = aim_at(patches[i], room, v[i][0], v[i][1], wo);
+    for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(lit.lamp.centre, earlier));
+    const AimedLamp<double> lamp = aim_at(lit.lamp, lit.mean, room, v[i][0], v[i][1], wo);
     if (lamp.emphasis == 0) continue;
     Excess<double> there = excess_at(lamp.wi);
     for (std::size_t k = 0; k < out.lobes.size(); ++k)
       there.value = there.value - out.values[k] * evaluate(out.lobes[k], lamp.wi);
-    of.push_back(&patches[i]);
+    of.push_back(lit.lamp);
     solid_angles.push_back(lamp.solid_angle);
     out.lobes.push_back(lamp.lobe);
     out.values.push_back(send(lamp, there.value, there.density).value);
@@ -33,7 +35,7 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
   Met<double> met;
   met.ray = out.drawn;
   for (std::size_t k = 0; k < out.lobes.size(); ++k)
-    met = meet(met, *of[k], out.lobes[k], solid_angles[k], out.values[k], out.drawn);
+    met = meet(met, of[k], out.lobes[k], solid_angles[k], out.values[k], out.drawn);
   out.wi = met.ray;
   const Excess<double> drawn = excess_at(out.drawn);
   const Rest<double> left = rest(drawn.value, drawn.density, count, met);

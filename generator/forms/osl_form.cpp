@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <regex>
 #include <set>
 #include <utility>
 
@@ -31,6 +32,19 @@ std::string parameter(const ParamInfo& p) {
     default:
       return fmt::format("    int {} = {}", p.name, int(p.value[0])) + meta;
   }
+}
+
+/// Numbers that are sockets are kept within their ranges, which sliders keep but links do not: a texture may be black.
+std::string within_ranges(const ModelInfo& info, const ParamValues& fixed, const std::string& statements) {
+  std::string bounds, names;
+  for (const ParamInfo& p : info.params) {
+    if (p.kind != ParamKind::Number || fixed.count(p.name)) continue;
+    if (!std::regex_search(statements, std::regex("\\b" + p.name + "\\b"))) continue;
+    // A parameter cannot be assigned to, but hidden by a variable of its name.
+    bounds += fmt::format("    float bounded_{0} = clamp({0}, {1}, {2});\n", p.name, number(p.min), number(p.max));
+    names += fmt::format("    float {0} = bounded_{0};\n", p.name);
+  }
+  return bounds.empty() ? statements : bounds + "    {\n" + print::indented(names + statements, 1) + "    }\n";
 }
 
 std::string closure_text(const RecordedClosure& closure, std::size_t i) {
@@ -79,8 +93,9 @@ std::vector<RecordedClosure> ShaderText::record(
     const Recording r = recording(choices, with_choices(info, choices, setting.fixed));
     operations = std::max(operations, r.operations);
     by_choice.add(choices, arrays.without_shared(r));
+    if (r.closures.empty()) continue;
     if (!closures.empty() && closures != r.closures)
-      throw std::logic_error(info.name + ": closures must be the same for every combination of choices");
+      throw std::logic_error(info.name + ": closures must be the same for every combination of choices that has any");
     closures = r.closures;
   }
   shader.operations += operations;
@@ -222,7 +237,7 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
            print::comment(fmt::format("{}. {}", what, info.equations)) +
            "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
            print::narrow(print::library_for(statements) + fmt::format("\nshader {}(\n", name) + parameters + sockets +
-                         ")\n{\n" + statements + "}\n");
+                         ")\n{\n" + within_ranges(info, fixed, statements) + "}\n");
   };
   const char* albedo_output = "    output color Albedo = 0";
   std::string sockets;

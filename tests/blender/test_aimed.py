@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
-from helpers import evaluate
+from helpers import add_camera, add_sphere, evaluate, render
+from mathutils import Vector
 
 #: Towards the sun; the camera is above.
 SUNS = [(0.5, 0.2, 0.8), (-0.7, 0.6, 0.15), (0.0, 0.1, 1.0)]
@@ -113,3 +114,87 @@ def test_a_lamp_that_is_not_in_the_list(extension, empty, tool):
     print(means)
     assert abs(aimed - drawn) < 4.5 * math.hypot(error, other) + 1e-3 * drawn
     assert error < 0.01 * aimed
+
+
+#: Of these a ball sees more or less by place: an area lamp with a narrow spread, and a spot whose
+#: cone is hardly wider than it looks.
+CONES = {
+    "spread": ("AREA", {"shape": "SQUARE", "size": 2.0, "spread": 0.7}),
+    "spot": ("SPOT", {"shadow_soft_size": 0.8, "spot_size": 0.5, "spot_blend": 0.5}),
+}
+
+
+@pytest.mark.parametrize("lamp", CONES)
+def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
+    """f is averaged over what shines on the point, right to 2 %; over the whole lamp a ball would
+    be 5 % too dark."""
+    kind, settings = CONES[lamp]
+    data = bpy.data.lights.new("Lamp", kind)
+    data.energy = 1000.0
+    for name, value in settings.items():
+        setattr(data, name, value)
+    item = bpy.data.objects.new("Lamp", data)
+    towards = unit((0.5, -0.62, 0.6))
+    item.location = 5 * towards
+    item.rotation_euler = Vector(-towards).to_track_quat("-Z", "Y").to_euler()
+    empty.collection.objects.link(item)
+    extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
+    extension.api.enable_osl(empty)
+    add_camera(empty)
+    empty.render.resolution_x = empty.render.resolution_y = 40
+    made = {f: extension.api.new_material("phong", f) for f in ("aimed", "sampled")}
+    ball = add_sphere(empty, made["aimed"])
+    means = {}
+    for form, samples in (("aimed", 512), ("sampled", 4096)):
+        ball.data.materials[0] = made[form]
+        bpy.context.view_layer.update()
+        extension.api.see_lamps(empty)
+        empty.cycles.samples = samples
+        pictures = []
+        for seed in range(4):
+            empty.cycles.seed = seed
+            pictures.append(render(empty)[..., 1].mean())
+        means[form] = np.mean(pictures), np.std(pictures, ddof=1) / 2
+    (aimed, error), (drawn, other) = means["aimed"], means["sampled"]
+    print(f"{lamp}: {aimed / drawn - 1:+.4f} +- {math.hypot(error, other) / drawn:.4f}")
+    assert abs(aimed - drawn) < 4.5 * math.hypot(error, other) + 0.02 * drawn
+    assert math.hypot(error, other) < 0.008 * drawn
+
+
+#: Number sockets whose models go astray outside their ranges, and a value beyond either end.
+BEYOND = [
+    ("cook_torrance", "m", -1.0),
+    ("cook_torrance", "m", 50.0),
+    ("ward", "ax", 0.0),
+    ("phong", "e", -3.0),
+    ("oren_nayar", "sigma", 100.0),
+]
+
+
+@pytest.mark.parametrize(("model", "name", "value"), BEYOND)
+def test_a_link_beyond_the_range_is_its_end(extension, empty, model, name, value):
+    """Sliders stop at the ends of a parameter's range, links do not: a texture may be black."""
+    (schema,) = [p for p in extension.api.models()[model]["parameters"] if p["name"] == name]
+    extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
+    extension.api.enable_osl(empty)
+    end = min(max(value, schema["min"]), schema["max"])
+    made = [extension.api.new_material(model, "aimed", **{name: end}) for _ in range(2)]
+    tree = made[1].node_tree
+    number = tree.nodes.new("ShaderNodeValue")
+    number.outputs[0].default_value = value
+    (node,) = extension.nodes.group_nodes(made[1])
+    tree.links.new(number.outputs[0], extension.nodes.sockets(node)[name])
+    pictures = []
+    for material in made:
+        # About halfway between sun and camera.
+        towards = unit((0.3, 0.0, 0.9))
+        slopes = 0.3 * np.random.default_rng(2).normal(size=(100, 3)) * (1, 1, 0)
+        slopes[::2, 0] = 0
+        meter = Goniometer(empty, material, unit(unit(towards + (0, 0, 1)) + slopes), samples=16)
+        meter.add_sun(towards)
+        extension.api.see_lamps(empty)
+        pictures.append(meter.measure())
+        for item in list(empty.objects):
+            bpy.data.objects.remove(item)
+    assert np.isfinite(pictures[0]).all() and pictures[0].max() > 0
+    np.testing.assert_allclose(pictures[1], pictures[0], rtol=1e-5, atol=1e-6)

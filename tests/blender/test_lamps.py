@@ -92,10 +92,10 @@ def expected(item):
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     shape = {
         "POINT": lambda: (1, light.shadow_soft_size, 0),
-        "SPOT": lambda: (1, light.shadow_soft_size, 0),
+        "SPOT": lambda: (1 + 0.45 * light.spot_blend, light.shadow_soft_size, light.spot_size),
         "SUN": lambda: (2, light.angle, 0),
         "AREA": lambda: (
-            3 if light.shape in {"SQUARE", "RECTANGLE"} else 4,
+            (3.5 if light.shape in {"SQUARE", "RECTANGLE"} else 4.5) - light.spread / (2 * math.pi),
             light.size,
             light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size,
         ),
@@ -147,12 +147,12 @@ def test_model_groups_are_fed_by_the_one_group(extension, ball, aimed):
 
 LAMPS = {
     "point": ("POINT", {"shadow_soft_size": 0.25}),
-    "spot": ("SPOT", {"shadow_soft_size": 0.0}),
+    "spot": ("SPOT", {"shadow_soft_size": 0.0, "spot_size": 0.5, "spot_blend": 1.0}),
     "sun": ("SUN", {"angle": 0.03}),
     "square": ("AREA", {"shape": "SQUARE", "size": 0.5, "size_y": 3.0}),
     "rectangle": ("AREA", {"shape": "RECTANGLE", "size": 0.5, "size_y": 2.0}),
     "disk": ("AREA", {"shape": "DISK", "size": 0.5, "size_y": 3.0}),
-    "ellipse": ("AREA", {"shape": "ELLIPSE", "size": 0.5, "size_y": 2.0}),
+    "ellipse": ("AREA", {"shape": "ELLIPSE", "size": 0.5, "size_y": 2.0, "spread": 0.1}),
 }
 
 

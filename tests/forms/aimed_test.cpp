@@ -200,7 +200,7 @@ TEST(Aimed, NoPointOfALampStandsForTheWholeOfIt) {
     const double turn = 0.2 + kPi + 0.3 * (measure::uniform(random) - 0.5);
     const LampPatch<double> lamp =
         disk(direction(0.1 * measure::uniform(random), turn) * 2.0, 0.2 * measure::uniform(random));
-    const AimedLamp<double> aim = aim_at(lamp, 1.0, measure::uniform(random), measure::uniform(random), wo);
+    const AimedLamp<double> aim = aim_at(lamp, lamp, 1.0, measure::uniform(random), measure::uniform(random), wo);
     aimed += aim.emphasis > 0;
     ASSERT_LE(aim.emphasis, 12) << i;
   }
@@ -224,7 +224,7 @@ TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
         double mean = 0;
         AimedLamp<double> aimed;
         for (int i = 0; i < kSteps * kSteps; ++i) {
-          aimed = aim_at(lamp, 1.0, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
+          aimed = aim_at(lamp, lamp, 1.0, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
           mean += brdf->eval(aimed.wi, wo).g * aimed.wi.z * aimed.emphasis / (kSteps * kSteps);
         }
         const double lit = over_patch(lamp, 1, [&](const Vec3<double>& w) { return evaluate(aimed.lobe, w); });
@@ -233,6 +233,55 @@ TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
             << cosTheta_o << " " << offset.x << " " << offset.y << " " << disk_or_not;
       }
   }
+}
+
+/// Lamps of which only a part shines on the point, by spread or the cone of a spot: f is averaged over that.
+TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
+  constexpr int kSteps = 64;
+  double worst = 0, worst_whole = 0;
+  for (const auto& [model, values] :
+       {std::pair{"phong", "e=20"}, {"radziszewski_alda", "n=4"}, {"oren_nayar", "rho=0.7"}}) {
+    const Model& m = find_model(model);
+    const auto brdf = m.make_double(values_of(m, {values}));
+    for (const double cosTheta_o : {0.4, 0.8})
+      for (const double angle : {0.15, 0.35, 0.7})
+        for (const double blend : {-1.0, 0.15, 1.0})
+          for (const Vec3<double>& aside : {Vec3<double>{0, 0, 0}, {0.12, 0, 0}, {0.1, -0.2, 0.05}}) {
+            const Vec3<double> wo = direction(cosTheta_o, 0.3),
+                               towards = normalize(reflect(wo) + Vec3<double>{0, 0, 0.3});
+            LampPatch<double> lamp = disk(towards * 5.0, 0.8);
+            lamp.disk = blend > 0;
+            // Of spread the axis is the lamp's normal: the point is moved instead.
+            if (blend < 0) lamp.centre = lamp.centre + lamp.across * (5 * aside.x) + lamp.along * (5 * aside.y);
+            const LampBeam<double> beam{blend < 0 ? towards : normalize(towards + aside), std::cos(angle), blend};
+            const auto light = [&](const Vec3<double>& w) { return beam(w); };
+            const double all = over_patch(lamp, 1, light);
+            const LitPart<double> part = lit_part(lamp, beam);
+            if (all < 1e-4) continue;
+            ASSERT_GT(dot(part.mean.across, part.mean.across), 0) << angle << " " << blend << " " << aside.x;
+            // No light is left out.
+            EXPECT_NEAR(over_patch(part.lamp, 1, [&](const auto& w) { return meets(lamp, w) ? beam(w) : 0; }), all,
+                        0.02 * all);
+            const auto off = [&](const LampPatch<double>& patch, const LampPatch<double>& shining) {
+              double mean = 0;
+              AimedLamp<double> aimed;
+              for (int i = 0; i < kSteps * kSteps; ++i) {
+                aimed = aim_at(patch, shining, 1.0, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
+                mean += brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * aimed.emphasis / (kSteps * kSteps);
+              }
+              const double lit = over_patch(lamp, 1, [&](const auto& w) { return beam(w) * evaluate(aimed.lobe, w); });
+              const double truth =
+                  over_patch(lamp, 1, [&](const auto& w) { return beam(w) * brdf->eval(w, wo).g * w.z; });
+              return std::abs(mean * lit / truth - 1);
+            };
+            const double found = off(part.lamp, part.mean);
+            EXPECT_LT(found, 0.03) << model << " " << cosTheta_o << " " << angle << " " << blend << " " << aside.x;
+            worst = std::max(worst, found);
+            worst_whole = std::max(worst_whole, off(lamp, lamp));
+          }
+  }
+  EXPECT_GT(worst_whole, 0.1) << "nothing would be wrong without";
+  std::printf("worst %.4f, with the whole lamp %.4f\n", worst, worst_whole);
 }
 
 /// What the drawn direction carries of a lamp is a lobe 1e-3 wide: it must lie on the lamp as a whole, and beside it
@@ -277,7 +326,8 @@ TEST(Aimed, NothingOfTheRestReachesOverTheEdgeOfALamp) {
 TEST(Aimed, DirectionsUnderALobeHaveTheirDensity) {
   for (const double radius : {0.01, 0.5}) {
     const Vec3<double> wo = direction(0.6, 1);
-    const AimedLobe<double> lobe = aim_at(disk({0.3, -0.5, 0.9}, radius), 1.0, 0.5, 0.5, wo).lobe;
+    const LampPatch<double> patch = disk({0.3, -0.5, 0.9}, radius);
+    const AimedLobe<double> lobe = aim_at(patch, patch, 1.0, 0.5, 0.5, wo).lobe;
     double mean = 0;
     constexpr int kSteps = 100;
     for (int i = 0; i < kSteps; ++i) {
