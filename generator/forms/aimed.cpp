@@ -85,8 +85,9 @@ class AimedText {
     const AimedSteps& steps = aimed_steps(0);
     if (lamps_ == 0) return operations_ + steps.alone.operations;
     int all = operations_ + steps.rest.operations;
-    for (const Recording* r : {&steps.beam, &steps.above, &steps.room, &steps.aim, &steps.less, &steps.send,
-                               &steps.toss, &steps.under, &steps.meet})
+    // Without the beam's: few lamps shine within a cone.
+    for (const Recording* r :
+         {&steps.above, &steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
       all += r->operations;
     return all;
   }

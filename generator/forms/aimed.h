@@ -275,17 +275,16 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
     const T d2 = dot(p, p);
     return abs(dot(normal, p)) / (d2 * sqrt(d2));
   };
-  // Its mean over the lamp by four points, which is right to third degree (A. Stroud: Approximate Calculation of
-  // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1); and by the same, how high above the lobe's normal the lamp is.
-  const auto points_of = [](const LampPatch<T>& p) {
-    const auto on_disk = p.disk > T(0.5);
-    const T node = select(on_disk, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(on_disk, T(0), node);
-    return std::array{p.at(node, other), p.at(-node, other * T(-1)), p.at(other * T(-1), node), p.at(other, -node)};
-  };
+  // Its mean over what shines by four points, which is right to third degree (A. Stroud: Approximate Calculation of
+  // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1); and by the same, how high above the lobe's normal that is.
+  const T node = select(round, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(round, T(0), node);
   T mean(0), mean_rise(0);
-  for (const Vec3<T>& p : points_of(patch)) mean = mean + density(p) / T(4);
-  for (const Vec3<T>& p : points_of(shining))
-    mean_rise = mean_rise + density(p) / T(4) * (dot(lamp.lobe.half, p) / sqrt(dot(p, p)));
+  for (const Vec3<T>& p : {shining.at(node, other), shining.at(-node, other * T(-1)), shining.at(other * T(-1), node),
+                           shining.at(other, -node)}) {
+    const T d = density(p);
+    mean = mean + d / T(4);
+    mean_rise = mean_rise + d / T(4) * (dot(lamp.lobe.half, p) / sqrt(dot(p, p)));
+  }
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
   const T sinRadius = lamp.lobe.sinRadius;
   const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
