@@ -175,7 +175,8 @@ def _program(text):
     arrays = {name: np.fromstring(numbers, sep=",") for name, numbers in _TABLE.findall(body)}
     body = _TABLE.sub("", body)
     steps = []
-    while body := body.lstrip():
+    # Parameters within their ranges stand in a block, which ends behind that.
+    while body := body.lstrip("{ \n"):
         if loop := _LOOP.match(body):
             steps.append(_loop(loop[1], int(loop[2]), loop[3]))
             body = body[loop.end() :]
