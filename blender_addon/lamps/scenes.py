@@ -39,7 +39,9 @@ def _rendered(scene, found=None):
             walk(child)
 
     for layer in [v for v in scene.view_layers if v.use] or scene.view_layers:
-        walk(layer.layer_collection)
+        # None in 5.2, of a scene that was made a moment ago.
+        if layer.layer_collection is not None:
+            walk(layer.layer_collection)
     if scene.background_set is not None:
         _rendered(scene.background_set, found)
     return found

@@ -165,7 +165,7 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
 BEYOND = [
     ("cook_torrance", "m", -1.0),
     ("cook_torrance", "m", 50.0),
-    ("ward", "ax", 0.0),
+    ("ward", "ax", 50.0),
     ("phong", "e", -3.0),
     ("oren_nayar", "sigma", 100.0),
 ]

@@ -197,7 +197,7 @@ def test_shaders_are_short(extension_zip, subtests):
             with subtests.test(name):
                 found = statements(archive.read(name).decode())
                 print(f"{name}: {operations} operations, {found} statements")
-                most = 2300 if "lossless_aimed" in name else 1300 if "_aimed" in name else 600
+                most = 2900 if "lossless_aimed" in name else 1300 if "_aimed" in name else 600
                 assert operations < most
                 assert 0 < found < most
 
@@ -410,12 +410,12 @@ def scripts_of(node):
 def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, empty, subtests):
     """A file holds source and bytecode of each. Fits hold tables of their own; what two aimed forms
     hold for each of their many choices is more than it should be."""
-    longer = {("ashikhmin_shirley", "aimed"): 140_000, ("radziszewski_alda", "aimed"): 175_000}
+    longer = {("ashikhmin_shirley", "aimed"): 152_000, ("radziszewski_alda", "aimed"): 192_000}
     for model, form in forms(extension):
         with subtests.test(model=model, form=form):
             source = extension.pack.source(model, form)[1]
             if form != "fitted":
-                assert len(source) <= longer.get((model, form), 100_000)
+                assert len(source) <= longer.get((model, form), 108_000)
             apart = extension.pack.albedo_source(model, form)
             assert extension.nodes.has_albedo_script(model, form) == (apart is not None)
             material = extension.api.new_material(model, form)
@@ -801,7 +801,7 @@ def test_warnings_of_an_aimed_form_that_is_denoised(extension, empty):
     empty.cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
     for model, expected in (
         ("cook_torrance", ["albedo_passes"]),
-        ("lossless", ["albedo_passes", "normal_pass"]),
+        ("lossless", ["albedo_passes"]),
         ("coupled", ["albedo_passes"]),
         ("phong", ["albedo_passes", "normal_pass"]),
         ("schlick_double", ["albedo_passes"]),

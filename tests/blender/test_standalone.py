@@ -20,7 +20,7 @@ from goniometer import Goniometer, tilted
 from helpers import albedo_and_mirror, empty_tree, pairs_csv, read_csv, to_csv
 
 COSINES = (1.0, 0.7, 0.3)
-REPLICAS, SAMPLES = 512, 16
+REPLICAS, SAMPLES = 512, 48
 POINTS = 24
 #: What is shown: 0 f, 1 pdf, 2 a sample's wi, 3 its weight, 4 its pdf, 5 mirror, 6 transmit.
 SHOWN = range(7)
