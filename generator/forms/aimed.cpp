@@ -125,26 +125,16 @@ class AimedText {
         "            lamp_across[lobes] = brdfc_local(across_here, frame_t, frame_b, frame_n);\n"
         "            lamp_along[lobes] = brdfc_local(along_here, frame_t, frame_b, frame_n);\n"
         "            lamp_disk[lobes] = disk_here;\n";
-    // A lamp's numbers are vectors of OSL, a recording's are three each.
-    const auto each = [&](const char* statement) {
-      for (const char* what : {"centre", "across", "along"})
-        for (int i = 0; i < 3; ++i) out += fmt::format(fmt::runtime(statement), what, "xyz"[i], i);
-    };
-    for (const char* part : {"shining", "lit"})
-      out += fmt::format(
-          "            float {0}_centre_x, {0}_centre_y, {0}_centre_z, {0}_across_x, {0}_across_y, {0}_across_z;\n"
-          "            float {0}_along_x, {0}_along_y, {0}_along_z, {0}_disk;\n",
-          part);
-    each("            shining_{0}_{1} = lamp_{0}[lobes][{2}];\n");
     out +=
-        "            shining_disk = disk_here;\n"
+        "            vector shining_centre = lamp_centre[lobes], shining_across = lamp_across[lobes];\n"
+        "            vector shining_along = lamp_along[lobes];\n            float shining_disk = disk_here;\n"
         "            if (beam_edge > 0.0) {\n"
-        "                vector beam_local = brdfc_local(beam_here, frame_t, frame_b, frame_n);\n"
-        "                float beam_x = beam_local[0], beam_y = beam_local[1], beam_z = beam_local[2];\n";
+        "                vector beam = brdfc_local(beam_here, frame_t, frame_b, frame_n);\n"
+        "                vector lit_centre, lit_across, lit_along;\n                float lit_disk;\n";
     out += indented(steps.beam.statements, 4);
-    for (const char* what : {"centre", "across", "along"})
-      out += fmt::format("                lamp_{0}[lobes] = vector(lit_{0}_x, lit_{0}_y, lit_{0}_z);\n", what);
-    out += "                lamp_disk[lobes] = lit_disk;\n            }\n";
+    for (const char* what : {"centre", "across", "along", "disk"})
+      out += fmt::format("                lamp_{0}[lobes] = lit_{0};\n", what);
+    out += "            }\n";
     if (!through_)
       out += "            float lamp_above;\n" + indented(steps.above.statements, 3) +
              "            if (lamp_above <= 0.0)\n                continue;\n";
@@ -278,16 +268,12 @@ void Aimed::write_closures(ShaderText& text) const {
   Shader& shader = text.shader;
   ChoiceSwitch by_choice(model.info(), setting.fixed);
   AimedText lamps(model.info(), setting.fixed, setting.max_lamps, model.has_through());
-  bool always = true;
   const auto base = text.record(by_choice, [&](const Choices& choices, const ParamValues& values) {
     const AimedRecording r = record_aimed(model, values, 0, setting.base, setting.views);
     lamps.add(choices, r, text.arrays);
-    always = always && !r.base.closures.empty();
     return r.base;
   });
   text.declare(base);
-  if (!always)
-    for (std::size_t c = 0; c < base.size(); ++c) text.statements += fmt::format("    weight_{} = 0.0;\n", c);
   shader.facets = false;  // none that is seen by more than the camera
   text.statements += block(by_choice.print(0), 1);
   text.scale(base, setting.base == AimedBase::Fitted ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)

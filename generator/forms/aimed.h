@@ -77,9 +77,8 @@ template <class T> LitPart<T> lit_part(const LampPatch<T>& patch, const LampBeam
   const Vec3<T> middle = beam.axis * reach - patch.centre;
   // The cone meets the lamp's plane within a circle about its axis, wider where the axis is oblique.
   const T sine = sqrt(maximum(T(1) - sqr(beam.edge), T(0)));
-  const T across = sqrt(maximum(T(1) - sqr(slant), T(0))),
-          widest = maximum(abs(slant) * beam.edge - across * sine, T(0.01));
-  const T radius = abs(reach) * sine / widest;
+  const T tilt = sqrt(maximum(T(1) - sqr(slant), T(0)));
+  const T radius = abs(reach) * sine / maximum(abs(slant) * beam.edge - tilt * sine, T(0.01));
   const auto range = [&](const T& at, const T& half) {
     const auto within = [](const T& x) { return minimum(maximum(x, T(-1)), T(1)); };
     return std::array<T, 2>{within((at - radius) / half), within((at + radius) / half)};
@@ -110,10 +109,9 @@ template <class T> LitPart<T> lit_part(const LampPatch<T>& patch, const LampBeam
     return select(lit, sqrt(maximum(T(3) * (square / all - sqr(mean)), T(0)) + sqr(step) / T(4)), T(0));
   };
   const T half_x = (xs[1] - xs[0]) / T(2), half_y = (ys[1] - ys[0]) / T(2);
-  const auto whole = half_x + half_y > T(1.999);
-  const auto part = [&](const T& of_part, const T& of_whole) { return select(whole, of_whole, of_part); };
-  return {{patch.at(part((xs[0] + xs[1]) / T(2), T(0)), part((ys[0] + ys[1]) / T(2), T(0))),
-           patch.across * part(half_x, T(1)), patch.along * part(half_y, T(1)), part(T(0), patch.disk)},
+  const auto whole = half_x + half_y >= T(2);
+  return {{patch.at((xs[0] + xs[1]) / T(2), (ys[0] + ys[1]) / T(2)), patch.across * half_x, patch.along * half_y,
+           select(whole, patch.disk, T(0))},
           {patch.at(x, y), patch.across * half(sums[5], x, step_x), patch.along * half(sums[6], y, step_y), T(0)}};
 }
 

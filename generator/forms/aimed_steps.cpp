@@ -41,24 +41,29 @@ const AimedSteps& aimed_steps(int indent) {
     lobe.extent = Expr::input(of("extent"));
     return lobe;
   };
-  const auto kept_patch = [](const std::string& index) {
-    const auto of = [&](const char* what) { return fmt::format("lamp_{}[{}]", what, index); };
+  const auto patch_named = [](const std::string& name, const std::string& index) {
+    const auto of = [&](const char* what) { return fmt::format("{}_{}{}", name, what, index); };
     return LampPatch<Expr>{input_vector(of("centre")), input_vector(of("across")), input_vector(of("along")),
                            Expr::input(of("disk"))};
   };
+  const auto kept_patch = [&](const std::string& index) { return patch_named("lamp", "[" + index + "]"); };
   const AimedLobe<Expr> earlier = kept_lobe("earlier");
   const LampPatch<Expr> patch = kept_patch("lobes");
-  const LampPatch<Expr> shining{input3("shining_centre"), input3("shining_across"), input3("shining_along"),
-                                Expr::input("shining_disk")};
+  const LampPatch<Expr> shining = patch_named("shining", "");
   const Expr lobes = Expr::input("lobes");
   steps.beam = record_step([&](Program& p) {
-    const LampBeam<Expr> beam{input3("beam"), Expr::input("beam_edge"), Expr::input("beam_blend")};
+    const LampBeam<Expr> beam{input_vector("beam"), Expr::input("beam_edge"), Expr::input("beam_blend")};
     const LitPart<Expr> lit = lit_part(patch, beam);
-    for (const auto& [name, part] : {std::pair{"shining", lit.mean}, {"lit", lit.lamp}}) {
-      p.output(fmt::format("{}_centre", name), part.centre);
-      p.output(fmt::format("{}_across", name), part.across);
-      p.output(fmt::format("{}_along", name), part.along);
-      p.output(fmt::format("{}_disk", name), part.disk);
+    const auto output_vector = [&](const std::string& name, const Vec3<Expr>& v) {
+      p.output(name + "[0]", v.x);
+      p.output(name + "[1]", v.y);
+      p.output(name + "[2]", v.z);
+    };
+    for (const auto& [name, part] : {std::pair<std::string, LampPatch<Expr>>{"shining", lit.mean}, {"lit", lit.lamp}}) {
+      output_vector(name + "_centre", part.centre);
+      output_vector(name + "_across", part.across);
+      output_vector(name + "_along", part.along);
+      p.output(name + "_disk", part.disk);
     }
   });
   steps.above = record_step([&](Program& p) { p.output("lamp_above", highest(patch)); });

@@ -9,13 +9,11 @@ namespace brdfc::forms {
 /// What is done with each lamp and at the end, which is the same for all models (aimed.h). `lobes` counts the lobes so
 /// far: arrays of lamp_* and lobe_* hold their numbers, at `earlier` one of them and at `lobes` the one to come.
 struct AimedSteps {
-  Recording
-      beam;  ///< reads the lamp and its beam_*; assigns shining_*, what f is averaged over, and the lamp's lit part
+  Recording beam;   ///< reads the lamp and beam*; assigns shining_*, what f is averaged over, and lit_*, the lamp anew
   Recording above;  ///< reads the lamp; assigns lamp_above, how high it reaches
   Recording room;   ///< of `earlier` and the lamp's centre: assigns lobe_room
-  Recording
-      aim;  ///< reads the lamp, shining_*, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_emphasis, lamp_solid_angle,
-            ///< lobe_height and of the lobe to_lamp_*, to_half_*, exponent, radius, end and extent
+  Recording aim;    ///< reads the lamp, shining_*, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_emphasis,
+                  ///< lamp_solid_angle, lobe_height and of the lobe to_lamp_*, to_half_*, exponent, radius, end, extent
   Recording less;   ///< reads the lobe `earlier` and wi_*; takes it off excess
   Recording send;   ///< reads excess, drawn_density and what aim assigned; assigns the lobe's value, weight and colour
   Recording toss;   ///< assigns tossed, the number of a lobe or less than 0, and u_0

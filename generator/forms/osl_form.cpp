@@ -105,7 +105,8 @@ std::vector<RecordedClosure> ShaderText::record(
 void ShaderText::declare(const std::vector<RecordedClosure>& closures) {
   for (std::size_t c = 0; c < closures.size(); ++c) {
     const ClosureKind kind = closures[c].kind;
-    statements += fmt::format("    color weight_{};\n", c);
+    // 0 for choices without closures.
+    statements += fmt::format("    color weight_{} = 0.0;\n", c);
     if (has_ramp(kind)) statements += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
     if (kind == ClosureKind::PhongRamp) statements += fmt::format("    float exponent_{};\n", c);
     if (has_facets(kind)) statements += fmt::format("    float alpha_{};\n", c);

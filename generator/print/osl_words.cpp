@@ -27,15 +27,13 @@ constexpr const char* kWords = R"(
   entry first frame_b frame_n frame_t last mirror_weight path_length show side
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
-  across_here aimed along_here beam_blend beam_edge beam_here beam_local beam_x beam_y beam_z centre_here chosen
-  covered covered_before density_under disk_here drawn_density drawn_x drawn_y drawn_z earlier excess half_way lamp
-  lamp_above lamp_across lamp_along lamp_centre lamp_disk lamp_emphasis lamp_met lamp_place lamp_scale lamp_shape
-  lamp_solid_angle lamp_turn lamps lit_across_x lit_across_y lit_across_z lit_along_x lit_along_y lit_along_z
-  lit_centre_x lit_centre_y lit_centre_z lit_disk lobe_colour lobe_colours lobe_end lobe_exponent lobe_extent
+  across_here aimed along_here beam beam_blend beam_edge beam_here centre_here chosen covered covered_before
+  density_under disk_here drawn_density drawn_x drawn_y drawn_z earlier excess half_way lamp lamp_above lamp_across
+  lamp_along lamp_centre lamp_disk lamp_emphasis lamp_met lamp_place lamp_scale lamp_shape lamp_solid_angle lamp_turn
+  lamps lit_across lit_along lit_centre lit_disk lobe_colour lobe_colours lobe_end lobe_exponent lobe_extent
   lobe_followed lobe_half lobe_height lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight lobes ray_x
-  ray_y ray_z rest_colour rest_followed rest_weight shining_across_x shining_across_y shining_across_z shining_along_x
-  shining_along_y shining_along_z shining_centre_x shining_centre_y shining_centre_z shining_disk to_half_x to_half_y
-  to_half_z to_lamp_x to_lamp_y to_lamp_z tossed v_all
+  ray_y ray_z rest_colour rest_followed rest_weight shining_across shining_along shining_centre shining_disk to_half_x
+  to_half_y to_half_z to_lamp_x to_lamp_y to_lamp_z tossed v_all
 )";
 
 /// What a shader numbers.
