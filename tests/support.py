@@ -11,6 +11,18 @@ ROOT = Path(__file__).resolve().parents[1]
 TOOL = str(Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve())
 LISTED = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
 MODELS = [model["name"] for model in LISTED]
+#: The colour configuration that the tool brings, and its working spaces.
+CONFIG = ROOT / "data" / "color" / "config.ocio"
+SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
+
+
+def run(*arguments, config=None):
+    """The tool, with another colour configuration than its own if one is given."""
+    environment = {k: v for k, v in os.environ.items() if k != "OCIO"}
+    if config:
+        environment["OCIO"] = str(config)
+    command = [TOOL, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=environment)
 
 
 def scene(**changes):

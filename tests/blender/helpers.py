@@ -204,6 +204,17 @@ def add_camera(scene, location=(0, -6, 0), rotation=(np.pi / 2, 0, 0), orthograp
     return data
 
 
+def add_lamp(scene, kind="POINT", name="Lamp", location=(0, 0, 4), turn=(0, 0, 0), **settings):
+    """A lamp with these values of its data; `turn` are its Euler angles."""
+    data = bpy.data.lights.new(name, kind)
+    for key, value in settings.items():
+        setattr(data, key, value)
+    item = bpy.data.objects.new(name, data)
+    item.location, item.rotation_euler = location, turn
+    scene.collection.objects.link(item)
+    return item
+
+
 def add_sphere(scene, material, segments=32):
     import bmesh
 

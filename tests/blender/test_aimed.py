@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from goniometer import Goniometer, tilted, unit
-from helpers import add_camera, add_sphere, evaluate, render
+from helpers import add_camera, add_lamp, add_sphere, evaluate, render
 from mathutils import Vector
 
 #: Towards the sun; the camera is above.
@@ -129,15 +129,9 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
     """f is averaged over what shines on the point, right to 2 %; over the whole lamp a ball would
     be 5 % too dark."""
     kind, settings = CONES[lamp]
-    data = bpy.data.lights.new("Lamp", kind)
-    data.energy = 1000.0
-    for name, value in settings.items():
-        setattr(data, name, value)
-    item = bpy.data.objects.new("Lamp", data)
     towards = unit((0.5, -0.62, 0.6))
-    item.location = 5 * towards
-    item.rotation_euler = Vector(-towards).to_track_quat("-Z", "Y").to_euler()
-    empty.collection.objects.link(item)
+    turn = Vector(-towards).to_track_quat("-Z", "Y").to_euler()
+    add_lamp(empty, kind, location=5 * towards, turn=turn, energy=1000.0, **settings)
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     extension.api.enable_osl(empty)
     add_camera(empty)

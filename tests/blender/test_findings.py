@@ -11,18 +11,9 @@ import bpy
 import helpers
 import numpy as np
 import pytest
+from helpers import add_lamp
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def add_lamp(scene, kind="POINT", name="Lamp", location=(0, 0, 4), **settings):
-    data = bpy.data.lights.new(name, kind)
-    for key, value in settings.items():
-        setattr(data, key, value)
-    item = bpy.data.objects.new(name, data)
-    item.location = location
-    scene.collection.objects.link(item)
-    return item
 
 
 def ring(scene, count, turn=0.0, **settings):

@@ -51,13 +51,7 @@ def ball(extension, empty, aimed):
 
 
 def add_lamp(scene, kind, name=None, location=(0, 0, 4), turn=(0.3, -0.5, 0.9), **settings):
-    data = bpy.data.lights.new(name or kind, kind)
-    for key, value in settings.items():
-        setattr(data, key, value)
-    item = bpy.data.objects.new(name or kind, data)
-    item.location, item.rotation_euler = location, turn
-    scene.collection.objects.link(item)
-    return item
+    return helpers.add_lamp(scene, kind, name or kind, location, turn, **settings)
 
 
 def slots(scene, update=True):

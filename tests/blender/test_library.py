@@ -208,15 +208,6 @@ def test_making_it_may_be_given_up(library, made):
 # Dragged
 
 
-def add_lamp(scene, location):
-    data = bpy.data.lights.new("Key", "POINT")
-    data.energy = 100
-    lamp = bpy.data.objects.new("Key", data)
-    lamp.location = location
-    scene.collection.objects.link(lamp)
-    return lamp
-
-
 def assert_aims_at(extension, material, lamp):
     """That the group of lamps in the material's model has the lamp's place."""
     bpy.context.view_layer.update()
@@ -230,7 +221,7 @@ def assert_aims_at(extension, material, lamp):
 
 @pytest.mark.parametrize("by_hand", [True, False])
 def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empty, by_hand):
-    lamp = add_lamp(empty, (1, 2, 3))
+    lamp = helpers.add_lamp(empty, name="Key", location=(1, 2, 3), energy=100)
     ball = helpers.add_sphere(empty, None, segments=8)
     if by_hand:
         ball.active_material = extension.api.new_material("ward")
@@ -275,7 +266,7 @@ def test_what_is_asked_for_by_name_stays(extension, made, empty):
 
 def test_undo_of_a_drag(extension, made, empty):
     ball = helpers.add_sphere(empty, extension.api.new_material("ward"), segments=8)
-    lamp = add_lamp(empty, (1, 2, 3))
+    lamp = helpers.add_lamp(empty, name="Key", location=(1, 2, 3), energy=100)
     assert_aims_at(extension, ball.active_material, lamp)
     bpy.ops.ed.undo_push(message="Start")
 
@@ -322,7 +313,7 @@ def test_dragged_materials_render_as_those_made_by_hand(extension, library, made
     width = 2.1 * len(balls)
     helpers.add_camera(empty, location=(width / 2 - 1.05, -8, 0), orthographic=width)
     helpers.add_world(empty, strength=0.5)
-    lamp = add_lamp(empty, (width / 2, -width, width))
+    lamp = helpers.add_lamp(empty, name="Key", location=(width / 2, -width, width), energy=100)
     lamp.data.energy, lamp.data.shadow_soft_size = 100 * width**2, 10
     extension.api.enable_osl(empty)
     empty.cycles.samples, empty.cycles.use_adaptive_sampling = 16, False

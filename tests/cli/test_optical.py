@@ -4,7 +4,6 @@ the same, in every working space; what is wrong in a file is said by both alike.
 
 import importlib
 import json
-import os
 import re
 import subprocess
 import sys
@@ -12,10 +11,8 @@ import sys
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
-from support import ROOT, TOOL, scene
+from support import CONFIG, ROOT, SPACES, TOOL, run, scene
 
-CONFIG = ROOT / "data" / "color" / "config.ocio"
-SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
 #: X, Y, Z of the normal reflectance under D65 for the observer of 1931, over those of a perfect
 #: reflector, by colour-science 0.4.7 of the same tables: from 360 to 830 nm, every 1 nm.
 COLOUR_SCIENCE = {
@@ -53,14 +50,6 @@ def config_in(folder, space):
     text = CONFIG.read_text(encoding="utf-8")
     path.write_text(text.replace("scene_linear: Linear Rec.709", f"scene_linear: {space}"))
     return path
-
-
-def run(*arguments, config=None):
-    environment = {k: v for k, v in os.environ.items() if k != "OCIO"}
-    if config:
-        environment["OCIO"] = str(config)
-    command = [TOOL, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=environment)
 
 
 def optical(*arguments, config=None):

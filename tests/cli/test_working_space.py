@@ -3,30 +3,18 @@
 pictures knows."""
 
 import json
-import os
-import subprocess
 import sys
 
 import numpy as np
 import OpenImageIO as oiio
 import PyOpenColorIO as ocio
 import pytest
-from support import ROOT, TOOL, scene
+from support import CONFIG, ROOT, SPACES, run, scene
 
 sys.path.insert(0, str(ROOT / "script"))
 from pictures import read_rgb
 
-CONFIG = ROOT / "data" / "color" / "config.ocio"
-SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
 REC709, REC2020, ACESCG = SPACES
-
-
-def run(*arguments, config=None):
-    environment = {k: v for k, v in os.environ.items() if k != "OCIO"}
-    if config:
-        environment["OCIO"] = str(config)
-    command = [TOOL, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=environment)
 
 
 def mirrors(folder, **changes):
