@@ -34,13 +34,6 @@ class Finding:
     message: str
 
 
-def osl_available():
-    """Whether this build of Blender has OSL."""
-    import _cycles
-
-    return bool(_cycles.with_osl)
-
-
 def gpu_backend():
     """Compute device type of the preferences: NONE, CUDA, OPTIX, HIP, METAL, ONEAPI."""
     addon = bpy.context.preferences.addons.get("cycles")
@@ -326,8 +319,8 @@ def scene_warnings(scene):
                 ),
             )
         )
-    if not osl_available():
-        found.append(Finding("no_osl", "ERROR", say("This Blender lacks Open Shading Language")))
+    if not pack.osl_available():
+        return [*found, Finding("no_osl", "ERROR", nodes.NO_OSL)]
     if scene.render.engine != "CYCLES":
         found.append(
             Finding(
@@ -483,8 +476,8 @@ def enable_osl(scene):
 
     Raises RuntimeError when this Blender has no OSL.
     """
-    if not osl_available():
-        raise RuntimeError(say("This Blender was built without Open Shading Language"))
+    if not pack.osl_available():
+        raise RuntimeError(nodes.NO_OSL)
     done = []
     if scene.render.engine != "CYCLES":
         done.append(say("Render engine changed from {engine} to Cycles", engine=engine_name(scene)))

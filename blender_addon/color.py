@@ -1,72 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of the open file, by the OpenColorIO that Blender brings, with Blender's configuration.
+"""Colours of the open file, by Blender's own conversions.
 
-The working space is its role scene_linear, which Blender 5 sets to the space that the file chose.
+The working space is the scene_linear of Blender's OpenColorIO configuration, or from Blender 5 on
+what the file chose. Blender converts one colour at a time; matrices and the curve of sRGB are made
+of that for many.
 """
 
 import functools
-import importlib
 
 import bpy
 import numpy as np
+from mathutils import Color
 
-_INTERCHANGE = "aces_interchange"
-_XYZ = "UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD"
-_SCREEN = "DISPLAY - CIE-XYZ-D65_to_sRGB"
-
-
-@functools.cache
-def _open_color_io():
-    try:
-        return importlib.import_module("PyOpenColorIO")
-    except ImportError:
-        pass
-    # Blender as a Python module does not look into its own folder of modules.
-    import sys
-    from importlib import machinery, util
-    from pathlib import Path
-
-    root = Path(bpy.utils.resource_path("LOCAL"))
-    folders = [str(p) for p in root.glob("python/lib/python3.*/site-packages")]
-    spec = machinery.PathFinder.find_spec("PyOpenColorIO", folders)
-    if spec is None:
-        raise ValueError("this Blender is built without OpenColorIO, which colours need")
-    module = util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def _converted(colors, *steps):
-    """Colours (..., 3) through conversions of the configuration: pairs of spaces or roles, or a
-    builtin transform and whether it is inverted."""
-    ocio = _open_color_io()
-    config = ocio.GetCurrentConfig()
-    pixels = np.array(colors, np.float32, order="C")
-    flat = pixels.reshape(-1, 3)
-    for first, second in steps:
-        if isinstance(second, str):
-            for name in (first, second):
-                if config.getColorSpace(name) is None:
-                    raise ValueError(
-                        f"Blender's OpenColorIO configuration has no colour space or role {name!r}"
-                    )
-            processor = config.getProcessor(first, second)
-        else:
-            transform = ocio.BuiltinTransform(first)
-            if second:
-                transform.setDirection(ocio.TransformDirection.TRANSFORM_DIR_INVERSE)
-            processor = config.getProcessor(transform)
-        # The default takes powers to 1e-4 only.
-        processor.getOptimizedCPUProcessor(ocio.OptimizationFlags.OPTIMIZATION_LOSSLESS).applyRGB(
-            flat
-        )
-    return pixels
+#: Values of sRGB at which its curve is taken: those of eight bits, and three between any two.
+_ENCODED = np.linspace(0, 1, 4 * 255 + 1)
 
 
 def working_space():
     """The name of the working space."""
-    return _open_color_io().GetCurrentConfig().getColorSpace("scene_linear").getName()
+    if hasattr(bpy.data, "colorspace"):
+        return bpy.data.colorspace.working_space
+    return "Linear Rec.709"  # of the configuration that Blender has before 5.0
 
 
 def set_working_space(name):
@@ -85,36 +39,45 @@ def set_working_space(name):
     bpy.ops.wm.set_working_color_space(working_space=name, convert_colors=True)
 
 
+@functools.lru_cache(maxsize=8)
+def _matrix(conversion, _space):
+    """What a linear conversion of Blender's makes of the colours of the working space: (3, 3)."""
+    return np.array([getattr(Color(axis), conversion)() for axis in np.eye(3)]).T
+
+
+def _converted(colors, conversion):
+    colors = np.asarray(colors)
+    return colors @ _matrix(conversion, working_space()).T.astype(colors.dtype)
+
+
+@functools.cache
+def _decoded():
+    """_ENCODED in linear light: of grey, which is the same in every working space."""
+    return np.array([Color((v, v, v)).from_srgb_to_scene_linear()[1] for v in _ENCODED])
+
+
 def to_xyz(rgb):
     """CIE XYZ, white D65, of linear colours (..., 3) of the working space."""
-    return _converted(rgb, ("scene_linear", _INTERCHANGE), (_XYZ, False))
+    return _converted(np.asarray(rgb, float), "from_scene_linear_to_xyz_d65")
 
 
 def from_xyz(xyz):
     """Linear colours of the working space, of X, Y, Z (..., 3) over those of a perfect reflector,
-    which becomes 1, 1, 1. ValueError where Blender's configuration has no role that relates its
-    spaces to what can be measured."""
-    absolute = np.asarray(xyz) * to_xyz([1.0, 1.0, 1.0])
-    return _converted(absolute, (_XYZ, True), (_INTERCHANGE, "scene_linear"))
-
-
-@functools.lru_cache(maxsize=4)
-def _luminance_weights(space):
-    return to_xyz(np.eye(3))[:, 1]
+    which becomes 1, 1, 1."""
+    absolute = np.asarray(xyz, float) * to_xyz([1, 1, 1])
+    return absolute @ np.linalg.inv(_matrix("from_scene_linear_to_xyz_d65", working_space())).T
 
 
 def luminance(rgb):
     """Y of linear colours (..., 3) of the working space, 1 of white, in the precision of theirs."""
-    rgb = np.asarray(rgb)
-    return rgb @ _luminance_weights(working_space()).astype(rgb.dtype)
+    return _converted(rgb, "from_scene_linear_to_xyz_d65")[..., 1]
 
 
-def to_scene_linear(colors, space):
-    """Colours (..., 3) of a space of Blender's as the working space has them."""
-    return _converted(colors, (space, "scene_linear"))
+def from_srgb(colors):
+    """Colours (..., 3) of sRGB in [0, 1] in linear light, with the primaries of sRGB."""
+    return np.interp(colors, _ENCODED, _decoded())
 
 
 def to_screen(rgb):
     """Linear colours (..., 3) of the working space as sRGB has them, in [0, 1]."""
-    steps = ("scene_linear", _INTERCHANGE), (_XYZ, False), (_SCREEN, False)
-    return np.clip(_converted(rgb, *steps), 0, 1)
+    return np.interp(_converted(rgb, "from_scene_linear_to_rec709_linear"), _decoded(), _ENCODED)

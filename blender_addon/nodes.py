@@ -24,6 +24,9 @@ ALBEDO = "Albedo"
 _SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
 
 
+NO_OSL = say("This Blender was built without Open Shading Language")
+
+
 class CompileError(RuntimeError):
     """Cycles could not compile a shader, or compiled it to something else than expected."""
 
@@ -176,6 +179,8 @@ def script_problem(group):
 def _compile(script_node, text, what):
     import cycles.osl
 
+    if not pack.osl_available():
+        raise CompileError(NO_OSL)
     _find_oslquery()
     reports = []
     with _captured_stderr() as console:

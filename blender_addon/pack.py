@@ -55,6 +55,13 @@ def manifest():
     return data
 
 
+def osl_available():
+    """Whether this build of Blender has Open Shading Language; that of Debian has not."""
+    import _cycles  # a part of Blender, and what reads packs runs outside of it, too
+
+    return bool(_cycles.with_osl)
+
+
 def version(generator):
     """The numbers of "brdfc 1.2.3"; empty where there are none."""
     return tuple(int(n) for n in re.findall(r"\d+", generator))
@@ -139,16 +146,16 @@ def resolve(model_name, representation, values=None):
     """Name of the representation. Raises ValueError.
 
     "auto" becomes the model's preference, or the next form where `values` have one that the
-    preferred form lacks.
+    preferred form lacks. Blender's own nodes come in only where Cycles can't run shaders.
     """
     entry, values = model(model_name), values or {}
     name = representation
     if name == "auto":
         forms = entry["representations"]
-        # Blender's own nodes only where they are asked for.
-        others = [n for n in forms if n != entry["auto"] and "nodes" not in forms[n]]
-        fitting = [n for n in (entry["auto"], *others) if refusal(model_name, n, values) is None]
-        name = fitting[0] if fitting else entry["auto"]
+        native = [n for n in forms if "nodes" in forms[n]]
+        others = [n for n in forms if n != entry["auto"] and n not in native]
+        order = [*([] if osl_available() else native), entry["auto"], *others]
+        name = next((n for n in order if refusal(model_name, n, values) is None), order[0])
     if name not in entry["representations"]:
         known = ", ".join(["auto", *sorted(entry["representations"])])
         raise ValueError(

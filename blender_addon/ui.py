@@ -2,7 +2,6 @@
 """Menus and panels."""
 
 import math
-import unicodedata
 
 import bpy
 import numpy as np
@@ -10,49 +9,7 @@ from bpy.types import Menu, Panel
 
 from . import api, checks, color, convert, energy, lamps, nodes, optical, pack
 from .i18n import button, form_name, iface, of_error, say
-
-_WRAP = 46  # widths of a letter in a panel's line; Blender does not wrap labels
-#: What no line of Japanese begins with.
-_CLOSING = "、。，．・：；）」』】"
-
-
-def _width(text):
-    """In widths of a Latin letter; what is of East Asian width takes two."""
-    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
-
-
-def _pieces(text):
-    """The parts between which a line may be broken: words, and characters of East Asian width."""
-    for word in text.split():
-        piece = " "
-        for c in word:
-            wide = unicodedata.east_asian_width(c) in "WF"
-            if piece.strip() and wide and c not in _CLOSING:
-                yield piece
-                piece = ""
-            piece += c
-            after = piece.strip()
-        if after:
-            yield piece
-
-
-def lines_of(text):
-    """A text in lines that a panel has room for."""
-    lines, line = [], ""
-    for piece in _pieces(text):
-        if line and _width(line) + _width(piece) > _WRAP:
-            lines.append(line)
-            line = ""
-        line += piece if line else piece.strip()
-    return [*lines, line]
-
-
-def _wrapped(layout, text, icon="NONE"):
-    """A label over several lines, of a Sentence or of a text that is not translated."""
-    for line in lines_of(iface(text)):
-        layout.label(text=line, icon=icon, translate=False)
-        icon = "BLANK1" if icon != "NONE" else "NONE"
-
+from .labels import wrapped
 
 #: Headings of menus by the looks that models declare.
 LOOKS = {
@@ -184,14 +141,14 @@ def energy_text(node):
             continue
         rgb = energy.albedo(model_name, values, cosine)
         luminance = color.luminance(np.array(rgb))
-        numbers.append(f"{angle}\u00b0 {luminance:.3f}")
-    return "   ".join(numbers) or say("not at a view angle of this scene")
+        numbers.append(f"{angle}\u00b0\u00a0{luminance:.3f}")  # on one line
+    return "  ".join(numbers) or say("not at a view angle of this scene")
 
 
 def _draw_form(layout, node, form, scene, editable):
     model_name, representation = nodes.identity(node)
     if lean := nodes.is_baked(node):
-        _wrapped(layout, say("Lean: only what this file needs. A form brings the whole one back"))
+        wrapped(layout, say("Lean: only what this file needs. A form brings the whole one back"))
     entry = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = editable
@@ -210,7 +167,7 @@ def _draw_form(layout, node, form, scene, editable):
         item.node, item.representation = node.name, name
     column = layout.column(align=True)
     for refusal in refusals:
-        _wrapped(column, refusal)
+        wrapped(column, refusal)
     # A button, for labels have no tooltip that could say what the number means.
     line = column.row()
     line.alignment = "LEFT"
@@ -221,9 +178,9 @@ def _draw_form(layout, node, form, scene, editable):
         icon="QUESTION",
         emboss=False,
     ).node = node.name
-    _wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
+    wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
     if entry.get("albedo"):
-        _wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
+        wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
 
 
 def _draw_values(layout, node):
@@ -243,7 +200,9 @@ def draw_node(layout, node, material, scene, editable=True):
     entry = {"representations": {}}
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
-        _wrapped(layout.column(align=True), f"{entry['paper']} {entry['equations']}".strip())
+        column = layout.column(align=True)
+        for said in filter(None, (entry["paper"], entry["equations"])):
+            wrapped(column, said)
         _draw_form(layout, node, made[0], scene, editable)
     _draw_values(layout, node)
     if made and optical.can_have(model_name):
@@ -271,12 +230,12 @@ def draw_lamps(layout, material, scene):
     found = lamps.seen(scene)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
-        _wrapped(box, say("Free of noise under {lamps}", lamps=", ".join(taken)), "LIGHT")
+        wrapped(box, say("Free of noise under {lamps}", lamps=", ".join(taken)), "LIGHT")
     else:
-        _wrapped(box, say("Free of noise under no lamp yet"), "LIGHT")
+        wrapped(box, say("Free of noise under no lamp yet"), "LIGHT")
     room = checks.lamps_that_fit(scene)
     if room is not None and room < slots:
-        _wrapped(
+        wrapped(
             box,
             say(
                 "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
@@ -323,7 +282,7 @@ def draw_warnings(layout, material, scene):
     for finding in found:
         row = layout.column(align=True)
         row.alert = finding.severity == "ERROR"
-        _wrapped(row, finding.message, "ERROR" if finding.severity == "ERROR" else "INFO")
+        wrapped(row, finding.message, "ERROR" if finding.severity == "ERROR" else "INFO")
         if finding.code in BUTTONS and finding.code not in offered:
             offered.add(finding.code)
             operator, text, settings = BUTTONS[finding.code]
@@ -354,7 +313,7 @@ class _BrdfcPanel:
             draw_material(self.layout, context.object.active_material, context.scene)
         except pack.PackError as error:
             said, _ = of_error(error)
-            _wrapped(self.layout, said, "ERROR")
+            wrapped(self.layout, said, "ERROR")
             _more(self.layout, said)
 
 

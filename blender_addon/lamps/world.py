@@ -75,9 +75,10 @@ def _image_spots(image):
         if image.channels < 3:
             pixels = pixels[..., :1].repeat(3, axis=-1)
         pixels = pixels[..., :3]
-        # Floats are in the working space already.
-        if not image.is_float and image.colorspace_settings.name:
-            pixels = color.to_scene_linear(pixels, image.colorspace_settings.name)
+        # Floats are in the working space already. Of bytes the curve is enough, to find what is
+        # bright.
+        if not image.is_float and not image.colorspace_settings.is_data:
+            pixels = color.from_srgb(pixels)
         luminance = np.nan_to_num(np.maximum(color.luminance(pixels), 0), posinf=0.0)
         _spots[key] = bright_spots.find(luminance)
     return _spots[key]

@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 
 import bpy
 
-from .. import pack
+from .. import nodes, pack
 from ..i18n import say
 from ..jobs import ProgramJob
 
@@ -186,6 +186,8 @@ class Making(ProgramJob):
     failure = LibraryError
 
     def __init__(self):
+        if not pack.osl_available():
+            raise LibraryError(nodes.NO_OSL)
         self._count = len(entries())
         self._made = self._open_folder("brdfc-library-") / "library"
         self._made.mkdir()

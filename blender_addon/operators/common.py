@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators share: how they refuse, and whose material they are about."""
 
-from .. import checks, nodes
+from .. import checks, nodes, pack
 from ..i18n import Sentence, iface, of_error, rpt, say
 
 ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
@@ -17,6 +17,13 @@ def refused(operator, error):
 
 
 def report_osl(operator, scene):
+    if not pack.osl_available():
+        said = say(
+            "This Blender has no Open Shading Language: models are made of Blender's own nodes, "
+            "and the panel shows how far off they are"
+        )
+        operator.report({"WARNING"}, rpt(said))
+        return
     for finding in checks.scene_warnings(scene):
         operator.report({"WARNING"}, rpt(finding.message))
 

@@ -4,7 +4,8 @@
 from bpy.types import Operator
 
 from .. import api
-from ..i18n import iface, rpt, say
+from ..i18n import rpt, say
+from ..labels import wrapped
 from .common import ERRORS, OfActiveMaterial, refused, report_osl
 
 
@@ -41,7 +42,7 @@ class BRDFC_OT_convert(Operator):
         column = self.layout.column(align=True)
         for made in self._plans:
             icon = "ERROR" if made.refusal else "CHECKMARK"
-            column.label(text=iface(made.line()), icon=icon, translate=False)
+            wrapped(column, made.line(), icon, pixels=560)
 
     def execute(self, context):
         try:

@@ -6,7 +6,8 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
 from .. import api
-from ..i18n import iface, rpt, say
+from ..i18n import rpt, say
+from ..labels import wrapped
 from .common import ERRORS, Long, refused
 
 
@@ -108,7 +109,7 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
         self.layout.prop(self, "fit")
         column = self.layout.column(align=True)
         for line in self.plan.lines():
-            column.label(text=iface(line), translate=False)
+            wrapped(column, line, pixels=780)
 
     def execute(self, context):
         if self.budget() == self.planned_with:

@@ -9,6 +9,7 @@ from bpy.types import Operator
 
 from .. import api, color, nodes
 from ..i18n import iface, of_error, rpt, say, tip
+from ..labels import wrapped
 from .common import ERRORS, OfActiveMaterial, model_node, refused
 
 
@@ -63,7 +64,7 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
 
     def draw(self, context):
         for line in self.lines(context):
-            self.layout.label(text=iface(line), translate=False)
+            wrapped(self.layout, line, pixels=480)
 
     def execute(self, context):
         for line in self.lines(context):
@@ -94,10 +95,7 @@ class BRDFC_OT_more(Operator):
         return context.window_manager.invoke_popup(self, width=500)
 
     def draw(self, context):
-        from .. import ui
-
-        for line in ui.lines_of(self.text):
-            self.layout.label(text=line, translate=False)
+        wrapped(self.layout.column(align=True), self.text, pixels=480)
 
     def execute(self, context):
         self.report({"INFO"}, self.text)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Previews through Blender's own OpenColorIO configuration, against what Blender saves; metals and
-glass of measured n and k in the working space of the file."""
+"""The tool's previews through Blender's OpenColorIO configuration, against what Blender saves;
+metals and glass of measured n and k in the working space of the file."""
 
 import importlib
 import json
@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 
 import bpy
+import mathutils
 import numpy as np
 import pytest
 from helpers import add_camera, add_world, open_image_io, render_passes
@@ -215,12 +216,14 @@ def test_the_button_sets_a_metal(extension, empty, tmp_path):
 def test_the_screens_curve_is_srgb_and_luminance_is_that_of_the_space(extension, empty, color):
     x = np.linspace(0, 1, 33)
     srgb = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
-    np.testing.assert_allclose(color.to_screen(np.stack([x, x, x], -1))[:, 1], srgb, atol=2e-4)
+    encoded = color.to_screen(np.stack([x, x, x], -1))
+    np.testing.assert_allclose(encoded[:, 1], srgb, atol=1e-5)
+    np.testing.assert_allclose(color.from_srgb(encoded)[:, 2], x, atol=1e-5)
     np.testing.assert_allclose(color.luminance(np.eye(3)), [0.2126, 0.7152, 0.0722], atol=1e-4)
     for space in SPACES[1:]:
         use_working_space(space)
         weights = color.luminance(np.eye(3))
         assert weights.sum() == pytest.approx(1, abs=1e-5) and weights[0] > 0.26
-    np.testing.assert_allclose(
-        color.to_scene_linear([[0.5] * 3], "sRGB"), [[0.21404] * 3], atol=1e-4
-    )
+        # A red of sRGB is one on the screen, whatever space it is kept in.
+        red = mathutils.Color((0.5, 0, 0)).from_rec709_linear_to_scene_linear()
+        np.testing.assert_allclose(color.to_screen(red), [0.73536, 0, 0], atol=1e-4)

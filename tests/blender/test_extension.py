@@ -627,7 +627,7 @@ def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
     monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
     assert codes(extension, material, empty) == ["blender_version"]
     monkeypatch.undo()
-    monkeypatch.setattr(extension.checks, "osl_available", lambda: False)
+    monkeypatch.setattr(extension.pack, "osl_available", lambda: False)
     assert codes(extension, material, empty) == ["no_osl"]
     with pytest.raises(RuntimeError, match="without Open Shading Language"):
         extension.api.enable_osl(empty)

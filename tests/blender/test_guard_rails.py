@@ -51,6 +51,30 @@ SPOILED = [
 ]
 
 
+def test_without_osl_models_are_blenders_own_nodes(extension, empty, monkeypatch):
+    """As in the packages of Debian: what has no twin is refused, and nothing is left of it."""
+    _cycles = import_module("_cycles")  # a part of bpy
+    extension.scene_loader.apply_clean_settings(empty)
+    monkeypatch.setattr(_cycles, "with_osl", False)
+    material = extension.api.new_material("phong", e=20.0)
+    (node,) = extension.nodes.group_nodes(material)
+    assert extension.nodes.identity(node) == ("phong", "twin")
+    assert extension.api.get_parameters(material)["e"] == pytest.approx(20)
+    found = {f.code: f.severity for f in extension.checks.warnings(material, empty)}
+    assert found == ({} if bpy.app.version >= (5, 0, 0) else {"leaning_facets": "WARNING"})
+    kept = len(bpy.data.node_groups), len(bpy.data.texts), len(bpy.data.materials)
+    for refused in (("glass",), ("phong", "aimed")):
+        with pytest.raises(RuntimeError, match="built without Open Shading Language"):
+            extension.api.new_material(*refused)
+    assert kept == (len(bpy.data.node_groups), len(bpy.data.texts), len(bpy.data.materials))
+    with pytest.raises(RuntimeError, match="built without Open Shading Language"):
+        bpy.ops.brdfc.add_library()
+    monkeypatch.undo()
+    made_elsewhere = extension.api.new_material("phong")
+    monkeypatch.setattr(_cycles, "with_osl", False)
+    assert [f.code for f in extension.checks.warnings(made_elsewhere, empty)] == ["no_osl"]
+
+
 @pytest.fixture
 def phong(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
@@ -69,7 +93,8 @@ def test_one_line_and_one_button(extension, empty, phong, monkeypatch, spoil, li
     spoil(extension, empty, monkeypatch)
     said, offered = shown(extension, phong, empty)
     assert line in said
-    assert len(said) <= extension.ui._WRAP, "it fits a line of the panel"
+    labels = import_module(f"{extension.package}.labels")
+    assert labels.width(said) <= labels.room(icon=True), "it fits a line of the panel"
     assert offered == f"operator {button}"
     module, name = button.split()[0].split(".")
     if module == "brdfc":

@@ -150,14 +150,14 @@ def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
 
 @pytest.mark.parametrize("locale", [None, *LOCALES])
 def test_lines_fit_the_panel(extension, i18n, locale):
-    ui = extension.ui
+    labels = import_module(f"{extension.package}.labels")
     texts = (
         i18n.catalogues()[locale].values() if locale else [k[1] for k in i18n.catalogues()["de_DE"]]
     )
     for text in texts:
-        lines = ui.lines_of(text)
+        lines = labels.lines_of(text, labels.room())
         assert "".join("".join(lines).split()) == "".join(text.split())
         for line in lines:
-            # What can't be broken and what may not begin a line may stick out.
-            assert ui._width(line) <= ui._WRAP + 4 or " " not in line, line
-            assert not line.startswith(tuple(ui._CLOSING)), line
+            # What can't be broken may stick out.
+            assert labels.width(line) <= labels.room() or " " not in line, line
+            assert not line.startswith(tuple(labels._CLOSING)), line
