@@ -8,19 +8,15 @@ import numpy as np
 from . import nodes, shader_nodes, shader_text
 
 
-def scattered(node, values, wi, wo):
-    """f cos(theta_i) of a group node of which nodes.is_fitted(), (N, 3), without an ideal mirror's
-    part, at these values of all parameters; wi: (N, 3), wo: (3,), unit vectors above the surface.
-    Raises shader_text.Unreadable."""
+def lobes(node, values, wo):
+    """shader_text.Lobes of a group node of which nodes.is_fitted(), at these values of all
+    parameters, for viewers (k, 3), unit vectors above the surface. It and what it returns raise
+    shader_text.Unreadable."""
     group = node.node_tree
     if not nodes.is_native(group):
-        light = shader_text.scattered(nodes.source_text(group), values, wi, wo)
-    else:
-        given = dict.fromkeys((s.identifier for s in node.inputs), np.zeros(3))
-        for name, socket in nodes.sockets(node).items():
-            if name in values:
-                given[socket.identifier] = values[name]
-        light = shader_nodes.scattered(group, given, wi, wo)
-    if not np.isfinite(light).all():
-        raise shader_text.Unreadable("expected numbers, got infinite ones or none")
-    return light
+        return shader_text.lobes(nodes.source_text(group), values, wo)
+    given = dict.fromkeys((s.identifier for s in node.inputs), np.zeros(3))
+    for name, socket in nodes.sockets(node).items():
+        if name in values:
+            given[socket.identifier] = values[name]
+    return shader_nodes.lobes(group, given, wo)

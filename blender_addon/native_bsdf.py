@@ -166,27 +166,56 @@ def matte(wi, wo, color, roughness):
     return nl[..., None] * ((a + b * t)[..., None] + again * lost[..., None]) * color
 
 
+def by_view(native, each):
+    """What the view alone decides, for each (k, 3) of Glossy and Principled: the share of the light
+    that a dielectric takes from its base (k,), and what to and fro between facets of metal adds, as
+    a factor (k, 3)."""
+    if native.is_mirror:
+        return dielectric(native.f0, each[:, 2]), np.ones((len(each), 3))
+    color = np.asarray(native.color, np.float64)
+    if native.kind == "glossy":
+        return np.zeros(len(each)), _multiscatter(each, native, color)
+    taken, scale = np.zeros(len(each)), np.ones((len(each), 3))
+    if native.metallic < 1:
+        taken = facet_albedo(each, native.alpha, False, lambda c: dielectric(native.f0, c))
+    if native.metallic > 0:
+        scale = _multiscatter(each, native, mean_schlick(color))
+    return taken, scale
+
+
 def f_cos(native, wi, wo, views):
     """f cos(theta_i), (n, 3), without an ideal mirror's part. `views`: the different wo (k, 3) and
     which of them each is, (n,), as numpy.unique() gives them."""
-    each, which = views
     if native.kind == "diffuse":
         return matte(wi, wo, native.color, native.roughness)
+    each, which = views
+    taken, scale = by_view(native, each)
+    return f_cos_of_view(native, wi, wo, taken[which], scale[which])
+
+
+def f_cos_of_view(native, wi, wo, taken, scale):
+    """The same of Glossy and Principled, with by_view() of each wo."""
     lobe = np.zeros(len(wi)) if native.is_mirror else facets(wi, wo, native.alpha, native.beckmann)
     lobe = lobe[:, None]
     color = np.asarray(native.color, np.float64)
     if native.kind == "glossy":
-        scale = 1.0 if native.is_mirror else _multiscatter(each, native, color)[which]
         return color * lobe * scale
     cosine = (wo * half(wi, wo)).sum(-1)
-    if native.is_mirror:
-        taken, scale = dielectric(native.f0, each[:, 2]), 1.0
-    else:
-        taken = facet_albedo(each, native.alpha, False, lambda c: dielectric(native.f0, c))
-        scale = _multiscatter(each, native, mean_schlick(color))[which]
-    base = matte(wi, wo, color, native.diffuse_roughness) * (1 - taken)[which][:, None]
+    base = matte(wi, wo, color, native.diffuse_roughness) * (1 - taken)[:, None]
     plastic = base + lobe * dielectric(native.f0, cosine)[:, None]
     metal = lobe * schlick(color, cosine) * scale
+    return (1 - native.metallic) * plastic + native.metallic * metal
+
+
+def albedo(native, each, taken, scale):
+    """Share of the light, (k, 3), that a Principled node with a smooth base reflects, and with an
+    ideal mirror; by_view() of each (k, 3) is known."""
+    color = np.asarray(native.color, np.float64)
+    plastic, metal = taken[:, None] + color * (1 - taken)[:, None], 0.0
+    if native.is_mirror:
+        metal = schlick(color, each[:, 2])
+    elif native.metallic > 0:
+        metal = facet_albedo(each, native.alpha, False, lambda c: schlick(color, c)) * scale
     return (1 - native.metallic) * plastic + native.metallic * metal
 
 

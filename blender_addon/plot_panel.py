@@ -32,7 +32,7 @@ def drawn(node):
 
     model_name, _ = nodes.identity(node)
     values, _ = _values(node)
-    form = functools.partial(form_light.scattered, node) if nodes.is_fitted(node) else None
+    form = functools.partial(form_light.lobes, node) if nodes.is_fitted(node) else None
     try:
         return plots.draw(model_name, values, form)
     except shader_text.Unreadable:
@@ -95,6 +95,7 @@ def _legend(node, legend):
         yield say("Arrow above: an ideal mirror, {percent} % of the light", percent=shares)
     if legend.refracted is not None:
         yield say("Arrow below: refracted, {percent} %", percent=_shares(legend.refracted))
+    yield say("Solid: the model")
     yield _form_said(node, legend)
     if legend.glossy is not None:
         yield say("Grey: the nearest Glossy, roughness {value}", value=f"{legend.glossy:.2f}")
@@ -107,6 +108,13 @@ def _legend(node, legend):
             metallic=f"{near.metallic:.2f}",
             ior=f"{near.ior:.2f}",
         )
+        shares = {"mirror": _shares(near.mirror), "refracted": _shares(near.refracted)}
+        if near.transmission:
+            yield say("Its transmission 1, mirror {mirror} %, refracted {refracted} %", **shares)
+        elif any(near.mirror):
+            yield say("Its mirror {mirror} %: the dashed arrow", mirror=shares["mirror"])
+        elif legend.mirror is not None:
+            yield say("It is rough, without ideal mirror")
 
 
 def draw_plots(layout, material):
@@ -119,11 +127,12 @@ def draw_plots(layout, material):
             said = say("This extension does not have this model", more=str(error))
             column.label(text=iface(said), icon="ERROR", translate=False)
             continue
-        column.template_icon(icon_value=preview.icon_id, scale=12.0)
+        column.template_icon(icon_value=preview.icon_id, scale=14.4)
         column.label(text="Above: light from 45\u00b0, and where it goes")
         for said in _legend(node, legend):
             column.label(text=iface(said), translate=False)
-        column.label(text="Below: under a lamp; reflected share, 0\u00b0 to 90\u00b0")
+        column.label(text="Middle: under a lamp, by the strokes below")
+        column.label(text="Below: reflected share, views from 0\u00b0 to 90\u00b0")
         _, linked = _values(node)
         if linked:
             labels = pack.parameters(nodes.identity(node)[0])

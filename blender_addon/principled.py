@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Principled node that is nearest to a curve in the plane of incidence. No bpy in here.
+"""The Principled node that is nearest to a material. No bpy in here.
 
 A node without coat, sheen and the like: roughness, metallic, IOR and base colour. The first three
 are searched on a grid, the colour follows from least squares; what is found is evaluated by the
-formulas of native_bsdf.py, and its error is that of these.
+formulas of native_bsdf.py, and its error is that of these. A rough node is the nearest to a curve
+in the plane of incidence; a smooth one, which has an ideal mirror, to shares of the light over the
+angle of the view.
 """
 
+import dataclasses
 import functools
 from dataclasses import dataclass
 
@@ -33,8 +36,32 @@ class Nearest:
     color: tuple
     #: f cos of the node over the angles of the curve, (N, 3).
     curve: np.ndarray
-    #: Part of the curve's area that lies elsewhere.
+    #: Part of the light from the incidence that lies elsewhere.
     error: float
+    #: Whether the base is let through: the input Transmission is 1.
+    transmission: bool = False
+    #: Shares (3,) of light from the incidence that are ideally reflected and refracted.
+    mirror: tuple = (0.0, 0.0, 0.0)
+    refracted: tuple = (0.0, 0.0, 0.0)
+
+    @property
+    def native(self):
+        return _native(self.roughness, self.metallic, self.ior, self.color)
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Parts of the light from some views that are ideally reflected, scattered and ideally
+    refracted: (..., 3) each."""
+
+    mirror: np.ndarray
+    scattered: np.ndarray
+    refracted: np.ndarray
+
+
+def _native(roughness, metallic, ior, color):
+    f0 = ((ior - 1) / (ior + 1)) ** 2
+    return Native("principled", color, roughness, metallic=metallic, f0=f0)
 
 
 def node_slice(native, wi, wo):
@@ -53,8 +80,8 @@ class Search:
     """For curves over directions wi (N, 3) in the plane of wo, in the order of their angles."""
 
     def __init__(self, wi, wo, angles):
-        self._wi, self._wo = wi, wo
-        self._area = np.gradient(angles)
+        self.wi, self.wo = wi, wo
+        self.area = np.gradient(angles)
         half = native_bsdf.half(wi, wo)
         cosine = half @ wo
         self._base = np.maximum(wi[:, 2], 0) / np.pi
@@ -81,13 +108,13 @@ class Search:
     def _parts(self, roughness):
         """By roughness: curves that a node is a sum of, as rows, weighed by the root of the area
         that each angle stands for; their products; albedos (seen, mean, those by index)."""
-        wo = np.broadcast_to(self._wo, self._wi.shape)
+        wo = np.broadcast_to(self.wo, self.wi.shape)
         rows = []
         for r in roughness:
-            lobe = native_bsdf.facets(self._wi, wo, (r * r, r * r))
+            lobe = native_bsdf.facets(self.wi, wo, (r * r, r * r))
             metal = np.stack([(1 - self._edge) * lobe, self._edge * lobe])
             rows.append(np.concatenate([self._base[None], metal, self._fresnel * lobe]))
-        rows = np.stack(rows) * np.sqrt(self._area)
+        rows = np.stack(rows) * np.sqrt(self.area)
         knots, albedos = self._albedos
         found = np.stack([np.interp(roughness, knots, column) for column in albedos.T], -1)
         return roughness, rows, rows @ rows.transpose(0, 2, 1), found
@@ -101,7 +128,7 @@ class Search:
         """Roughness, metallic, index of refraction and colour with the least sum of squares, among
         `metallic` and the indices `which` of _F0."""
         roughness, rows, products, albedos = parts
-        onto = rows @ (curve * np.sqrt(self._area)[:, None])  # (roughness, rows, 3)
+        onto = rows @ (curve * np.sqrt(self.area)[:, None])  # (roughness, rows, 3)
         # Axes: roughness, index, metallic, channel.
         seen, mean = (albedos[:, i, None, None, None] for i in (0, 1))
         taken = albedos[:, 2:][:, which, None, None]
@@ -136,7 +163,7 @@ class Search:
         off = off.sum(-1)
         # A curve in one plane leaves much open. Of nodes that are as near the plain one is taken.
         plain = 4 * m[..., 0] * (1 - m[..., 0]) + (which != 0)[None, :, None]
-        off = off + _PLAIN * np.sum(curve**2 * self._area[:, None]) * plain
+        off = off + _PLAIN * np.sum(curve**2 * self.area[:, None]) * plain
         r, f, k = np.unravel_index(np.argmin(off), off.shape)
         return float(roughness[r]), float(metallic[k]), int(which[f]), color[r, f, k]
 
@@ -150,9 +177,9 @@ class Search:
         finest = self._around(r, step ** (1 / 12), 9)
         r, m, index, color = self._best(finest, curve, np.array([m]), np.array([index]))
         color = tuple(float(c) for c in color)
-        native = Native("principled", color, r, metallic=m, f0=float(_F0[index]))
-        found = node_slice(native, self._wi, self._wo)
-        error = misplaced(found, curve, self._area)
+        native = _native(r, m, float(_IOR[index]), color)
+        found = node_slice(native, self.wi, self.wo)
+        error = misplaced(found, curve, self.area)
         return Nearest(r, m, float(_IOR[index]), color, found, error)
 
 
@@ -165,8 +192,78 @@ def _search(incidence, angles):
 
 
 def nearest_principled(curve, angles, incidence):
-    """The node that is Nearest to f cos (N, 3) at these angles, in radians, of light from the
+    """The rough node that is Nearest to f cos (N, 3) at these angles, in radians, of light from the
     angle -incidence, in degrees; None for a curve that is 0."""
     if not curve.any():
         return None
     return _search(incidence, angles.tobytes()).nearest(curve)
+
+
+#: What is searched of smooth nodes, and then between neighbours.
+_SMOOTH_IOR = np.concatenate([[1.5], np.linspace(1, 4, 61)])
+_SMOOTH_METALLIC = np.linspace(0, 1, 21)
+
+
+def _smooth_best(shares, cosines, metallic, ior, through):
+    """Metallic, IOR and colour with the least sum of squares over the hemisphere."""
+    m, eta = metallic[None, :, None], ior[:, None, None]
+    taken = native_bsdf.dielectric(((eta - 1) / (eta + 1)) ** 2, cosines)
+    edge = (1 - cosines) ** 5
+    # Either share of the node is color * slope + rest; axes: IOR, metallic, view.
+    slopes = [m * (1 - edge) + 0 * taken, (1 - m) * (1 - taken)]
+    rests = [(1 - m) * taken + m * edge, 0 * m * taken]
+    wanted = [shares.mirror, shares.refracted if through else shares.scattered]
+    weights = cosines * np.sqrt(1 - cosines**2)
+    terms = list(zip(slopes, rests, wanted, strict=True))
+    along = sum((weights * a) @ b - ((weights * a) * r).sum(-1)[..., None] for a, r, b in terms)
+    square = sum((weights * a * a).sum(-1) for a, _, _ in terms)
+    color = np.clip(along / np.maximum(square, 1e-30)[..., None], 0, 1)
+    found = [a[..., None] * color[..., None, :] + r[..., None] for a, r, _ in terms]
+    off = sum((weights @ (f - b) ** 2).sum(-1) for f, b in zip(found, wanted, strict=True))
+    f, k = np.unravel_index(np.argmin(off), off.shape)
+    return float(metallic[k]), float(ior[f]), color[f, k]
+
+
+def _smooth(shares, cosines, through):
+    """The same of the smooth node whose Shares (V, 3) at these cosines of the view are nearest."""
+    metallic = np.zeros(1) if through else _SMOOTH_METALLIC
+    m, eta, _ = _smooth_best(shares, cosines, metallic, _SMOOTH_IOR, through)
+    if not through:
+        metallic = np.unique(np.clip(m + np.linspace(-0.05, 0.05, 21), 0, 1))
+    ior = np.maximum(eta + np.concatenate([[0], np.linspace(-0.05, 0.05, 41)]), 1)
+    return _smooth_best(shares, cosines, metallic, ior, through)
+
+
+def _smooth_node(curve, search, cosines, shares, here):
+    """The smooth node that is Nearest; its error is a share of all light, 0 to 2."""
+    through = bool(shares.refracted.any())
+    metallic, ior, color = _smooth(shares, cosines, through)
+    native = _native(0.0, metallic, ior, tuple(float(c) for c in color))
+    each = search.wo[None]
+    mirror = native_bsdf.mirror(native, each)[0]
+    base = (1 - metallic) * (1 - native_bsdf.by_view(native, each)[0]) * color
+    refracted, scattered = (base, 0 * base) if through else (0 * base, base)
+    found = np.zeros_like(curve) if through else node_slice(native, search.wi, search.wo)
+    off = np.abs(mirror - here.mirror).sum() + np.abs(refracted - here.refracted).sum()
+    if curve.any():
+        off += here.scattered.sum() * misplaced(found, curve, search.area)
+    else:
+        off += scattered.sum()
+    arrows = tuple(mirror.tolist()), tuple(refracted.tolist())
+    return Nearest(0.0, metallic, ior, native.color, found, float(off), through, *arrows)
+
+
+def nearest(curve, angles, incidence, cosines, shares, here):
+    """The node that is Nearest to a material of f cos (N, 3) at these angles, in radians, of light
+    from the angle -incidence, in degrees; of Shares at these cosines of the view, and `here`, at
+    the incidence. None for what reflects nothing."""
+    rough = nearest_principled(curve, angles, incidence)
+    ideal = float(here.mirror.sum() + here.refracted.sum())
+    if not ideal > 0:
+        return rough
+    search = _search(incidence, angles.tobytes())
+    found = _smooth_node(curve, search, cosines, shares, here)
+    if rough:  # which lacks what is ideal
+        off = ideal + float(here.scattered.sum()) * rough.error
+        found = min(found, dataclasses.replace(rough, error=off), key=lambda node: node.error)
+    return dataclasses.replace(found, error=found.error / (ideal + float(here.scattered.sum())))

@@ -13,7 +13,6 @@ import re
 import numpy as np
 
 from .brdfc import _closures
-from .brdfc._formula import rgb
 
 
 class Unreadable(ValueError):
@@ -85,7 +84,14 @@ class _Parser:
         second = self._choice()
         self._take(":")
         third = self._choice()
-        return lambda v: second(v) if first(v) else third(v)
+
+        def chosen(v):
+            condition = first(v)
+            if np.size(condition) == 1:
+                return second(v) if condition else third(v)
+            return np.where(condition, second(v), third(v))
+
+        return chosen
 
     def _binary(self, level):
         if level == len(_BINARY):
@@ -190,81 +196,144 @@ def _program(text):
 
 
 def _table(values, *sizes_and_positions):
-    """brdfc_table1 and its like: linear along each axis, positions run to its size less 1."""
+    """brdfc_table1 and its like: linear along each axis, positions run to its size less 1. Of
+    several points one position at most differs, the view's."""
     count = len(sizes_and_positions) // 2
     sizes, positions = sizes_and_positions[:count], sizes_and_positions[count:]
-    values = values.reshape([int(n) for n in sizes])
-    for size, position in zip(sizes, positions, strict=True):
-        i = int(min(position, size - 2))
-        values = values[i] + (values[i + 1] - values[i]) * (position - i)
-    return values
+    values, of_view = values.reshape([int(n) for n in sizes]), None
+    for position in positions:
+        if np.size(position) == 1:
+            values = _between(values, float(np.ravel(position)[0]))
+        elif of_view is None:
+            of_view, values = position, np.moveaxis(values, 0, -1)
+        else:
+            raise Unreadable("expected a table of one position that the view decides")
+    return values if of_view is None else _between(values, of_view)
 
 
-def _three(x, y=None, z=None):
-    return x, x if y is None else y, x if z is None else z
+def _between(values, position):
+    """Linear along the first axis."""
+    i = np.minimum(np.asarray(position, int), len(values) - 2)
+    return values[i] + (values[i + 1] - values[i]) * (position - i)
+
+
+def vector(*components):
+    """Of three, (a, b) each or numbers: (3, a, b)."""
+    return np.stack(np.broadcast_arrays(*(np.atleast_2d(x) for x in components)))
+
+
+def _unit(v):
+    return v / np.sqrt((v * v).sum(0))
 
 
 _FUNCTIONS = {
     "atan": np.arctan,
     "backfacing": lambda: False,
-    "brdfc_max_component": np.max,
+    # What is declared a colour may have been assigned a number.
+    "brdfc_max_component": lambda color: color.max(axis=0) if np.ndim(color) == 3 else color,
     "brdfc_table1": _table,
     "brdfc_table2": _table,
     "brdfc_table3": _table,
     "clamp": lambda x, low, high: np.minimum(np.maximum(x, low), high),
-    "color": lambda *c: rgb(*_three(*c)),
+    "color": lambda *c: vector(*(c * 3)[:3]),
     "cos": np.cos,
     "exp": np.exp,
     "log": np.log,
     "max": np.maximum,
     "min": np.minimum,
-    "normalize": lambda v: v / np.linalg.norm(v),
+    "normalize": _unit,
     "sin": np.sin,
     "sqrt": np.sqrt,
-    "vector": lambda *c: np.array(_three(*c)),
+    "vector": lambda *c: vector(*(c * 3)[:3]),
 }
 
 
-def facets(kind, normal, tangent, along, across, wi, wo):
-    """f cos(theta_i) of facets, (N,), for wi (N, 3) and wo (3,); those without a tangent, which is
-    0, are round."""
+def facets(wi, wo, kind, normal, tangent, along, across, *_):
+    """Those without a tangent, which is 0, are round."""
     if not np.any(tangent):
-        tangent = np.eye(3)[np.argmin(np.abs(normal))]
+        tangent = np.moveaxis(np.eye(3)[np.argmin(np.abs(normal), axis=0)], -1, 0)
     of_kind = {"ggx": _closures.ggx, "beckmann": _closures.beckmann}[kind]
-    return of_kind(*wi.T, *wo, *normal, *tangent, along, across)
+    return of_kind(*wi, *wo, *normal, *tangent, along, across)
 
 
-def matte(normal, wi, wo):
-    """The same of a matte surface."""
-    return _closures.diffuse(*wi.T, *wo, *normal)
+#: Closures: f cos(theta_i) of directions and what is given, all with their components first.
+_CLOSURES = {
+    "diffuse": lambda wi, wo, n: _closures.diffuse(*wi, *wo, *n),
+    "diffuse_ramp": lambda wi, wo, n, ramp: _closures.diffuse_ramp(*wi, *wo, *n, *ramp),
+    "phong_ramp": lambda wi, wo, n, e, ramp: _closures.phong_ramp(*wi, *wo, *n, e, *ramp),
+    "microfacet": facets,
+    # An ideal mirror is what ideal() tells.
+    "reflection": lambda wi, wo, n: 0.0,
+}
 
 
-def _closures_of(wi, wo):
-    """Closures as functions, of f cos (3, N) or (N,)."""
-    both = (*wi.T, *wo)
-    return {
-        "diffuse_ramp": lambda n, ramp: _closures.diffuse_ramp(*both, *n, *ramp),
-        "phong_ramp": lambda n, e, ramp: _closures.phong_ramp(*both, *n, e, *ramp),
-        "microfacet": lambda kind, n, t, x, y, *_: facets(kind, n, t, x, y, wi, wo),
-        # An ideal mirror is drawn by itself.
-        "reflection": lambda n: 0.0,
-    }
+def _of_views(value, views):
+    """The part for some of all views of what a closure is given."""
+    if isinstance(value, list | tuple):
+        return [_of_views(x, views) for x in value]
+    several = isinstance(value, np.ndarray) and value.ndim > 1 and value.shape[-2] > 1
+    return value[..., views, :] if several else value
 
 
-def scattered(text, values, wi, wo):
-    """f cos(theta_i) of a shader, (N, 3), without an ideal mirror's part. `values`: numbers and
-    colours of its parameters; wi: (N, 3), wo: (3,), unit vectors above the surface.
+class Lobes:
+    """What is scattered to some viewers: a sum of closures with weights. What the view decides is
+    in them; it is computed once for all lights."""
 
-    Raises Unreadable.
-    """
+    __array_ufunc__ = None  # a weight that is an array leaves the product to this class
+
+    def __init__(self, wo, terms):
+        self._wo, self._terms = wo, terms
+
+    @classmethod
+    def of(cls, wo, name, *given):
+        """Of one closure, for viewers (3, k, 1)."""
+        return cls(wo, [(1.0, name, given)])
+
+    def __add__(self, other):
+        return Lobes(self._wo, self._terms + other._terms)
+
+    def __rmul__(self, weight):
+        return Lobes(self._wo, [(weight * w, name, given) for w, name, given in self._terms])
+
+    def _sum(self, views, shape, values):
+        try:
+            weights = (_of_views(weight, views) for weight, *_ in self._terms)
+            light = sum(w * x for w, x in zip(weights, values, strict=True))
+            light = np.moveaxis(np.broadcast_to(light, (3, *shape)), 0, -1)
+        except FAILURES as error:
+            raise Unreadable(str(error)) from error
+        if not np.isfinite(light).all():
+            raise Unreadable("expected numbers, got infinite ones or none")
+        return light
+
+    def scattered(self, wi, views=slice(None)):
+        """f cos(theta_i), (k, n, 3), without an ideal mirror's part, for lights (k, n, 3), unit
+        vectors above the surface, and these of the viewers."""
+        wi, wo = np.moveaxis(wi, -1, 0), self._wo[:, views]
+        values = (_CLOSURES[n](wi, wo, *_of_views(given, views)) for _, n, given in self._terms)
+        return self._sum(views, np.broadcast_shapes(wi.shape, wo.shape)[1:], values)
+
+    def ideal(self, views=slice(None)):
+        """Weight of an ideal mirror, (k, 3)."""
+        values = (float(name == "reflection") for _, name, _ in self._terms)
+        return self._sum(views, self._wo[0, views].shape, values)[:, 0]
+
+
+def lobes(text, values, wo):
+    """Lobes of a shader for viewers (k, 3), unit vectors above the surface. `values`: numbers and
+    colours of its parameters. It and what it returns raise Unreadable."""
     try:
         arrays, steps = _program(text)
-        v = {name: np.reshape(x, (3, 1)) if np.ndim(x) else x for name, x in values.items()}
+        wo = np.transpose(wo)[:, :, None]
+        v = {n: np.reshape(x, (3, 1, 1)) if np.ndim(x) else x for n, x in values.items()}
         v |= {name: list(x) if isinstance(x, list) else x for name, x in arrays.items()}
-        v |= dict(zip(_FRAME, (*np.eye(3)[[2, 0, 1]], *wo), strict=True), I=wo)
-        v |= {name + "(": f for name, f in (_FUNCTIONS | _closures_of(wi, wo)).items()}
+        v |= dict(zip(_FRAME, (*np.eye(3)[[2, 0, 1], :, None, None], *wo), strict=True), I=wo)
+        v |= {name + "(": f for name, f in _FUNCTIONS.items()}
+        v |= {name + "(": functools.partial(Lobes.of, wo, name) for name in _CLOSURES}
         for step in steps:
             step(v)
-        return np.broadcast_to(v["BSDF"], (3, len(wi))).T
     except FAILURES as error:
         raise Unreadable(str(error)) from error
+    if not isinstance(v["BSDF"], Lobes):
+        raise Unreadable("expected BSDF to be a sum of closures")
+    return v["BSDF"]

@@ -27,13 +27,13 @@ GAP = 8
 
 
 def drawing_time(draw):
-    """Wall seconds of a plot, once what all share is there: the least of seven."""
+    """Seconds of a core for a plot, once what all share is there: the least of fifteen."""
     draw()
     taken = []
-    for _ in range(7):
-        start = time.perf_counter()
+    for _ in range(15):
+        start = time.process_time()
         draw()
-        taken.append(time.perf_counter() - start)
+        taken.append(time.process_time() - start)
     return min(taken)
 
 
