@@ -24,7 +24,7 @@ from .i18n import Sentence, say
 from .lamps import Lamp
 from .lean import PlanError
 from .library import LibraryError
-from .nodes import CompileError, has_twin
+from .nodes import CompileError
 from .pack import PackError
 from .update import Update
 
@@ -38,7 +38,6 @@ __all__ = [
     "Update",
     "add_albedo",
     "add_library",
-    "add_twin",
     "albedo",
     "bake",
     "convert_back",
@@ -46,7 +45,6 @@ __all__ = [
     "enable_osl",
     "enlarge_lamps",
     "get_parameters",
-    "has_twin",
     "make_local",
     "models",
     "new_material",
@@ -124,20 +122,15 @@ def new_material(model, representation="auto", **parameters):
     return material
 
 
-def _for_eevee(node):
-    users = [link.to_node for socket in node.outputs for link in socket.links]
-    return bool(users) and all(getattr(user, "target", None) == "EEVEE" for user in users)
-
-
 def _must_be_material(given):
     if not isinstance(given, bpy.types.Material):
         raise ValueError(say("Expected a material, got {given!r}", given=given))
 
 
 def _the_node(material):
-    """The one node of this extension; what only EEVEE shows does not count."""
+    """The one node of this extension."""
     _must_be_material(material)
-    ours = [n for n in nodes.group_nodes(material) if not _for_eevee(n)]
+    ours = nodes.group_nodes(material)
     if len(ours) != 1:
         raise ValueError(
             say(
@@ -321,42 +314,6 @@ def add_albedo(material):
     Raises ValueError for a lean node, and for one of another version of the extension.
     """
     nodes.add_albedo(_the_node(material))
-
-
-#: The form that is made of Blender's own nodes.
-TWIN = "twin"
-
-
-def add_twin(material):
-    """Gives a material of one model its twin for EEVEE, in an output of its own.
-
-    Values of the twin's node follow those of the model's, by drivers without Python, and links are
-    its links. The outputs that there are become those for Cycles. Raises ValueError where the model
-    has no twin for these values, the model is inside another group, or the material has an output
-    for EEVEE.
-    """
-    node = _the_node(material)
-    tree = material.node_tree
-    if node.id_data != tree:
-        raise ValueError(
-            say("Material {material!r}: its model is inside a node group", material=material.name)
-        )
-    if has_twin(material):
-        raise ValueError(
-            say("Material {material!r} has an output for EEVEE already", material=material.name)
-        )
-    model = nodes.identity(node)[0]
-    pack.resolve(model, TWIN, nodes.all_values(node))
-    twin = nodes.add_group_node(tree, model, TWIN)
-    twin.location = (node.location.x, node.location.y - 400)
-    nodes.follow(twin, node, material)
-    for output in tree.nodes:
-        if output.bl_idname == "ShaderNodeOutputMaterial" and output.target == "ALL":
-            output.target = "CYCLES"
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    output.target = "EEVEE"
-    output.location = (twin.location.x + 300, twin.location.y)
-    tree.links.new(twin.outputs["BSDF"], output.inputs["Surface"])
 
 
 def add_library():

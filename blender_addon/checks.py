@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import closure_pool, i18n, lamp_checks, nodes, pack, update
+from . import closure_pool, i18n, lamp_checks, nodes, pack, stand_in, update
 from .i18n import say
 
 BLENDER_MIN = (4, 5, 0)
@@ -212,8 +212,8 @@ def _albedo_passes(material, scene):
         return (
             "WARNING",
             say(
-                "The denoiser is given too bright a colour of this form: it may blur details; "
-                "the picture itself is right"
+                "Denoising may blur details of this form; without it the picture is right",
+                more="The colour that the denoiser is given of it is too bright",
             ),
         )
     if passes:
@@ -238,8 +238,9 @@ def _normal_pass(material, scene):
         return (
             "WARNING",
             say(
-                "The normals that the denoiser has of this form are noisy: details may blur; let "
-                "it use Albedo alone"
+                "Denoising may blur details of this form; without it the picture is right",
+                more="The normals that the denoiser is given of it are noisy: Albedo alone is "
+                "better",
             ),
         )
 
@@ -287,21 +288,26 @@ def engine_name(scene):
     return "EEVEE" if is_eevee(scene) else known.get(scene.render.engine, scene.render.engine)
 
 
-def _under_eevee(found, ours, material):
-    """The findings of a scene for a material with these nodes: EEVEE shows twins."""
-    if nodes.has_twin(material):
-        return [f for f in found if f.code != "engine"]
-    model_name, _ = nodes.identity(ours[0])
-    forms = pack.manifest()["models"].get(model_name, {}).get("representations", {})
-    inside = ours[0].id_data != material.node_tree  # of another group, where no twin is added
-    if len(ours) > 1 or inside or "twin" not in forms:
-        return found
-    values = nodes.all_values(ours[0])
-    if pack.refusal(model_name, "twin", values):
-        return found
-    return [
-        Finding("eevee_twin", f.severity, f.message) if f.code == "engine" else f for f in found
-    ]
+def _by_twin(finding, ours):
+    """A finding that shaders do not run in a scene, where twins stand in for all of them."""
+    off = [_twin_error(node) for node in ours]
+    if None in off:
+        said = say("{reason}: Blender's own nodes stand in", reason=finding.message)
+    else:
+        said = say(
+            "{reason}: Blender's own nodes stand in, {percent} % off",
+            reason=finding.message,
+            percent=f"{100 * max(off):.2g}",
+        )
+    return Finding(finding.code, "WARNING", said)
+
+
+def _twin_error(node):
+    """How far a node's twin is off; None where that is not known for its values."""
+    made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
+    if not made or pack.refusal(model_name, "twin", nodes.all_values(node)):
+        return None
+    return pack.representation(model_name, "twin")["error"]["relative_l1"]
 
 
 def scene_warnings(scene):
@@ -439,21 +445,25 @@ def node_warnings(node, material, scene):
     return found
 
 
-#: Findings of a scene under which models are black.
-UNABLE = {"no_osl", "engine", "eevee_twin", "osl_off", "device"}
+#: Findings of a scene under which shaders do not run.
+UNABLE = {"no_osl", "engine", "osl_off", "device"}
 
 
-def _of_scene(ours, material, scene):
-    """The findings of a scene for a material with these nodes: Blender's own run anywhere."""
-    scripted = any(not nodes.is_native(node.node_tree) for node in ours)
+def of_scene(ours, scene):
+    """The findings of a scene for these nodes: Blender's own run anywhere."""
+    scripted = [node for node in ours if not nodes.is_native(node.node_tree)]
     found = scene_warnings(scene) if scripted else []
-    return _under_eevee(found, ours, material) if is_eevee(scene) else found
+    takes_nodes = scene.render.engine == "CYCLES" or is_eevee(scene)
+    if not takes_nodes or not all(stand_in.is_in(node.node_tree) for node in scripted):
+        return found
+    return [_by_twin(f, scripted) if f.code in UNABLE else f for f in found]
 
 
-def why_black(material, scene):
-    """Why a material's models can't run in a scene, a sentence each."""
+def why_not_run(material, scene):
+    """The findings that say why a material's shaders do not run in a scene: errors where they are
+    black, warnings where twins stand in."""
     ours = nodes.group_nodes(material)
-    return [f.message for f in _of_scene(ours, material, scene) if f.code in UNABLE]
+    return [f for f in of_scene(ours, scene) if f.code in UNABLE]
 
 
 def warnings(material, scene):
@@ -464,7 +474,7 @@ def warnings(material, scene):
     ours = nodes.group_nodes(material)
     if not ours:
         return []
-    found = _of_scene(ours, material, scene)
+    found = of_scene(ours, scene)
     for node in ours:
         found += node_warnings(node, material, scene)
     found += _pool_findings(material, scene)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Says on the console why models are black in a picture: renders without a window show no panel."""
+"""Says on the console why models are black or stood in for: without a window there is no panel."""
 
 import bpy
 from bpy.app.handlers import persistent
@@ -22,11 +22,12 @@ def _materials(scene):
 def _before_render(scene, *_):
     why = {}
     for material in _materials(scene):
-        for sentence in checks.why_black(material, scene):
-            why.setdefault(sentence, []).append(material.name)
-    for sentence, names in why.items():
+        for finding in checks.why_not_run(material, scene):
+            why.setdefault(finding, []).append(material.name)
+    for finding, names in why.items():
         more = f" and {len(names) - 3} more" if names[3:] else ""
-        print(f"brdfc: {sentence}: {', '.join(names[:3])}{more} will be black")
+        black = " will be black" if finding.severity == "ERROR" else ""
+        print(f"brdfc: {finding.message}: {', '.join(names[:3])}{more}{black}")
 
 
 def register():

@@ -31,7 +31,8 @@ def _after_import(context):
     groups = [group for group in brought if nodes.TAG in group]
     if groups or any(lamps.is_group(group) for group in brought):
         lamps.follow()
-    for group in groups:
+    # Twins first: they are parts of the others.
+    for group in sorted(groups, key=lambda group: not nodes.is_native(group)):
         nodes.give_way(group)
 
 

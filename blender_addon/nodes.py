@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from . import drivers, lamps, pack, twin
+from . import lamps, pack, stand_in, twin
 from .i18n import say
 from .pack import choice_label
 
@@ -137,7 +137,8 @@ def _scripts(group):
     """The script node that gives the closure, and the one of the Albedo output, if it has one."""
     found = [n for n in group.nodes if n.bl_idname == "ShaderNodeScript"]
     albedo = next((n for n in found if n.name == ALBEDO), None)
-    return next((n for n in found if n != albedo), None), albedo
+    others = (n for n in found if n.name not in (ALBEDO, stand_in.NODE))
+    return next(others, None), albedo
 
 
 def _script_problem(script, inputs, outputs):
@@ -333,9 +334,9 @@ def _add_script(group, text, what):
     return script
 
 
-def _fill_group(group, model_name, representation, texts):
+def _fill_group(group, model_name, representation, texts, twin_group):
     """`texts`: of the script and, where the Albedo output has one of its own that was asked for, of
-    that."""
+    that. `twin_group`: that of the model's twin, or None."""
     what = f"{model_name} ({representation})"
     apart = has_albedo_script(model_name, representation)
     outputs = [n for n in OUTPUTS if not apart or n != ALBEDO or len(texts) > 1]
@@ -376,11 +377,18 @@ def _fill_group(group, model_name, representation, texts):
         shared.location = (-500, -400)
         for name in lamp_inputs:
             group.links.new(shared.outputs[name], inputs[name])
+    sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
+    if twin_group is not None:
+        runs = _add_script(group, stand_in.text(), "what tells where shaders run")
+        of_twin = {i: sources.get(name) for name, i in twin_group[TAG]["sockets"].items()}
+        bsdf = stand_in.add(group, runs, twin_group, of_twin, from_scripts["BSDF"])
+        from_scripts["BSDF"] = bsdf
+        group_output.location.x += 100
     for output in outputs:
         group.links.new(from_scripts[output], group_output.inputs[output])
     if len(texts) > 1:
         for socket in albedo.inputs:
-            group.links.new(inputs[socket.identifier].links[0].from_socket, socket)
+            group.links.new(sources[socket.identifier], socket)
     tag["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
 
 
@@ -430,7 +438,11 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     native = pack.is_native(model_name, representation)
     if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
         sources |= dict([of_albedo])
+    # Lean ones hold no more than a render needs.
+    stands_in = not native and not baked and "twin" in pack.model(model_name)["representations"]
+    twin_group = ensure_group(model_name, "twin") if stands_in else None
     texts = [] if native else [bpy.data.texts.new(f"{stem}.osl") for stem in sources]
+    names = [text.name for text in texts]
     form = ", ".join([representation, *([ALBEDO] if len(texts) > 1 else [])])
     group = bpy.data.node_groups.new(
         f"{pack.model(model_name)['label']} ({form})", "ShaderNodeTree"
@@ -462,12 +474,13 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
             for text, source in zip(texts, sources.values(), strict=True):
                 text.write(source)
                 text.cursor_set(0)
-            _fill_group(group, model_name, representation, texts)
+            _fill_group(group, model_name, representation, texts, twin_group)
     except BaseException:
-        bpy.data.node_groups.remove(group)
-        for text in texts:
-            bpy.data.texts.remove(text)
-        lamps.remove_unused_group()
+        remove_group(group)
+        for name in set(names) & set(bpy.data.texts.keys()):
+            bpy.data.texts.remove(bpy.data.texts[name])
+        if twin_group is not None and twin_group.users == 0:
+            remove_group(twin_group)
         raise
     return group
 
@@ -501,14 +514,6 @@ def made_by(node):
 def is_newer(node):
     """Whether a later version than the installed one made a node's group."""
     return pack.version(made_by(node)) > pack.version(pack.manifest()["generator"])
-
-
-def has_twin(material):
-    """Whether a material shows a twin in EEVEE."""
-    return any(
-        n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE"
-        for n in material.node_tree.nodes
-    )
 
 
 def manifest_entry(node):
@@ -580,23 +585,6 @@ def get_value(node, name):
     return socket.default_value
 
 
-def follow(node, leader, material):
-    """Gives the sockets of a group node the links of another one of the same model in the tree of a
-    material; where that has values, these, and drivers that keep them so."""
-    theirs = sockets(leader)
-    for name, socket in sockets(node).items():
-        if (other := theirs.get(name)) is None:
-            continue
-        if other.is_linked:
-            node.id_data.links.new(other.links[0].from_socket, socket)
-        elif socket.type in ("VALUE", "RGBA"):
-            socket.default_value = other.default_value
-            for channel in range(3) if socket.type == "RGBA" else (-1,):
-                path = f"node_tree.{other.path_from_id('default_value')}"
-                path += f"[{channel}]" if channel >= 0 else ""
-                drivers.point_at(drivers.add(socket, channel)[1], material, path)
-
-
 def _trees(tree, seen):
     if tree is None or tree in seen:
         return
@@ -640,9 +628,14 @@ def all_values(node):
 
 
 def remove_group(group):
-    """Takes a group out of the file, and the text of its script, if nothing else has it."""
+    """Takes a group out of the file, and the texts of its scripts and its twin, if nothing else has
+    them."""
     texts = [n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script]
+    inner = [n.node_tree for n in group.nodes if is_ours(n)]
     bpy.data.node_groups.remove(group)
+    for tree in inner:
+        if tree.users == 0:
+            remove_group(tree)
     trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
     used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
     for text in texts:
@@ -653,9 +646,12 @@ def remove_group(group):
 
 def remove_unused_groups():
     """Takes every group of this extension that no node has out of the file."""
-    for group in list(bpy.data.node_groups):
-        if TAG in group and group.library is None and group.users == 0:
-            remove_group(group)
+
+    def unused(group):
+        return TAG in group and group.library is None and group.users == 0
+
+    while group := next(filter(unused, bpy.data.node_groups), None):
+        remove_group(group)
 
 
 def switch(node, representation):

@@ -257,7 +257,10 @@ def digest(model_name, name):
     redraw: of the source, of up to a megabyte, the manifest has the hash."""
     form = representation(model_name, name)
     schema = [model(model_name)["parameters"], form["only"]]
+    forms = model(model_name)["representations"]
     hashes = [form["sha256"], form.get("albedo_sha256")]
+    if "twin" in forms and name != "twin":  # which stands in for it
+        hashes.append(forms["twin"]["sha256"])
     text = json.dumps([*hashes, *schema], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -195,9 +195,8 @@ def _draw_values(layout, node):
 
 def draw_node(layout, node, material, scene, editable=True):
     """Model, form, error, cost, energy and values of one group node."""
-    model_name, representation = nodes.identity(node)
+    model_name, _ = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
-    entry = {"representations": {}}
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         column = layout.column(align=True)
@@ -212,10 +211,6 @@ def draw_node(layout, node, material, scene, editable=True):
         menu.node = node.name
     if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
-    if api.TWIN in entry["representations"] and representation != api.TWIN:
-        row = layout.row()
-        row.enabled = not api.has_twin(material)
-        row.operator("brdfc.add_twin", icon="NODE_MATERIAL")
     if model_name == api.KERNEL_MODEL:
         layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
 
@@ -254,7 +249,6 @@ BUTTONS = {
     "blender_version": _DOWNLOAD,
     "no_osl": _DOWNLOAD,
     "engine": ("brdfc.enable_osl", button("Use Cycles"), {}),
-    "eevee_twin": ("brdfc.add_twin", button("Add Twin for EEVEE"), {}),
     "osl_off": ("brdfc.enable_osl", button("Turn On OSL"), {}),
     "device": ("brdfc.enable_osl", button("Use the CPU"), {}),
     "outdated": ("brdfc.update", button("Update Materials"), {}),
@@ -275,30 +269,33 @@ def _more(layout, said):
         row.operator("brdfc.more", icon="QUESTION", emboss=False).text = more
 
 
-def draw_warnings(layout, material, scene):
-    """The findings for a material, with buttons that mend what can be mended."""
-    found = checks.warnings(material, scene)
-    offered = set()
+def draw_findings(layout, found):
+    """Findings, with buttons that mend what can be mended; what two say alike stands there once."""
+    said, offered = set(), set()
     for finding in found:
-        row = layout.column(align=True)
-        row.alert = finding.severity == "ERROR"
-        wrapped(row, finding.message, "ERROR" if finding.severity == "ERROR" else "INFO")
+        line = iface(finding.message)
+        if line not in said:
+            row = layout.column(align=True)
+            row.alert = finding.severity == "ERROR"
+            wrapped(row, line, "ERROR" if finding.severity == "ERROR" else "INFO")
+            _more(layout, finding.message)
+        said.add(line)
         if finding.code in BUTTONS and finding.code not in offered:
             offered.add(finding.code)
             operator, text, settings = BUTTONS[finding.code]
             item = layout.operator(operator, text=text, icon="CHECKMARK")
             for key, value in settings.items():
                 setattr(item, key, value)
-        _more(layout, finding.message)
-    return found
 
 
 def draw_material(layout, material, scene):
-    """Everything the panels show for a material."""
-    draw_warnings(layout, material, scene)
+    """Everything the panels show for a material: what makes the picture wrong comes first."""
+    found = checks.warnings(material, scene)
+    draw_findings(layout, [f for f in found if f.severity == "ERROR"])
     for node in nodes.group_nodes(material):
         draw_node(layout.box(), node, material, scene)
     draw_lamps(layout, material, scene)
+    draw_findings(layout, [f for f in found if f.severity != "ERROR"])
     if any(convert.is_converted(node) for node in nodes.group_nodes(material)):
         layout.operator("brdfc.convert_back", icon="LOOP_BACK")
     layout.operator("brdfc.write_materials", icon="EXPORT")

@@ -20,7 +20,6 @@ from .lean import (
 )
 from .model import (
     BRDFC_OT_add_albedo,
-    BRDFC_OT_add_twin,
     BRDFC_OT_details,
     BRDFC_OT_kernel,
     BRDFC_OT_more,
@@ -48,7 +47,6 @@ _CLASSES = (
     BRDFC_OT_bake_plan,
     BRDFC_OT_bake_apply,
     BRDFC_OT_add_albedo,
-    BRDFC_OT_add_twin,
     BRDFC_OT_convert,
     BRDFC_OT_convert_back,
     BRDFC_OT_details,

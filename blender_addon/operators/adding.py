@@ -61,7 +61,7 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
         if isinstance(space.id, bpy.types.Material):
             for change in api.prepare_material(space.id):
                 self.report({"INFO"}, rpt(change))
-        report_osl(self, context.scene)
+        report_osl(self, [node], context.scene)
         return {"FINISHED"}
 
     def invoke(self, context, event):
@@ -91,7 +91,7 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         target.active_material = material  # Blender makes a slot where there is none
         said = say("{material} assigned to {object}", material=material.name, object=target.name)
         self.report({"INFO"}, rpt(said))
-        report_osl(self, context.scene)
+        report_osl(self, nodes.group_nodes(material), context.scene)
         return {"FINISHED"}
 
 

@@ -16,15 +16,15 @@ def refused(operator, error):
     return {"CANCELLED"}
 
 
-def report_osl(operator, scene):
+def report_osl(operator, ours, scene):
+    """Reports what keeps the shaders of these nodes from running in a scene."""
     if not pack.osl_available():
         said = say(
             "This Blender has no Open Shading Language: models are made of Blender's own nodes, "
             "and the panel shows how far off they are"
         )
         operator.report({"WARNING"}, rpt(said))
-        return
-    for finding in checks.scene_warnings(scene):
+    for finding in checks.of_scene(ours, scene):
         operator.report({"WARNING"}, rpt(finding.message))
 
 

@@ -3,7 +3,7 @@
 
 from bpy.types import Operator
 
-from .. import api
+from .. import api, nodes
 from ..i18n import rpt, say
 from ..labels import wrapped
 from .common import ERRORS, OfActiveMaterial, refused, report_osl
@@ -54,7 +54,8 @@ class BRDFC_OT_convert(Operator):
             return refused(self, error)
         for made in plans:
             self.report({"WARNING" if made.refusal else "INFO"}, rpt(made.line()))
-        report_osl(self, context.scene)
+        done = [node for m in _selected_materials(context) for node in nodes.group_nodes(m)]
+        report_osl(self, done, context.scene)
         return {"FINISHED"} if count else {"CANCELLED"}
 
 

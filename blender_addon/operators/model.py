@@ -141,22 +141,6 @@ class BRDFC_OT_add_albedo(OfActiveMaterial, Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_add_twin(OfActiveMaterial, Operator):
-    bl_idname = "brdfc.add_twin"
-    bl_label = "Add Twin for EEVEE"
-    bl_description = (
-        "Give the active material a second output, for EEVEE, made of Blender's own nodes"
-    )
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, context):
-        try:
-            api.add_twin(context.object.active_material)
-        except ERRORS as error:
-            return refused(self, error)
-        return {"FINISHED"}
-
-
 class BRDFC_OT_kernel(OfActiveMaterial, Operator):
     bl_idname = "brdfc.kernel"
     bl_label = "Kernel from Float Curve"

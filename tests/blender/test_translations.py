@@ -99,16 +99,16 @@ def test_the_panel_in_other_languages(extension, empty, phong, speak, locale, er
     layout = helpers.Layout()
     extension.ui.draw_material(layout, phong, empty)
     text = "\n".join(layout.log)
-    for part in (error, cost, off):
+    for part in (error, cost):
         assert part in text
-    assert "Open Shading Language is off" not in text
-    assert {"Open Shading Language is off"} <= set(english.log)
+    assert off.replace(" ", "") in "".join(text.split()), "over two lines"
+    assert "Language is off" not in text and "Language is off" in " ".join(english.log)
     # Names of models and parameters are those of the papers.
     assert extension.pack.model("phong")["label"] in text
     for label in (p["label"] for p in extension.pack.parameters("phong").values()):
         assert label in text
     (finding,) = [f for f in extension.api.warnings(phong, empty) if f.code == "osl_off"]
-    assert finding.message == "Open Shading Language is off", "scripts have English"
+    assert finding.message.startswith("Open Shading Language is off"), "scripts have English"
 
 
 def test_reports_in_german(extension, empty, speak):
@@ -138,7 +138,7 @@ def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
     assert finding.message.endswith(": has no script node")
     assert i18n.iface(finding.message).endswith("choose its form again to make it anew")
     layout = helpers.Layout()
-    extension.ui.draw_warnings(layout, phong, empty)
+    extension.ui.draw_findings(layout, extension.checks.warnings(phong, empty))
     assert "operator brdfc.more " in layout.log
     assert "script node" not in "\n".join(layout.log)
     assert bpy.ops.brdfc.more(text="behind") == {"FINISHED"}

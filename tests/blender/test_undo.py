@@ -178,12 +178,6 @@ def test_find_lamps(extension, start):
     assert state() == before
 
 
-def test_add_twin(extension, start, use_pack):
-    use_pack({"m": {"model": "phong", "parameters": {"ks": [0.5, 0.5, 0.5], "e": 20}}}, "--twin")
-    start("phong")
-    is_one_step(bpy.ops.brdfc.add_twin)
-
-
 @pytest.fixture
 def with_program(kept_program, monkeypatch):
     monkeypatch.setenv("BRDFC_TOOL", str(kept_program))
