@@ -305,7 +305,8 @@ def _by_twin(finding, ours):
 def _twin_error(node):
     """How far a node's twin is off; None where that is not known for its values."""
     made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
-    if not made or pack.refusal(model_name, "twin", nodes.all_values(node)):
+    forms = pack.model(model_name)["representations"] if made else ()
+    if "twin" not in forms or pack.refusal(model_name, "twin", nodes.all_values(node)):
         return None
     return pack.representation(model_name, "twin")["error"]["relative_l1"]
 

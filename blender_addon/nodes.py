@@ -378,11 +378,15 @@ def _fill_group(group, model_name, representation, texts, twin_group):
         for name in lamp_inputs:
             group.links.new(shared.outputs[name], inputs[name])
     sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
+    instead = None
     if twin_group is not None:
-        runs = _add_script(group, stand_in.text(), "what tells where shaders run")
         of_twin = {i: sources.get(name) for name, i in twin_group[TAG]["sockets"].items()}
-        bsdf = stand_in.add(group, runs, twin_group, of_twin, from_scripts["BSDF"])
-        from_scripts["BSDF"] = bsdf
+        instead = stand_in.twin_of(group, twin_group, of_twin)
+    elif stand_in.has_node(model_name) and "baked" not in tag:
+        instead = stand_in.node_of(group, model_name, sources)
+    if instead is not None:
+        runs = _add_script(group, stand_in.text(), "what tells where shaders run")
+        from_scripts["BSDF"] = stand_in.add(group, runs, from_scripts["BSDF"], instead)
         group_output.location.x += 100
     for output in outputs:
         group.links.new(from_scripts[output], group_output.inputs[output])
@@ -628,14 +632,17 @@ def all_values(node):
 
 
 def remove_group(group):
-    """Takes a group out of the file, and the texts of its scripts and its twin, if nothing else has
-    them."""
+    """Takes a group out of the file, and its texts, images and twin, if nothing else has them."""
     texts = [n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script]
-    inner = [n.node_tree for n in group.nodes if is_ours(n)]
+    images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage" and n.image}
+    inner = {n.node_tree for n in group.nodes if is_ours(n)}
     bpy.data.node_groups.remove(group)
     for tree in inner:
         if tree.users == 0:
             remove_group(tree)
+    for image in images:
+        if image.users == 0:
+            bpy.data.images.remove(image)
     trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
     used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
     for text in texts:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where Open Shading Language does not run, a model's twin stands in for its shader.
+"""Where Open Shading Language does not run, a model's twin stands in for its shader; or, for glass
+and ideal mirrors, the node of Blender's that is nearest.
 
 EEVEE, and Cycles on devices or with settings that have no OSL, take the outputs of a script node
 for 0. So a script whose output is 1 tells where shaders run, and chooses between the two. OSL finds
-the constant before it renders: there the twin takes no time.
+the constant before it renders: there what stands in takes no time.
 """
 
 import bpy
@@ -19,41 +20,91 @@ shader brdfc_runs(output float Runs = 1)
 """
 
 
+def _texts():
+    return [t for t in bpy.data.texts if t.library is None and t.as_string() == _SOURCE]
+
+
 def text():
     """The script's text, of which a file has one."""
-    for found in bpy.data.texts:
-        if found.library is None and found.as_string() == _SOURCE:
-            return found
+    for found in _texts():
+        return found
     made = bpy.data.texts.new(_FILE)
     made.write(_SOURCE)
     made.cursor_set(0)
     return made
 
 
-def add(group, script, twin, inputs, bsdf):
-    """Puts a twin beside a shader. Returns the output that is whichever runs.
+def keep_one_text():
+    """Copies of the text, which come with appended materials, give way. One that was appended is
+    kept, if there is one: Blender knows that and does not append it again."""
+    found = sorted(_texts(), key=lambda t: t.library_weak_reference is None)
+    for other in found[1:]:
+        other.user_remap(found[0])
+        bpy.data.texts.remove(other)
+    if found[1:]:
+        found[0].name = _FILE
 
-    group: that of the shader; script: a script node in it that runs text(); twin: the group of the
-    twin; inputs: what its sockets are linked to, by identifier; bsdf: output of the shader.
-    """
-    script.name = script.label = NODE
-    script.location = (0, 300)
+
+#: Blender's nodes in place of models without a twin, which scatter nothing: a kind, and which
+#: parameters its sockets take.
+_NODES = {
+    "glass": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
+    "fresnel_dielectric": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
+    "fresnel_conductor": (
+        "ShaderNodeBsdfMetallic",
+        {"IOR": ("n_r", "n_g", "n_b"), "Extinction": ("k_r", "k_g", "k_b")},
+    ),
+}
+
+
+def has_node(model_name):
+    return model_name in _NODES
+
+
+def node_of(group, model_name, parameters):
+    """The shader of the node that stands in for a model. `parameters`: outputs by name."""
+    kind, given = _NODES[model_name]
+    node = group.nodes.new(kind)
+    if kind == "ShaderNodeBsdfMetallic":
+        node.fresnel_type = "PHYSICAL_CONDUCTOR"
+    node.inputs["Roughness"].default_value = 0.0
+    for name, source in given.items():
+        if isinstance(source, str):
+            group.links.new(parameters[source], node.inputs[name])
+            continue
+        vector = group.nodes.new("ShaderNodeCombineXYZ")
+        for part, socket in zip(source, vector.inputs, strict=True):
+            group.links.new(parameters[part], socket)
+        group.links.new(vector.outputs[0], node.inputs[name])
+    return node.outputs["BSDF"]
+
+
+def twin_of(group, twin, inputs):
+    """The shader of a twin's group. `inputs`: outputs for its sockets, by identifier."""
     node = group.nodes.new("ShaderNodeGroup")
     node.node_tree = twin
-    node.location = (0, 200)
     for socket in node.inputs:
         if source := inputs.get(socket.identifier):
             group.links.new(source, socket)
+    return node.outputs["BSDF"]
+
+
+def add(group, script, bsdf, instead):
+    """Returns the output that is the shader `bsdf` of a group where that runs, and else `instead`.
+    script: a script node in the group that runs text()."""
+    script.name = script.label = NODE
+    script.location = (0, 300)
+    instead.node.location = (0, 200)
     mix = group.nodes.new("ShaderNodeMixShader")
     mix.location = (150, 0)
     factor, first, second = mix.inputs
     factor.default_value = 0.0  # where there is no script node
     group.links.new(script.outputs[NODE], factor)
-    group.links.new(node.outputs["BSDF"], first)
+    group.links.new(instead, first)
     group.links.new(bsdf, second)
     return mix.outputs["Shader"]
 
 
 def is_in(group):
-    """Whether a group of a shader has a twin that stands in for it."""
+    """Whether something stands in for the shader of a group."""
     return NODE in group.nodes

@@ -124,12 +124,14 @@ def catalog_id(catalog):
 
 def catalogs_text(found):
     """Content of the file that names the catalogues of these entries."""
-    paths = dict.fromkeys(entry.catalog for entry in found)
+    paths = {PurePosixPath(NAME, entry.catalog): None for entry in found}
+    # Also what they are in: Blender would add it, and take its own addition for unsaved changes.
+    paths |= {parent: None for path in paths for parent in list(path.parents)[:-1]}
     lines = [
-        f"{catalog_id(path)}:{PurePosixPath(NAME, path)}:{NAME}-{path.replace('/', '-')}\n"
-        for path in paths
+        (catalog_id(path.relative_to(NAME).as_posix()), str(path), str(path).replace("/", "-"))
+        for path in sorted(paths)
     ]
-    return "VERSION 1\n\n" + "".join(lines)
+    return "VERSION 1\n\n" + "".join(":".join(line) + "\n" for line in lines)
 
 
 def stamp():

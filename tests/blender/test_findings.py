@@ -316,7 +316,8 @@ def test_ray_visibility_of_lamps(extension, empty, rays):
 
 
 def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch):
-    """By the name of the material, whose twin is 15 % off; glass has none."""
+    """By the name of the material, whose twin is 15 % off; of glass that is not known, and in lean
+    ones nothing stands in."""
     material = ball(extension, empty, "phong")
     light_of(empty, 1)
     assert "brdfc: " not in capsys.readouterr().out
@@ -330,13 +331,18 @@ def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch
     monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "CUDA")
     empty.cycles.device = "GPU"
     glass = extension.api.new_material("glass")
-    bpy.data.objects["Sphere"].data.materials.append(glass)
+    lean = extension.api.new_material("lambert")
+    (node,) = extension.nodes.group_nodes(lean)
+    node.node_tree.nodes.remove(node.node_tree.nodes["Runs"])
+    for made in (glass, lean):
+        bpy.data.objects["Sphere"].data.materials.append(made)
     console._before_render(empty)
     assert capsys.readouterr().out == (
         f"brdfc: CUDA devices can't run these shaders: {stands_in}\n"
-        "brdfc: CUDA devices can't run these shaders: Glass will be black\n"
+        "brdfc: CUDA devices can't run these shaders: Blender's own nodes stand in: Glass\n"
+        "brdfc: CUDA devices can't run these shaders: Lambert will be black\n"
     )
-    for made in (material, glass):
+    for made in (material, glass, lean):
         made.user_clear()
     bpy.data.objects["Sphere"].data.materials.clear()
     console._before_render(empty)

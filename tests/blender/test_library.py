@@ -105,8 +105,11 @@ def test_catalogues_and_what_is_said_of_each_material(extension, library, made, 
         if line:
             identifier, path, simple = line.split(":")
             assert str(uuid.UUID(identifier)) == identifier and "/" not in simple
-            assert path.startswith(f"{library.NAME}/")
+            assert path.split("/")[0] == library.NAME
             catalogs[identifier] = path.removeprefix(f"{library.NAME}/")
+    paths = {*catalogs.values()}
+    assert library.NAME in paths, "Blender shows what it adds itself as not saved"
+    assert all(path.rpartition("/")[0] in paths for path in paths if "/" in path)
     with bpy.data.libraries.load(str(made.blend), link=True, assets_only=True) as (there, here):
         assert not there.node_groups, "materials alone are assets"
         here.materials = there.materials
@@ -207,13 +210,16 @@ def test_making_it_may_be_given_up(library, made):
 
 # Dragged
 
+#: Of what is dragged: the shader's, and what stands in for it.
+FORMS = ("aimed", "twin")
+
 
 def assert_aims_at(extension, material, lamp):
     """That the group of lamps in the material's model has the lamp's place."""
     bpy.context.view_layer.update()
     (node,) = extension.nodes.group_nodes(material)
-    (inner,) = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
-    assert inner.node_tree == bpy.data.node_groups["brdfc Lamps"]
+    inner = {getattr(n, "node_tree", None): n for n in node.node_tree.nodes}
+    inner = inner[bpy.data.node_groups["brdfc Lamps"]]
     group = inner.node_tree.evaluated_get(bpy.context.evaluated_depsgraph_get())
     first = next(n for n in group.nodes if n.bl_idname == "ShaderNodeCombineXYZ")
     assert [s.default_value for s in first.inputs] == pytest.approx(list(lamp.location))
@@ -230,13 +236,14 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empt
     for name in ("Brushed Steel", "Turned Copper", "Red Plastic", "Brushed Steel"):
         ball.active_material = drag(made, name)
         assert_aims_at(extension, ball.active_material, lamp)
-        found = (names(bpy.data.node_groups), names(bpy.data.texts))
+        found = tuple(map(names, (bpy.data.node_groups, bpy.data.texts, bpy.data.images)))
         if name == "Red Plastic":
             once = found
     assert found == once, "what was dragged once is not brought again"
-    groups, texts = once
-    assert groups == ["Ashikhmin-Shirley (aimed)", "Ward (aimed)", "brdfc Lamps"]
-    assert len(texts) == 2
+    groups, texts, _ = once
+    made_of = [f"{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS]
+    assert groups == [*made_of, "brdfc Lamps"]
+    assert len(texts) == 3, "two shaders, and which tells whether they run"
     if made.reuse and not by_hand:
         assert names(bpy.data.materials) == ["Brushed Steel", "Red Plastic", "Turned Copper"]
     lamp.location = (3, -2, 1)
@@ -259,7 +266,7 @@ def test_what_is_asked_for_by_name_stays(extension, made, empty):
     """Who appends a group itself holds on to it; as who loads it from a script does."""
     extension.api.new_material("ward")
     with bpy.data.libraries.load(str(made.blend)) as (there, here):
-        here.node_groups = [name for name in there.node_groups if name.startswith("Ward")]
+        here.node_groups = [name for name in there.node_groups if name == "Ward (aimed)"]
     (group,) = here.node_groups
     assert group.name == "Ward (aimed).001" and extension.nodes.TAG in group
 
