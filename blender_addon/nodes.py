@@ -445,6 +445,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     # Lean ones hold no more than a render needs.
     stands_in = not native and not baked and "twin" in pack.model(model_name)["representations"]
     twin_group = ensure_group(model_name, "twin") if stands_in else None
+    twin_name = twin_group and twin_group.name
     texts = [] if native else [bpy.data.texts.new(f"{stem}.osl") for stem in sources]
     names = [text.name for text in texts]
     form = ", ".join([representation, *([ALBEDO] if len(texts) > 1 else [])])
@@ -483,8 +484,10 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
         remove_group(group)
         for name in set(names) & set(bpy.data.texts.keys()):
             bpy.data.texts.remove(bpy.data.texts[name])
-        if twin_group is not None and twin_group.users == 0:
-            remove_group(twin_group)
+        # The group takes the twin with it if it has it already.
+        left = twin_name and bpy.data.node_groups.get((twin_name, None))
+        if left and left.users == 0:
+            remove_group(left)
         raise
     return group
 

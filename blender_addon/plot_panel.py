@@ -9,7 +9,8 @@ import numpy as np
 from bpy.types import Panel
 
 from . import color, nodes, pack
-from .i18n import form_name, iface, of_error, say
+from .i18n import form_name, of_error, say
+from .labels import wrapped
 
 #: Pictures that are kept; the oldest gives its place away.
 _KEPT = 16
@@ -125,20 +126,20 @@ def draw_plots(layout, material):
             preview, legend = picture(node)
         except ValueError as error:
             said = say("This extension does not have this model", more=str(error))
-            column.label(text=iface(said), icon="ERROR", translate=False)
+            wrapped(column, said, "ERROR")
             continue
         column.template_icon(icon_value=preview.icon_id, scale=14.4)
-        column.label(text="Above: light from 45\u00b0, and where it goes")
+        wrapped(column, say("Above: light from 45\u00b0, and where it goes"))
         for said in _legend(node, legend):
-            column.label(text=iface(said), translate=False)
-        column.label(text="Middle: under a lamp, by the strokes below")
-        column.label(text="Below: reflected share, views from 0\u00b0 to 90\u00b0")
+            wrapped(column, said)
+        wrapped(column, say("Middle: under a lamp, by the strokes below"))
+        wrapped(column, say("Below: reflected share, views from 0\u00b0 to 90\u00b0"))
         _, linked = _values(node)
         if linked:
             labels = pack.parameters(nodes.identity(node)[0])
             names = ", ".join(labels[name]["label"] for name in linked)
             said = say("At the default of {parameters}", parameters=names)
-            column.label(text=iface(said), icon="INFO", translate=False)
+            wrapped(column, said, "INFO")
 
 
 def _material(context):
@@ -157,7 +158,7 @@ class _Plots:
         try:
             draw_plots(self.layout, _material(context))
         except pack.PackError as error:
-            self.layout.label(text=iface(of_error(error)[0]), icon="ERROR", translate=False)
+            wrapped(self.layout, of_error(error)[0], "ERROR")
 
 
 class MATERIAL_PT_brdfc_plots(_Plots, Panel):

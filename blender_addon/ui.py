@@ -225,13 +225,14 @@ def draw_lamps(layout, material, scene):
     found = lamps.seen(scene)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
-        wrapped(box, say("Free of noise under {lamps}", lamps=", ".join(taken)), "LIGHT")
+        said = say("Free of noise under {lamps}", lamps=", ".join(taken))
     else:
-        wrapped(box, say("Free of noise under no lamp yet"), "LIGHT")
+        said = say("Free of noise under no lamp yet")
+    wrapped(box.column(align=True), said, "LIGHT")
     room = checks.lamps_that_fit(scene)
     if room is not None and room < slots:
         wrapped(
-            box,
+            box.column(align=True),
             say(
                 "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
                 "Shader mixes shares it",
