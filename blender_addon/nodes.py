@@ -636,13 +636,11 @@ def all_values(node):
 
 def remove_group(group):
     """Takes a group out of the file, and its texts, images and twin, if nothing else has them."""
-    texts = [n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script]
+    texts = {n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script}
+    texts |= {*stand_in.texts()}
     images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage" and n.image}
     inner = {n.node_tree for n in group.nodes if is_ours(n)}
     bpy.data.node_groups.remove(group)
-    for tree in inner:
-        if tree.users == 0:
-            remove_group(tree)
     for image in images:
         if image.users == 0:
             bpy.data.images.remove(image)
@@ -651,6 +649,9 @@ def remove_group(group):
     for text in texts:
         if text not in used:
             bpy.data.texts.remove(text)
+    for tree in inner:
+        if tree.users == 0:
+            remove_group(tree)
     lamps.remove_unused_group()
 
 

@@ -20,13 +20,14 @@ shader brdfc_runs(output float Runs = 1)
 """
 
 
-def _texts():
+def texts():
+    """The file's own texts that are the script."""
     return [t for t in bpy.data.texts if t.library is None and t.as_string() == _SOURCE]
 
 
 def text():
     """The script's text, of which a file has one."""
-    for found in _texts():
+    for found in texts():
         return found
     made = bpy.data.texts.new(_FILE)
     made.write(_SOURCE)
@@ -37,7 +38,7 @@ def text():
 def keep_one_text():
     """Copies of the text, which come with appended materials, give way. One that was appended is
     kept, if there is one: Blender knows that and does not append it again."""
-    found = sorted(_texts(), key=lambda t: t.library_weak_reference is None)
+    found = sorted(texts(), key=lambda t: t.library_weak_reference is None)
     for other in found[1:]:
         other.user_remap(found[0])
         bpy.data.texts.remove(other)

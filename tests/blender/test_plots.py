@@ -546,7 +546,7 @@ def test_forms_that_equal_the_model_have_no_curve(panel, extension, empty):
         material = extension.api.new_material(model, form)
         log, legend, picture = legend_of(panel, extension, material)
         assert legend.form is None and not inked(picture).any()
-        assert f"The form {form.capitalize()} reflects what the model does" in log
+        assert f"The form {form.capitalize()} reflects what the model does" in " ".join(log)
     twin = extension.api.new_material("ward", "twin")
     assert inked(legend_of(panel, extension, twin)[2]).any()
 
@@ -555,7 +555,7 @@ def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
     """A file may hold anything."""
     material = extension.api.new_material("phong", "fitted")
     (node,) = extension.nodes.group_nodes(material)
-    (script,) = (n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
+    script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
     said = "What the form Fitted reflects can't be drawn"
     good = script.script.as_string()
     for text in ("", "shader x(\n)\n{\n  BSDF = diffuse(N);\n}\n", good.replace("exp(", "eval(")):
