@@ -308,9 +308,9 @@ def test_copies_of_the_group_give_way(extension, shared_group, ball, empty, aime
     for material in (own, to.materials[0]):
         (node,) = extension.nodes.group_nodes(material)
         inner = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
-        assert [n.node_tree for n in inner] == [group]
-    copy = group.copy()
-    next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup").node_tree = copy
+        (inner,) = [n for n in inner if shared_group.TAG in n.node_tree]
+        assert inner.node_tree == group
+    inner.node_tree = group.copy()
     lamp.data.angle = 0.5
     assert_lamps(slots(scene), [lamp])
     assert len([g for g in bpy.data.node_groups if shared_group.TAG in g]) == 1
