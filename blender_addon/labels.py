@@ -51,13 +51,14 @@ def _pieces(text):
 
 
 def lines_of(text, pixels):
-    """A text in lines that are no wider than that, if its words allow."""
+    """A text in lines that are no wider than that, if its words allow, indented as it is."""
+    margin = text[: len(text) - len(text.lstrip(" "))]
     lines, line = [], ""
     for piece in _pieces(text):
         if line and width(line + piece) > pixels:
             lines.append(line)
             line = ""
-        line += piece if line else piece.strip()
+        line += piece if line else margin + piece.strip()
     return [*lines, line]
 
 

@@ -290,13 +290,14 @@ def draw_findings(layout, found):
 
 
 def draw_material(layout, material, scene):
-    """Everything the panels show for a material: what makes the picture wrong comes first."""
+    """Everything the panels show for a material: what makes the picture another one comes first."""
     found = checks.warnings(material, scene)
-    draw_findings(layout, [f for f in found if f.severity == "ERROR"])
+    first = [f for f in found if f.severity == "ERROR" or f.code in checks.UNABLE]
+    draw_findings(layout, first)
     for node in nodes.group_nodes(material):
         draw_node(layout.box(), node, material, scene)
     draw_lamps(layout, material, scene)
-    draw_findings(layout, [f for f in found if f.severity != "ERROR"])
+    draw_findings(layout, [f for f in found if f not in first])
     if any(convert.is_converted(node) for node in nodes.group_nodes(material)):
         layout.operator("brdfc.convert_back", icon="LOOP_BACK")
     layout.operator("brdfc.write_materials", icon="EXPORT")
