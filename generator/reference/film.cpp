@@ -9,15 +9,6 @@
 
 namespace brdfc::reference {
 
-void camera_ray(const Camera& c, const RenderSettings& settings, double x, double y, Vec3<double>& origin,
-                Vec3<double>& direction) {
-  const double scale = 2 * c.half_height / settings.height;
-  const double right = (x - settings.width / 2.0) * scale, up = (settings.height / 2.0 - y) * scale;
-  const Vec3<double> offset = c.right * right + c.up * up;
-  origin = c.orthographic ? c.position + offset : c.position;
-  direction = c.orthographic ? c.forward : normalize(c.forward + offset);
-}
-
 void PixelMoments::write(std::size_t i, Image& mean, Image& variance) const {
   for (std::size_t c = 0; c < 3; ++c) {
     mean.rgb[3 * i + c] += float(channels_[c].mean);

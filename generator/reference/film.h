@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 
+#include "reference/cone.h"
 #include "reference/image.h"
 #include "reference/render.h"
 #include "reference/scene.h"
@@ -12,17 +13,24 @@
 namespace brdfc::reference {
 
 /// The ray through a point of the film, in pixels from the upper left corner.
-void camera_ray(const Camera& camera, const RenderSettings& settings, double x, double y, Vec3<double>& origin,
-                Vec3<double>& direction);
+inline void camera_ray(const Camera& c, int width, int height, double x, double y, Vec3<double>& origin,
+                       Vec3<double>& direction) {
+  const double scale = 2 * c.half_height / height;
+  const double right = (x - width / 2.0) * scale, up = (height / 2.0 - y) * scale;
+  const Vec3<double> offset = c.right * right + c.up * up;
+  origin = select(c.orthographic, c.position + offset, c.position);
+  direction = select(c.orthographic, c.forward, unit(c.forward + offset));
+}
 
 /// Mean and sum of squared deviations of a pixel's samples (Welford): exact for constants, stable otherwise.
 class PixelMoments {
  public:
   void add(const Rgb<double>& c) {
     ++count_;
-    channels_[0].add(c.r, count_);
-    channels_[1].add(c.g, count_);
-    channels_[2].add(c.b, count_);
+    const double share = 1.0 / count_;
+    channels_[0].add(c.r, share);
+    channels_[1].add(c.g, share);
+    channels_[2].add(c.b, share);
   }
   int count() const { return count_; }
   /// Adds the mean and its variance to pixel `i`; the variance of less than two samples is left as it is.
@@ -31,9 +39,9 @@ class PixelMoments {
  private:
   struct Moments {
     double mean = 0, m2 = 0;
-    void add(double x, int count) {
+    void add(double x, double share) {
       const double d = x - mean;
-      mean += d / count;
+      mean += d * share;
       m2 += d * (x - mean);
     }
   };

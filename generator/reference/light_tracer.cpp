@@ -99,16 +99,24 @@ class LightTracer {
   PixelMoments seen(const Lights& lights, int x, int y, int spp) const {
     PixelMoments out;
     Hit hit;
-    for (int s = 0; s < spp; ++s) {
-      Random random(std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, std::uint64_t(s));
-      Vector origin, direction;
-      const double film_x = x + random.uniform(), film_y = y + random.uniform();
-      camera_ray(scene_.camera, settings_, film_x, film_y, origin, direction);
-      const bool found = tracer_.intersect({origin, direction}, true, hit);
-      Color light(0);
-      lights.meet(origin, direction, found ? hit.distance : kInfinity, lights.place(direction), {}, nullptr, true,
-                  [&](const Color& radiance, double) { light += radiance; });
-      out.add(light);
+    Rays rays;
+    Numbers distance;
+    Lanes<Color> light;
+    for (int from = 0; from < spp; from += int(kBlock)) {
+      const std::size_t count = std::min(kBlock, std::size_t(spp - from));
+      for (std::size_t k = 0; k < count; ++k) {
+        Random random(std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, std::uint64_t(from) + k);
+        Vector origin, direction;
+        const double film_x = x + random.uniform(), film_y = y + random.uniform();
+        camera_ray(scene_.camera, settings_.width, settings_.height, film_x, film_y, origin, direction);
+        distance[k] = tracer_.intersect({origin, direction}, true, hit) ? hit.distance : kInfinity;
+        rays.origin.set(k, origin);
+        rays.direction.set(k, direction);
+        light[k] = Color(0);
+      }
+      lights.meet(rays, distance, count, {}, {}, true,
+                  [&](std::size_t k, const Color& radiance, double) { light[k] += radiance; });
+      for (std::size_t k = 0; k < count; ++k) out.add(light[k]);
     }
     return out;
   }

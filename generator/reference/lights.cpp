@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "reference/cone.h"
 #include "reference/procedural.h"
@@ -91,35 +92,40 @@ std::size_t EnvironmentSampler::cell_at(double u, double v) const {
 
 double EnvironmentSampler::pdf(double u, double v) const { return cells_.empty() ? 0 : cells_[cell_at(u, v)].density; }
 
+void EnvironmentSampler::fetch_texels(int x, int y) const {
+  // The colour is between this row and one of its neighbours.
+  for (int row = std::max(y - 1, 0); row <= std::min(y + 1, height_ - 1); ++row)
+    __builtin_prefetch(image_.pixel(x, row));
+}
+
 void EnvironmentSampler::fetch(double u, double v) const {
   const std::size_t cell = cell_at(u, v);
   if (!cells_.empty()) __builtin_prefetch(&cells_[cell]);
-  __builtin_prefetch(&image_.rgb[3 * cell]);
+  fetch_texels(int(cell % unsigned(width_)), int(cell / unsigned(width_)));
 }
 
 void EnvironmentSampler::fetch_cell(double u1) const {
   const unsigned cell = this->cell(u1);
   __builtin_prefetch(&cells_[cell]);
-  // The colour is between this row and one of its neighbours.
-  const int x = int(cell % unsigned(width_)), y = int(cell / unsigned(width_));
-  for (int row = std::max(y - 1, 0); row <= std::min(y + 1, height_ - 1); ++row)
-    __builtin_prefetch(image_.pixel(x, row));
+  fetch_texels(int(cell % unsigned(width_)), int(cell / unsigned(width_)));
 }
 
 Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_(scene.lights.size()) {
   for (const Light& light : scene.lights) {
-    Known k;
-    k.luminance = luminance(light.intensity);
+    Lamp l{light.position, light.direction, light.u, light.v, light.radius, light.radiance};
     if (light.kind == Light::Kind::Rectangle || light.kind == Light::Kind::Disk) {
-      k.area = 4 * length(light.u) * length(light.v) * (light.kind == Light::Kind::Disk ? kPi / 4 : 1);
-      k.luminance = luminance(light.radiance) * k.area;
-      k.per_u2 = 1 / dot(light.u, light.u);
-      k.per_v2 = 1 / dot(light.v, light.v);
-    } else if (light.kind == Light::Kind::Sun && light.radius > 0) {
-      k.one_minus_cos = one_minus_cos_from_sin2(sqr(light.radius));
-      k.cone_pdf = 1 / (2 * kPi * k.one_minus_cos);
+      l.area = 4 * length(light.u) * length(light.v) * (light.kind == Light::Kind::Disk ? kPi / 4 : 1);
+      l.luminance = luminance(light.radiance) * l.area;
+      l.per_u2 = 1 / dot(light.u, light.u);
+      l.per_v2 = 1 / dot(light.v, light.v);
+    } else {
+      l.luminance = luminance(light.intensity);
+      l.delta = light.radius == 0;
+      if (l.delta) l.shine = light.intensity;
+      l.one_minus_cos = one_minus_cos_from_sin2(sqr(light.radius));
+      l.cone_pdf = 1 / (2 * kPi * l.one_minus_cos);
     }
-    known_.push_back(k);
+    lamps_.push_back(l);
   }
   const Environment& e = scene.environment;
   if (e.image) {
@@ -152,154 +158,193 @@ Rgb<double> Lights::environment(const Vector& direction, const std::array<double
   return e.radiance(place[0], place[1]);
 }
 
-double Lights::weight(std::size_t i, const Vector& p, const Vector& normal) const {
-  const Light& light = scene_.lights[i];
-  const Known& known = known_[i];
-  if (light.kind == Light::Kind::Sun) {
+template <class Body> void Lights::of_kind(Light::Kind kind, const Body& body) {
+  using Kind = Light::Kind;
+  switch (kind) {
+    case Kind::Sun:
+      return body(std::integral_constant<Kind, Kind::Sun>());
+    case Kind::Point:
+      return body(std::integral_constant<Kind, Kind::Point>());
+    case Kind::Rectangle:
+      return body(std::integral_constant<Kind, Kind::Rectangle>());
+    case Kind::Disk:
+      return body(std::integral_constant<Kind, Kind::Disk>());
+  }
+}
+
+template <Light::Kind kKind> inline double Lights::weight(const Lamp& lamp, const Vector& p, const Vector& normal) {
+  if constexpr (kKind == Light::Kind::Sun) {
     // Of the disk of the sun the highest point counts.
-    return dot(-light.direction, normal) > -light.radius ? known.luminance : 0.0;
-  }
-  const Vector d = light.position - p;
-  const double height = dot(d, normal), distance2 = dot(d, d);
-  if (light.kind == Light::Kind::Point)
-    return height > -light.radius ? known.luminance / std::max(distance2, sqr(light.radius)) : 0.0;
-  const double extent = abs(dot(light.u, normal)) + abs(dot(light.v, normal));
-  if (height <= -extent || dot(d, light.direction) >= 0) return 0;
-  return known.luminance / std::max(distance2, known.area * kInvPi);
-}
-
-bool Lights::chances(const Vector& p, const Vector& normal, std::span<double> chance) const {
-  double sum = 0;
-  for (std::size_t i = 0; i < scene_.lights.size(); ++i) sum += chance[i] = weight(i, p, normal);
-  if (sampled_environment_) sum += chance.back() = environment_weight_;
-  if (!(sum > 0)) return false;
-  if (count_ == 1)
-    chance[0] = 1;
-  else
-    for (double& c : chance) c /= sum;
-  return true;
-}
-
-LightSample Lights::sample(const Vector& p, const Vector& normal, std::span<const double> chance, double choice,
-                           double u1, double u2, double u3) const {
-  std::size_t i = 0;
-  while (i + 1 < chance.size() && choice >= chance[i]) choice -= chance[i++];
-  if (!(chance[i] > 0)) return {};  // rounding: the last light may have no chance
-  LightSample s;
-  if (i < scene_.lights.size()) {
-    s = sample_light(i, p, u1, u2);
-  } else if (image_) {
-    double u, v;
-    s.wi = image_->sample(u1, u2, u3, s.pdf, u, v);
-    s.radiance = scene_.environment.radiance(u, v);
+    return dot(-lamp.direction, normal) > -lamp.radius ? lamp.luminance : 0.0;
   } else {
-    s.wi = sample_cone(normal, 1, u1, u2);
-    s.pdf = 1 / (2 * kPi);
-    s.radiance = scene_.environment.color;
+    const Vector d = lamp.position - p;
+    const double height = dot(d, normal), distance2 = dot(d, d);
+    if constexpr (kKind == Light::Kind::Point) {
+      return height > -lamp.radius ? lamp.luminance / maximum(distance2, sqr(lamp.radius)) : 0.0;
+    } else {
+      const double extent = abs(dot(lamp.u, normal)) + abs(dot(lamp.v, normal));
+      const bool shows = (height > -extent) & (dot(d, lamp.direction) < 0);
+      return shows ? lamp.luminance / maximum(distance2, lamp.area * kInvPi) : 0.0;
+    }
   }
-  s.pdf *= chance[i];
+}
+
+template <Light::Kind kKind>
+inline Lights::Sample Lights::sample_light(const Lamp& lamp, const Vector& p, double u1, double u2) {
+  Sample s;
+  if constexpr (kKind == Light::Kind::Sun) {
+    if (lamp.delta) {
+      s.wi = -lamp.direction;
+      s.pdf = 1;
+    } else {
+      s.wi = sample_cone(-lamp.direction, lamp.one_minus_cos, u1, u2);
+      s.pdf = lamp.cone_pdf;
+    }
+  } else if constexpr (kKind == Light::Kind::Point) {
+    const Vector d = lamp.position - p;
+    const double distance2 = dot(d, d), distance = sqrt(distance2), r2 = sqr(lamp.radius);
+    if (lamp.delta) {
+      s.wi = d * (1 / distance);
+      s.distance = distance;
+      s.brightness = 1 / distance2;
+      s.pdf = distance > 0 ? 1 : 0;
+    } else if (distance2 > r2) {
+      const double h = one_minus_cos_from_sin2(r2 / distance2);
+      s.wi = sample_cone(d * (1 / distance), h, u1, u2);
+      s.pdf = 1 / (2 * kPi * h);
+      const double along = dot(d, s.wi), across2 = std::max(distance2 - along * along, 0.0);
+      s.distance = along - sqrt(std::max(r2 - across2, 0.0));
+    } else {
+      s.wi = sample_cone({0, 0, 1}, 2, u1, u2);
+      s.pdf = 1 / (4 * kPi);
+      const double along = dot(d, s.wi);
+      s.distance = along + sqrt(std::max(along * along - distance2 + r2, 0.0));
+    }
+  } else {
+    double a = 2 * u1 - 1, b = 2 * u2 - 1;
+    if constexpr (kKind == Light::Kind::Disk) {
+      const double r = sqrt(u1), phi = 2 * kPi * u2;
+      a = r * cos(phi);
+      b = r * sin(phi);
+    }
+    const Vector d = lamp.position + lamp.u * a + lamp.v * b - p;
+    const double distance2 = dot(d, d);
+    s.distance = sqrt(distance2);
+    s.wi = d * (1 / s.distance);
+    const double cosine = -dot(s.wi, lamp.direction);
+    s.pdf = cosine > 0 ? distance2 / (cosine * lamp.area) : 0;  // false for NaN
+  }
   return s;
 }
 
-LightSample Lights::sample_light(std::size_t i, const Vector& p, double u1, double u2) const {
-  const Light& light = scene_.lights[i];
-  const Known& known = known_[i];
-  LightSample s;
-  s.radiance = light.radiance;
-  switch (light.kind) {
-    case Light::Kind::Sun: {
-      if (light.radius == 0) {
-        s.wi = -light.direction;
-        s.radiance = light.intensity;
-        s.pdf = 1;
-        s.delta = true;
-        return s;
-      }
-      s.wi = sample_cone(-light.direction, known.one_minus_cos, u1, u2);
-      s.pdf = known.cone_pdf;
-      return s;
-    }
-    case Light::Kind::Point: {
-      const Vector d = light.position - p;
-      const double distance2 = dot(d, d), distance = sqrt(distance2);
-      if (light.radius == 0) {
-        if (!(distance > 0)) return {};
-        s.wi = d / distance;
-        s.distance = distance;
-        s.radiance = light.intensity / distance2;
-        s.pdf = 1;
-        s.delta = true;
-        return s;
-      }
-      const double r2 = sqr(light.radius);
-      if (distance2 > r2) {
-        const double h = one_minus_cos_from_sin2(r2 / distance2);
-        s.wi = sample_cone(d / distance, h, u1, u2);
-        s.pdf = 1 / (2 * kPi * h);
-        const double along = dot(d, s.wi), across2 = std::max(distance2 - along * along, 0.0);
-        s.distance = along - sqrt(std::max(r2 - across2, 0.0));
-      } else {
-        s.wi = sample_cone({0, 0, 1}, 2, u1, u2);
-        s.pdf = 1 / (4 * kPi);
-        const double along = dot(d, s.wi);
-        s.distance = along + sqrt(std::max(along * along - distance2 + r2, 0.0));
-      }
-      return s;
-    }
-    default: {
-      double a = 2 * u1 - 1, b = 2 * u2 - 1;
-      if (light.kind == Light::Kind::Disk) {
-        const double r = sqrt(u1), phi = 2 * kPi * u2;
-        a = r * cos(phi);
-        b = r * sin(phi);
-      }
-      const Vector d = light.position + light.u * a + light.v * b - p;
-      const double distance2 = dot(d, d);
-      s.distance = sqrt(distance2);
-      if (!(s.distance > 0)) return {};
-      s.wi = d / s.distance;
-      const double cosine = -dot(s.wi, light.direction);
-      if (!(cosine > 0)) return {};
-      s.pdf = distance2 / (cosine * known.area);
-      return s;
-    }
+template <Light::Kind kKind>
+inline double Lights::pdf_of_hit(const Lamp& lamp, const Vector& p, const Vector& w, double distance) {
+  if constexpr (kKind == Light::Kind::Sun) {
+    const Vector off = w + lamp.direction;  // |off|^2 = 2 (1 - cos)
+    const bool meets = (distance == kInfinity) & (dot(off, off) <= 2 * lamp.one_minus_cos);
+    return meets ? lamp.cone_pdf : 0;
+  } else if constexpr (kKind == Light::Kind::Point) {
+    const Vector d = lamp.position - p;
+    const double along = dot(d, w), r2 = sqr(lamp.radius), distance2 = dot(d, d);
+    const Vector across = d - w * along;
+    const double half2 = r2 - dot(across, across), half = sqrt(maximum(half2, 0.0));
+    const bool outside = distance2 > r2, meets = (half2 >= 0) & ((outside ? along - half : along + half) < distance);
+    const double pdf = outside ? 1 / (2 * kPi * one_minus_cos_from_sin2(r2 / distance2)) : 1 / (4 * kPi);
+    return meets & ((along > 0) | !outside) ? pdf : 0;
+  } else {
+    const double cosine = -dot(w, lamp.direction);
+    const Vector d = lamp.position - p;
+    const double t = -dot(d, lamp.direction) / cosine;
+    const Vector q = w * t - d;
+    const double a = dot(q, lamp.u) * lamp.per_u2, b = dot(q, lamp.v) * lamp.per_v2;
+    const bool inside = kKind == Light::Kind::Disk ? a * a + b * b <= 1 : maximum(abs(a), abs(b)) <= 1;
+    // dot(d, direction) < 0 in front of the lamp, so t > 0 there.
+    const bool meets = (cosine > 0) & (t > 0) & (t < distance) & inside;
+    return meets ? t * t / (cosine * lamp.area) : 0;
   }
 }
 
-double Lights::pdf_of_hit(std::size_t i, const Vector& p, const Vector& w, double distance) const {
-  const Light& light = scene_.lights[i];
-  const Known& known = known_[i];
-  switch (light.kind) {
-    case Light::Kind::Sun: {
-      if (light.radius == 0 || distance < kInfinity) return 0;
-      const Vector off = w + light.direction;  // |off|^2 = 2 (1 - cos)
-      return dot(off, off) <= 2 * known.one_minus_cos ? known.cone_pdf : 0.0;
+BRDFC_VECTORISED void Lights::chances(const Vectors& p, const Vectors& normal, std::size_t count,
+                                      const Lanes<double*>& chance, Lanes<bool>& lit) const {
+  Numbers sum, mine;
+  sum.fill(sampled_environment_ ? environment_weight_ : 0);
+  for (std::size_t i = 0; i < lamps_.size(); ++i) {
+    const Lamp lamp = lamps_[i];
+    of_kind(scene_.lights[i].kind, [&](auto kind) {
+      for_lanes(count, [&](std::size_t k) {
+        mine[k] = weight<kind>(lamp, p[k], normal[k]);
+        sum[k] += mine[k];
+      });
+    });
+    for (std::size_t k = 0; k < count; ++k) chance[k][i] = mine[k];
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    lit[k] = sum[k] > 0;
+    if (!lit[k]) continue;
+    if (sampled_environment_) chance[k][count_ - 1] = environment_weight_;
+    if (count_ == 1)
+      chance[k][0] = 1;
+    else
+      for (std::size_t i = 0; i < count_; ++i) chance[k][i] /= sum[k];
+  }
+}
+
+BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, std::size_t count,
+                                     const Lanes<double*>& chance, const Lanes<bool>& lit, const LightNumbers& u,
+                                     LightSamples& out) const {
+  Lanes<std::size_t> chosen{};
+  if (choose())
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!lit[k]) continue;
+      double choice = u.choice[k];
+      std::size_t& i = chosen[k];
+      while (i + 1 < count_ && choice >= chance[k][i]) choice -= chance[k][i++];
     }
-    case Light::Kind::Point: {
-      if (light.radius == 0) return 0;
-      const Vector d = light.position - p;
-      const double along = dot(d, w), r2 = sqr(light.radius), distance2 = dot(d, d);
-      const Vector across = d - w * along;
-      const double half2 = r2 - dot(across, across);
-      if (half2 < 0) return 0;
-      if (distance2 > r2)
-        return along > 0 && along - sqrt(half2) < distance ? 1 / (2 * kPi * one_minus_cos_from_sin2(r2 / distance2))
-                                                           : 0.0;
-      return along + sqrt(half2) < distance ? 1 / (4 * kPi) : 0.0;
-    }
-    default: {
-      const double cosine = -dot(w, light.direction);
-      if (!(cosine > 0)) return 0;
-      const Vector d = light.position - p;
-      const double t = -dot(d, light.direction) / cosine;
-      // dot(d, direction) < 0 in front of the lamp, so t > 0 there.
-      if (!(t > 0 && t < distance)) return 0;
-      const Vector q = w * t - d;
-      const double a = dot(q, light.u) * known.per_u2, b = dot(q, light.v) * known.per_v2;
-      if (light.kind == Light::Kind::Disk ? a * a + b * b > 1 : abs(a) > 1 || abs(b) > 1) return 0;
-      return t * t / (cosine * known.area);
+  const std::size_t lamps = lamps_.size();
+  for (std::size_t begin = 0, end; begin < count; begin = end) {
+    const std::size_t i = chosen[begin];
+    end = begin + 1;
+    while (end < count && chosen[end] == i) ++end;
+    std::fill(out.delta.begin() + begin, out.delta.begin() + end, i < lamps && lamps_[i].delta);
+    if (i < lamps) {
+      const Lamp lamp = lamps_[i];
+      of_kind(scene_.lights[i].kind, [&](auto kind) {
+        for_lanes(begin, end == count ? lanes_for(count) : end, [&](std::size_t k) {
+          const Sample s = sample_light<kind>(lamp, p[k], u.u1[k], u.u2[k]);
+          out.wi.set(k, s.wi);
+          out.distance[k] = s.distance;
+          out.radiance.set(k, lamp.shine * s.brightness);
+          out.pdf[k] = s.pdf;
+        });
+      });
+    } else {
+      for (std::size_t k = begin; k < end; ++k) {
+        out.distance[k] = kInfinity;
+        if (!lit[k]) continue;
+        if (image_) {
+          double x, y;
+          out.wi.set(k, image_->sample(u.u1[k], u.u2[k], u.u3[k], out.pdf[k], x, y));
+          out.radiance.set(k, scene_.environment.radiance(x, y));
+        } else {
+          out.wi.set(k, sample_cone(normal[k], 1, u.u1[k], u.u2[k]));
+          out.radiance.set(k, scene_.environment.color);
+          out.pdf[k] = 1 / (2 * kPi);
+        }
+      }
     }
   }
+  // By rounding the last light may be chosen without a chance.
+  for (std::size_t k = 0; k < count; ++k) out.pdf[k] = lit[k] ? out.pdf[k] * chance[k][chosen[k]] : 0;
+}
+
+BRDFC_VECTORISED void Lights::pdfs_of_hit(std::size_t i, const Rays& rays, const Numbers& distance, std::size_t count,
+                                          Numbers& pdf) const {
+  const Lamp lamp = lamps_[i];
+  if (lamp.delta) return pdf.fill(0);
+  of_kind(scene_.lights[i].kind, [&](auto kind) {
+    for_lanes(count,
+              [&](std::size_t k) { pdf[k] = pdf_of_hit<kind>(lamp, rays.origin[k], rays.direction[k], distance[k]); });
+  });
 }
 
 }  // namespace brdfc::reference

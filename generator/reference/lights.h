@@ -8,20 +8,25 @@
 #include <span>
 #include <vector>
 
+#include "reference/block.h"
 #include "reference/scene.h"
 
 namespace brdfc::reference {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A direction towards a light. pdf == 0: none.
-struct LightSample {
-  Vec3<double> wi;
-  double distance = kInfinity;
-  /// Radiance, or for a point without extent its irradiance facing it.
-  Rgb<double> radiance{0, 0, 0};
-  double pdf = 0;      ///< per solid angle, times the chance to choose this light; for a delta light the chance alone
-  bool delta = false;  ///< can't be met by a ray
+/// Directions towards lights. pdf == 0: none.
+struct LightSamples {
+  Vectors wi;
+  Numbers distance;
+  Colors radiance;    ///< or for a point without extent its irradiance facing it
+  Numbers pdf;        ///< per solid angle, times the chance to choose this light; for a delta light the chance alone
+  Lanes<bool> delta;  ///< can't be met by a ray
+};
+
+/// Random numbers for them: which light, where, and where else.
+struct LightNumbers {
+  Numbers choice, u1, u2, u3;
 };
 
 /// Importance-sampled equirectangular image: a cell a texel, with the integral of its bilinear reconstruction.
@@ -48,6 +53,7 @@ class EnvironmentSampler {
     float keep = 1;      // chance to stay, of Vose's alias table
     int other = 0;       // cell to go to otherwise
   };
+  void fetch_texels(int x, int y) const;
   std::size_t slot(double scaled) const { return std::min(std::size_t(scaled), cells_.size() - 1); }
   /// The cell that u1 chooses.
   unsigned cell(double u1) const {
@@ -72,61 +78,90 @@ class Lights {
   bool empty() const { return count_ == 0; }
   std::size_t count() const { return count_; }
 
-  /// Chance of each light for a point with this geometric normal, about in proportion to what it can contribute;
-  /// 0 only for a light that is wholly below the surface or shows its back. False if no light can contribute. There are
-  /// count() of them.
-  bool chances(const Vec3<double>& p, const Vec3<double>& normal, std::span<double> chance) const;
+  /// Chance of each light for points with these geometric normals, about in proportion to what it can contribute; 0
+  /// only for a light that is wholly below the surface or shows its back. `lit` is false where no light can contribute.
+  /// At each `chance` there is room for count() of them.
+  void chances(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& chance,
+               Lanes<bool>& lit) const;
 
-  LightSample sample(const Vec3<double>& p, const Vec3<double>& normal, std::span<const double> chance, double choice,
-                     double u1, double u2, double u3) const;
+  /// Where `lit` holds. Of `numbers` those are read that choose() and choose_more() ask for, and where.
+  void sample(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& chance,
+              const Lanes<bool>& lit, const LightNumbers& numbers, LightSamples& out) const;
+  /// Does sample() choose among lights, and is there one with more to choose than a place on it?
+  bool choose() const { return count_ > 1; }
+  bool choose_more() const { return image_ && sampled_environment_; }
+  /// What sample() will read of that more with this u1, in two steps as EnvironmentSampler's.
+  void fetch_slot(double u1) const { image_->fetch_slot(u1); }
+  void fetch_cell(double u1) const { image_->fetch_cell(u1); }
 
-  /// Is the environment an image that is sampled?
-  bool samples_image() const { return image_ && sampled_environment_; }
-  const EnvironmentSampler& image() const { return *image_; }
-  /// Where in the environment's image a ray ends that leaves the scene, as direction_to_equirectangular() gives it;
-  /// what is there will be read soon.
-  std::array<double, 2> place(const Vec3<double>& direction) const;
-
-  /// Calls found(radiance, pdf) for every light that a ray from p meets before `distance`; `chance` as given to
-  /// sample() at p, nullptr for the camera or after a mirror (pdf is 0 then). Lamps do not hide each other. `place` is
-  /// that of the direction, where the ray leaves the scene.
-  template <class Found> void meet(const Vec3<double>& p, const Vec3<double>& direction, double distance,
-                                   const std::array<double, 2>& place, const Vec3<double>& normal, const double* chance,
-                                   bool from_camera, const Found& found) const {
+  /// Calls found(k, radiance, pdf) for every light that ray k meets before its distance; `chance` as given to sample()
+  /// at its origin, nullptr for the camera or after a mirror (pdf is 0 then), where the surface has that normal. Lamps
+  /// do not hide each other.
+  template <class Found> void meet(const Rays& rays, const Numbers& distance, std::size_t count, const Vectors& normal,
+                                   const Lanes<const double*>& chance, bool from_camera, const Found& found) const {
+    Numbers pdf;
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       const Light& light = scene_.lights[i];
       if (from_camera && !light.camera_visible) continue;
-      const double pdf = pdf_of_hit(i, p, direction, distance);
-      if (pdf > 0) found(light.radiance, chance ? pdf * chance[i] : 0.0);
+      pdfs_of_hit(i, rays, distance, count, pdf);
+      for (std::size_t k = 0; k < count; ++k)
+        if (pdf[k] > 0) found(k, light.radiance, chance[k] ? pdf[k] * chance[k][i] : 0.0);
     }
-    if (distance == kInfinity) {
-      double pdf = 0;
-      const Rgb<double> radiance =
-          environment(direction, place, normal, chance && sampled_environment_ ? &pdf : nullptr);
-      if (max_component(radiance) > 0) found(radiance, pdf > 0 ? pdf * chance[scene_.lights.size()] : 0.0);
+    Lanes<std::array<double, 2>> places;
+    if (image_)
+      for (std::size_t k = 0; k < count; ++k)
+        if (distance[k] == kInfinity) places[k] = place(rays.direction[k]);
+    for (std::size_t k = 0; k < count; ++k) {
+      if (distance[k] < kInfinity) continue;
+      double of_environment = 0;
+      const Rgb<double> radiance = environment(rays.direction[k], places[k], normal[k],
+                                               chance[k] && sampled_environment_ ? &of_environment : nullptr);
+      if (max_component(radiance) > 0)
+        found(k, radiance, of_environment > 0 ? of_environment * chance[k][scene_.lights.size()] : 0.0);
     }
   }
 
  private:
-  /// What sampling needs again and again.
-  struct Known {
+  /// What sampling needs again and again, as loops over lanes keep it in registers.
+  struct Lamp {
+    Vec3<double> position, direction, u, v;  // as Light's
+    double radius;
+    Rgb<double> shine;              // radiance, or a delta light's intensity
     double luminance = 0;           // of radiance x area, or of the intensity
     double area = 0;                // of a flat lamp
     double per_u2 = 0, per_v2 = 0;  // 1 / |half axis|^2
     double cone_pdf = 0;            // of a sun with an angle
     double one_minus_cos = 0;
+    bool delta = false;  // no ray can meet it
   };
 
-  double weight(std::size_t i, const Vec3<double>& p, const Vec3<double>& normal) const;
+  /// A direction towards a light.
+  struct Sample {
+    Vec3<double> wi;
+    double distance = kInfinity, pdf = 0;
+    double brightness = 1;  // of what the light shines with
+  };
+
+  /// Calls body with a light's kind as a constant.
+  template <class Body> static void of_kind(Light::Kind kind, const Body& body);
+  template <Light::Kind kKind>
+  static double weight(const Lamp& lamp, const Vec3<double>& p, const Vec3<double>& normal);
+  template <Light::Kind kKind>
+  static Sample sample_light(const Lamp& lamp, const Vec3<double>& p, double u1, double u2);
+  /// Density of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
+  template <Light::Kind kKind>
+  static double pdf_of_hit(const Lamp& lamp, const Vec3<double>& p, const Vec3<double>& direction, double distance);
+  void pdfs_of_hit(std::size_t i, const Rays& rays, const Numbers& distance, std::size_t count, Numbers& pdf) const;
+
+  /// Where in the environment's image a ray ends that leaves the scene, as direction_to_equirectangular() gives it;
+  /// what is there will be read soon.
+  std::array<double, 2> place(const Vec3<double>& direction) const;
   /// Radiance from the environment, and where asked for the density of sampling that direction.
   Rgb<double> environment(const Vec3<double>& direction, const std::array<double, 2>& place, const Vec3<double>& normal,
                           double* pdf) const;
-  LightSample sample_light(std::size_t i, const Vec3<double>& p, double u1, double u2) const;
-  /// Density of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
-  double pdf_of_hit(std::size_t i, const Vec3<double>& p, const Vec3<double>& direction, double distance) const;
 
   const Scene& scene_;
-  std::vector<Known> known_;
+  std::vector<Lamp> lamps_;
   std::unique_ptr<EnvironmentSampler> image_;
   bool sampled_environment_ = false;
   double environment_weight_ = 0;

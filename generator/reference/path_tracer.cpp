@@ -5,6 +5,7 @@
 
 #include "model/horizon.h"
 #include "model/sampling.h"
+#include "reference/cone.h"
 #include "reference/film.h"
 
 namespace brdfc::reference {
@@ -13,24 +14,13 @@ namespace {
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
 
-/// Dimensions of a bounce: which term, which lobe, its direction, and for each side which lamp, where, and where else.
-constexpr std::uint64_t kDimensions = 9;
+/// Dimensions of a bounce: which term, which lobe, its direction, whether the path goes on, and for each side which
+/// lamp, where, and where else.
+constexpr std::uint64_t kDimensions = 10;
 constexpr std::uint64_t dimension_of(int bounce) { return 1 + kDimensions * std::uint64_t(bounce); }
-
-/// Random numbers of a direction towards a light.
-struct LightChoice {
-  double choice, u1, u2, u3;
-  LightChoice(PathSampler& random, int bounce, bool far) {
-    const std::uint64_t dimension = dimension_of(bounce) + 3 + 3 * std::uint64_t(far);
-    choice = random.one(dimension);
-    const auto place = random.two(dimension + 1);
-    u1 = place[0], u2 = place[1];
-    u3 = random.one(dimension + 2);
-  }
-};
-
-/// Paths ahead of the one that scatters, whose memory is fetched.
-constexpr std::size_t kAhead = 8;
+constexpr std::uint64_t light_dimension(int bounce, bool far) {
+  return dimension_of(bounce) + 4 + 3 * std::uint64_t(far);
+}
 
 }  // namespace
 
@@ -53,53 +43,49 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
   wave.active.clear();
   wave.rays.clear();
   wave.chances.resize(2 * lights_.count() * starts.size());
-  for (const auto& [x, y, sample] : starts) {
-    Path& path = wave.paths.emplace_back(
-        PathSampler(points_, std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, sample));
-    const auto film = path.random.two(0);
-    Ray& ray = wave.rays.emplace_back();
-    camera_ray(scene_.camera, settings_, x + film[0], y + film[1], ray.origin, ray.direction);
-    wave.active.push_back(&path);
+  Block& b = *wave.block;
+  for (std::size_t from = 0; from < starts.size(); from += kBlock) {
+    b.count = std::min(kBlock, starts.size() - from);
+    for (std::size_t k = 0; k < b.count; ++k) {
+      const auto& [x, y, sample] = starts[from + k];
+      b.paths[k] = &wave.paths.emplace_back(
+          PathSampler(points_, std::uint64_t(settings_.seed), std::uint64_t(y) * settings_.width + x, sample));
+      b.keys[k] = b.paths[k]->random.random_key();
+    }
+    Numbers film_x, film_y;
+    draw(b, 0, film_x, film_y);
+    for (std::size_t k = 0; k < b.count; ++k) film_x[k] += starts[from + k].x, film_y[k] += starts[from + k].y;
+    begin(film_x, film_y, b);
+    for (std::size_t k = 0; k < b.count; ++k) {
+      wave.active.push_back(b.paths[k]);
+      wave.rays.push_back({b.rays.origin[k], b.rays.direction[k]});
+    }
   }
 
   for (int bounce = 0; !wave.active.empty(); ++bounce) {
-    const std::size_t count = wave.active.size();
-    wave.meetings.resize(count);
+    wave.meetings.resize(wave.active.size());
     tracer_.intersect(wave.rays, bounce == 0, wave.meetings);
-
-    wave.hits.resize(count);
-    wave.places.assign(surfaces_.size() + 1, 0);
-    for (std::size_t i = 0; i < count; ++i) {
-      Hit& hit = wave.hits[i];
-      if (!tracer_.at(wave.rays[i], wave.meetings[i], hit)) {
-        hit.material = -1;
-        hit.distance = kInfinity;
-        hit.environment = lights_.place(wave.rays[i].direction);
-      }
-      ++wave.places[std::size_t(hit.material + 1)];
-    }
-    for (std::size_t i = 0; i < count; ++i) collect(*wave.active[i], wave.rays[i], wave.hits[i], bounce == 0);
-    if (bounce > settings_.max_bounces) break;
-
-    int place = -wave.places[0];
-    for (int& p : wave.places) place += std::exchange(p, place);
-    wave.order.resize(std::size_t(place));
-    for (std::size_t i = 0; i < count; ++i)
-      if (const int material = wave.hits[i].material; material >= 0)
-        wave.order[std::size_t(wave.places[std::size_t(material + 1)]++)] = int(i);
-
+    sort_by_material(wave);
     wave.shadows.clear();
     wave.shadow_rays.clear();
     wave.next.clear();
     wave.next_rays.clear();
-    const std::size_t scattering = wave.order.size();
-    for (std::size_t k = 0; k < scattering; ++k) {
-      if (k + 2 * kAhead < scattering) fetch(wave, k + 2 * kAhead, bounce, &EnvironmentSampler::fetch_slot);
-      if (k + kAhead < scattering) fetch(wave, k + kAhead, bounce, &EnvironmentSampler::fetch_cell);
-      const std::size_t i = std::size_t(wave.order[k]);
-      Path* path = wave.active[i];
-      if (scatter(*path, wave.rays[i].direction, wave.hits[i], bounce, wave)) wave.next.push_back(path);
+    // For the first blocks; scatter() does it for later ones.
+    if (lights_.choose_more() && bounce <= settings_.max_bounces) {
+      const std::size_t first = std::size_t(wave.places[0]);
+      for (std::size_t k = 0; k < 2 * kBlock; ++k) fetch(wave, first + k, bounce, &Lights::fetch_slot);
+      for (std::size_t k = 0; k < kBlock; ++k) fetch(wave, first + k, bounce, &Lights::fetch_cell);
     }
+    for (int material = -1, from = 0; material < int(surfaces_.size()); ++material)
+      for (const int end = wave.places[std::size_t(material + 1)]; from < end; from += int(b.count)) {
+        gather(from, end, wave);
+        if (material < 0)
+          b.hits.distance.fill(kInfinity);
+        else
+          tracer_.at(b.rays, b.meetings, b.count, b.hits);
+        collect(b, bounce == 0);
+        if (material >= 0 && bounce <= settings_.max_bounces) scatter(material, from, bounce, wave);
+      }
     wave.hidden.resize(wave.shadows.size());
     tracer_.occluded(wave.shadow_rays, wave.hidden);
     for (std::size_t i = 0; i < wave.shadows.size(); ++i)
@@ -110,20 +96,65 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
   for (std::size_t i = 0; i < starts.size(); ++i) light[i] = wave.paths[i].light;
 }
 
-void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce,
-                       void (EnvironmentSampler::*what)(double) const) const {
-  if (!lights_.samples_image()) return;
-  const std::size_t i = std::size_t(wave.order[place]);
-  const Surface& surface = surfaces_[std::size_t(wave.hits[i].material)];
-  if (!surface.has_scatter()) return;
-  PathSampler ahead = wave.active[i]->random;
-  for (int far = 0; far <= int(surface.scatters_through()); ++far)
-    (lights_.image().*what)(LightChoice(ahead, bounce, far).u1);
+void PathTracer::sort_by_material(Wave& wave) const {
+  wave.places.assign(surfaces_.size() + 2, 0);
+  for (const Meeting& m : wave.meetings) ++wave.places[std::size_t(tracer_.material(m) + 2)];
+  for (std::size_t m = 2; m < wave.places.size(); ++m) wave.places[m] += wave.places[m - 1];
+  wave.order.resize(wave.meetings.size());
+  for (std::size_t i = 0; i < wave.meetings.size(); ++i)
+    wave.order[std::size_t(wave.places[std::size_t(tracer_.material(wave.meetings[i]) + 1)]++)] = int(i);
 }
 
-void PathTracer::collect(Path& path, const Ray& ray, const Hit& hit, bool from_camera) const {
-  lights_.meet(ray.origin, ray.direction, hit.distance, hit.environment, path.normal, path.sampled, from_camera,
-               [&](const Color& radiance, double light_pdf) {
+void PathTracer::gather(int from, int end, Wave& wave) const {
+  Block& b = *wave.block;
+  b.count = std::min(kBlock, std::size_t(end - from));
+  for (std::size_t k = 0; k < b.count; ++k) {
+    const std::size_t i = std::size_t(wave.order[std::size_t(from) + k]);
+    const Path& path = *(b.paths[k] = wave.active[i]);
+    b.keys[k] = path.random.random_key();
+    b.sampled[k] = path.sampled;
+    b.normal.set(k, path.normal);
+    b.rays.origin.set(k, wave.rays[i].origin);
+    b.rays.direction.set(k, wave.rays[i].direction);
+    b.meetings[k] = wave.meetings[i];
+  }
+}
+
+void PathTracer::draw(const Block& b, std::uint64_t dimension, Numbers& out) const {
+  if (points_.pattern() == Pattern::Random) return random(b, PathSampler::first(dimension), out);
+  for (std::size_t k = 0; k < b.count; ++k) out[k] = b.paths[k]->random.one(dimension);
+}
+
+void PathTracer::draw(const Block& b, std::uint64_t dimension, Numbers& first, Numbers& second) const {
+  if (points_.pattern() == Pattern::Random) {
+    random(b, PathSampler::first(dimension), first);
+    random(b, PathSampler::first(dimension) + 1, second);
+    return;
+  }
+  for (std::size_t k = 0; k < b.count; ++k) {
+    const auto point = b.paths[k]->random.two(dimension);
+    first[k] = point[0], second[k] = point[1];
+  }
+}
+
+BRDFC_VECTORISED void PathTracer::random(const Block& b, std::uint64_t index, Numbers& out) {
+  for_lanes(b.count, [&](std::size_t k) { out[k] = Random::at(b.keys[k], index); });
+}
+
+BRDFC_VECTORISED void PathTracer::begin(const Numbers& x, const Numbers& y, Block& b) const {
+  const Camera camera = scene_.camera;
+  for_lanes(b.count, [&](std::size_t k) {
+    Vector origin, direction;
+    camera_ray(camera, settings_.width, settings_.height, x[k], y[k], origin, direction);
+    b.rays.origin.set(k, origin);
+    b.rays.direction.set(k, direction);
+  });
+}
+
+void PathTracer::collect(const Block& b, bool from_camera) const {
+  lights_.meet(b.rays, b.hits.distance, b.count, b.normal, b.sampled, from_camera,
+               [&](std::size_t k, const Color& radiance, double light_pdf) {
+                 Path& path = *b.paths[k];
                  if (!path.sampled || light_pdf == 0)
                    path.light += path.throughput * radiance;
                  else if (strategy_ != Strategy::Light)
@@ -131,26 +162,120 @@ void PathTracer::collect(Path& path, const Ray& ray, const Hit& hit, bool from_c
                });
 }
 
-bool PathTracer::scatter(Path& path, const Vector& direction, const Hit& hit, int bounce, Wave& wave) const {
-  PathSampler& random = path.random;
-  Color& throughput = path.throughput;
+void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce, void (Lights::*what)(double) const) const {
+  if (place >= wave.order.size()) return;
+  const std::size_t i = std::size_t(wave.order[place]);
+  const Surface& surface = surfaces_[std::size_t(tracer_.material(wave.meetings[i]))];
+  if (!surface.has_scatter()) return;
+  for (int far = 0; far <= int(surface.scatters_through()); ++far)
+    (lights_.*what)(wave.active[i]->random.two(light_dimension(bounce, far) + 1)[0]);
+}
+
+void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const {
+  const Surface& surface = surfaces_[std::size_t(material)];
+  Brdf<double>* const scratch = wave.scratch.of(material);
+  Block& b = *wave.block;
   const std::uint64_t dimension = dimension_of(bounce);
-  const Surface& surface = surfaces_[hit.material];
-  const Brdf<double>& brdf = surface.at(hit.u, hit.v, wave.scratch.of(hit.material));
-  if (hit.inside && surface.has_medium()) {
-    const Color left = brdf.transmittance(hit.distance);
-    surface.check("transmittance", direction, -direction, left);
+  make_frames(surface.has_transmit() || surface.scatters_through(), b);
+  for (int far = 0; far < 2; ++far)
+    if (surface.has_scatter() && !lights_.empty() && (!far || surface.scatters_through()))
+      aim(far, bounce, wave);
+    else
+      b.sides[std::size_t(far)].lit.fill(false);
+  if (surface.has_scatter()) {
+    draw(b, dimension + 1, b.lobe);
+    draw(b, dimension + 2, b.u, b.v);
+  }
+  Lanes<bool> on;
+  for (std::size_t k = 0; k < b.count; ++k) {
+    if (lights_.choose_more()) {
+      fetch(wave, std::size_t(place) + k + 2 * kBlock, bounce, &Lights::fetch_slot);
+      fetch(wave, std::size_t(place) + k + kBlock, bounce, &Lights::fetch_cell);
+    }
+    const auto [u, v] = scratch ? tracer_.texture_place(b.meetings[k]) : std::array<double, 2>{};
+    on[k] = choose(surface, surface.at(u, v, scratch), k, bounce, wave);
+  }
+  turn_to_world(b);
+  for (std::size_t k = 0; k < b.count; ++k) {
+    if (!on[k] || !(b.rises[k] > 0)) continue;
+    Path& path = *b.paths[k];
+    const double brightest = max_component(path.throughput);
+    if (!(brightest > 0)) continue;
+    if (bounce + 1 >= kRouletteStart && brightest < 1) {
+      if (path.random.random(dimension + 3) >= brightest) continue;
+      path.throughput = path.throughput * (1 / brightest);
+    }
+    path.normal = b.normal[k];
+    wave.next.push_back(&path);
+    wave.next_rays.push_back({b.from[k], b.out[k]});
+  }
+}
+
+BRDFC_VECTORISED void PathTracer::make_frames(bool two_sided, Block& b) {
+  for_lanes(b.count, [&](std::size_t k) {
+    const Vector normal = b.hits.normal[k], tangent = b.hits.tangent[k], bitangent = cross(normal, tangent),
+                 direction = b.rays.direction[k];
+    Vector wo = raise_to_horizon(Vector{-dot(direction, tangent), -dot(direction, bitangent), -dot(direction, normal)});
+    b.side[k] = two_sided ? b.hits.side[k] : 1;
+    wo.z *= b.side[k];
+    b.bitangent.set(k, bitangent);
+    b.wo.set(k, wo);
+  });
+}
+
+void PathTracer::aim(bool far, int bounce, Wave& wave) const {
+  Block& b = *wave.block;
+  Block::Side& side = b.sides[far];
+  for (std::size_t k = 0; k < b.count; ++k) {
+    side.chances[k] = wave.chances.data() + (2 * std::size_t(b.paths[k] - wave.paths.data()) + far) * lights_.count();
+    side.facing.set(k, b.hits.geometric[k] * (far ? -1.0 : 1.0));
+  }
+  lights_.chances(b.hits.p, side.facing, b.count, side.chances, side.lit);
+  LightNumbers numbers;
+  const std::uint64_t dimension = light_dimension(bounce, far);
+  if (lights_.choose()) draw(b, dimension, numbers.choice);
+  draw(b, dimension + 1, numbers.u1, numbers.u2);
+  if (lights_.choose_more()) draw(b, dimension + 2, numbers.u3);
+  lights_.sample(b.hits.p, side.facing, b.count, side.chances, side.lit, numbers, side.lights);
+  turn_to_lights(far, b);
+}
+
+BRDFC_VECTORISED void PathTracer::turn_to_lights(bool far, Block& b) {
+  Block::Side& side = b.sides[far];
+  const double sign = far ? -1 : 1;
+  for_lanes(b.count, [&](std::size_t k) {
+    const Vector w = side.lights.wi[k];
+    const Vector wi{dot(w, b.hits.tangent[k]), dot(w, b.bitangent[k]), b.side[k] * dot(w, b.hits.normal[k])};
+    const double height = dot(w, side.facing[k]), way = sign * wi.z * b.wo.z[k];
+    const bool reaches = (height > 0) & (way > 0);
+    side.wi.set(k, wi);
+    side.from.set(k, Tracer::leave(b.hits.p[k], b.hits.geometric[k], w));
+    side.lights.pdf[k] = reaches ? side.lights.pdf[k] : 0;
+  });
+}
+
+BRDFC_VECTORISED void PathTracer::turn_to_world(Block& b) {
+  for_lanes(b.count, [&](std::size_t k) {
+    const Vector wi = b.wi[k], geometric = b.hits.geometric[k];
+    const Vector out = unit(b.hits.tangent[k] * wi.x + b.bitangent[k] * wi.y + b.hits.normal[k] * (b.side[k] * wi.z));
+    const Vector normal = geometric * (wi.z * b.wo.z[k] < 0 ? -1.0 : 1.0);
+    b.rises[k] = dot(out, normal);
+    b.normal.set(k, normal);
+    b.out.set(k, out);
+    b.from.set(k, Tracer::leave(b.hits.p[k], geometric, out));
+  });
+}
+
+bool PathTracer::choose(const Surface& surface, const Brdf<double>& brdf, std::size_t k, int bounce, Wave& wave) const {
+  Block& b = *wave.block;
+  Path& path = *b.paths[k];
+  Color& throughput = path.throughput;
+  const Vector wo = b.wo[k];
+  if (b.hits.side[k] < 0 && surface.has_medium()) {
+    const Color left = brdf.transmittance(b.hits.distance[k]);
+    surface.check("transmittance", -wo, wo, left);
     throughput = throughput * left;
   }
-  // The frame of a model of two sides has its z outside.
-  const double side = hit.inside && (surface.has_transmit() || surface.scatters_through()) ? -1 : 1;
-  const Vector bitangent = cross(hit.normal, hit.tangent);
-  const auto to_local = [&](const Vector& w) {
-    return Vector{dot(w, hit.tangent), dot(w, bitangent), side * dot(w, hit.normal)};
-  };
-  Vector wo =
-      raise_to_horizon(Vector{-dot(direction, hit.tangent), -dot(direction, bitangent), -dot(direction, hit.normal)});
-  wo.z *= side;
   Color mirror(0), transmit(0);
   if (surface.has_mirror()) {
     mirror = brdf.mirror(wo);
@@ -166,85 +291,55 @@ bool PathTracer::scatter(Path& path, const Vector& direction, const Hit& hit, in
   const auto crossing_by = [&](double ior) {
     return !settings_.scale_radiance ? 1 : wo.z > 0 ? 1 / sqr(ior) : sqr(ior);
   };
-  double crossing = crossing_by(brdf.ior());
+  double crossing = settings_.scale_radiance ? crossing_by(brdf.ior()) : 1;
 
-  const std::size_t lights = lights_.count();
-  double* const first = wave.chances.data() + 2 * lights * std::size_t(&path - wave.paths.data());
-  const auto chances = [&](bool far) { return std::span<double>(first + far * lights, lights); };
-  std::array<bool, 2> lit{};
-  if (surface.has_scatter() && !lights_.empty())
-    for (int far = 0; far <= int(surface.scatters_through()); ++far) {
-      const Vector facing = far ? -hit.geometric : hit.geometric;
-      lit[far] = lights_.chances(hit.p, facing, chances(far));
-      if (lit[far])
-        direct(path, throughput * (far ? crossing : 1), hit, facing, surface, brdf, to_local, wo, far, 1 - delta_chance,
-               chances(far), bounce, wave);
-    }
+  for (std::size_t far = 0; far < 2; ++far) {
+    const Block::Side& side = b.sides[far];
+    if (!side.lit[k] || !(side.lights.pdf[k] > 0)) continue;
+    const bool delta = side.lights.delta[k];
+    if (strategy_ == Strategy::Brdf && !delta) continue;
+    const Vector wi = side.wi[k];
+    const auto [f, pdf] = brdf.evaluate(wi, wo);
+    surface.check("f", wi, wo, f);
+    const Color value = f * side.lights.radiance[k] * std::abs(wi.z);
+    if (!(max_component(value) > 0)) continue;
+    const double light_pdf = side.lights.pdf[k];
+    const double weight = delta ? 1 : power_heuristic(light_pdf, pdf * (1 - delta_chance));
+    wave.shadows.push_back({&path, throughput * (far ? crossing : 1) * (value * (weight / light_pdf))});
+    // A little short of a lamp, which may lie in a surface.
+    wave.shadow_rays.push_back({side.from[k], side.lights.wi[k], side.lights.distance[k] * (1 - 0x1p-18)});
+  }
 
-  // Drawn in any case, so that a stream's place does not depend on the material.
-  const double choose = random.one(dimension), lobe = random.one(dimension + 1);
-  const auto way = random.two(dimension + 2);
-  const Vector u{lobe, way[0], way[1]};
   Vector wi;
   path.sampled = nullptr;
-  if (choose < delta_chance) {
+  if (const double u = delta_chance > 0 ? path.random.one(dimension_of(bounce)) : 1; u < delta_chance) {
     const double share = luminance(mirror) / luminance(mirror + transmit);
-    if (choose < delta_chance * share) {
+    if (u < delta_chance * share) {
       wi = {-wo.x, -wo.y, wo.z};
       throughput = throughput * mirror / (delta_chance * share);
     } else {
       throughput = throughput * transmit / (delta_chance * (1 - share));
-      const Bent bent = bend(brdf.channel_iors(), throughput, (choose / delta_chance - share) / (1 - share));
+      const Bent bent = bend(brdf.channel_iors(), throughput, (u / delta_chance - share) / (1 - share));
       wi = refract(wo, bent.ior);
       crossing = crossing_by(bent.ior);
       throughput = bent.throughput;
     }
   } else {
-    const Sample<double> s = brdf.sample(wo, u);
+    const Sample<double> s = brdf.sample(wo, {b.lobe[k], b.u[k], b.v[k]});
     surface.check("sample weight", s.wi, wo, s.weight);
     if (!(s.pdf > 0)) {
       if (s.pdf == 0) return false;
       surface.bad_value("sample pdf", s.wi, wo, Color(s.pdf));
     }
     wi = s.wi;
-    throughput = throughput * s.weight / (1 - delta_chance);
+    throughput = throughput * s.weight * (1 / (1 - delta_chance));
     path.scattered_pdf = s.pdf * (1 - delta_chance);
-    const bool far = wi.z * wo.z < 0;
-    if (lit[far]) path.sampled = chances(far).data();
+    const Block::Side& side = b.sides[wi.z * wo.z < 0];
+    if (side.lit[k]) path.sampled = side.chances[k];
   }
-  const bool crosses = wi.z * wo.z < 0;
-  if (crosses) throughput = throughput * crossing;
-  path.normal = crosses ? -hit.geometric : hit.geometric;
-  const Vector out = normalize(hit.tangent * wi.x + bitangent * wi.y + hit.normal * (side * wi.z));
-  if (!(dot(out, path.normal) > 0)) return false;
-  const double brightest = max_component(throughput);
-  if (!(brightest > 0)) return false;
-  if (bounce + 1 >= kRouletteStart && brightest < 1) {
-    if (random.uniform() >= brightest) return false;
-    throughput = throughput / brightest;
-  }
-  wave.next_rays.push_back({Tracer::leave(hit.p, hit.geometric, out), out});
+  if (wi.z * wo.z < 0) throughput = throughput * crossing;
+  b.wi.set(k, wi);
   return true;
-}
-
-template <class ToLocal>
-void PathTracer::direct(Path& path, const Color& throughput, const Hit& hit, const Vector& facing,
-                        const Surface& surface, const Brdf<double>& brdf, const ToLocal& to_local, const Vector& wo,
-                        bool far, double rest_chance, std::span<const double> chance, int bounce, Wave& wave) const {
-  const LightChoice u(path.random, bounce, far);
-  const LightSample s = lights_.sample(hit.p, facing, chance, u.choice, u.u1, u.u2, u.u3);
-  if (!(s.pdf > 0) || !(dot(s.wi, facing) > 0)) return;
-  if (strategy_ == Strategy::Brdf && !s.delta) return;
-  const Vector wi = to_local(s.wi);
-  if (far ? !(wi.z * wo.z < 0) : !(wi.z * wo.z > 0)) return;
-  const auto [f, pdf] = brdf.evaluate(wi, wo);
-  surface.check("f", wi, wo, f);
-  const Color value = f * s.radiance * std::abs(wi.z);
-  if (!(max_component(value) > 0)) return;
-  const double weight = s.delta ? 1 : power_heuristic(s.pdf, pdf * rest_chance);
-  wave.shadows.push_back({&path, throughput * (value * (weight / s.pdf))});
-  // A little short of a lamp, which may lie in a surface.
-  wave.shadow_rays.push_back({Tracer::leave(hit.p, hit.geometric, s.wi), s.wi, s.distance * (1 - 0x1p-18)});
 }
 
 }  // namespace brdfc::reference

@@ -2,8 +2,8 @@
 // Paths from the camera, many at a time.
 //
 // The paths of a wave take each step together: their rays are traced in packets, then they scatter, those on one
-// material after the other, then the rays towards lights are traced. No path knows of another: the light that it brings
-// is the same to the last bit whatever is in the wave.
+// material after the other in blocks, then the rays towards lights are traced. No path knows of another: the light that
+// it brings is the same to the last bit whatever is in the wave.
 #pragma once
 
 #include <cstdint>
@@ -36,21 +36,35 @@ class PathTracer {
  private:
   struct Path;
   struct Shadow;
+  struct Block;
 
-  /// Adds the light that the path's ray meets on its way.
-  void collect(Path& path, const Ray& ray, const Hit& hit, bool from_camera) const;
-  /// Lets the environment's image fetch what the light samples of a path will read, which is at a place in the order.
-  void fetch(const Wave& wave, std::size_t place, int bounce, void (EnvironmentSampler::*what)(double) const) const;
-  /// Puts into `wave.next_rays` where a path goes that came along `direction`, or returns false if it ends there. Light
-  /// from the lamps is promised to `wave.shadows`.
-  bool scatter(Path& path, const Vec3<double>& direction, const Hit& hit, int bounce, Wave& wave) const;
-  /// Light from one sampled direction on the side that `facing` points to, `throughput` being the
-  /// path's, on that side.
-  /// `far`: not the viewer's side.
-  template <class ToLocal> void direct(Path& path, const Rgb<double>& throughput, const Hit& hit,
-                                       const Vec3<double>& facing, const Surface& surface, const Brdf<double>& brdf,
-                                       const ToLocal& to_local, const Vec3<double>& wo, bool far, double rest_chance,
-                                       std::span<const double> chance, int bounce, Wave& wave) const;
+  /// Makes the order of the rays: first those that leave the scene, then those on each material.
+  void sort_by_material(Wave& wave) const;
+  /// Puts active paths and their rays into the block, those in the order's places from `from` on before `end`.
+  void gather(int from, int end, Wave& wave) const;
+  /// One or two numbers of a dimension for each path.
+  void draw(const Block& b, std::uint64_t dimension, Numbers& first) const;
+  void draw(const Block& b, std::uint64_t dimension, Numbers& first, Numbers& second) const;
+  /// Adds the light that rays meet on their way.
+  void collect(const Block& b, bool from_camera) const;
+  /// Puts into `wave.next_rays` where the block's paths go from points on one material; they are at `place` in the
+  /// order. Light from the lamps is promised to `wave.shadows`.
+  void scatter(int material, int place, int bounce, Wave& wave) const;
+  /// Fetches what the light samples of a path will read, which is at a place in the order.
+  void fetch(const Wave& wave, std::size_t place, int bounce, void (Lights::*what)(double) const) const;
+  /// Chooses lights on one side, and directions towards them.
+  void aim(bool far, int bounce, Wave& wave) const;
+  /// Takes the light that aim() has found for path k, and chooses where the path goes on, or returns false if it ends.
+  bool choose(const Surface& surface, const Brdf<double>& brdf, std::size_t k, int bounce, Wave& wave) const;
+
+  /// Loops over a block: the rays from the camera through points of the film; random numbers; the frames of points;
+  /// directions to lights into the frames; directions where paths go out of them.
+  void begin(const Numbers& x, const Numbers& y, Block& b) const;
+  static void random(const Block& b, std::uint64_t index, Numbers& out);
+  static void make_frames(bool two_sided, Block& b);
+  static void turn_to_lights(bool far, Block& b);
+  static void turn_to_world(Block& b);
+
   /// 1 where one strategy alone finds light.
   double power_heuristic(double mine, double other) const {
     if (strategy_ != Strategy::Mis) return 1;
@@ -84,22 +98,52 @@ struct PathTracer::Shadow {
   Rgb<double> light;
 };
 
+/// Paths that take a step together, in loops over lanes.
+struct PathTracer::Block {
+  std::size_t count;
+  Lanes<Path*> paths;
+  Lanes<std::uint64_t> keys;  // of their random numbers
+  Rays rays;
+  Lanes<Meeting> meetings;
+  Lanes<const double*> sampled;  // Path's
+  Hits hits;
+
+  // The frame: z is normal * side, and wo is in it. Of a model of two sides z is outside.
+  Vectors bitangent, wo;
+  Numbers side;
+  /// Light from one side of the surface, the viewer's or the other.
+  struct Side {
+    Lanes<double*> chances;
+    Lanes<bool> lit;
+    Vectors facing;
+    LightSamples lights;
+    Vectors wi, from;  // in the frame; where the ray to the light begins
+  };
+  std::array<Side, 2> sides;
+
+  // Where paths go: by which numbers, in the frame, and in the world.
+  Numbers lobe, u, v;
+  Vectors wi, from, out;
+  Vectors normal;  // Path's
+  Numbers rises;   // cosine to it
+};
+
 class PathTracer::Wave {
   friend class PathTracer;
-  explicit Wave(const std::vector<Surface>& surfaces) : scratch(surfaces), places(surfaces.size() + 1) {}
+  explicit Wave(const std::vector<Surface>& surfaces) : scratch(surfaces) {}
 
   std::vector<Path> paths;
   std::vector<double> chances;  // for each path, of the lights on the viewer's side of a surface and on the other
   std::vector<Path*> active, next;
   std::vector<Ray> rays, next_rays;  // of `active` and `next`
   std::vector<Meeting> meetings;
-  std::vector<Hit> hits;
-  std::vector<int> order;  // of the hits, by material
+  std::vector<int> order;   // of the rays, by material
+  std::vector<int> places;  // in the order, behind the last ray that leaves and that on each material
+  std::unique_ptr<Block> block = std::make_unique<Block>();
   std::vector<Shadow> shadows;
   std::vector<Ray> shadow_rays;
   std::vector<std::uint8_t> hidden;
   SurfaceScratch scratch;
-  std::vector<int> places;  // in the order, of each material's first
 };
 
 }  // namespace brdfc::reference

@@ -83,12 +83,12 @@ std::array<double, 2> PatternPoints::point(int index, std::uint64_t key) const {
   return {a, b};
 }
 
-std::uint64_t PathSampler::random_key(std::uint64_t seed, std::uint64_t pixel) {
+std::uint64_t PathSampler::pattern_key(std::uint64_t seed, std::uint64_t pixel) {
   return Random::mix(Random::mix(seed ^ 0x6a09e667f3bcc909ULL) + pixel);
 }
 
 std::array<double, 2> PathSampler::point(std::uint64_t dimension) const {
-  const std::uint64_t key = Random::mix(key_ + dimension * 0x9e3779b97f4a7c15ULL);
+  const std::uint64_t key = Random::mix(pattern_key_ + dimension * 0x9e3779b97f4a7c15ULL);
   const auto index = permuted(std::uint32_t(sample_), std::uint32_t(points_.count()), key);
   return points_.point(int(index), Random::mix(key ^ 0xbb67ae8584caa73bULL));
 }

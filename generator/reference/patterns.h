@@ -53,39 +53,41 @@ class PatternPoints {
   std::uint32_t count_, columns_, rows_;
 };
 
-/// The random numbers of one path. Under Pattern::Random they are those of Random, one after the other. Otherwise the
-/// samples of a pixel share a pattern for each dimension, in an order of its own, so that the dimensions know nothing
-/// of each other.
+/// The random numbers of one path, by dimension; each is to be used once. Under Pattern::Random they are those of
+/// Random. Otherwise the samples of a pixel share a pattern for each dimension, in an order of its own, so that the
+/// dimensions know nothing of each other.
 class PathSampler {
  public:
   /// Sample `sample` of points.count() of a pixel; later ones are random.
   PathSampler(const PatternPoints& points, std::uint64_t seed, std::uint64_t pixel, int sample)
       : points_(points),
-        random_(seed, pixel, std::uint64_t(sample)),
+        random_key_(Random(seed, pixel, std::uint64_t(sample)).key()),
         sample_(sample),
         in_pattern_(points.pattern() != Pattern::Random && sample < points.count()) {
-    if (in_pattern_) key_ = random_key(seed, pixel);
+    if (in_pattern_) pattern_key_ = pattern_key(seed, pixel);
   }
 
+  bool in_pattern() const { return in_pattern_; }
+  /// Of Random, with first() for the first number of a dimension and the next one for the second.
+  std::uint64_t random_key() const { return random_key_; }
+  static constexpr std::uint64_t first(std::uint64_t dimension) { return 2 * dimension; }
+
   /// Of no pattern.
-  double uniform() { return random_.uniform(); }
-  /// One or two numbers of a dimension, which must be another at each call.
-  double one(std::uint64_t dimension) { return in_pattern_ ? point(dimension)[0] : uniform(); }
-  std::array<double, 2> two(std::uint64_t dimension) {
+  double random(std::uint64_t dimension) const { return Random::at(random_key_, first(dimension)); }
+  double one(std::uint64_t dimension) const { return in_pattern_ ? point(dimension)[0] : random(dimension); }
+  std::array<double, 2> two(std::uint64_t dimension) const {
     if (in_pattern_) return point(dimension);
-    const double first = uniform();
-    return {first, uniform()};
+    return {random(dimension), Random::at(random_key_, first(dimension) + 1)};
   }
 
  private:
-  static std::uint64_t random_key(std::uint64_t seed, std::uint64_t pixel);
+  static std::uint64_t pattern_key(std::uint64_t seed, std::uint64_t pixel);
   std::array<double, 2> point(std::uint64_t dimension) const;
 
   const PatternPoints& points_;
-  Random random_;
+  std::uint64_t random_key_, pattern_key_ = 0;
   const int sample_;
   const bool in_pattern_;
-  std::uint64_t key_ = 0;
 };
 
 }  // namespace brdfc::reference

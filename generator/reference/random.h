@@ -1,23 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "core/vec.h"
 
 namespace brdfc::reference {
 
-/// xoshiro256++ (D. Blackman, S. Vigna, 2019), started by SplitMix64 from a hash of seed, pixel and sample: a stream
-/// of its own for each path, so that a picture does not depend on the order or number of threads.
+/// SplitMix64 (G. Steele, D. Lea, C. Flood, 2014), begun at a hash of seed, pixel and sample: numbers of its own for
+/// each path, so that a picture does not depend on the order or number of threads.
 class Random {
  public:
-  Random(std::uint64_t seed, std::uint64_t pixel, std::uint64_t sample) {
-    std::uint64_t key = mix(mix(mix(seed) + pixel) + sample);
-    for (std::uint64_t& word : state_) word = mix(key += 0x9e3779b97f4a7c15ULL);
-  }
+  Random(std::uint64_t seed, std::uint64_t pixel, std::uint64_t sample) : key_(mix(mix(mix(seed) + pixel) + sample)) {}
 
-  /// Uniform in [0, 1), a multiple of 2^-53.
-  double uniform() { return double(next() >> 11) * 0x1p-53; }
+  /// Chooses the numbers.
+  std::uint64_t key() const { return key_; }
+  /// Number `index` of a key, uniform in [0, 1), a multiple of 2^-52.
+  static double at(std::uint64_t key, std::uint64_t index) {
+    // As the significand of a number in [1, 2): more instruction sets have vectors of that than of a conversion.
+    const std::uint64_t significand = mix(key + index * 0x9e3779b97f4a7c15ULL) >> 12;
+    return std::bit_cast<double>(0x3ff0000000000000ULL | significand) - 1;
+  }
+  /// One after the other.
+  double uniform() { return at(key_, ++last_); }
   Vec3<double> uniform3() {
     const double a = uniform(), b = uniform();
     return {a, b, uniform()};
@@ -31,21 +37,7 @@ class Random {
   }
 
  private:
-  static std::uint64_t rotate(std::uint64_t x, int k) { return x << k | x >> (64 - k); }
-
-  std::uint64_t next() {
-    const std::uint64_t result = rotate(state_[0] + state_[3], 23) + state_[0];
-    const std::uint64_t t = state_[1] << 17;
-    state_[2] ^= state_[0];
-    state_[3] ^= state_[1];
-    state_[1] ^= state_[2];
-    state_[0] ^= state_[3];
-    state_[2] ^= t;
-    state_[3] = rotate(state_[3], 45);
-    return result;
-  }
-
-  std::uint64_t state_[4];
+  std::uint64_t key_, last_ = 0;
 };
 
 }  // namespace brdfc::reference

@@ -5,14 +5,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "reference/cone.h"
+
 namespace brdfc::reference {
 
 namespace {
 
 using Vector = Vec3<double>;
-
-/// One division instead of three.
-Vector unit(const Vector& v) { return v * (1 / sqrt(dot(v, v))); }
 
 template <class A> Vector to_vector(const A& a) { return {a[0], a[1], a[2]}; }
 std::array<float, 3> to_floats(const Vector& v) { return {float(v.x), float(v.y), float(v.z)}; }
@@ -51,10 +50,14 @@ Tracer::Tracer(const Scene& scene) {
   if (!device_) throw std::runtime_error("Embree can't start on this machine");
   parts_.reserve(scene.objects.size());
   for (const Object& object : scene.objects) {
-    Part part{object.mesh.get(), {}, {}, {}, {}, object.material};
-    for (const auto& v : object.mesh->vertices)
-      part.vertices.push_back(to_floats(object.transform.point(to_vector(v))));
-    for (const auto& n : object.mesh->normals) part.normals.push_back(to_floats(object.transform.normal(to_vector(n))));
+    const Mesh& mesh = *object.mesh;
+    Part part{&mesh, std::vector<Corner>(mesh.vertices.size()), {}, {}, object.material};
+    for (std::size_t i = 0; i < part.corners.size(); ++i) {
+      Corner& corner = part.corners[i];
+      corner.p = to_floats(object.transform.point(to_vector(mesh.vertices[i])));
+      if (!mesh.normals.empty()) corner.normal = to_floats(object.transform.normal(to_vector(mesh.normals[i])));
+      if (!mesh.uvs.empty()) corner.uv = mesh.uvs[i];
+    }
     part.x_axis = normalize(object.transform.vector({1, 0, 0}));
     part.z_axis = normalize(object.transform.vector({0, 0, 1}));
     parts_.push_back(std::move(part));
@@ -67,13 +70,12 @@ Tracer::Tracer(const Scene& scene) {
       if (scene.objects[i].camera_only && !for_camera) continue;
       const Part& part = parts_[i];
       RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-      // Embree may read 16 bytes at the last vertex, hence its own buffer.
-      auto* vertices = static_cast<float*>(
-          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, part.vertices.size()));
+      // Embree may read 16 bytes at a vertex, which a corner has, and at the last triangle.
+      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, part.corners.data(), 0,
+                                 sizeof(Corner), part.corners.size());
       auto* indices = static_cast<std::int32_t*>(rtcSetNewGeometryBuffer(
           geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, part.mesh->triangles.size()));
-      if (!vertices || !indices) throw std::bad_alloc();
-      std::copy_n(part.vertices.front().data(), 3 * part.vertices.size(), vertices);
+      if (!indices) throw std::bad_alloc();
       std::copy_n(part.mesh->triangles.front().data(), 3 * part.mesh->triangles.size(), indices);
       rtcCommitGeometry(geometry);
       rtcAttachGeometryByID(out, geometry, unsigned(i));
@@ -145,7 +147,20 @@ void Tracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> hidden)
 bool Tracer::intersect(const Ray& ray, bool from_camera, Hit& hit) const {
   Meeting meeting;
   intersect({&ray, 1}, from_camera, {&meeting, 1});
-  return at(ray, meeting, hit);
+  if (material(meeting) < 0) return false;
+  const Part& part = parts_[meeting.part];
+  const auto [a, b, c] = corners(meeting);
+  static_cast<Point&>(hit) = point({{to_vector(a->p), to_vector(b->p), to_vector(c->p)},
+                                    {to_vector(a->normal), to_vector(b->normal), to_vector(c->normal)},
+                                    part.x_axis,
+                                    part.z_axis,
+                                    meeting.u,
+                                    meeting.v},
+                                   ray.origin, ray.direction);
+  const auto [u, v] = texture_place(meeting);
+  hit.u = u, hit.v = v;
+  hit.material = part.material;
+  return true;
 }
 
 bool Tracer::occluded(const Ray& ray) const {
@@ -154,38 +169,63 @@ bool Tracer::occluded(const Ray& ray) const {
   return hidden;
 }
 
-bool Tracer::at(const Ray& ray, const Meeting& meeting, Hit& hit) const {
-  if (meeting.part == RTC_INVALID_GEOMETRY_ID) return false;
-  const Part& part = parts_[meeting.part];
-  const auto& triangle = part.mesh->triangles[meeting.triangle];
-  const Vector a = to_vector(part.vertices[triangle[0]]), b = to_vector(part.vertices[triangle[1]]),
-               c = to_vector(part.vertices[triangle[2]]);
+std::array<double, 2> Tracer::texture_place(const Meeting& meeting) const {
+  const auto [a, b, c] = corners(meeting);
   const double wb = meeting.u, wc = meeting.v, wa = 1 - wb - wc;
-  hit.material = part.material;
+  return {a->uv[0] * wa + b->uv[0] * wb + c->uv[0] * wc, a->uv[1] * wa + b->uv[1] * wb + c->uv[1] * wc};
+}
+
+inline Point Tracer::point(const Place& place, const Vector& origin, const Vector& direction) {
+  const auto& [a, b, c] = place.corners;
+  const auto& [na, nb, nc] = place.normals;
+  const double wb = place.u, wc = place.v, wa = 1 - wb - wc;
+  Point out;
   // From the corners, not along the ray: so that the point is in the plane of the triangle.
-  hit.p = a * wa + b * wb + c * wc;
-  hit.distance = length(hit.p - ray.origin);
-  hit.geometric = unit(cross(b - a, c - a));
-  hit.normal = hit.geometric;
-  if (!part.normals.empty())
-    hit.normal = unit(to_vector(part.normals[triangle[0]]) * wa + to_vector(part.normals[triangle[1]]) * wb +
-                      to_vector(part.normals[triangle[2]]) * wc);
-  if (!part.mesh->uvs.empty()) {
-    const auto &ua = part.mesh->uvs[triangle[0]], &ub = part.mesh->uvs[triangle[1]], &uc = part.mesh->uvs[triangle[2]];
-    hit.u = ua[0] * wa + ub[0] * wb + uc[0] * wc;
-    hit.v = ua[1] * wa + ub[1] * wb + uc[1] * wc;
-  } else {
-    hit.u = hit.v = 0;
+  out.p = a * wa + b * wb + c * wc;
+  out.distance = length(out.p - origin);
+  const Vector geometric = unit(cross(b - a, c - a)), normal = na * wa + nb * wb + nc * wc;
+  out.inside = dot(geometric, direction) > 0;
+  const double side = out.inside ? -1 : 1;
+  out.geometric = geometric * side;
+  out.normal = select(dot(normal, normal) > 0, unit(normal), geometric) * side;
+  const Vector tangent = place.z_axis - out.normal * dot(place.z_axis, out.normal),
+               other = place.x_axis - out.normal * dot(place.x_axis, out.normal);
+  out.tangent = unit(select(dot(tangent, tangent) < 1e-8, other, tangent));
+  return out;
+}
+
+BRDFC_VECTORISED void Tracer::at(const Rays& rays, const Lanes<Meeting>& meetings, std::size_t count,
+                                 Hits& hits) const {
+  struct {
+    std::array<VectorsOf<float>, 3> corners, normals;
+    Vectors x_axis, z_axis;
+    Lanes<float> u, v;
+  } places;
+  for (std::size_t k = 0; k < lanes_for(count); ++k) {
+    const Meeting& m = meetings[std::min(k, count - 1)];
+    const auto from = corners(m);
+    for (std::size_t i = 0; i < 3; ++i) {
+      places.corners[i].set(k, from[i]->p);
+      places.normals[i].set(k, from[i]->normal);
+    }
+    places.x_axis.set(k, parts_[m.part].x_axis);
+    places.z_axis.set(k, parts_[m.part].z_axis);
+    places.u[k] = m.u;
+    places.v[k] = m.v;
   }
-  hit.inside = dot(hit.geometric, ray.direction) > 0;
-  if (hit.inside) {
-    hit.geometric = -hit.geometric;
-    hit.normal = -hit.normal;
-  }
-  Vector tangent = part.z_axis - hit.normal * dot(part.z_axis, hit.normal);
-  if (dot(tangent, tangent) < 1e-8) tangent = part.x_axis - hit.normal * dot(part.x_axis, hit.normal);
-  hit.tangent = unit(tangent);
-  return true;
+  for_lanes(count, [&](std::size_t k) {
+    const auto& [a, b, c] = places.corners;
+    const auto& [na, nb, nc] = places.normals;
+    const Point p =
+        point({{a[k], b[k], c[k]}, {na[k], nb[k], nc[k]}, places.x_axis[k], places.z_axis[k], places.u[k], places.v[k]},
+              rays.origin[k], rays.direction[k]);
+    hits.p.set(k, p.p);
+    hits.geometric.set(k, p.geometric);
+    hits.normal.set(k, p.normal);
+    hits.tangent.set(k, p.tangent);
+    hits.distance[k] = p.distance;
+    hits.side[k] = p.inside ? -1 : 1;
+  });
 }
 
 Sphere Tracer::bounds() const {

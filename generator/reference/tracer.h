@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <span>
 
+#include "reference/block.h"
 #include "reference/lights.h"
 #include "reference/scene.h"
 
@@ -30,14 +31,22 @@ struct Meeting {
 };
 
 /// A point on a surface as seen along a ray. Unit vectors, both normals on the viewer's side.
-struct Hit {
+struct Point {
   Vec3<double> p;
   Vec3<double> geometric, normal, tangent;
-  double u = 0, v = 0;  ///< texture coordinates
   double distance = kInfinity;
-  int material = 0;                     ///< path tracing: -1 where a ray leaves the scene
-  std::array<double, 2> environment{};  ///< there: its place in the environment's image
-  bool inside = false;                  ///< seen from behind: the object's own normal points away from the viewer
+  bool inside = false;  ///< seen from behind: the object's own normal points away from the viewer
+};
+struct Hit : Point {
+  double u = 0, v = 0;  ///< texture coordinates
+  int material = 0;
+};
+
+/// The points of a block.
+struct Hits {
+  Vectors p, geometric, normal, tangent;
+  Numbers distance;
+  Numbers side;  ///< -1 inside, else 1
 };
 
 class Tracer {
@@ -49,8 +58,14 @@ class Tracer {
 
   /// What each ray meets first. Rays are traced in packets, which change nothing of what is found.
   void intersect(std::span<const Ray> rays, bool from_camera, std::span<Meeting> meetings) const;
-  /// The point of a meeting, or false if there is none.
-  bool at(const Ray& ray, const Meeting& meeting, Hit& hit) const;
+  /// Of what a ray meets, or -1 if that is nothing.
+  int material(const Meeting& meeting) const {
+    return meeting.part == RTC_INVALID_GEOMETRY_ID ? -1 : parts_[meeting.part].material;
+  }
+  /// The points of meetings, all of which there are.
+  void at(const Rays& rays, const Lanes<Meeting>& meetings, std::size_t count, Hits& hits) const;
+  /// Texture coordinates there.
+  std::array<double, 2> texture_place(const Meeting& meeting) const;
   /// For each ray whether it meets anything.
   void occluded(std::span<const Ray> rays, std::span<std::uint8_t> hidden) const;
   /// The same for one ray alone.
@@ -61,17 +76,36 @@ class Tracer {
   /// `p` moved off its surface by a few units in the last place of float, to the side of `direction`.
   static Vec3<double> leave(const Vec3<double>& p, const Vec3<double>& geometric, const Vec3<double>& direction) {
     // Eight units in the last place of the largest coordinate cover the rounding of the corners and of the origin.
-    const double step = std::max({abs(p.x), abs(p.y), abs(p.z), 1e-3}) * 0x1p-20;
+    const double step = maximum(maximum(abs(p.x), abs(p.y)), maximum(abs(p.z), 1e-3)) * 0x1p-20;
     return p + geometric * (dot(geometric, direction) > 0 ? step : -step);
   }
 
  private:
+  /// In world space, as Embree sees it. What is read together lies together.
+  struct Corner {
+    std::array<float, 3> p, normal{};
+    std::array<float, 2> uv{};
+  };
   struct Part {
     const Mesh* mesh;
-    std::vector<std::array<float, 3>> vertices, normals;  // world space, as Embree sees them
+    std::vector<Corner> corners;
     Vec3<double> x_axis, z_axis;
     int material;
   };
+
+  /// What a point is made of.
+  struct Place {
+    std::array<Vec3<double>, 3> corners, normals;  // no normals: the triangle's own
+    Vec3<double> x_axis, z_axis;
+    double u, v;
+  };
+  static Point point(const Place& place, const Vec3<double>& origin, const Vec3<double>& direction);
+  std::array<const Corner*, 3> corners(const Meeting& meeting) const {
+    const Part& part = parts_[meeting.part];
+    const auto& triangle = part.mesh->triangles[meeting.triangle];
+    return {&part.corners[std::size_t(triangle[0])], &part.corners[std::size_t(triangle[1])],
+            &part.corners[std::size_t(triangle[2])]};
+  }
 
   RTCDevice device_ = nullptr;
   RTCScene camera_scene_ = nullptr, scene_ = nullptr;  // equal unless an object is for the camera only

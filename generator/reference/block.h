@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Structures of arrays: loops over paths of which compilers make vector instructions.
+//
+// A function that has such loops is BRDFC_VECTORISED: it is compiled for several instruction sets, of which the
+// machine's is taken when the program starts. Values are the same in all of them: no product is contracted with a sum.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "core/vec.h"
+
+#if !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#define BRDFC_VECTORISED [[gnu::flatten, gnu::target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")]]
+#define BRDFC_INDEPENDENT _Pragma("GCC ivdep")
+#else
+#define BRDFC_VECTORISED
+#define BRDFC_INDEPENDENT
+#endif
+
+namespace brdfc::reference {
+
+/// Lanes of a block, of which the first are in use. Others may hold anything: what is computed of it is not read.
+inline constexpr std::size_t kBlock = 64;
+
+template <class T> using Lanes = std::array<T, kBlock>;
+using Numbers = Lanes<double>;
+
+/// Vectors that are kept as T.
+template <class T> struct VectorsOf {
+  Lanes<T> x, y, z;
+  Vec3<double> operator[](std::size_t k) const { return {x[k], y[k], z[k]}; }
+  template <class A> void set(std::size_t k, const A& v) { x[k] = T(v[0]), y[k] = T(v[1]), z[k] = T(v[2]); }
+  void set(std::size_t k, const Vec3<double>& v) { x[k] = T(v.x), y[k] = T(v.y), z[k] = T(v.z); }
+};
+using Vectors = VectorsOf<double>;
+
+struct Colors {
+  Numbers r, g, b;
+  Rgb<double> operator[](std::size_t k) const { return {r[k], g[k], b[k]}; }
+  void set(std::size_t k, const Rgb<double>& c) { r[k] = c.r, g[k] = c.g, b[k] = c.b; }
+};
+
+/// Rays of a block; directions are unit vectors.
+struct Rays {
+  Vectors origin, direction;
+};
+
+/// `count` rounded up to whole vectors.
+inline std::size_t lanes_for(std::size_t count) { return (count + 7) / 8 * 8; }
+
+/// Calls body(k) for the lanes from `begin` to before `end`, which do not depend on each other.
+template <class Body> void for_lanes(std::size_t begin, std::size_t end, const Body& body) {
+  BRDFC_INDEPENDENT
+  for (std::size_t k = begin; k < end; ++k) body(k);
+}
+/// For whole vectors, the first `count` lanes among them.
+template <class Body> void for_lanes(std::size_t count, const Body& body) { for_lanes(0, lanes_for(count), body); }
+
+}  // namespace brdfc::reference
