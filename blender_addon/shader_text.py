@@ -261,6 +261,9 @@ _CLOSURES = {
     "diffuse": lambda wi, wo, n: _closures.diffuse(*wi, *wo, *n),
     "diffuse_ramp": lambda wi, wo, n, ramp: _closures.diffuse_ramp(*wi, *wo, *n, *ramp),
     "phong_ramp": lambda wi, wo, n, e, ramp: _closures.phong_ramp(*wi, *wo, *n, e, *ramp),
+    "glossy_toon": lambda wi, wo, n, size, smooth: _closures.glossy_toon(
+        *wi, *wo, *n, size, smooth
+    ),
     "microfacet": facets,
     # An ideal mirror is what ideal() tells.
     "reflection": lambda wi, wo, n: 0.0,

@@ -20,6 +20,8 @@ enum class ClosureKind {
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
   Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): without Fresnel term, Smith's height-correlated masking
   Beckmann,     ///< microfacet("beckmann", ...): the same, with Walter's rational masking as Cycles has it
+  GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction, level within the angle `size` and
+                ///< falling to 0 over `smooth`, linear in the angle; no cosine
   Refraction,   ///< refraction(N, ior): delta in the direction of ideal refraction, none beyond the critical angle
 };
 
@@ -48,6 +50,7 @@ template <class T> struct Closure {
   T alpha;                             ///< Ggx, Beckmann: roughness in (0, 1], of stretched facets along `tangent`
   T alpha_across;                      ///< of stretched facets: across it
   Vec3<T> tangent;                     ///< of stretched facets: unit, perpendicular to the normal
+  T size, smooth;                      ///< GlossyToon: in units of 90 degrees, from 0 to 1
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
   bool turned = false;                 ///< `normal` is not the surface's; it is not below it
   Tangent stretched = Tangent::None;   ///< what `tangent` is
@@ -60,6 +63,8 @@ template <class T> struct Closure {
         alpha(1),
         alpha_across(1),
         tangent{T(1), T(0), T(0)},
+        size(0),
+        smooth(1),
         ior(1) {}
 };
 
@@ -145,6 +150,13 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
         return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
       };
       return select(both, c.weight * of_facets(), none);
+    }
+    case ClosureKind::GlossyToon: {
+      const T cosAlpha = clamp01(T(2) * cosTheta_o * cosTheta_i - dot(wo, wi));
+      const T angle = atan(sqrt((T(1) - cosAlpha) / (T(1) + cosAlpha))) * T(4 * kInvPi);
+      const T outer = c.size + c.smooth, half = sin(minimum(outer, T(1)) * T(kPi / 4));
+      const T height = clamp01((outer - angle) / maximum(c.smooth, tiny<T>())) * T(kInvPi / 4) / sqr(half);
+      return select(both, c.weight * height, none);
     }
     case ClosureKind::Reflection:
     case ClosureKind::Refraction:

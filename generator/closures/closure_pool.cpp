@@ -21,6 +21,8 @@ int pool_bytes(ClosureKind kind) {
     case ClosureKind::Ggx:
     case ClosureKind::Beckmann:
       return with(kPointer + 2 * kVector + 4 * kNumber);
+    case ClosureKind::GlossyToon:
+      return with(kVector + 2 * kNumber);
     case ClosureKind::Refraction:
       return with(kVector + kNumber);
   }

@@ -52,6 +52,8 @@ Rgb<double> used_by_forms(ClosureKind kind, const Lobe& c, const Vec3<double>& w
   closure.turned = true;
   closure.ramp = c.ramp;
   closure.exponent = c.exponent;
+  closure.size = c.size;
+  closure.smooth = c.smooth;
   return evaluate(closure, wi, wo);
 }
 
@@ -91,8 +93,7 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
     case LobeKind::DiffuseToon:
       return cosTheta_i > 0 ? c.weight * toon(c, cosTheta_i) : Rgb<double>(0.0);
     case LobeKind::GlossyToon:
-      if (cosTheta_i <= 0 || cosTheta_o <= 0) return Rgb<double>(0.0);
-      return c.weight * toon(c, dot(c.normal * (2 * cosTheta_o) - wo, wi));
+      return used_by_forms(ClosureKind::GlossyToon, c, wi, wo);
   }
   throw InputError("closure of unknown kind");
 }

@@ -19,9 +19,8 @@ enum class LobeKind {
   Ggx,               ///< Smith's height-correlated masking
   Beckmann,          ///< the same with Walter's rational masking, as Cycles has it
   AshikhminShirley,  ///< eq. 16 of their paper, n = 2 / alpha^2 - 2. Cycles samples it wrongly: no form may use it
-  // In units of 90 degrees: 1 inside the cone `size`, linear in angle to 0 over `smooth`; no cosine.
-  DiffuseToon,  ///< diffuse_toon(N, size, smooth): a cone about N
-  GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction
+  DiffuseToon,       ///< diffuse_toon(N, size, smooth): as GlossyToon, about N
+  GlossyToon,
 };
 
 /// As the command line and the conformance tests call it.

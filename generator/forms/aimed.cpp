@@ -49,18 +49,16 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     const auto closures = output_closures(base, program, fit ? division_of(*fit) : Division::Done);
     out.base = recording_of(model, program, indent, closures);
   }
+  const ClosureSum<Expr> given = input_closures(base);
   {
     Program program;
-    program.output("drawn", turned(draw(*brdf, !base.empty(), wo, recorded_u())));
+    program.output("drawn", turned(draw(*brdf, given, wo, recorded_u())));
     out.draw = recording_of(model, program, indent);
   }
   {
     Program program;
     const Vec3<Expr> wi = input3("wi");
-    Rgb<Expr> given(Expr(0));
-    // Closures are on the viewer's side, where the model's frame is the shader's.
-    for (const Closure<Expr>& c : input_closures(base)) given += evaluate(c, wi, wo);
-    const Excess<Expr> e = excess(*brdf, !base.empty(), given, turned(wi), wo);
+    const Excess<Expr> e = excess(*brdf, given, turned(wi), wo);
     program.output("excess", e.value);
     program.output("drawn_density", e.density);
     out.value = recording_of(model, program, indent);

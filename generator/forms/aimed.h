@@ -398,25 +398,33 @@ template <class T> struct Excess {
   T density;
 };
 
-/// How often the direction of draw() comes from everywhere: a base may give light that the model has none of.
-inline constexpr double kFromEverywhere = 0.2;
+/// How often the direction of draw() comes from everywhere: a base may give light that the model has none of. Never
+/// where the base has no weight.
+template <class T> T share_from_everywhere(const ClosureSum<T>& base) {
+  constexpr double kFromEverywhere = 0.2;
+  T all(0);
+  for (const Closure<T>& c : base) all = all + max_component(c.weight);
+  return select(all > T(0), T(kFromEverywhere), T(0));
+}
 
-/// u: three numbers in [0, 1). `with_base`: whether there is a base.
-template <class T> Vec3<T> draw(const Brdf<T>& brdf, bool with_base, const Vec3<T>& wo, const Vec3<T>& u) {
-  if (!with_base) return brdf.sample(wo, u).wi;
-  const T share = T(1 - kFromEverywhere);
+/// u: three numbers in [0, 1).
+template <class T> Vec3<T> draw(const Brdf<T>& brdf, const ClosureSum<T>& base, const Vec3<T>& wo, const Vec3<T>& u) {
+  if (base.empty()) return brdf.sample(wo, u).wi;
+  const T share = T(1) - share_from_everywhere(base);
   // The number that chooses serves again, stretched.
   const Sample<T> s = brdf.sample(wo, {minimum(u.x / share, T(1 - 1e-7)), u.y, u.z});
   return select(u.x < share, s.wi, sample_everywhere(u.y, u.z));
 }
 
 template <class T>
-Excess<T> excess(const Brdf<T>& brdf, bool with_base, const Rgb<T>& base, const Vec3<T>& wi, const Vec3<T>& wo) {
+Excess<T> excess(const Brdf<T>& brdf, const ClosureSum<T>& base, const Vec3<T>& wi, const Vec3<T>& wo) {
   Excess<T> out;
-  const Rgb<T> f_cos = brdf.eval(wi, wo) * abs(wi.z);
-  out.value = with_base ? f_cos - base : f_cos;
+  out.value = brdf.eval(wi, wo) * abs(wi.z);
   out.density = brdf.pdf(wi, wo);
-  if (with_base) out.density = T(1 - kFromEverywhere) * out.density + T(kFromEverywhere) * everywhere_pdf(wi);
+  if (base.empty()) return out;
+  out.value = out.value - evaluate(base, wi, wo);
+  const T everywhere = share_from_everywhere(base);
+  out.density = (T(1) - everywhere) * out.density + everywhere * everywhere_pdf(wi);
   return out;
 }
 

@@ -6,9 +6,7 @@ namespace brdfc::forms {
 AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
                    const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
                    const std::vector<std::array<double, 2>>& v, const std::vector<LampBeam<double>>& beams) {
-  const auto excess_at = [&](const Vec3<double>& wi) {
-    return excess(brdf, !base.empty(), evaluate(base, wi, wo), wi, wo);
-  };
+  const auto excess_at = [&](const Vec3<double>& wi) { return excess(brdf, base, wi, wo); };
   AimedSum out;
   std::vector<LampPatch<double>> of;
   std::vector<double> solid_angles;
@@ -30,7 +28,7 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
   }
   const auto count = double(out.lobes.size());
   const Toss<double> tossed = toss(u.x, count);
-  out.drawn = tossed.lobe < 0 ? draw(brdf, !base.empty(), wo, {tossed.u, u.y, u.z})
+  out.drawn = tossed.lobe < 0 ? draw(brdf, base, wo, {tossed.u, u.y, u.z})
                               : sample_under(out.lobes[std::size_t(tossed.lobe)], u.y, u.z);
   Met<double> met;
   met.ray = out.drawn;

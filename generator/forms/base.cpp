@@ -46,14 +46,14 @@ BaseWorth base_worth(const measure::BoundModel& bound, const Vec3<double>& wo, i
     white_drawn.add(drawn.weight);
     sky_drawn.add(drawn.weight * sky(drawn.wi));
 
-    const Vec3<double> wi = draw(brdf, true, wo, u);
+    const Vec3<double> wi = draw(brdf, base, wo, u);
     if (wi.z <= 0) {
       white_rest.add(Rgb<double>(0.0));
       sky_rest.add(Rgb<double>(0.0));
       continue;
     }
     const Rgb<double> of_closures = evaluate(base, wi, wo);
-    const Excess<double> e = excess(brdf, true, of_closures, wi, wo);
+    const Excess<double> e = excess(brdf, base, wi, wo);
     const Rgb<double> b = of_closures / e.density, rest = e.value / e.density, f = rest + b;
     measure::require_value(b, "base", bound.label, wi, wo);
     white_rest.add(rest);

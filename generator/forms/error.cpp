@@ -93,8 +93,9 @@ FormError error_of_closures(const Model& model, const ParamValues& confined, con
   const auto record = [&](const Brdf<Expr>& brdf, Program& program) {
     kinds = output_closures(closures_of(brdf), program);
     for (const RecordedClosure& c : kinds)
-      if (has_facets(c.kind) || c.turned)
-        throw std::logic_error(model.info().name + ": the error of facets or of closures with normals is not executed");
+      if (has_facets(c.kind) || c.kind == ClosureKind::GlossyToon || c.turned)
+        throw std::logic_error(model.info().name +
+                               ": the error of facets, cones or closures with normals is not executed");
   };
   const double albedo = largest_difference(model, confined, record, [&](Case& at, Sequence3& points) {
     const auto out = at.run();

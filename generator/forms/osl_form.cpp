@@ -69,6 +69,8 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
       return fmt::format("weight_{} * reflection({})", i, n);
     case ClosureKind::Refraction:
       return fmt::format("weight_{} * refraction({}, ior_{})", i, n, i);
+    case ClosureKind::GlossyToon:
+      return fmt::format("weight_{0} * glossy_toon({1}, size_{0}, smooth_{0})", i, n);
     case ClosureKind::PhongRamp:
       return fmt::format("weight_{} * phong_ramp({}, exponent_{}, ramp_{})", i, n, i, i);
     case ClosureKind::Ggx:
@@ -109,6 +111,7 @@ void ShaderText::declare(const std::vector<RecordedClosure>& closures) {
     statements += fmt::format("    color weight_{} = 0.0;\n", c);
     if (has_ramp(kind)) statements += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
     if (kind == ClosureKind::PhongRamp) statements += fmt::format("    float exponent_{};\n", c);
+    if (kind == ClosureKind::GlossyToon) statements += fmt::format("    float size_{0}, smooth_{0};\n", c);
     if (has_facets(kind)) statements += fmt::format("    float alpha_{};\n", c);
     if (closures[c].stretched != Tangent::None) statements += fmt::format("    float alpha_across_{};\n", c);
     if (closures[c].stretched == Tangent::Surface)

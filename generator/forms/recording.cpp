@@ -72,6 +72,10 @@ std::vector<RecordedClosure> output_closures(const ClosureSum<Expr>& sum, Progra
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
+    if (sum[c].kind == ClosureKind::GlossyToon) {
+      program.output(fmt::format("size_{}", c), sum[c].size);
+      program.output(fmt::format("smooth_{}", c), sum[c].smooth);
+    }
     if (has_facets(sum[c].kind)) program.output(fmt::format("alpha_{}", c), sum[c].alpha);
     if (sum[c].stretched != Tangent::None) program.output(fmt::format("alpha_across_{}", c), sum[c].alpha_across);
     if (sum[c].stretched == Tangent::Surface) program.output(fmt::format("tangent_{}", c), sum[c].tangent);
@@ -87,6 +91,10 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) sum[c].ramp[i] = Rgb<Expr>::input(ramp_entry(c, i));
     if (sum[c].kind == ClosureKind::PhongRamp) sum[c].exponent = Expr::input(fmt::format("exponent_{}", c));
+    if (sum[c].kind == ClosureKind::GlossyToon) {
+      sum[c].size = Expr::input(fmt::format("size_{}", c));
+      sum[c].smooth = Expr::input(fmt::format("smooth_{}", c));
+    }
     if (has_facets(sum[c].kind)) sum[c].alpha = Expr::input(fmt::format("alpha_{}", c));
     if (sum[c].stretched != Tangent::None) sum[c].alpha_across = Expr::input(fmt::format("alpha_across_{}", c));
     if (sum[c].stretched == Tangent::Surface) sum[c].tangent = input3(fmt::format("tangent_{}", c));

@@ -11,6 +11,7 @@
 // partner, 2 (r.wi) r - wi, is below, and jumps there. Every ray counts, so the albedo is k_r c_r at every angle.
 //
 // Stable forms: see power_lobe.h.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -67,6 +68,10 @@ template <class T> struct GlossyReflector {
       wi = select(flip, turned, wi);
     }
     return sample_if(above(wi, wo), wi, cr * kr, pdf(wi, wo));
+  }
+
+  ClosureSum<T> base(const Vec3<T>&) const {
+    return power_cones(cr * (kr * share_of_wide(e) * (e + T(1)) / (T(2) * pi<T>())), e);
   }
 };
 

@@ -7,6 +7,7 @@
 //
 // c = (e + 1) / (2 pi): f cos theta_i is then at most a density over directions, so that the albedo stays below k_s and
 // reaches it for e -> infinity at every angle. The paper's Fresnel term is k_s here, constant.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -52,6 +53,19 @@ template <class T> struct MaxPhong {
     const Vec3<T> wi = about_axis(reflect(wo), sample_power_lobe(e, u.y, u.z));
     const T ratio = wi.z / maximum(maximum(wi.z, wo.z), tiny<T>());
     return sample_if(above(wi, wo), wi, ks * ratio, pdf(wi, wo));
+  }
+
+  /// cos theta_i / max(cos theta_i, cos theta_o) as a constant and a share of cos theta_i / cos theta_o, by how much
+  /// the latter varies over the lobe: along the normal it is always the smaller one, near the horizon hardly ever.
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const T width = T(1) / sqrt(e + T(2)), z = maximum(wo.z, T(1e-3));
+    const T slope = named("slope", sqrt(sin2_theta(wo)) / z * width), slope2 = slope * slope;
+    const T smaller = named("smaller", sqr(clamp01(T(1.3) * width * width / maximum(slope, tiny<T>()))));
+    const T sloped = T(0.65) / (T(1) + T(2.5) * slope2), level = T(1) - sloped - T(0.6) * slope / sqr(T(1) + slope2);
+    const Rgb<T> all = ks * share_of_wide(e);
+    ClosureSum<T> sum = power_cones(all * (level * (T(1) - smaller) * (e + T(1)) / (T(2) * pi<T>())), e);
+    sum.push_back(power_closure(all * ((sloped + (T(1) - sloped) * smaller) * (e + T(1)) / (e + T(2)) / z), e));
+    return sum;
   }
 };
 

@@ -8,6 +8,7 @@
 //
 // So f is not reciprocal. Nothing ties k_s to e: at normal incidence the albedo is 2 pi k_s / (e + 1), a gain below
 // e = 5.28 and next to nothing for large e. What the horizon cuts off the lobe is lost.
+#include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -51,6 +52,8 @@ template <class T> struct Phong {
     const Vec3<T> wi = about_axis(reflect(wo), sample_power_lobe(e, u.y, u.z));
     return sample_if(above(wi, wo), wi, ks * (T(2) * pi<T>() / (e + T(1))), pdf(wi, wo));
   }
+
+  ClosureSum<T> base(const Vec3<T>&) const { return power_cones(ks * share_of_wide(e), e); }
 };
 
 BRDFC_MODEL(Phong)

@@ -256,7 +256,7 @@ std::string closures_module() {
   for (const auto& [kind, name] :
        {std::pair{ClosureKind::Diffuse, "diffuse"}, std::pair{ClosureKind::DiffuseRamp, "diffuse_ramp"},
         std::pair{ClosureKind::PhongRamp, "phong_ramp"}, std::pair{ClosureKind::Ggx, "ggx"},
-        std::pair{ClosureKind::Beckmann, "beckmann"}}) {
+        std::pair{ClosureKind::Beckmann, "beckmann"}, std::pair{ClosureKind::GlossyToon, "glossy_toon"}}) {
     Recorder recorder(Precision::Double);
     std::vector<std::string> arguments;
     const auto vector = [&](const std::string& v) {
@@ -272,6 +272,10 @@ std::string closures_module() {
     c.normal = vector("normal");
     c.turned = true;
     if (kind == ClosureKind::PhongRamp) c.exponent = number("exponent");
+    if (kind == ClosureKind::GlossyToon) {
+      c.size = number("size");
+      c.smooth = number("smooth");
+    }
     for (std::size_t i = 0; has_ramp(kind) && i < kRampSize; ++i) {
       arguments.push_back(fmt::format("ramp_{}", i));
       c.ramp[i] = Rgb<Expr>::input(arguments.back());

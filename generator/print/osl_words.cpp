@@ -19,7 +19,7 @@ constexpr const char* kWords = R"(
 
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
-  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute isfinite log max
+  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
   microfacet min normalize phong_ramp pow raytype reflection refraction sin sqrt
 
   Albedo BSDF Normal Shown Tangent
@@ -38,7 +38,8 @@ constexpr const char* kWords = R"(
 
 /// What a shader numbers.
 constexpr const char* kNumbered =
-    "alpha alpha_across exponent ior knots normal position ramp table table_b table_g table_r tangent u v weight";
+    "alpha alpha_across exponent ior knots normal position ramp size smooth table table_b table_g table_r tangent u v "
+    "weight";
 
 std::set<std::string> split(const char* text) {
   std::istringstream in(text);

@@ -77,39 +77,39 @@ def test_elsewhere_nothing_is_limited(extension, optix, setting, value):
 
 
 def test_lamps_are_as_many_as_the_largest_material_has_room_for(extension, optix):
-    phong = put(optix, extension.api.new_material("phong"))  # (1016 - 136) / 160
+    first = put(optix, extension.api.new_material("radziszewski_alda"))  # (1016 - 160) / 160
     add_lamps(optix, 7)
     assert filled() == 5
     found = extension.api.see_lamps(optix)
     assert [lamp.slot for lamp in found] == [1, 2, 3, 4, 5, None, None]
     assert found[5].why == "fainter than the 5 that a material can aim at"
-    text = panel(extension, phong.active_material, optix)
+    text = panel(extension, first.active_material, optix)
     assert "OptiX has memory for 5 lamps" in text and "Mix Shader" in text
     # By themselves: another material, which needs more; its end; another device.
     ward = put(optix, extension.api.new_material("ward"))  # (1016 - 232) / 160
     assert filled() == 4
     bpy.data.materials.remove(ward.active_material)
-    put(optix, phong.active_material)
+    put(optix, first.active_material)
     assert filled() == 5
     # A script's change of a setting of Cycles tells nobody; the next change of anything does.
     for device, count in (("CPU", 7), ("GPU", 5)):
         optix.cycles.device = device
-        phong.location.x += 1
+        first.location.x += 1
         assert filled() == count
     optix.cycles.device = "CPU"
     assert sum(lamp.slot is not None for lamp in extension.api.see_lamps(optix)) == 7
 
 
 def mixed(extension, scene):
-    """Ward's and Phong's model in one material, by a Mix Shader."""
+    """Two models in one material, by a Mix Shader."""
     material = extension.api.new_material("ward")
     tree = material.node_tree
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     ward = extension.nodes.group_nodes(material)[0]
-    phong = extension.nodes.add_group_node(tree, "phong")
+    other = extension.nodes.add_group_node(tree, "radziszewski_alda")
     mix = tree.nodes.new("ShaderNodeMixShader")
     tree.links.new(ward.outputs["BSDF"], mix.inputs[1])
-    tree.links.new(phong.outputs["BSDF"], mix.inputs[2])
+    tree.links.new(other.outputs["BSDF"], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
     put(scene, material)
     return material, mix
@@ -118,7 +118,7 @@ def mixed(extension, scene):
 def test_models_that_are_mixed_share_the_pool(extension, optix):
     material, mix = mixed(extension, optix)
     add_lamps(optix, 4)
-    assert filled() == 1  # (1016 - 232 - 136 - 72) / (2 * 160)
+    assert filled() == 1  # (1016 - 232 - 160 - 72) / (2 * 160)
     assert not {"closure_pool", "closure_pool_shared"} & codes(extension, material, optix).keys()
     # What is not linked does not run; what Blender's own nodes take is not known.
     tree = material.node_tree

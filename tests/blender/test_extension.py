@@ -815,7 +815,8 @@ def test_warnings_of_an_aimed_form_that_is_denoised(extension, empty):
         ("cook_torrance", ["albedo_passes"]),
         ("lossless", ["albedo_passes"]),
         ("coupled", ["albedo_passes"]),
-        ("phong", ["albedo_passes", "normal_pass"]),
+        ("phong", ["albedo_passes"]),
+        ("radziszewski_alda", ["albedo_passes", "normal_pass"]),
         ("schlick_double", ["albedo_passes"]),
     ):
         material = clean(extension, empty, model, "aimed")

@@ -172,6 +172,8 @@ TEST(Aimed, AddsUpToTheModel) {
 TEST(Aimed, AddsUpToTheModelWhereItIsStiff) {
   const Case cases[] = {{"ashikhmin_shirley", {"nu=100", "nv=10000", "rd=0", "rs=0.9"}},
                         {"phong", {"e=5000"}},
+                        {"glossy_reflector", {"e=250"}},
+                        {"max_phong", {"e=3"}},
                         {"ward", {"ax=0.02", "ay=0.3"}},
                         {"cook_torrance", {"m=0.05"}},
                         {"schlick", {"rough=0.01", "p=0.5"}},

@@ -75,6 +75,25 @@ TEST(Closure, StretchesFacetsAlongATangentOfTheSurface) {
   }
 }
 
+TEST(Closure, IsLevelWithinAConeAndFallsBesideIt) {
+  Closure<double> c(ClosureKind::GlossyToon, Rgb<double>(0.5));
+  c.size = 0.2, c.smooth = 0.3;
+  const Vec3<double> wo = direction(std::cos(0.4), 2), mirror{-wo.x, -wo.y, wo.z};
+  const auto at = [&](double angle) {
+    return evaluate(c, normalize(about_axis(mirror, {0, std::sin(angle), std::cos(angle)})), wo).g;
+  };
+  // Over the solid angle of all of the cone.
+  const double height = 0.5 / (2 * kPi * (1 - std::cos(0.25 * kPi)));
+  EXPECT_NEAR(at(0), height, 1e-12);
+  EXPECT_NEAR(at(0.09 * kPi), height, 1e-12);
+  EXPECT_NEAR(at(0.175 * kPi), height / 2, 1e-12);
+  EXPECT_EQ(at(0.26 * kPi), 0);
+  EXPECT_EQ(evaluate(c, {0, 0.8, -0.6}, wo).g, 0) << "below the surface";
+  c.smooth = 0;
+  EXPECT_NEAR(at(0.09 * kPi), 0.5 / (2 * kPi * (1 - std::cos(0.1 * kPi))), 1e-12);
+  EXPECT_EQ(at(0.11 * kPi), 0);
+}
+
 TEST(Closure, LooksARampUpWithoutAnIndex) {
   Closure<double> c(ClosureKind::DiffuseRamp, Rgb<double>(0.5));
   Recorder recorder;
@@ -116,11 +135,18 @@ const Row kRows[] = {{"ashikhmin_shirley", {}, 0.008, 0.18},
                      {"cook_torrance", {}, 0.007, 0.16},
                      {"coupled", {}, 0.006, 0.006},
                      {"coupled", {"fresnel=dielectric"}, 0.006, 0.006},
+                     {"glossy_reflector", {}, 0.023, 0.026},
+                     {"glossy_reflector", {"below=lose", "e=10"}, 0.023, 0.023},
                      {"lafortune", {}, 0.007, 0.05},
                      {"lossless", {}, 0.1, 0.034},
                      {"lossless", {"n=1"}, 0.006, 0.004},
+                     {"max_phong", {}, 0.01, 0.23},
+                     {"max_phong", {"e=100"}, 0.01, 0.14},
                      {"oren_nayar", {}, 0.022, 0.18},
                      {"oren_nayar", {"form=qualitative"}, 0.012, 0.12},
+                     {"phong", {}, 0.021, 0.021},
+                     {"phong", {"e=3"}, 0.022, 0.02},
+                     {"phong", {"e=1"}, 0.044, 0.041},
                      {"phong_material", {}, 0.01, 0.18},
                      {"schlick", {}, 0.035, 0.08},
                      {"schlick", {"p=0.3"}, 0.24, 0.2},
