@@ -122,7 +122,7 @@ CASES = [
     _phong(20.0, tilted_=True),
     *_microfacets(),
     *(_toon("diffuse_toon", *p) for p in ((0.5, 0.0), (0.3, 0.4), (0.9, 0.5))),
-    *(_toon("glossy_toon", *p) for p in ((0.3, 0.0), (0.1, 0.3), (0.0, 0.05), (0.6, 0.4))),
+    *(_toon("glossy_toon", *p) for p in ((0.3, 0.0), (0.1, 0.3), (0.001, 0.05), (0.6, 0.4))),
     # Nothing defines these yet: only their sampling is held against their evaluation.
     Case("oren_nayar 0.5", "oren_nayar(n, 0.5)"),
     Case("oren_nayar_diffuse_bsdf 0.7", "oren_nayar_diffuse_bsdf(n, color(0.8, 0.5, 0.2), 0.7)"),
