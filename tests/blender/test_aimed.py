@@ -6,8 +6,9 @@ import math
 import bpy
 import numpy as np
 import pytest
+import worlds
 from goniometer import Goniometer, tilted, unit
-from helpers import add_camera, add_lamp, add_sphere, evaluate, render
+from helpers import add_camera, add_lamp, add_sphere, add_world, evaluate, render
 from mathutils import Vector
 
 #: Towards the sun; the camera is above.
@@ -18,7 +19,9 @@ CASES = {
     "ashikhmin_shirley": [{"nu": 100.0, "nv": 1e4, "rs": 0.9, "rd": 0.0}],
     "blinn": [{"e": 2000.0}],
     "cook_torrance": [{"m": 0.03}],
-    "phong": [{"e": 5000.0}],
+    "glossy_reflector": [{"e": 10.0}],
+    "max_phong": [{"e": 5.0}],
+    "phong": [{"e": 5000.0}, {"e": 3.0}],
     "radziszewski_alda": [{"n": 50.0}],
     "schlick": [{"rough": 0.01, "p": 0.5}],
     "ward": [{"ax": 0.02, "ay": 0.3}],
@@ -153,6 +156,47 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
     print(f"{lamp}: {aimed / drawn - 1:+.4f} +- {math.hypot(error, other) / drawn:.4f}")
     assert abs(aimed - drawn) < 4.5 * math.hypot(error, other) + 0.02 * drawn
     assert math.hypot(error, other) < 0.008 * drawn
+
+
+@pytest.mark.parametrize("model", ["phong", "max_phong", "glossy_reflector"])
+def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
+    """Over an exponent from 1 to 600, from one side of a ball to the other, the base of cones comes
+    and goes: each quarter of it is as bright as by drawn directions."""
+    worlds.gradient(*add_world(empty))
+    extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
+    extension.api.enable_osl(empty)
+    add_camera(empty)
+    empty.render.resolution_x = empty.render.resolution_y = 32
+    empty.cycles.samples = 1024
+    ball = add_sphere(empty, None)
+    quarters = {}
+    for form in ("aimed", "sampled"):
+        material = extension.api.new_material(model, form)
+        (node,) = extension.nodes.group_nodes(material)
+        links = material.node_tree
+        place = links.nodes.new("ShaderNodeTexCoord")
+        apart = links.nodes.new("ShaderNodeSeparateXYZ")
+        power = links.nodes.new("ShaderNodeMath")
+        power.operation = "POWER"
+        power.inputs[0].default_value = 600.0
+        links.links.new(place.outputs["Generated"], apart.inputs[0])
+        links.links.new(apart.outputs[0], power.inputs[1])
+        links.links.new(power.outputs[0], extension.nodes.sockets(node)["e"])
+        ball.data.materials[0] = material
+        bpy.context.view_layer.update()
+        pictures = []
+        for seed in range(4):
+            empty.cycles.seed = seed
+            # The ball takes the middle half.
+            pictures.append(render(empty)[:, 8:24, 1].reshape(32, 4, 4).mean((0, 2)))
+        quarters[form] = np.mean(pictures, 0), np.std(pictures, 0, ddof=1) / 2
+    (aimed, error), (drawn, other) = quarters["aimed"], quarters["sampled"]
+    print(f"{model}: {aimed / drawn - 1} +- {np.hypot(error, other) / drawn}")
+    assert (drawn > 1e-4).all() and (error < 0.05 * drawn).all()
+    # Spreads of four pictures: t of three degrees of freedom.
+    assert (np.abs(aimed - drawn) < 9 * np.hypot(error, other)).all()
+    whole, bound = aimed.sum() - drawn.sum(), 4.5 * math.hypot(*error, *other)
+    assert abs(whole) < bound < 0.05 * drawn.sum()
 
 
 #: Number sockets whose models go astray outside their ranges, and a value beyond either end.
