@@ -496,4 +496,7 @@ def make_local(material):
         material = material.make_local()
     nodes.make_local(material.node_tree)
     lamps.follow()
+    groups = {node.node_tree for node in nodes.group_nodes(material)}
+    twins = {n.node_tree for group in groups for n in group.nodes if nodes.is_ours(n)}
+    nodes.unite(groups | twins)
     return material

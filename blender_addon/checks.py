@@ -302,13 +302,18 @@ def _by_twin(finding, ours):
     return Finding(finding.code, "WARNING", said)
 
 
+def _twin(node):
+    """Manifest entry of the twin of a node's model; None where there is none."""
+    made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
+    return pack.model(model_name)["representations"].get("twin") if made else None
+
+
 def _twin_error(node):
     """How far a node's twin is off; None where that is not known for its values."""
-    made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
-    forms = pack.model(model_name)["representations"] if made else ()
-    if "twin" not in forms or pack.refusal(model_name, "twin", nodes.all_values(node)):
+    entry = _twin(node)
+    if not entry or pack.refusal(nodes.identity(node)[0], "twin", nodes.all_values(node)):
         return None
-    return pack.representation(model_name, "twin")["error"]["relative_l1"]
+    return entry["error"]["relative_l1"]
 
 
 def scene_warnings(scene):
@@ -401,7 +406,9 @@ def node_warnings(node, material, scene):
     form, schema = nodes.manifest_entry(node) or ({}, {})
     if not form:
         found.append(_of_another_version(material, node, label))
-    declared = form.get("warnings", [])
+    if is_stood_in(node, scene):
+        form = _twin(node) or {}
+    declared = [] if is_eevee(scene) else form.get("warnings", [])
     for name, parameter in schema.items():
         value = nodes.get_value(node, name)
         if parameter["kind"] == "choice" or value is None:
@@ -433,7 +440,8 @@ def node_warnings(node, material, scene):
             )
             found.append(Finding("out_of_fit", "WARNING", _of(label, said)))
     # Measured: a sampled form comes out right, no less noisy, and half as slow again.
-    if nodes.identity(node)[1] == "sampled" and scene.cycles.use_guiding:
+    sampled = form and nodes.identity(node)[1] == "sampled" and not is_stood_in(node, scene)
+    if sampled and scene.cycles.use_guiding:
         said = say("Path Guiding is on: it only costs time with a sampled form")
         found.append(Finding("path_guiding", "WARNING", _of(label, said)))
     if form.get("highlight") and (result := _clamp_highlight(node, form, scene)):
@@ -458,6 +466,12 @@ def of_scene(ours, scene):
     if not takes_nodes or not all(stand_in.is_in(node.node_tree) for node in scripted):
         return found
     return [_by_twin(f, scripted) if f.code in UNABLE else f for f in found]
+
+
+def is_stood_in(node, scene):
+    """Whether a twin is what a scene shows of a node."""
+    stands_in = stand_in.is_in(node.node_tree)
+    return stands_in and any(f.code in UNABLE for f in of_scene([node], scene))
 
 
 def why_not_run(material, scene):

@@ -20,7 +20,9 @@ def working_space():
     """The name of the working space."""
     if hasattr(bpy.data, "colorspace"):
         return bpy.data.colorspace.working_space
-    return "Linear Rec.709"  # of the configuration that Blender has before 5.0
+    # Before 5.0 there is no name: Blender has Rec.709, a configuration of the user's may not.
+    usual = np.allclose(_matrix("from_scene_linear_to_rec709_linear", None), np.eye(3), atol=1e-4)
+    return "Linear Rec.709" if usual else "scene_linear of the OpenColorIO configuration"
 
 
 def set_working_space(name):
@@ -47,7 +49,8 @@ def _matrix(conversion, _space):
 
 def _converted(colors, conversion):
     colors = np.asarray(colors)
-    return colors @ _matrix(conversion, working_space()).T.astype(colors.dtype)
+    kind = colors.dtype if colors.dtype.kind == "f" else float
+    return colors.astype(kind) @ _matrix(conversion, working_space()).T.astype(kind)
 
 
 @functools.cache

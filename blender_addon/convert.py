@@ -443,16 +443,20 @@ def apply(plans):
     """
     wanted = [p for p in plans if not p.refusal]
     checked = [{k: pack.check_value(p.model, k, v) for k, v in p.values.items()} for p in wanted]
+    # What is linked may have any value.
+    forms = [
+        pack.resolve(p.model, "auto", values | dict.fromkeys(p.links))
+        for p, values in zip(wanted, checked, strict=True)
+    ]
     known = set(bpy.data.node_groups)
     try:
-        for p in wanted:
-            nodes.ensure_group(p.model)
+        for p, form in zip(wanted, forms, strict=True):
+            nodes.ensure_group(p.model, form)
     except BaseException:
-        for group in set(bpy.data.node_groups) - known:
-            nodes.remove_group(group)
+        nodes.remove_unused_groups(known)
         raise
-    for p, values in zip(wanted, checked, strict=True):
-        _replace(p, nodes.add_group_node(p.material.node_tree, p.model), values)
+    for p, form, values in zip(wanted, forms, checked, strict=True):
+        _replace(p, nodes.add_group_node(p.material.node_tree, p.model, form), values)
     return len(wanted)
 
 

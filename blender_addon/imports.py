@@ -8,7 +8,7 @@ Blender itself would have each drag add another copy where the file has a group 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import lamps, nodes, stand_in
+from . import lamps, nodes
 
 
 def _brought(context):
@@ -31,11 +31,8 @@ def _after_import(context):
     groups = [group for group in brought if nodes.TAG in group]
     if groups or any(lamps.is_group(group) for group in brought):
         lamps.follow()
-    if groups:
-        stand_in.keep_one_text()
-    # Twins first: they are parts of the others.
-    for group in sorted(groups, key=lambda group: not nodes.is_native(group)):
-        nodes.give_way(group)
+    if any(item.id_type == "NODETREE" for item in context.import_items):
+        nodes.unite(groups)
 
 
 def register():

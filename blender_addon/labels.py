@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Text of panels and dialogs in lines that fit: Blender does not wrap labels, it cuts them."""
 
+import re
 import unicodedata
 
 import blf
@@ -12,7 +13,7 @@ from .i18n import iface
 #: strip of tabs of a sidebar, an icon, and the room that is taken where there is no region.
 _MARGIN, _TABS, _ICON, _ROOM = 54, 22, 20, 250
 #: What no line of Japanese begins with.
-_CLOSING = "、。，．・：；）」』】"
+_CLOSING = "、。，．・：；！？）」』】…%ー々ァィゥェォッャュョぁぃぅぇぉっゃゅょ"
 
 
 def _scale():
@@ -38,7 +39,7 @@ def room(icon=False):
 
 def _pieces(text):
     """The parts between which a line may be broken: words, and characters of East Asian width."""
-    for word in text.split(" "):
+    for word in re.split(r"[ \t\n]+", text):  # not at spaces that hold words together
         piece = " "
         for c in word:
             wide = unicodedata.east_asian_width(c) in "WF"

@@ -171,6 +171,8 @@ def script_problem(group):
     outputs = {n: k for n, k in OUTPUTS.items() if not alone or n != ALBEDO}
     if problem := _script_problem(script, inputs, outputs):
         return problem
+    if tag.get("stands_in") and _script_problem(*stand_in.expected(group)):
+        return f"has lost its node {stand_in.NODE}"
     if albedo_inputs is None:
         return None
     problem = _script_problem(albedo, dict(albedo_inputs), {ALBEDO: OUTPUTS[ALBEDO]})
@@ -385,8 +387,10 @@ def _fill_group(group, model_name, representation, texts, twin_group):
     elif stand_in.has_node(model_name) and "baked" not in tag:
         instead = stand_in.node_of(group, model_name, sources)
     if instead is not None:
+        tag["stands_in"] = True
         runs = _add_script(group, stand_in.text(), "what tells where shaders run")
-        from_scripts["BSDF"] = stand_in.add(group, runs, from_scripts["BSDF"], instead)
+        for name, output in stand_in.add(group, runs, from_scripts, instead).items():
+            from_scripts[name] = output
         group_output.location.x += 100
     for output in outputs:
         group.links.new(from_scripts[output], group_output.inputs[output])
@@ -416,7 +420,15 @@ def find_group(model_name, representation, albedo=False):
     return None
 
 
-def give_way(group):
+def unite(groups):
+    """Has groups that came from another file give way to equal ones of the open file."""
+    stand_in.keep_one_text()
+    # Twins first: they are parts of the others.
+    for group in sorted(groups, key=lambda group: not is_native(group)):
+        _give_way(group)
+
+
+def _give_way(group):
     """Puts the group of the open file that is equal in its place, if there is one."""
     tag = group[TAG].to_dict()
     for other in bpy.data.node_groups:
@@ -617,9 +629,9 @@ def group_nodes(material):
 
 
 def make_local(tree):
-    """Makes the groups and scripts that a tree of this file is made of this file's own."""
+    """Makes the groups, scripts and images that a tree of this file is made of this file's own."""
     for node in tree.nodes:
-        for name in ("node_tree", "script"):
+        for name in ("node_tree", "script", "image"):
             inner = getattr(node, name, None)
             if inner is not None and inner.library is not None:
                 inner.make_local()
@@ -655,11 +667,12 @@ def remove_group(group):
     lamps.remove_unused_group()
 
 
-def remove_unused_groups():
-    """Takes every group of this extension that no node has out of the file."""
+def remove_unused_groups(kept=()):
+    """Takes every group of this extension that no node has out of the file, but for those."""
 
     def unused(group):
-        return TAG in group and group.library is None and group.users == 0
+        ours = TAG in group and group.library is None
+        return ours and group.users == 0 and group not in kept
 
     while group := next(filter(unused, bpy.data.node_groups), None):
         remove_group(group)

@@ -15,6 +15,8 @@ _INSTALLED = Path(__file__).parent
 #: Where models are read from; see use().
 root = _INSTALLED
 FORMAT = 1
+#: Another number whenever nodes.py or twin.py wires nodes in another way.
+WIRING = 1
 
 #: Custom property of a node group: which model and representation it is, and its sockets'
 #: identifiers.
@@ -57,8 +59,10 @@ def manifest():
 
 def osl_available():
     """Whether this build of Blender has Open Shading Language; that of Debian has not."""
-    import _cycles  # a part of Blender, and what reads packs runs outside of it, too
-
+    try:
+        import _cycles
+    except ImportError:  # outside of Blender
+        return True
     return bool(_cycles.with_osl)
 
 
@@ -258,7 +262,7 @@ def digest(model_name, name):
     form = representation(model_name, name)
     schema = [model(model_name)["parameters"], form["only"]]
     forms = model(model_name)["representations"]
-    hashes = [form["sha256"], form.get("albedo_sha256")]
+    hashes = [WIRING, form["sha256"], form.get("albedo_sha256")]
     if "twin" in forms and name != "twin":  # which stands in for it
         hashes.append(forms["twin"]["sha256"])
     text = json.dumps([*hashes, *schema], sort_keys=True)

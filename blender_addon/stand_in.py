@@ -63,7 +63,8 @@ def has_node(model_name):
 
 
 def node_of(group, model_name, parameters):
-    """The shader of the node that stands in for a model. `parameters`: outputs by name."""
+    """The outputs, by name, of the node that stands in for a model. `parameters`: outputs by
+    name."""
     kind, given = _NODES[model_name]
     node = group.nodes.new(kind)
     if kind == "ShaderNodeBsdfMetallic":
@@ -77,33 +78,49 @@ def node_of(group, model_name, parameters):
         for part, socket in zip(source, vector.inputs, strict=True):
             group.links.new(parameters[part], socket)
         group.links.new(vector.outputs[0], node.inputs[name])
-    return node.outputs["BSDF"]
+    return {"BSDF": node.outputs["BSDF"]}
 
 
 def twin_of(group, twin, inputs):
-    """The shader of a twin's group. `inputs`: outputs for its sockets, by identifier."""
+    """The outputs, by name, of a twin's group. `inputs`: outputs for its sockets, by identifier."""
     node = group.nodes.new("ShaderNodeGroup")
     node.node_tree = twin
     for socket in node.inputs:
         if source := inputs.get(socket.identifier):
             group.links.new(source, socket)
-    return node.outputs["BSDF"]
+    return {socket.name: socket for socket in node.outputs}
 
 
-def add(group, script, bsdf, instead):
-    """Returns the output that is the shader `bsdf` of a group where that runs, and else `instead`.
-    script: a script node in the group that runs text()."""
+def add(group, script, outputs, instead):
+    """Returns outputs, by name, that are those of a shader where that runs, and else those of what
+    stands in, as far as both have them. script: a script node in the group that runs text()."""
     script.name = script.label = NODE
     script.location = (0, 300)
-    instead.node.location = (0, 200)
-    mix = group.nodes.new("ShaderNodeMixShader")
-    mix.location = (150, 0)
-    factor, first, second = mix.inputs
-    factor.default_value = 0.0  # where there is no script node
-    group.links.new(script.outputs[NODE], factor)
-    group.links.new(instead, first)
-    group.links.new(bsdf, second)
-    return mix.outputs["Shader"]
+    instead["BSDF"].node.location = (0, 200)
+    made = {}
+    for name in outputs.keys() & instead.keys():
+        if name == "BSDF":
+            mix = group.nodes.new("ShaderNodeMixShader")
+            factor, first, second = mix.inputs
+            made[name] = mix.outputs[0]
+        else:
+            mix = group.nodes.new("ShaderNodeMix")
+            mix.data_type = "RGBA"
+            by_identifier = {socket.identifier: socket for socket in (*mix.inputs, *mix.outputs)}
+            names = ("Factor_Float", "A_Color", "B_Color")
+            factor, first, second = (by_identifier[n] for n in names)
+            made[name] = by_identifier["Result_Color"]
+        mix.location = (150, -200 * len(made))
+        factor.default_value = 0.0  # where there is no script node
+        group.links.new(script.outputs[NODE], factor)
+        group.links.new(instead[name], first)
+        group.links.new(outputs[name], second)
+    return made
+
+
+def expected(group):
+    """The node that tells where shaders run, or None, its inputs and its outputs."""
+    return group.nodes.get(NODE), {}, {NODE: "VALUE"}
 
 
 def is_in(group):

@@ -142,7 +142,7 @@ def energy_text(node):
         rgb = energy.albedo(model_name, values, cosine)
         luminance = color.luminance(np.array(rgb))
         numbers.append(f"{angle}\u00b0\u00a0{luminance:.3f}")  # on one line
-    return "  ".join(numbers) or say("not at a view angle of this scene")
+    return ", ".join(numbers) or say("not at a view angle of this scene")
 
 
 def _draw_form(layout, node, form, scene, editable):

@@ -5,7 +5,6 @@ import math
 
 import bpy
 
-from .. import drivers
 from . import slots
 
 #: Name of the shared group, and the custom property that tells it from another of that name.
@@ -106,13 +105,21 @@ def _read(curve):
     return slots.Driven(target.id, path, factor, added)
 
 
+def _add_driver(socket):
+    """A driver of a socket's value that is the mean of its one variable, and so computes without
+    Python: a file is right where scripts are not allowed to run. Its curve and the variable."""
+    curve = socket.driver_add("default_value")
+    curve.driver.type = "AVERAGE"
+    return curve, curve.driver.variables.new()
+
+
 def write(socket, value):
     """Gives a socket a float, or the driver of a slots.Driven."""
     socket.driver_remove("default_value")
     if not isinstance(value, slots.Driven):
         socket.default_value = value
         return
-    curve, variable = drivers.add(socket)
+    curve, variable = _add_driver(socket)
     if value.is_channel:
         variable.type = "TRANSFORMS"
         target = variable.targets[0]
@@ -121,7 +128,9 @@ def write(socket, value):
         target.transform_space = "WORLD_SPACE"
         target.rotation_mode = "QUATERNION"
     else:
-        drivers.point_at(variable, value.of, value.path)
+        target = variable.targets[0]
+        target.id_type, target.id = value.of.id_type, value.of
+        target.data_path = value.path
     if (value.factor, value.added) != (1.0, 0.0):
         # 4.5 gives a driver's curve this modifier, later versions two keys on the diagonal.
         modifier = curve.modifiers[0] if curve.modifiers else curve.modifiers.new("GENERATOR")

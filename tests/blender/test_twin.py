@@ -149,6 +149,60 @@ def test_what_is_linked_reaches_the_twin_too(extension, balls):
     assert np.ptp(stood_in.mean((0, 1))) > 1e-3, "the noise has colours"
 
 
+def test_the_albedo_output_is_the_twins_too(extension, balls):
+    def shining(form):
+        material = extension.api.new_material("coupled", form)
+        tree, (node,) = material.node_tree, extension.nodes.group_nodes(material)
+        emission = tree.nodes.new("ShaderNodeEmission")
+        tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
+        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+        tree.links.new(emission.outputs[0], output.inputs["Surface"])
+        return material
+
+    shone = {osl: balls([shining("exact")], osl) for osl in (True, False)}
+    np.testing.assert_allclose(balls([shining("twin")], osl=False), shone[False], rtol=1e-5)
+    np.testing.assert_allclose(shone[True], shone[False], atol=0.02)
+    assert np.ptp(shone[True]) > 0.1
+
+
+def test_a_group_that_lost_what_tells_where_shaders_run_is_made_anew(extension, empty):
+    material = extension.api.new_material("phong")
+    (node,) = extension.nodes.group_nodes(material)
+    node.node_tree.nodes.remove(node.node_tree.nodes["Runs"])
+    found = {f.code: f.message for f in extension.api.warnings(material, empty)}
+    assert "has lost its node Runs" in found["script_failed"]
+    extension.api.switch_representation(material, "aimed")
+    assert "script_failed" not in {f.code for f in extension.api.warnings(material, empty)}
+    assert "Runs" in node.node_tree.nodes
+
+
+def test_linked_materials_become_the_files_own_with_their_twins(extension, empty, tmp_path):
+    for model, form in (("phong", "aimed"), ("phong", "sampled"), ("glass", "exact")):
+        extension.api.new_material(model, form).use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (there, here):
+        here.materials = there.materials
+    for material in here.materials:
+        extension.api.make_local(material)
+    for kind, count in (("materials", 3), ("node_groups", 5), ("texts", 4), ("images", 1)):
+        found = getattr(bpy.data, kind)
+        assert len(found) == count, [f.name for f in found]
+        assert not [f.name for f in found if f.library]
+
+
+def test_what_is_said_is_of_the_twin_where_that_stands_in(extension, empty):
+    extension.scene_loader.apply_clean_settings(empty)
+    material = extension.api.new_material("phong", "aimed")
+    material.cycles.use_bump_map_correction = True
+    assert "bump_correction" in {f.code for f in extension.api.warnings(material, empty)}
+    empty.cycles.shading_system = False
+    as_twin = extension.api.new_material("phong", "twin")
+    as_twin.cycles.use_bump_map_correction = True
+    said = [{f.code for f in extension.api.warnings(m, empty)} for m in (material, as_twin)]
+    assert said[0] == said[1] | {"osl_off"}
+
+
 def test_a_twin_goes_with_its_shader(extension, empty):
     material = extension.api.new_material("phong", "aimed")
     assert [t.name for t in bpy.data.node_groups if "twin" in t.name] == ["Phong (twin)"]
