@@ -715,11 +715,27 @@ def add_albedo(node):
         remove_group(without)
 
 
+def _curves(tree):
+    """The curves and drivers of a tree's animation."""
+    data = tree.animation_data
+    if data is None:
+        return
+    yield from data.drivers
+    for layer in data.action.layers if data.action else ():
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                if bag.slot == data.action_slot:
+                    yield from bag.fcurves
+
+
 def replace_group(node, group):
-    """Puts another group of the same model into a group node; values and links stay."""
+    """Puts another group of the same model into a group node; values, links and animation stay.
+    Animation of what the group has no socket of is muted."""
     if group == node.node_tree:
         return
     tree = node.id_data
+    paths = {s.path_from_id("default_value"): name for name, s in sockets(node).items()}
+    animated = [(c, paths[c.data_path]) for c in _curves(tree) if c.data_path in paths]
     values = all_values(node)
     incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
     outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
@@ -735,3 +751,8 @@ def replace_group(node, group):
             tree.links.new(source, present[name])
     for name, target in outgoing:
         tree.links.new(node.outputs[name], target)
+    for curve, name in animated:  # which knows sockets by their number
+        if name in present:
+            curve.data_path = present[name].path_from_id("default_value")
+        else:
+            curve.mute = True

@@ -203,6 +203,28 @@ def test_what_is_said_is_of_the_twin_where_that_stands_in(extension, empty):
     assert said[0] == said[1] | {"osl_off"}
 
 
+def test_animation_stays_with_its_socket_when_the_form_changes(extension, empty):
+    """The twin of lafortune has fewer sockets, so that they have other numbers."""
+    material = extension.api.new_material("lafortune")
+    add_sphere(empty, material)  # or nothing evaluates it
+    (node,) = extension.nodes.group_nodes(material)
+    sockets = extension.nodes.sockets
+    for frame, value in ((1, 10.0), (11, 60.0)):
+        sockets(node)["e"].default_value = value
+        sockets(node)["e"].keyframe_insert("default_value", frame=frame)
+    driver = sockets(node)["ks"].driver_add("default_value", 1)
+    driver.driver.expression = "0.25"
+    before = sockets(node)["e"].path_from_id("default_value")
+    for form in ("twin", "aimed", "sampled"):
+        extension.api.switch_representation(material, form)
+        empty.frame_set(6)
+        bpy.context.view_layer.update()
+        assert sockets(node)["e"].default_value == pytest.approx(35), form
+        assert sockets(node)["ks"].default_value[1] == pytest.approx(0.25), form
+        moved = sockets(node)["e"].path_from_id("default_value") != before
+        assert moved == (form == "twin")
+
+
 def test_a_twin_goes_with_its_shader(extension, empty):
     material = extension.api.new_material("phong", "aimed")
     assert [t.name for t in bpy.data.node_groups if "twin" in t.name] == ["Phong (twin)"]
