@@ -39,7 +39,9 @@ def room(icon=False):
 
 def _pieces(text):
     """The parts between which a line may be broken: words, and characters of East Asian width."""
-    for word in re.split(r"[ \t\n]+", text):  # not at spaces that hold words together
+    # Not at spaces that hold words together, as before a per cent sign.
+    text = re.sub(rf" (?=[{re.escape(_CLOSING)}])", "\u00a0", text)
+    for word in re.split(r"[ \t\n]+", text):
         piece = " "
         for c in word:
             wide = unicodedata.east_asian_width(c) in "WF"

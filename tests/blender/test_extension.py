@@ -602,7 +602,7 @@ def test_no_warnings_for_other_materials(extension, empty):
 
 
 def test_warning_engine_and_osl(extension, empty):
-    material = clean(extension, empty)
+    material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
     empty.render.engine = "BLENDER_WORKBENCH"
     assert codes(extension, material, empty) == ["engine"]
     empty.render.engine = "CYCLES"
@@ -620,7 +620,7 @@ def test_warning_engine_and_osl(extension, empty):
 def test_warning_device(extension, empty, monkeypatch, backend, works):
     # This machine may not have the device: only the preference is pretended.
     monkeypatch.setattr(extension.checks, "gpu_backend", lambda: backend)
-    material = clean(extension, empty)
+    material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
     empty.cycles.device = "GPU"
     untested = ["optix_untested"] if backend == "OPTIX" else []
     assert codes(extension, material, empty) == (untested if works else ["device"])
@@ -635,7 +635,7 @@ def test_gpu_backend_is_the_preference(extension, empty):
 
 
 def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
-    material = clean(extension, empty)
+    material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
     monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
     assert codes(extension, material, empty) == ["blender_version"]
     monkeypatch.undo()

@@ -113,7 +113,7 @@ def test_no_material_is_an_error_that_says_so(extension, empty, given):
 
 
 def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(extension, empty):
-    material = ball(extension, empty, "phong", e=10.0)
+    material = ball(extension, empty, "radziszewski_alda")  # which has no base to show them
     ring(empty, 8, shadow_soft_size=0.0, energy=50)
     assert found(extension, material, empty) == {}
     ring(empty, 8, turn=0.3, shadow_soft_size=0.0, energy=50)
@@ -128,7 +128,7 @@ def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(exte
     # are large enough for a small picture.
     for item in empty.objects:
         if item.type == "LIGHT":
-            item.data.shadow_soft_size = 0.5
+            item.data.shadow_soft_size = 0.25
     assert light_of(empty, 256) == pytest.approx(2 * shown, rel=0.1)
 
 

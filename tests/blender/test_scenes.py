@@ -491,7 +491,7 @@ def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, to
     texture = {"texture": {"image": "green.exr", "colorspace": "Linear Rec.709"}}
     content = {
         "name": "s",
-        "settings": {"width": 32, "height": 32, "spp": 64, "max_bounces": 3},
+        "settings": {"width": 32, "height": 32, "spp": 1024, "max_bounces": 3},
         "camera": {
             "type": "perspective",
             "position": [0, -6, 3],
@@ -518,7 +518,7 @@ def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, to
         tool("scene", source, "--out", folder)
         pairs.append((folder / "blender.exr", folder / "reference.exr"))
         jobs.append({"scene": str(folder / "scene.json"), "out": str(pairs[-1][0]), "timed": False})
-        tool("render", source, "--out", pairs[-1][1], "--spp", "256")
+        tool("render", source, "--out", pairs[-1][1], "--spp", "4096")
     (tmp_path / "jobs.json").write_text(json.dumps(jobs))
     done = drive(extension_zip, "--jobs", tmp_path / "jobs.json")
     if not hasattr(bpy.data, "colorspace"):
