@@ -62,7 +62,7 @@ def lines_of(text, pixels):
             lines.append(line)
             line = ""
         line += piece if line else margin + piece.strip()
-    return [*lines, line]
+    return [made.replace("\u00a0", " ") for made in (*lines, line)]
 
 
 def wrapped(layout, text, icon="NONE", pixels=None):

@@ -114,22 +114,29 @@ def test_no_material_is_an_error_that_says_so(extension, empty, given):
 
 def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(extension, empty):
     material = ball(extension, empty, "radziszewski_alda")  # which has no base to show them
-    ring(empty, 8, shadow_soft_size=0.0, energy=50)
+    first = ring(empty, 8, shadow_soft_size=0.0, energy=50)
     assert found(extension, material, empty) == {}
-    ring(empty, 8, turn=0.3, shadow_soft_size=0.0, energy=50)
+    alone = light_of(empty)
+    second = ring(empty, 8, turn=0.3, shadow_soft_size=0.0, energy=50)
     message = found(extension, material, empty)["lost_lamps"]
     assert "and 5 more" in message and "fainter than the 8" in message
     assert offered(extension, material, empty) == ["operator brdfc.enlarge_lamps Give Lamps a Size"]
     shown = light_of(empty)
+    for item in first:
+        item.hide_render = True
+    bpy.context.view_layer.update()
+    both = alone + light_of(empty)
+    for item in first:
+        item.hide_render = False
+    assert shown < 0.6 * both
     assert bpy.ops.brdfc.enlarge_lamps() == {"FINISHED"}
-    assert all(o.data.shadow_soft_size > 0 for o in empty.objects if o.type == "LIGHT")
+    assert all(item.data.shadow_soft_size > 0 for item in (*first, *second))
     assert list(found(extension, material, empty)) == ["not_aimed"], "what is left is noise"
-    # Half of the light was lost. The other half comes as dots: that it comes is shown by lamps that
-    # are large enough for a small picture.
-    for item in empty.objects:
-        if item.type == "LIGHT":
-            item.data.shadow_soft_size = 0.25
-    assert light_of(empty, 256) == pytest.approx(2 * shown, rel=0.1)
+    # What was lost comes as dots: that it comes is shown by lamps that are large enough for a small
+    # picture.
+    for item in (*first, *second):
+        item.data.shadow_soft_size = 0.25
+    assert light_of(empty, 2048) == pytest.approx(both, rel=0.05)
 
 
 def test_small_lamps_of_sampled_forms_get_a_size_by_the_same_button(extension, empty):
