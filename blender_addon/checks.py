@@ -4,24 +4,16 @@
 from dataclasses import dataclass
 
 import bpy
-import numpy as np
 
 from . import closure_pool, i18n, lamp_checks, nodes, pack, stand_in, update
 from .i18n import say
+from .setting_checks import DECLARED, clamp_highlight
 
 BLENDER_MIN = (4, 5, 0)
 #: Devices other than the CPU whose kernels can run OSL.
 OSL_DEVICES = {"OPTIX"}
 #: The run of these shaders on an OptiX device that is on record, in words; None: there is none.
 OPTIX_RUN = None
-#: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
-#: pixel is about 1e-6 of the distance; an orthographic camera has no direction to help out.
-FAR_PIXEL = 1e-5
-#: Below this, a clamp on indirect light shows in the highlights of Blender's own closures.
-LOW_CLAMP = 10
-#: A brighter one shows earlier: measured (script/conditions) under a sun of irradiance 3, in which
-#: a highlight of f cos = 14 loses 6 % of its light to a clamp at 10, and one of 2 nothing.
-CLAMP_OF_HIGHLIGHT = 5
 
 
 @dataclass(frozen=True)
@@ -100,183 +92,6 @@ def _pool_findings(material, scene):
         )
 
 
-def _pixel_size(scene):
-    render, camera = scene.render, scene.camera.data
-    longest = max(render.resolution_x, render.resolution_y) * render.resolution_percentage / 100
-    return camera.ortho_scale / max(longest, 1)
-
-
-def _far_orthographic(scene):
-    camera = scene.camera
-    if camera is None or camera.type != "CAMERA" or camera.data.type != "ORTHO":
-        return False
-    distance = camera.matrix_world.translation.length
-    return _pixel_size(scene) < FAR_PIXEL * distance
-
-
-def _bump_correction(material, scene):
-    if material.cycles.use_bump_map_correction:
-        return (
-            "ERROR",
-            say(
-                "Bump Map Correction is on in the material's settings: where a normal map or bump "
-                "bends the surface this form sends light the wrong way"
-            ),
-        )
-
-
-def _path_guiding(material, scene):
-    if scene.cycles.use_guiding:
-        return "ERROR", say("Path Guiding is on: this form comes out wrong with it")
-
-
-def _clamp_indirect(material, scene):
-    clamp = scene.cycles.sample_clamp_indirect
-    if clamp > 0:
-        return (
-            "WARNING",
-            say(
-                "Indirect Light is clamped to {clamp}: it darkens bright reflections of this form; "
-                "0 is exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
-
-
-def _clamp_mirror(material, scene):
-    clamp = scene.cycles.sample_clamp_indirect
-    if clamp > 0:
-        return (
-            "WARNING",
-            say(
-                "Indirect Light is clamped to {clamp}: it darkens bright lights in this mirror; "
-                "0 is exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
-
-
-def _clamp_direct(material, scene):
-    clamp = scene.cycles.sample_clamp_direct
-    if clamp > 0:
-        return (
-            "WARNING",
-            say(
-                "Direct Light is clamped to {clamp}: it darkens highlights of this form; 0 is "
-                "exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
-
-
-def _far_camera(material, scene):
-    if _far_orthographic(scene):
-        return (
-            "WARNING",
-            say(
-                "The orthographic camera is so far away that the noise of this form shows "
-                "patterns: move it closer"
-            ),
-        )
-
-
-def _caustics(material, scene):
-    if not scene.cycles.caustics_reflective:
-        return (
-            "WARNING",
-            say(
-                "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
-                "is lost"
-            ),
-        )
-
-
-def _filter_glossy(material, scene):
-    if scene.cycles.blur_glossy > 0:
-        return (
-            "WARNING",
-            say(
-                "Filter Glossy is {value}: it darkens repeated reflections of this form; "
-                "0 is exact",
-                value=f"{scene.cycles.blur_glossy:g}",
-            ),
-        )
-
-
-def _albedo_passes(material, scene):
-    cycles = scene.cycles
-    denoised = cycles.use_denoising and cycles.denoising_input_passes != "RGB"
-    layers = scene.view_layers
-    passes = any(v.use_pass_diffuse_color or v.cycles.denoising_store_passes for v in layers)
-    if denoised:
-        return (
-            "WARNING",
-            say(
-                "Denoising may blur details of this form; without it the picture is right",
-                more="The colour that the denoiser is given of it is too bright",
-            ),
-        )
-    if passes:
-        return (
-            "WARNING",
-            say(
-                "Colour and denoising passes show this form too bright: denoising may blur "
-                "details; the picture itself is right"
-            ),
-        )
-
-
-def _albedo_passes_mirror(material, scene):
-    # Measured: from 5.2 the denoiser counts a part of a mirror beside drawn directions.
-    return _albedo_passes(material, scene) if bpy.app.version >= (5, 2, 0) else None
-
-
-def _normal_pass(material, scene):
-    cycles = scene.cycles
-    denoised = cycles.use_denoising and cycles.denoising_input_passes == "RGB_ALBEDO_NORMAL"
-    if denoised or any(v.cycles.denoising_store_passes for v in scene.view_layers):
-        return (
-            "WARNING",
-            say(
-                "Denoising may blur details of this form; without it the picture is right",
-                more="The normals that the denoiser is given of it are noisy: Albedo alone is "
-                "better",
-            ),
-        )
-
-
-def _leaning_facets(material, scene):
-    # Measured (tests/blender/test_every_fit.py); later versions are right.
-    if bpy.app.version < (5, 0, 0) and scene.render.engine == "CYCLES":
-        return (
-            "WARNING",
-            say(
-                "In Blender 4.5 a twin is up to 7 % too bright where it is seen from the side; "
-                "Blender 5.0 is right"
-            ),
-        )
-
-
-#: What a form may declare itself sensitive to in the manifest. A rule returns
-#: (severity, message), or None where nothing is wrong.
-DECLARED = {
-    "bump_correction": _bump_correction,
-    "path_guiding": _path_guiding,
-    "clamp_indirect": _clamp_indirect,
-    "clamp_direct": _clamp_direct,
-    "zero_size_lights": lamp_checks.tiny,
-    "multiple_importance": lamp_checks.multiple_importance,
-    "orthographic_far": _far_camera,
-    "caustics": _caustics,
-    "filter_glossy": _filter_glossy,
-    "albedo_passes": _albedo_passes,
-    "albedo_passes_mirror": _albedo_passes_mirror,
-    "clamp_mirror": _clamp_mirror,
-    "normal_pass": _normal_pass,
-    "leaning_facets": _leaning_facets,
-}
-
-
 def is_eevee(scene):
     """Whether a scene renders with EEVEE, which has another name in each version."""
     return scene.render.engine.startswith("BLENDER_EEVEE")
@@ -332,7 +147,7 @@ def scene_warnings(scene):
             )
         )
     if not pack.osl_available():
-        return [*found, Finding("no_osl", "ERROR", nodes.NO_OSL)]
+        return [*found, Finding("no_osl", "ERROR", pack.NO_OSL)]
     if scene.render.engine != "CYCLES":
         found.append(
             Finding(
@@ -363,24 +178,6 @@ def scene_warnings(scene):
     return found
 
 
-def _clamp_highlight(node, form, scene):
-    """A clamp that shows in the highlight that a form has at the node's values."""
-    clamp, highlight = scene.cycles.sample_clamp_indirect, form["highlight"]
-    bright = max(highlight["f_cos"])
-    if highlight["name"]:
-        value = nodes.get_value(node, highlight["name"])
-        if value is not None:
-            bright = np.interp(value, highlight["values"], highlight["f_cos"])
-    if 0 < clamp < max(LOW_CLAMP, CLAMP_OF_HIGHLIGHT * bright):
-        return (
-            "WARNING",
-            say(
-                "Indirect Light is clamped to {clamp}: it darkens highlights; 0 is exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
-
-
 def _of_another_version(material, node, label):
     if nodes.is_newer(node):
         said = say("made by a later version, {version}", version=nodes.made_by(node))
@@ -406,7 +203,7 @@ def node_warnings(node, material, scene):
     form, schema = nodes.manifest_entry(node) or ({}, {})
     if not form:
         found.append(_of_another_version(material, node, label))
-    if is_stood_in(node, scene):
+    if stood_in := is_stood_in(node, scene):
         form = _twin(node) or {}
     declared = [] if is_eevee(scene) else form.get("warnings", [])
     for name, parameter in schema.items():
@@ -440,11 +237,11 @@ def node_warnings(node, material, scene):
             )
             found.append(Finding("out_of_fit", "WARNING", _of(label, said)))
     # Measured: a sampled form comes out right, no less noisy, and half as slow again.
-    sampled = form and nodes.identity(node)[1] == "sampled" and not is_stood_in(node, scene)
+    sampled = form and nodes.identity(node)[1] == "sampled" and not stood_in
     if sampled and scene.cycles.use_guiding:
         said = say("Path Guiding is on: it only costs time with a sampled form")
         found.append(Finding("path_guiding", "WARNING", _of(label, said)))
-    if form.get("highlight") and (result := _clamp_highlight(node, form, scene)):
+    if form.get("highlight") and (result := clamp_highlight(node, form, scene)):
         found.append(Finding("clamp_low", result[0], _of(label, result[1])))
     for code, severity, said in lamp_checks.of_node(node, form, scene):
         found.append(Finding(code, severity, _of(label, said)))
@@ -502,7 +299,7 @@ def enable_osl(scene):
     Raises RuntimeError when this Blender has no OSL.
     """
     if not pack.osl_available():
-        raise RuntimeError(nodes.NO_OSL)
+        raise RuntimeError(pack.NO_OSL)
     done = []
     if scene.render.engine != "CYCLES":
         done.append(say("Render engine changed from {engine} to Cycles", engine=engine_name(scene)))

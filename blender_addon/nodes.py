@@ -5,16 +5,13 @@ A group is made once per model, representation and version of the shader, and re
 bytecode both lie inside the .blend, so a saved file renders where the extension is not installed.
 """
 
-import contextlib
 import json
-import os
-import sys
-import tempfile
-from pathlib import Path
 
 import bpy
 
-from . import lamps, pack, stand_in, twin
+from . import compiler, lamps, pack, stand_in, twin
+from .compiler import CompileError
+from .group_sockets import VECTORS, add_parameter, vector_socket
 from .i18n import say
 from .pack import choice_label
 
@@ -24,69 +21,12 @@ ALBEDO = "Albedo"
 _SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
 
 
-NO_OSL = say("This Blender was built without Open Shading Language")
-
-
-class CompileError(RuntimeError):
-    """Cycles could not compile a shader, or compiled it to something else than expected."""
-
-
 def empty_tree(owner):
     """The node tree of a new material or world, without a node."""
     if owner.node_tree is None:  # before 5.0 it starts without nodes
         owner.use_nodes = True
     owner.node_tree.nodes.clear()
     return owner.node_tree
-
-
-def _find_oslquery():
-    """Makes the `oslquery` module importable, which Cycles needs to find a script's sockets.
-
-    Blender proper has it on its path. The bpy wheel has not: there it lies in the folder of
-    site-packages that ships with the wheel.
-    """
-    try:
-        import oslquery  # noqa: F401
-
-        return
-    except ImportError:
-        pass
-    root = Path(bpy.utils.resource_path("LOCAL"))
-    # On Windows without a folder of the version.
-    layouts = ("python/lib/python3.*/site-packages", "python/lib/site-packages")
-    added = [str(p) for layout in layouts for p in root.glob(layout)]
-    # At the end, so that what the interpreter already has keeps its priority.
-    sys.path.extend(p for p in added if p not in sys.path)
-    try:
-        import oslquery  # noqa: F401
-    except ImportError as error:
-        raise CompileError(
-            say(
-                "Blender's compiler of shaders can't be loaded",
-                more=f"the module oslquery: {error}. A separately installed OpenImageIO in the "
-                "same Python gets in its way",
-            )
-        ) from error
-
-
-@contextlib.contextmanager
-def _captured_stderr():
-    """Collects what native code prints: the OSL compiler reports errors nowhere else."""
-    lines = []
-    try:
-        saved = os.dup(2)
-    except OSError:  # a windowed application without a console
-        yield lines
-        return
-    with tempfile.TemporaryFile() as sink:
-        os.dup2(sink.fileno(), 2)
-        try:
-            yield lines
-        finally:
-            os.dup2(saved, 2)
-            os.close(saved)
-            sink.seek(0)
-            lines += sink.read().decode(errors="replace").splitlines()
 
 
 def is_native(group):
@@ -179,128 +119,6 @@ def script_problem(group):
     return problem and f"of the Albedo output {problem}"
 
 
-def _compile(script_node, text, what):
-    import cycles.osl
-
-    if not pack.osl_available():
-        raise CompileError(NO_OSL)
-    _find_oslquery()
-    reports = []
-    with _captured_stderr() as console:
-        # Under Cycles the assignment compiles by itself; under another engine it does nothing.
-        script_node.script = text
-        if not script_node.bytecode:
-            cycles.osl.update_script_node(
-                script_node, lambda kind, message: reports.append((kind, message))
-            )
-    if script_node.bytecode and script_node.outputs:
-        return
-    lines = [line.strip() for line in console if "error" in line.lower()]
-    lines += [message for kind, message in reports if "ERROR" in kind]
-    detail = "; ".join(dict.fromkeys(lines[:4])) or "the compiler gave no reason"
-    raise CompileError(
-        say(
-            "Blender could not compile the shader of a model",
-            more=f"{what}: the shader failed to compile: {detail}",
-        )
-    )
-
-
-def _socket(group, name, kind, description, **settings):
-    socket = group.interface.new_socket(
-        name, in_out="INPUT", socket_type=kind, description=description
-    )
-    for key, value in settings.items():
-        setattr(socket, key, value)
-    return socket
-
-
-def _range_text(parameter):
-    unit = f" {parameter['unit']}" if parameter.get("unit") else ""
-    return f"{parameter['min']:g} to {parameter['max']:g}{unit}"
-
-
-def tooltip(parameter):
-    """Tooltip of a parameter's socket: its description and what it accepts."""
-    doc = parameter["doc"].rstrip()
-    doc += "" if doc.endswith((".", "!", "?")) or not doc else "."
-    if parameter["kind"] == "number":
-        return f"{doc} Accepted: {_range_text(parameter)}"
-    if parameter["kind"] == "choice":
-        listed = ", ".join(f"{i} = {c}" for i, c in enumerate(parameter["choices"]))
-        return f"{doc} {listed}"
-    return doc.removesuffix(".")
-
-
-def has_menus():
-    """Whether shader groups can have menu sockets (from 5.0); a choice is a number before that."""
-    return bpy.app.version >= (5, 0, 0)
-
-
-def _add_choice(group, group_input, script_input, parameter):
-    default = parameter["choices"].index(parameter["default"])
-    if not has_menus():
-        socket = _socket(
-            group,
-            parameter["label"],
-            "NodeSocketInt",
-            tooltip(parameter),
-            min_value=0,
-            max_value=len(parameter["choices"]) - 1,
-            default_value=default,
-        )
-        group.links.new(group_input.outputs[-2], script_input)
-        return socket
-    switch = group.nodes.new("GeometryNodeMenuSwitch")
-    switch.label = parameter["label"]
-    switch.data_type = "INT"
-    switch.enum_items.clear()
-    for identifier in parameter["choices"]:
-        switch.enum_items.new(choice_label(identifier))
-    values = [s for s in switch.inputs if s.type == "INT"]
-    for index, value in enumerate(values):
-        value.default_value = index
-    socket = _socket(group, parameter["label"], "NodeSocketMenu", tooltip(parameter))
-    group.links.new(group_input.outputs[-2], switch.inputs[0])
-    group.links.new(switch.outputs[0], script_input)
-    socket.default_value = choice_label(parameter["default"])
-    return socket
-
-
-def _add_parameter(group, group_input, script_input, parameter):
-    label, text, kind = parameter["label"], tooltip(parameter), parameter["kind"]
-    if kind == "choice":
-        return _add_choice(group, group_input, script_input, parameter)
-    if kind == "color":
-        color = (*parameter["default"], 1.0)
-        socket = _socket(group, label, "NodeSocketColor", text, default_value=color)
-    else:
-        # Blender holds a slider to a socket's range but accepts other typed numbers: that is
-        # the meaning of the soft range. Out of the accepted range, the panel warns.
-        low, high = parameter["soft_min"], parameter["soft_max"]
-        settings = {"min_value": low, "max_value": high}
-        if (low, high) == (0, 1) == (parameter["min"], parameter["max"]):
-            settings = {"subtype": "FACTOR"} | settings
-        socket = _socket(
-            group, label, "NodeSocketFloat", text, **settings, default_value=parameter["default"]
-        )
-    group.links.new(group_input.outputs[-2], script_input)
-    return socket
-
-
-#: Sockets of a group beside its model's parameters, and their tooltips.
-VECTORS = {
-    pack.NORMAL: "Shading normal; unlinked, the one of the surface",
-    pack.TANGENT: "First axis of anisotropy; unlinked, the object's Z axis along the surface",
-}
-
-
-def _vector_socket(group, name, text):
-    # Without a value, an unlinked input keeps the shader's own default: the shading normal, and
-    # the frame that the shader builds for itself.
-    return _socket(group, name, "NodeSocketVector", text, hide_value=True)
-
-
 def _start_group(group, outputs=OUTPUTS):
     """Output sockets, and the nodes that stand for the group's inputs and outputs."""
     kinds = {"SHADER": "NodeSocketShader", "RGBA": "NodeSocketColor"}
@@ -317,9 +135,9 @@ def _fill_native_group(group, model_name, representation, source):
     for name, parameter in pack.socket_parameters(model_name, representation).items():
         relay = group.nodes.new("NodeReroute")
         relay.location = (-100, -40 * len(outputs))
-        sockets[name] = _add_parameter(group, group_input, relay.inputs[0], parameter)
+        sockets[name] = add_parameter(group, group_input, relay.inputs[0], parameter)
         outputs[name] = relay.outputs[0]
-    sockets |= {name: _vector_socket(group, name, text) for name, text in VECTORS.items()}
+    sockets |= {name: vector_socket(group, name, text) for name, text in VECTORS.items()}
     normal = group_input.outputs[pack.NORMAL]
     tables = f"{pack.model(model_name)['label']} (twin)"
     made = twin.wire(group, json.loads(source), normal, outputs, tables)
@@ -332,7 +150,7 @@ def _fill_native_group(group, model_name, representation, source):
 def _add_script(group, text, what):
     script = group.nodes.new("ShaderNodeScript")
     script.mode = "INTERNAL"
-    _compile(script, text, what)
+    compiler.compile_script(script, text, what)
     return script
 
 
@@ -369,9 +187,9 @@ def _fill_group(group, model_name, representation, texts, twin_group):
     inputs = {s.identifier: s for s in script.inputs}
     sockets = {}
     for name, parameter in pack.socket_parameters(model_name, representation).items():
-        sockets[name] = _add_parameter(group, group_input, inputs[name], parameter)
+        sockets[name] = add_parameter(group, group_input, inputs[name], parameter)
     for name, text_ in VECTORS.items():
-        sockets[name] = _vector_socket(group, name, text_)
+        sockets[name] = vector_socket(group, name, text_)
         group.links.new(group_input.outputs[-2], inputs[name])
     if lamp_inputs := _lamp_inputs(model_name, representation):
         shared = group.nodes.new("ShaderNodeGroup")
@@ -456,8 +274,8 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
         sources |= dict([of_albedo])
     # Lean ones hold no more than a render needs.
     stands_in = not native and not baked and "twin" in pack.model(model_name)["representations"]
+    known = set(bpy.data.node_groups)
     twin_group = ensure_group(model_name, "twin") if stands_in else None
-    twin_name = twin_group and twin_group.name
     texts = [] if native else [bpy.data.texts.new(f"{stem}.osl") for stem in sources]
     names = [text.name for text in texts]
     form = ", ".join([representation, *([ALBEDO] if len(texts) > 1 else [])])
@@ -496,10 +314,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
         remove_group(group)
         for name in set(names) & set(bpy.data.texts.keys()):
             bpy.data.texts.remove(bpy.data.texts[name])
-        # The group takes the twin with it if it has it already.
-        left = twin_name and bpy.data.node_groups.get((twin_name, None))
-        if left and left.users == 0:
-            remove_group(left)
+        remove_unused_groups(known)  # a twin that was made for it
         raise
     return group
 

@@ -57,6 +57,10 @@ def manifest():
     return data
 
 
+#: Why there is no form but twins.
+NO_OSL = say("This Blender was built without Open Shading Language")
+
+
 def osl_available():
     """Whether this build of Blender has Open Shading Language; that of Debian has not."""
     try:

@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 
 import bpy
 
-from .. import nodes, pack
+from .. import pack
 from ..i18n import say
 from ..jobs import ProgramJob
 
@@ -189,7 +189,7 @@ class Making(ProgramJob):
 
     def __init__(self):
         if not pack.osl_available():
-            raise LibraryError(nodes.NO_OSL)
+            raise LibraryError(pack.NO_OSL)
         self._count = len(entries())
         self._made = self._open_folder("brdfc-library-") / "library"
         self._made.mkdir()

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -256,7 +257,7 @@ def script_material(extension, name, source, surface="BSDF"):
     tree = empty_tree(material)
     script = tree.nodes.new("ShaderNodeScript")
     script.mode = "INTERNAL"
-    extension.nodes._compile(script, text, name)
+    import_module(f"{extension.package}.compiler").compile_script(script, text, name)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(script.outputs[surface], output.inputs["Surface"])
     material.cycles.use_bump_map_correction = False

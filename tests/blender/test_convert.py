@@ -268,7 +268,8 @@ def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkey
     before = helpers.counts()
     plans = convert.plan(materials)
     assert helpers.counts() == before
-    compile_, calls = extension.nodes._compile, []
+    compiler = import_module(f"{extension.package}.compiler")
+    compile_, calls = compiler.compile_script, []
 
     def fail_second(*arguments):
         calls.append(arguments)
@@ -276,7 +277,7 @@ def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkey
             raise extension.nodes.CompileError("as if it could not")
         compile_(*arguments)
 
-    monkeypatch.setattr(extension.nodes, "_compile", fail_second)
+    monkeypatch.setattr(compiler, "compile_script", fail_second)
     with pytest.raises(RuntimeError, match="as if it could not"):
         convert.apply(plans)
     assert helpers.counts() == before

@@ -4,6 +4,7 @@
 import os
 import sysconfig
 import time
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -272,8 +273,8 @@ def test_without_the_program_nothing_changes(extension, used, tmp_path, monkeypa
 
 
 def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeypatch):
-    compile_ = extension.nodes._compile
-    calls = []
+    compiler = import_module(f"{extension.package}.compiler")
+    compile_, calls = compiler.compile_script, []
 
     def fail_second(*arguments):
         calls.append(arguments)
@@ -281,7 +282,7 @@ def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeyp
             raise extension.nodes.CompileError("as if it could not")
         compile_(*arguments)
 
-    monkeypatch.setattr(extension.nodes, "_compile", fail_second)
+    monkeypatch.setattr(compiler, "compile_script", fail_second)
     refused_and_unchanged(extension, used["coupled"], "as if it could not")
     assert len(calls) == 2
 
