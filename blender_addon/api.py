@@ -18,9 +18,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, convert, lamp_checks, lamps, lean, library, nodes, pack, update
+from . import checks, convert, kernel, lamp_checks, lamps, lean, library, nodes, pack, update
 from .checks import Finding, enable_osl, warnings
-from .i18n import Sentence, say
+from .i18n import say
 from .lamps import Lamp
 from .lean import PlanError
 from .library import LibraryError
@@ -169,11 +169,6 @@ def _set(node, what, parameters):
         nodes.set_value(node, name, value)
 
 
-#: The model whose kernel may be drawn, and its heights: equally far apart, the last at u = 3.
-KERNEL_MODEL = "lossless"
-_HEIGHTS = ("h0", "h1", "h2", "h3")
-
-
 def set_kernel(group, curve):
     """Draws the kernel of a group node of `lossless` as a Float Curve node has it.
 
@@ -181,50 +176,16 @@ def set_kernel(group, curve):
     Raises ValueError for another node, and where a height is not positive or too small beside the
     largest; nothing is changed then.
     """
-    if not nodes.is_ours(group) or nodes.identity(group)[0] != KERNEL_MODEL:
+    if not nodes.is_ours(group) or nodes.identity(group)[0] != kernel.MODEL:
         raise ValueError(
             say(
                 "Node {node!r}: expected a node of the model {model!r}",
                 node=group.name,
-                model=KERNEL_MODEL,
+                model=kernel.MODEL,
             )
         )
-    if curve.bl_idname != "ShaderNodeFloatCurve":
-        raise ValueError(
-            say(
-                "Node {node!r}: expected a Float Curve, got {kind}",
-                node=curve.name,
-                kind=Sentence(curve.bl_label),
-            )
-        )
-    mapping = curve.mapping
-    mapping.initialize()  # a new curve can't be evaluated before
-    places = [i / (len(_HEIGHTS) - 1) for i in range(len(_HEIGHTS))]
-    heights = [mapping.evaluate(mapping.curves[0], x) for x in places]
-    lowest = pack.parameters(KERNEL_MODEL).get("h0", {"min": 0})["min"]
-    for x, height in zip(places, heights, strict=True):
-        where = {"curve": curve.name, "x": f"{x:.3g}"}
-        if not height > 0:
-            raise ValueError(
-                say(
-                    "Curve {curve!r} at x = {x}: expected a height above 0, got {height}",
-                    **where,
-                    height=f"{height:.3g}",
-                )
-            )
-        if height < lowest * max(heights):
-            raise ValueError(
-                say(
-                    "Curve {curve!r} at x = {x}: expected at least {lowest} of the largest "
-                    "height, got {height} of it",
-                    **where,
-                    lowest=f"{lowest:g}",
-                    height=f"{height / max(heights):.3g}",
-                )
-            )
-    relative = [height / max(heights) for height in heights]
-    values = dict(zip(_HEIGHTS, relative, strict=True))
-    _set(group, say("node {name!r}", name=group.name), {"kernel": "table", **values})
+    values = {"kernel": "table", **kernel.heights(curve)}
+    _set(group, say("node {name!r}", name=group.name), values)
 
 
 def set_substance(material, substance, node=None, thickness=None):

@@ -1,25 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials of Blender's own nodes, as the model of this extension that comes nearest.
 
-Each candidate's width is sought so that it misplaces least of the light, and the candidate that
-misplaces least is taken; the formulas of the models come as NumPy with the extension. Nothing is
-changed before apply().
+Nothing is changed before apply().
 """
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
-import numpy as np
 
-from . import native_bsdf, nodes, pack
+from . import nodes, pack
 from .i18n import Sentence, say
 from .native_bsdf import Native
+from .nearest_model import Target, candidates, nearest_factor, with_width
 
-#: Views at which models are compared, as cosines, and directions of light for each.
-VIEWS = (0.95, 0.75, 0.5, 0.25)
-DIRECTIONS = 256
 #: Roughnesses at which a model is to be near where a texture gives it.
 ROUGHNESSES = (0.2, 0.5, 0.8)
 #: Colour at which one that a texture gives is compared.
@@ -29,214 +22,6 @@ GREY = (0.5, 0.5, 0.5)
 BEFORE = "brdfc_before"
 #: Of nodes that were added for it: the name of the group node.
 HELPS = "brdfc_helps"
-
-
-@dataclass(frozen=True)
-class Width:
-    """The parameter that says how wide a lobe is: in proportion to roughness^power."""
-
-    name: str
-    low: float
-    high: float
-    power: float
-    #: Parameters of the same meaning across the tangent, and what stretch does to both.
-    across: str = ""
-    stretched: float = 0.0
-
-
-@dataclass(frozen=True)
-class Candidate:
-    model: str
-    #: From the node's values: parameters, as pack.check_value takes them.
-    values: Callable
-    width: Width | None = None
-    #: Which of the node's sockets is which parameter.
-    links: dict = field(default_factory=dict)
-
-
-def _grey(color):
-    return sum(color) / 3
-
-
-def _mixed(native):
-    """Reflectance along the normal."""
-    m = native.metallic
-    return tuple((1 - m) * native.f0 + m * c for c in native.color)
-
-
-def _base(native):
-    return tuple((1 - native.metallic) * c for c in native.color)
-
-
-_SLOPE = {"low": 1e-3, "high": 1.0, "power": 2}
-_EXPONENT = {"low": 1.0, "high": 1e6, "power": -4}
-_COLORED = (
-    Candidate(
-        "cook_torrance",
-        lambda n: {"f0": n.color},
-        Width("m", **(_SLOPE | {"low": 1e-4})),
-        {"f0": "Color"},
-    ),
-    Candidate(
-        "ward",
-        lambda n: {"ks": n.color},
-        Width("ax", **_SLOPE, across="ay", stretched=0.5),
-        {"ks": "Color"},
-    ),
-    Candidate("blinn", lambda n: {"ks": n.color}, Width("e", **_EXPONENT), {"ks": "Color"}),
-    Candidate("max_phong", lambda n: {"ks": n.color}, Width("e", **_EXPONENT), {"ks": "Color"}),
-    Candidate(
-        "modified_phong", lambda n: {"ks": n.color}, Width("e", **_EXPONENT), {"ks": "Color"}
-    ),
-)
-_MATTE = (
-    Candidate("lambert", lambda n: {"rho": n.color}, None, {"rho": "Color"}),
-    *(
-        Candidate(
-            "oren_nayar",
-            lambda n, form=form: {"rho": n.color, "form": form},
-            Width("sigma", 1e-3, 0.66, 1),
-            {"rho": "Color"},
-        )
-        for form in ("full", "qualitative")
-    ),
-)
-_MIRROR = Candidate("lambertian_specular", lambda n: {"rd": 0.0, "rs": _grey(n.color)})
-_COATED = Candidate("coupled", lambda n: {"r0": n.f0, "rm": n.color}, None, {"rm": "Color"})
-
-
-def _polished(links):
-    """A highlight over a base that gives way to it."""
-    width = Width("nu", **_EXPONENT, across="nv", stretched=-1.0)
-    return tuple(
-        Candidate(
-            "ashikhmin_shirley",
-            lambda n, diffuse=diffuse: {"rs": _mixed(n), "rd": _base(n), "diffuse": diffuse},
-            width,
-            links,
-        )
-        for diffuse in ("paper", "tabulated")
-    )
-
-
-def candidates(native):
-    """What may stand for a node. A model without a highlight is none for a node that has one,
-    however little of the light that is."""
-    if native.kind == "diffuse" or (native.kind == "principled" and _mixed(native) == (0, 0, 0)):
-        return _MATTE
-    if native.is_mirror:
-        return (_COATED,) if native.kind == "principled" and native.metallic == 0 else (_MIRROR,)
-    if native.kind == "glossy":
-        return _COLORED
-    if native.metallic == 1:
-        return (*_COLORED, *_polished({"rs": "Color"}))
-    return _polished({"rd": "Color"} if native.metallic == 0 else {})
-
-
-# ---- how near ------------------------------------------------------------------------------------
-
-
-class Directions:
-    """Views and directions of light that see a node's lobe, with weights of an integral over wi."""
-
-    def __init__(self, native):
-        azimuths = (0.3,) if native.stretch == 1 else (0.2, 1.3)
-        self.each = np.array(
-            [
-                (math.sqrt(1 - c * c) * math.cos(a), math.sqrt(1 - c * c) * math.sin(a), c)
-                for c in VIEWS
-                for a in azimuths
-            ]
-        )
-        i = np.arange(DIRECTIONS)
-        u = (0.5 + np.outer(i, (0.8191725134, 0.6710436067))) % 1
-        r, phi = np.sqrt(u[:, 0]), 2 * np.pi * u[:, 1]
-        flat = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - u[:, 0])], -1)
-        alpha = tuple(max(a, 0.02) for a in native.alpha)
-        h = native_bsdf.draw_facets(u, alpha)
-        wi, wo, weight, which = [], [], [], []
-        for k, w in enumerate(self.each):
-            drawn = 2 * (h @ w)[:, None] * h - w
-            # A sample below the surface stands for none: it must not count as one either.
-            both = np.concatenate([flat, drawn])
-            up = both[:, 2] > 1e-4
-            both = both[up]
-            here = np.broadcast_to(w, both.shape)
-            half = native_bsdf.half(both, here)
-            of_lobe = native_bsdf.distribution(half, alpha, False) * half[:, 2]
-            of_lobe /= 4 * np.maximum((half * here).sum(-1), 1e-6)
-            density = (both[:, 2] / np.pi + of_lobe) / 2
-            wi.append(both)
-            wo.append(here)
-            weight.append(1 / (density * 2 * DIRECTIONS))
-            which.append(np.full(len(both), k))
-        self.wi, self.wo = np.concatenate(wi), np.concatenate(wo)
-        self.weight, self.which = np.concatenate(weight), np.concatenate(which)
-
-    def light(self, f_cos):
-        """Integral over the directions of light by view, (k, 3)."""
-        weighed = f_cos * self.weight[:, None]
-        return np.stack([np.bincount(self.which, weighed[:, c]) for c in range(3)], -1)
-
-
-class Target:
-    """A node's light at these directions."""
-
-    def __init__(self, native):
-        self.native, self.at = native, Directions(native)
-        self.f_cos = native_bsdf.f_cos(
-            native, self.at.wi, self.at.wo, (self.at.each, self.at.which)
-        )
-        self.mirror = native_bsdf.mirror(native, self.at.each)
-        self.total = self.at.light(self.f_cos) + self.mirror
-
-    def error(self, model, values):
-        """Part of the light that the model sends elsewhere, mean over views and channels."""
-        from .brdfc import model as formulas
-
-        formula, at = formulas(model), self.at
-        f = formula.eval(at.wi, at.wo, **values) * at.wi[:, 2:]
-        off = at.light(np.abs(f - self.f_cos))
-        off += np.abs(formula.mirror(at.each, **values) - self.mirror)
-        return float((off.sum(1) / np.maximum(self.total.sum(1), 1e-9)).mean())
-
-
-def _with_width(candidate, native, factor):
-    """Values of a candidate whose width is `factor` times the power of the roughness."""
-    values, width = dict(candidate.values(native)), candidate.width
-    if width is None:
-        return values
-    size = factor * max(native.roughness, 1e-3) ** width.power
-    stretch = native.stretch**width.stretched if width.across else 1.0
-    for name, share in ((width.name, stretch), (width.across, 1 / stretch)):
-        if name:
-            values[name] = float(min(max(size * share, width.low), width.high))
-    return values
-
-
-def nearest_factor(candidate, targets):
-    """The factor of the width with the least mean error over the targets, and that error."""
-
-    def error(factor):
-        return sum(
-            t.error(candidate.model, _with_width(candidate, t.native, factor)) for t in targets
-        ) / len(targets)
-
-    if candidate.width is None:
-        return 1.0, error(1.0)
-    width, r = candidate.width, np.array([max(t.native.roughness, 1e-3) for t in targets])
-    ends = np.log([width.low, width.high])[:, None] - width.power * np.log(r)[None]
-    low, high = ends.min(), ends.max()
-    grid = np.linspace(low, high, 16)
-    errors = [error(math.exp(x)) for x in grid]
-    best = int(np.argmin(errors))
-    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    golden = (math.sqrt(5) - 1) / 2
-    for _ in range(10):
-        a, b = high - golden * (high - low), low + golden * (high - low)
-        low, high = (low, b) if error(math.exp(a)) < error(math.exp(b)) else (a, high)
-    factor = math.exp((low + high) / 2)
-    return min((error(f), f) for f in (factor, math.exp(grid[best])))[::-1]
 
 
 # ---- what a node is ------------------------------------------------------------------------------
@@ -394,7 +179,7 @@ def _plan_node(material, node):
             )
         )
     links = {name: color if s == "Color" else s for name, s in candidate.links.items()}
-    values, widths = _with_width(candidate, native, factor), ()
+    values, widths = with_width(candidate, native, factor), ()
     if width and node.inputs["Roughness"].is_linked:
         stretch = native.stretch**width.stretched if width.across else 1.0
         named = [(width.name, stretch), (width.across, 1 / stretch)]

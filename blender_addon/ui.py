@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.types import Menu, Panel
 
-from . import api, checks, color, convert, energy, lamps, nodes, optical, pack
+from . import checks, color, convert, energy, kernel, lamps, nodes, optical, pack
 from .i18n import button, form_name, iface, of_error, say
 from .labels import wrapped
 
@@ -211,7 +211,7 @@ def draw_node(layout, node, material, scene, editable=True):
         menu.node = node.name
     if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
-    if model_name == api.KERNEL_MODEL:
+    if model_name == kernel.MODEL:
         layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
 
 

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
-from .. import api, color, nodes
+from .. import api, color, kernel, nodes
 from ..i18n import iface, of_error, rpt, say, tip
 from ..labels import wrapped
 from .common import ERRORS, OfActiveMaterial, model_node, refused
@@ -163,7 +163,7 @@ class BRDFC_OT_kernel(OfActiveMaterial, Operator):
         return {"FINISHED"}
 
     def _group(self, material):
-        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n)[0] == api.KERNEL_MODEL]
+        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n)[0] == kernel.MODEL]
         wanted = [n for n in ours if n.name == self.node] if self.node else ours
         active = [n for n in wanted if n == n.id_data.nodes.active]
         if not wanted or (len(wanted) > 1 and not active):
@@ -171,7 +171,7 @@ class BRDFC_OT_kernel(OfActiveMaterial, Operator):
                 say(
                     "Material {material!r}: expected an active node of the model {model!r}",
                     material=material.name,
-                    model=api.KERNEL_MODEL,
+                    model=kernel.MODEL,
                 )
             )
         return (active or wanted)[0]

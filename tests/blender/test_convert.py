@@ -39,6 +39,10 @@ def convert(extension, empty):
     return import_module(f"{extension.package}.convert")
 
 
+def nearest_model(convert):
+    return import_module(f"{convert.__package__}.nearest_model")
+
+
 def only(plans):
     (plan,) = plans
     return plan
@@ -63,7 +67,7 @@ def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distrib
     material, node = material_of(kind, distribution, **inputs)
     (native,) = convert.natives(node)
     rng = np.random.default_rng(3)
-    cosines = rng.choice(convert.VIEWS, 200)
+    cosines = rng.choice(nearest_model(convert).VIEWS, 200)
     empty.cycles.max_bounces = 0
     meter = Goniometer(empty, material, tilted(cosines, rng.uniform(0, 6.28, 200)), 4)
     wi = meter.local(meter.add_sun(unit((0.4, -0.3, 0.85))))
@@ -71,7 +75,7 @@ def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distrib
     lit = wi[:, 2] > 1e-2
     wi, wo = wi[lit], wo[lit]
     each, which = np.unique(wo, axis=0, return_inverse=True)
-    expected = convert.native_bsdf.f_cos(native, wi, wo, (each, which.ravel()))
+    expected = nearest_model(convert).native_bsdf.f_cos(native, wi, wo, (each, which.ravel()))
     error = np.abs(measured[lit] - expected).sum() / expected.sum()
     print(f"{kind} {distribution} {inputs}: relative L1 {error:.2g}")
     # Cycles takes albedos of facets from tables of its own, which are coarse.
@@ -138,7 +142,7 @@ def test_the_error_is_that_of_the_pictures(extension, convert, empty):
     for shown in (material, copy):
         bpy.context.scene.cycles.max_bounces = 0
         rng = np.random.default_rng(8)
-        normals = tilted(rng.choice(convert.VIEWS, 600), rng.uniform(0, 6.28, 600))
+        normals = tilted(rng.choice(nearest_model(convert).VIEWS, 600), rng.uniform(0, 6.28, 600))
         meter = Goniometer(empty, shown, normals, 64, perspective=True)
         meter.add_sun(unit((0.4, -0.3, 0.85)))
         pictures.append(meter.measure())
