@@ -170,6 +170,21 @@ def emissive_ball(scene, _folder):
     sphere(scene, "Lamp", material, radius, CENTRE + distance * TOWARDS, segments=24)
 
 
+def emissive_plane(scene, _folder):
+    """A softbox as many make it: a plane of 1.5 x 1 m with an Emission node."""
+    width, height, distance = 1.5, 1.0, 4.0
+    strength = IRRADIANCE * distance**2 / (width * height)
+    material = node_material("Lamp", "ShaderNodeEmission", Strength=strength)
+    plane = quads(
+        scene,
+        "Lamp",
+        material,
+        [rectangle(-width / 2, width / 2, -height / 2, height / 2, 0)],
+    )
+    plane.location = CENTRE + distance * TOWARDS
+    aim(plane, -TOWARDS)
+
+
 def sky_texture(scene, _folder):
     """The node as it is when added, with its sun; only dimmed, and turned to shine on the ball."""
     tree, background = world(scene, strength=0.05)
@@ -256,6 +271,7 @@ CONDITIONS = {
     "sun_angle_0": Condition("sun, angle 0", sun_without_angle, "point"),
     "area": Condition("area lamp, 1 m", area, "point"),
     "emissive_ball": Condition("emissive ball, radius 0.2", emissive_ball, "point"),
+    "emissive_plane": Condition("emissive plane, 1.5 x 1 m", emissive_plane, "point"),
     "sky_texture": Condition("Sky Texture with sun", sky_texture, "point"),
     "smooth_sky": Condition("smooth sky", smooth_sky, "smooth_sky"),
     # Light from the floor takes many random numbers, which hides how fast closures converge.

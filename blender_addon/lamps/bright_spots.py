@@ -46,11 +46,21 @@ def _connected(mask, start):
     return mask & whole[: mask.shape[0], : mask.shape[1]]
 
 
+#: Share of all light times radiance over its mean, from which a place is worth a lobe: drawn
+#: directions that meet it by chance make a variance of about that much, in squares of all light.
+_WORTH = 0.2
+#: The full angle of the largest place: in wider ones light differs more from place to place, and
+#: drawn directions meet them.
+_WIDEST = math.radians(30)
+
+
 def find(luminance, count=SLOTS):
-    """The small bright places of an equirectangular picture, (height, width), row 0 at the bottom:
+    """The bright places of an equirectangular picture, (height, width), row 0 at the bottom:
     [(direction, full angle, irradiance)], the brightest first.
 
-    A place has at least 1 % of all light, a radiance of 20 times the mean, and 0.05 sr at most.
+    A place has a radiance of 3 times the mean at its peak, is 30 degrees wide at most, does not
+    lie around a brighter one, and has a share of all light that is worth a lobe: 1 % where its
+    radiance is 20 times the mean, 4 % at 5 times.
     """
     small, step = _reduced(luminance, 1024)
     height, width = small.shape
@@ -63,23 +73,37 @@ def find(luminance, count=SLOTS):
     total = light.sum()
     if not total > 0:
         return []
+    mean = total / (4 * np.pi)
     left, found = small.copy(), []
     for _ in range(4 * count):
         peak = np.unravel_index(left.argmax(), left.shape)
-        if left[peak] < 20 * total / (4 * np.pi) or len(found) == count:
+        if left[peak] < 3 * mean:
             break
         place = _connected(left >= 0.1 * left[peak], peak)
-        carried = (light * place).sum()
-        # What lies around the place is its own glow.
-        middle = (directions * (light * place)[..., None]).sum((0, 1))
-        middle /= np.linalg.norm(middle)
+        middle, angle = _disk(directions[place], light[place], pixel)
         wide = np.arccos(np.clip((directions[place] @ middle).min(), -1, 1))
+        # What lies around the place is its own glow.
         left[directions @ middle > math.cos(min(wide + 2 * pixel, np.pi))] = 0
         left[place] = 0
-        if carried < 0.01 * total or (solid * place).sum() > 0.05:
-            continue
-        found.append((*_measured(luminance, middle, wide + pixel), carried))
-    return sorted(found, key=lambda spot: -spot[2])
+        if wide < 8 * pixel:
+            middle, angle = _measured(luminance, middle, wide + pixel)
+        share = light[place].sum() / total
+        contrast = share * 2 / (1 - math.cos(angle / 2))
+        glow = any(middle @ other > math.cos(angle / 2) for other, *_ in found)
+        if angle <= _WIDEST and share * contrast >= _WORTH and not glow:
+            found.append((middle, angle, share * total))
+    return sorted(found, key=lambda spot: -spot[2])[:count]
+
+
+def _disk(directions, light, pixel):
+    """Middle and full angle of the disk that holds 95 % of the light of some pixels."""
+    middle = light @ directions
+    middle /= np.linalg.norm(middle)
+    away = np.arccos(np.clip(directions @ middle, -1, 1))
+    order = np.argsort(away)
+    shares = np.cumsum(light[order])
+    radius = away[order][np.searchsorted(shares, 0.95 * shares[-1])]
+    return middle, 2 * (radius + pixel)  # and a pixel, for interpolation
 
 
 def _measured(luminance, direction, wide):
@@ -98,12 +122,8 @@ def _measured(luminance, direction, wide):
         columns = np.arange(math.floor(around) - half, math.ceil(around) + half + 1) % width
         part = part[:, columns]
     directions = _pixel_directions(*np.meshgrid((columns + 0.5) / width, v))
-    weight = part * np.cos((v - 0.5) * np.pi)[:, None]
-    weight = weight * ((directions @ direction > math.cos(wide)) & (part >= 0.1 * part.max()))
-    middle = (directions * weight[..., None]).sum((0, 1))
-    middle /= np.linalg.norm(middle)
-    away = np.arccos(np.clip(directions @ middle, -1, 1)).ravel()
-    order = np.argsort(away)
-    shares = np.cumsum(weight.ravel()[order])
-    radius = away[order][np.searchsorted(shares, 0.95 * shares[-1])]
-    return middle, 2 * (radius + np.pi / height)  # and a pixel, for interpolation
+    # Of the place alone: elsewhere may be brighter.
+    part = part * (directions @ direction > math.cos(wide))
+    place = part >= 0.1 * part.max()
+    light = part * np.cos((v - 0.5) * np.pi)[:, None]
+    return _disk(directions[place], light[place], np.pi / height)

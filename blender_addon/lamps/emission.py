@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much light lights and materials give, as their nodes and settings have it."""
 
+import math
+
+import bpy
 import numpy as np
 
 from .. import color, shader_trees
@@ -30,25 +33,60 @@ _EMITTERS = {
 }
 
 
+#: Nodes by which light differs from place to place, beside textures.
+_PLACES = {
+    "ShaderNodeNewGeometry",
+    "ShaderNodeUVMap",
+    "ShaderNodeAttribute",
+    "ShaderNodeVertexColor",
+}
+
+
+def _emitters(tree, output):
+    output = shader_trees.output(tree, output) if tree is not None else None
+    nodes = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []
+    return [node for node in nodes if node.bl_idname in _EMITTERS]
+
+
+def is_even(owner):
+    """Whether a light or a material emits the same at every place of it."""
+    kind = "ShaderNodeOutputMaterial" if isinstance(owner, bpy.types.Material) else None
+    return not any(
+        source.bl_idname.startswith("ShaderNodeTex") or source.bl_idname in _PLACES
+        for node in _emitters(shader_trees.shading(owner), kind or "ShaderNodeOutputLight")
+        for name in _EMITTERS[node.bl_idname]
+        for source in shader_trees.upstream(node.inputs[name])
+    )
+
+
 def of_material(material):
     """Radiance of a material that light sampling looks for, 0 of most."""
     tree = shader_trees.shading(material)
     if tree is None or material.cycles.emission_sampling == "NONE":
         return 0.0
-    output = shader_trees.output(tree, "ShaderNodeOutputMaterial")
-    if output is None:
-        return 0.0
     return sum(
         _strength(node, *_EMITTERS[node.bl_idname])
-        for node in shader_trees.upstream(output.inputs["Surface"], "SHADER")
-        if node.bl_idname in _EMITTERS
+        for node in _emitters(tree, "ShaderNodeOutputMaterial")
     )
+
+
+def _size(light):
+    """Area of a light, of a sun its solid angle: what the energy of one counts for each of that is
+    not normalised; 0 where it has no size."""
+    if light.type == "SUN":
+        return math.pi * math.tan(min(light.angle, 3.0) / 2) ** 2
+    if light.type != "AREA":
+        return 4 * math.pi * light.shadow_soft_size**2
+    other = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
+    return light.size * other * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1.0)
 
 
 def of_light(light):
     """Energy of a light times its colour, negative as it is positive: closures aim at lamps that
     take light as at others. Of a dark one that may light up, next to nothing."""
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
+    if not getattr(light, "normalize", True):  # since 4.5
+        power *= _size(light) or 1.0
     if tree := shader_trees.shading(light):
         output = shader_trees.output(tree, "ShaderNodeOutputLight")
         nodes = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []

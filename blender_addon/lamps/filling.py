@@ -16,11 +16,12 @@ def _by_slot(numbers):
 
 
 def _arranged(chosen, before):
-    """The chosen lamps in the order of slots: each stays where it is if the list has it already, so
-    that a lamp more or less changes one slot."""
+    """The chosen lamps in the order of slots. Wide ones come first: what the lobe of one gives
+    where a smaller one shines is taken off that one's (docs/aimed.md). Else each stays where it is
+    if the list has it already, so that a lamp more or less changes one slot."""
     arranged, rest = [None] * slots.SLOTS, []
     for candidate in chosen:
-        places = [i for i in range(len(chosen)) if arranged[i] is None]
+        places = [i for i in range(min(len(chosen), len(before))) if arranged[i] is None]
         kept = next((i for i in places if shared_group.all_same(candidate.values, before[i])), None)
         if kept is None:
             rest.append(candidate)
@@ -28,7 +29,8 @@ def _arranged(chosen, before):
             arranged[kept] = candidate
     for candidate in rest:
         arranged[arranged.index(None)] = candidate
-    return arranged[: len(chosen)]
+    # Stable.
+    return sorted(arranged[: len(chosen)], key=lambda c: -c.width)
 
 
 def _checks():
@@ -57,9 +59,8 @@ def _listed(survey, chosen, why=None):
     not for want of room."""
     taken = {id(c) for c in chosen}
     why = why or slots.too_many(len(chosen))
-    return [
-        slots.Lamp(c.name, slot, c.rank, "", c.sizeless) for slot, c in enumerate(chosen, 1)
-    ] + [
+    placed = sorted(enumerate(chosen, 1), key=lambda item: -item[1].rank)
+    return [slots.Lamp(c.name, slot, c.rank, "", c.sizeless) for slot, c in placed] + [
         slots.Lamp(c.name, None, c.rank, c.why or why, c.sizeless)
         for c in survey.candidates
         if id(c) not in taken
@@ -72,17 +73,26 @@ memory = SimpleNamespace(
 )
 
 
+def _add_others(survey, scene):
+    """Adds the lamps of scenes whose pictures are parts of the scene's: Blender calls handlers for
+    the one alone. Each is ranked in its own."""
+    for other in scenes.shown_with(scene):
+        names = {candidate.name for candidate in survey.candidates}
+        survey.candidates += [c for c in scenes.look(other, None).candidates if c.name not in names]
+    survey.candidates.sort(key=lambda c: (-c.rank, c.name))
+
+
 def _fill(scene, depsgraph, subject=None, keep=True):
     """Brings the shared group, if there is one, up to date; returns [slots.Lamp]. `keep`: lamps
-    stay in their slots; else the brightest come first."""
+    stay in their slots where that is possible."""
     survey = scenes.look(scene, depsgraph, subject)
+    _add_others(survey, scene)
     limit = limit_of(scene)
-    chosen = _worth_aiming(survey)[:limit]
-    if group := shared_group.the_one():
+    group = shared_group.the_one()
+    now = shared_group.written(group) if group else []
+    chosen = _arranged(_worth_aiming(survey)[:limit], _by_slot(now) if group and keep else [])
+    if group:
         sockets = shared_group.sockets(group)
-        now = shared_group.written(group)
-        if keep:
-            chosen = _arranged(chosen, _by_slot(now))
         empty = (0.0,) * _SIZE
         wanted = [v for c in chosen for v in c.values] + [*empty] * (slots.SLOTS - len(chosen))
         for (socket, _), old, new in zip(sockets, now, wanted, strict=True):
@@ -142,9 +152,8 @@ def follow():
 
 
 def see(scene):
-    """Fills the slots of the shared group from a scene, the brightest lamp first, and looks at
-    environment images anew. Returns every lamp of the scene as a slots.Lamp, those with a
-    slot first."""
+    """Fills the slots of the shared group from a scene and looks at environment images anew.
+    Returns every lamp of the scene as a slots.Lamp, those with a slot and bright ones first."""
     world.forget_images()
     return quietly(scene, keep=False)
 
@@ -158,7 +167,7 @@ def seen(scene, group=None):
     survey = memory.survey if looked else scenes.look(scene, scene.view_layers[0].depsgraph)
     worth = _worth_aiming(survey)
     if group is None:
-        return _listed(survey, worth[: limit_of(scene)])
+        return _listed(survey, _arranged(worth[: limit_of(scene)], []))
     there = _by_slot(shared_group.written(group))
     chosen = [c for c in worth if any(shared_group.all_same(c.values, slot) for slot in there)]
     return _listed(survey, chosen, slots.elsewhere(group.library))

@@ -73,11 +73,29 @@ def _irradiance(light, matrix):
     return irradiance
 
 
+def _looks(light, matrix):
+    if light.type == "SUN":
+        return slots.looks_alike(light.angle)
+    radius = light.shadow_soft_size if light.type != "AREA" else 0.0
+    if light.type == "AREA":
+        scale = matrix.to_scale()
+        other = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
+        radius = math.hypot(light.size * scale.x, other * scale.y) / 2
+    return slots.looks_like(matrix.translation, radius)
+
+
 def candidate_of(item, name, light, matrix):
     """A light that stands where `matrix` says: followed by drivers where `item` is its object, None
     where it is a copy."""
     values = _values(light, item, matrix)
-    return slots.Candidate(name, values, _irradiance(light, matrix), sizeless=is_sizeless(light))
+    return slots.Candidate(
+        name,
+        values,
+        _irradiance(light, matrix),
+        _looks(light, matrix),
+        sizeless=is_sizeless(light),
+        uneven=light.type == "AREA" and not emission.is_even(light),
+    )
 
 
 def places_lamps(item, depth=0):

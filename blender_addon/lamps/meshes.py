@@ -1,50 +1,110 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that emit as lamps: each as the ball around it, where it looks like one."""
+"""Objects that emit as lamps: flat ones as a rectangle or an ellipse, others as the ball around
+them, where they look like one."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector, geometry
 
 from ..i18n import say
-from . import slots
+from . import emission, slots
 
 #: A lobe covers the whole ball around a mesh, and within it the model and what is seen of the lamp
-#: are averaged apart. So a mesh must fill its ball, as a cube does, or look small; a wide one is
-#: met by drawn directions anyway. Angular radii in radians.
-_FILLS_BALL, _LOOKS_SMALL, _LOOKS_WIDE = 0.5, 0.03, 0.3
+#: are averaged apart. So a mesh must fill its ball, as a cube does, or look small; one that looks
+#: large must be a ball, and a wide one is met by drawn directions. Angular radii in radians.
+_FILLS_BALL, _IS_BALL = 0.5, 0.95
+_LOOKS_SMALL, _LOOKS_LARGE, _LOOKS_WIDE = 0.03, 0.3, 0.4
+#: The same of a rectangle and of an ellipse: what part of the rectangle around it a flat mesh must
+#: fill, and how thick it may be for its lesser side.
+_FILLS_RECTANGLE, _FILLS_ELLIPSE, _THICK = 0.95, 0.7, 0.1
 #: Types of objects that have faces.
 TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
-def _points(item, materials, depsgraph):
-    """Points of an object's faces of some materials, in its own space."""
+def _lit(item, materials, depsgraph):
+    """Points of an object's faces of some materials, in its own space, (n, 3), and triangles of
+    these points, (m, 3); no triangles of what is no mesh or too large a one to look at."""
     own = item.evaluated_get(depsgraph) if depsgraph is not None else item
     mesh = own.data
+    none = np.empty((0, 3), np.int32)
     if item.type != "MESH" or len(mesh.vertices) == 0 or len(mesh.vertices) > 200000:
-        return np.array(own.bound_box)
+        return np.array(own.bound_box), none
     points = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", points)
     points = points.reshape(-1, 3)
-    lit_slots = [s.material in materials for s in item.material_slots]
-    if all(lit_slots):
-        return points
-    index = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get("material_index", index)
-    totals = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get("loop_total", totals)
-    corners = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    lit = np.array(lit_slots)[np.clip(index, 0, len(lit_slots) - 1)]
-    return points[np.unique(corners[np.repeat(lit, totals)])]
+    mesh.calc_loop_triangles()
+    triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    triangles = triangles.reshape(-1, 3)
+    lit_slots = np.array([s.material in materials for s in item.material_slots])
+    if lit_slots.all():
+        return points, triangles
+    index = np.empty(len(triangles), np.int32)
+    mesh.loop_triangles.foreach_get("material_index", index)
+    triangles = triangles[lit_slots[np.clip(index, 0, len(lit_slots) - 1)]]
+    kept, triangles = np.unique(triangles, return_inverse=True)
+    return points[kept], triangles.reshape(-1, 3)
+
+
+def _flat(points, triangles):
+    """A flat mesh as a lamp: its kind, middle, axes as rows, the last across it, and two sizes;
+    None of what is not flat, or neither a rectangle nor an ellipse. In the world's space."""
+    if not 0 < len(triangles) <= 20000:
+        return None
+    edges = points[triangles[:, 1:]] - points[triangles[:, :1]]
+    areas = np.cross(edges[:, 0], edges[:, 1]) / 2
+    across = areas[(areas**2).sum(-1).argmax()]
+    size = np.linalg.norm(across)
+    if not size > 0:
+        return None
+    across = across / size
+    # Each side of something thin by itself.
+    area = max(np.maximum(side * areas @ across, 0).sum() for side in (1, -1))
+    frame = np.array(Vector(across).to_track_quat("Z", "Y").to_matrix()).T
+    flat = ((points - points[0]) @ frame.T)[:, :2]
+    turns = {
+        slots.RECTANGLE: geometry.box_fit_2d([Vector(p) for p in flat]),
+        slots.ELLIPSE: -_main_axis(flat),
+    }
+    for kind, turn in turns.items():
+        turned = np.array(Matrix.Rotation(turn, 3, "Z")) @ frame
+        places = (points - points[0]) @ turned.T
+        low, high = places.min(0), places.max(0)
+        middle, (width, height, thickness) = (low + high) / 2, high - low
+        if not thickness <= _THICK * min(width, height):
+            continue
+        filled = area / (width * height)
+        if kind == slots.ELLIPSE:
+            # No corner may reach out of it.
+            away = ((places - middle)[:, :2] / ((high - low)[:2] / 2)) ** 2
+            fits = filled >= _FILLS_ELLIPSE and away.sum(-1).max() < 1.05
+        else:
+            fits = filled >= _FILLS_RECTANGLE
+        if fits:
+            return kind, points[0] + middle @ turned, turned, (width, height)
+    return None
+
+
+def _main_axis(places):
+    """Angle of the axis along which points, (n, 2), lie farthest apart."""
+    covariance = np.cov(places.T)
+    return math.atan2(2 * covariance[0, 1], covariance[0, 0] - covariance[1, 1]) / 2
 
 
 def candidate_of(item, materials, matrix, depsgraph):
     """An object that emits, as a ball; None where none of its faces does."""
-    points = _points(item, materials, depsgraph)
+    points, triangles = _lit(item, materials, depsgraph)
     if len(points) == 0:
         return None
+    glowing = {s.material for s in item.material_slots} & set(materials)
+    radiance = sum(materials[m] for m in glowing)
+    uneven = not all(emission.is_even(m) for m in glowing)
+    world = points @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
+    if flat := _flat(world, triangles):
+        candidate = _sheet(item, radiance, *flat)
+        candidate.uneven = uneven
+        return candidate
     low, high = points.min(0), points.max(0)
     centre = Vector((low + high) / 2)
     radius = float(np.sqrt(((points - np.array(centre)) ** 2).sum(-1).max()))
@@ -59,29 +119,48 @@ def candidate_of(item, materials, matrix, depsgraph):
         values = slots.numbers(
             slots.BALL, where, sizes=(slots.Driven(item, f"SCALE_{'XYZ'[largest]}", radius), 0.0)
         )
-    radiance = sum(materials[m] for m in {s.material for s in item.material_slots} & set(materials))
     middle = np.array(place)
 
     def irradiance(points):
         squared = ((points - middle) ** 2).sum(-1)
         return radiance * math.pi * size**2 / np.maximum(squared, max(size**2, 1e-12))
 
-    candidate = slots.Candidate(item.name, values, irradiance)
+    looks = slots.looks_like(middle, size)
+    candidate = slots.Candidate(item.name, values, irradiance, looks, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
-    candidate.ball = SimpleNamespace(
-        place=middle, radius=size, fills=size > 0 and extent >= _FILLS_BALL * size
-    )
+
+    def judge(points):
+        distance = np.sqrt(((points - middle) ** 2).sum(-1)).min()
+        angle, fills = size / max(distance, 1e-9), extent / max(size, 1e-12)
+        if angle > (_LOOKS_WIDE if fills >= _IS_BALL else _LOOKS_LARGE):
+            candidate.why = slots.NO_NEED
+        elif angle > _LOOKS_SMALL and fills < _FILLS_BALL:
+            candidate.why = say("a mesh that is neither flat, round nor small")
+
+    candidate.judge = judge
     return candidate
 
 
-def judge(candidate, points):
-    """Leaves a mesh out that is no ball from where the subject is."""
-    ball = candidate.ball
-    if ball is None:
-        return
-    distance = np.sqrt(((points - ball.place) ** 2).sum(-1)).min()
-    angle = ball.radius / max(distance, 1e-9)
-    if angle > _LOOKS_WIDE:
-        candidate.why = slots.NO_NEED
-    elif angle > _LOOKS_SMALL and not ball.fills:
-        candidate.why = say("a mesh that is neither round nor small")
+def _sheet(item, radiance, kind, middle, frame, sizes):
+    """A flat mesh, which shines on both sides, as a lamp that shines on the side of the subject."""
+    area = sizes[0] * sizes[1] * (1 if kind == slots.RECTANGLE else math.pi / 4)
+
+    def irradiance(points):
+        to = points - middle
+        squared = np.maximum((to**2).sum(-1), max(area / math.pi, 1e-12))
+        return radiance * area * np.abs(to @ frame[2]) / squared**1.5
+
+    looks = slots.looks_like(middle, math.hypot(*sizes) / 2)
+    candidate = slots.Candidate(item.name, (), irradiance, looks)
+
+    def judge(points):
+        # Lamps shine along their own -z.
+        z = -frame[2] * (1 if ((points - middle) @ frame[2]).mean() > 0 else -1)
+        axes = Matrix((frame[0], np.cross(z, frame[0]), z)).transposed()
+        turn = axes.to_quaternion()
+        candidate.values = slots.numbers(
+            kind, tuple(middle), (turn.x, turn.y, turn.z), (1, 1, turn.w), sizes
+        )
+
+    candidate.judge = judge
+    return candidate

@@ -8,7 +8,12 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ..i18n import say
 from . import emission, lights, meshes, slots, world
+
+#: Angular radius from which it counts that a lamp's light differs over it: what a lobe carries is
+#: the mean of the model over the lamp.
+_LOOKS_UNEVEN = 0.03
 
 
 @dataclass
@@ -78,6 +83,27 @@ def _subject(scene, shown, matrices):
     return centres.mean(0)[None]
 
 
+def shown_with(scene):
+    """Other scenes whose pictures are parts of a scene's: by its compositor and its sequencer."""
+    found = []
+
+    def walk(tree, seen):
+        for node in tree.nodes if tree is not None and tree not in seen else ():
+            if node.bl_idname == "CompositorNodeRLayers":
+                found.append(node.scene)
+            walk(getattr(node, "node_tree", None), [*seen, tree])
+
+    if scene.render.use_compositing:
+        if hasattr(scene, "compositing_node_group"):  # since 5.0
+            walk(scene.compositing_node_group, [])
+        elif scene.use_nodes:
+            walk(scene.node_tree, [])
+    if scene.render.use_sequencer and scene.sequence_editor is not None:
+        strips = scene.sequence_editor.strips_all
+        found += [strip.scene for strip in strips if strip.type == "SCENE"]
+    return list(dict.fromkeys(s for s in found if s is not None and s != scene))
+
+
 def look(scene, depsgraph, subject=None):
     """A Survey of a scene. `subject`: points of an earlier one, which need no looking for."""
     survey = Survey(subject=subject)
@@ -114,7 +140,12 @@ def look(scene, depsgraph, subject=None):
     if survey.subject is None:
         survey.subject = _subject(scene, shown, matrices)
     for candidate in survey.candidates:
-        meshes.judge(candidate, survey.subject)
+        if candidate.judge is not None:
+            candidate.judge(survey.subject)
         candidate.rank = float(np.mean(candidate.irradiance(survey.subject)))
+        angle = float(np.mean(candidate.looks(survey.subject)))
+        candidate.width = round(math.log2(max(angle, 1e-4)))
+        if candidate.uneven and angle > _LOOKS_UNEVEN and not candidate.why:
+            candidate.why = say("its light is not the same all over it")
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
     return survey

@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 from mathutils import Matrix, Vector
 
 from ..i18n import say
@@ -66,16 +67,35 @@ class Driven:
 
 @dataclass
 class Candidate:
-    """A lamp, the twelve numbers of its slot, and irradiance(points), (n, 3) to (n,)."""
+    """A lamp, the twelve numbers of its slot, irradiance(points), (n, 3) to (n,), and likewise
+    looks(points), its angular radius."""
 
     name: str
     values: tuple
     irradiance: object
+    looks: object
     why: str = ""
     rank: float = 0.0
+    width: int = 0  # doublings of its angular radius
     sizeless: bool = False
-    #: Of a mesh: the ball around it; see meshes.judge().
-    ball: object = None
+    uneven: bool = False  # its light is not the same all over it
+    #: Of a mesh: judge(points) sets values and `why` for a subject at these points, (n, 3).
+    judge: object = None
+
+
+def looks_like(place, radius):
+    """looks() of what has a place and a radius."""
+    middle = np.array(place)
+
+    def looks(points):
+        return radius / np.maximum(np.sqrt(((points - middle) ** 2).sum(-1)), 1e-9)
+
+    return looks
+
+
+def looks_alike(angle):
+    """looks() of what lies in a direction and has this full angle."""
+    return lambda points: np.full(len(points), angle / 2)
 
 
 def numbers(kind, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):

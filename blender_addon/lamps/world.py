@@ -91,7 +91,8 @@ def _sky(node, strength):
     power = _SKY_SUN_IRRADIANCE * strength * node.sun_intensity
     turn = (node.sun_elevation, node.sun_rotation, 0.0)
     values = slots.numbers(slots.SKY_SUN, turn=turn, sizes=(node.sun_size, 0.0))
-    return slots.Candidate(name, values, lambda p: np.full(len(p), power))
+    looks = slots.looks_alike(node.sun_size)
+    return slots.Candidate(name, values, lambda p: np.full(len(p), power), looks)
 
 
 def _environment(node, strength):
@@ -103,7 +104,9 @@ def _environment(node, strength):
     for index, (direction, angle, irradiance) in enumerate(_image_spots(node.image)):
         which = say("{image}, bright spot {number}", image=name, number=index + 1)
         power = irradiance * strength
-        candidate = slots.Candidate(which, None, lambda p, power=power: np.full(len(p), power))
+        candidate = slots.Candidate(
+            which, None, lambda p, power=power: np.full(len(p), power), slots.looks_alike(angle)
+        )
         back = None
         if turn is not None and abs(turn.determinant()) > 1e-9:
             back = turn.inverted() @ Vector(direction)

@@ -196,7 +196,9 @@ def test_meshes_that_shine(extension, empty):
     material = ball(extension, empty)
     add_lamp(empty, energy=100, shadow_soft_size=0.2)
     mesh = bpy.data.meshes.new("Tube")
-    mesh.from_pydata([(-1, 0, 0), (1, 0, 0), (1, 0.1, 0), (-1, 0.1, 0)], [], [(0, 1, 2, 3)])
+    # Two strips at right angles.
+    points = [(-1, 0, 0), (1, 0, 0), (1, 0.1, 0), (-1, 0.1, 0), (-1, 0, 0.1), (1, 0, 0.1)]
+    mesh.from_pydata(points, [], [(0, 1, 2, 3), (0, 1, 5, 4)])
     mesh.materials.append(emissive(0.01))
     tube = bpy.data.objects.new("Tube", mesh)
     tube.location = (0, 0, 6)
@@ -206,7 +208,7 @@ def test_meshes_that_shine(extension, empty):
     messages = found(extension, material, empty)
     assert list(messages) == ["not_aimed"]
     assert messages["not_aimed"].endswith(
-        "Noisy under Tube: a mesh that is neither round nor small"
+        "Noisy under Tube: a mesh that is neither flat, round nor small"
     )
 
 

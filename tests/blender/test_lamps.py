@@ -10,7 +10,7 @@ import bpy
 import helpers
 import numpy as np
 import pytest
-from mathutils import Matrix, Quaternion
+from mathutils import Matrix, Quaternion, Vector
 
 
 @pytest.fixture(scope="module")
@@ -512,8 +512,16 @@ def test_bright_spots_are_found(lamps, subtests):
             assert spot[2] == pytest.approx(5000 * math.pi * 0.05**2, rel=0.05)
     plain = np.ones((64, 128))
     assert find(plain) == [] == find(0 * plain)
-    window = spotted(np.array([1.0, 0, 0]), 0.3, 100.0)[..., 0]
-    assert find(window) == []  # drawn directions meet that
+    window = spotted(np.array([1.0, 0, 0]), 0.2, 100.0)[..., 0]
+    (spot,) = find(window)
+    assert 0.38 <= spot[1] < 0.42
+    assert find(spotted(np.array([1.0, 0, 0]), 0.3, 100.0)[..., 0]) == []  # it is too wide
+    assert find(spotted(np.array([1.0, 0, 0]), 0.05, 3.0)[..., 0]) == []  # it gives too little
+    # The glow around a sun is none, a wall elsewhere that shines as much is one.
+    glow = spotted(np.array([0.0, 1, 0]), 0.02, 5e4) + spotted(np.array([0.0, 1, 0]), 0.2, 60.0)
+    spots = find((glow + spotted(np.array([1.0, 0, 0]), 0.2, 60.0))[..., 0])
+    assert [spot[0] @ (0, 1, 0) > 0.99 for spot in spots] == [True, False]
+    assert spots[0][1] < 0.07 and spots[1][1] > 0.38
     large = spotted(np.array([0.6, 0, 0.8]), 0.01, 1e5, width=2048)[..., 0]
     (spot,) = find(large)
     assert 0.02 <= spot[1] < 0.026
@@ -581,11 +589,139 @@ def test_emissive_meshes(extension, ball, empty, kind):
     assert slots(empty) == [ball_at((4, 3.3, 6), 0.3)]
     glow.location.z = 7
     assert slots(empty) == [ball_at((4, 3.3, 7), 0.3)]
-    glow.scale = (5, 5, 5)
+    glow.location, glow.scale = (4, -12, 0), (12, 12, 12)
     assert slots(empty) == []
-    glow.scale = (0.3, 0.3, 0.001)
+    glow.location, glow.scale = (4, 3, 7), (1.5, 0.3, 0.3)
     (lamp,) = extension.api.see_lamps(empty)
-    assert lamp.slot is None and "neither round nor small" in lamp.why
+    assert lamp.slot is None and "neither flat, round nor small" in lamp.why
+
+
+def emissive_plane(scene, material, points):
+    mesh = bpy.data.meshes.new("Panel")
+    mesh.from_pydata([(*p, 0) for p in points], [], [range(len(points))])
+    mesh.materials.append(material)
+    item = bpy.data.objects.new("Panel", mesh)
+    scene.collection.objects.link(item)
+    return item
+
+
+def test_flat_meshes_are_area_lamps(extension, ball, empty):
+    """As rectangles and ellipses that shine towards the subject, however their points lie."""
+    material, _ = emissive()
+    panel = emissive_plane(empty, material, [(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)])
+    for turn, points, stretch in ((0, 0, 3), (0.4, 0, 3), (0.4, 0.7, 1)):
+        panel.data.transform(Matrix.Rotation(points, 4, Vector((0.2, 0.5, 1)).normalized()))
+        panel.location, panel.rotation_euler, panel.scale = (
+            (1, -2, 5),
+            (turn, turn, 0.3),
+            (1, stretch, 1),
+        )
+        empty.view_layers[0].update()
+        (slot,) = slots(empty)
+        corners = [panel.matrix_world @ v.co for v in panel.data.vertices]
+        assert slot[9] == 3 and slot[:3] == pytest.approx(sum(corners, Vector()) / 4, abs=1e-4)
+        across, along, back = axes(slot).T
+        half = across * slot[10] / 2, along * slot[11] / 2
+        made = {
+            tuple(np.round(slot[:3] + a * half[0] + b * half[1], 2))
+            for a in (-1, 1)
+            for b in (-1, 1)
+        }
+        there = {tuple(np.round(c, 2)) for c in corners}
+        assert np.sort(list(made), 0) == pytest.approx(np.sort(list(there), 0), abs=0.011)
+        assert back @ np.array(slot[:3]) > 0  # the ball is at the origin
+    area = np.prod(slot[10:12])
+    (lamp,) = extension.api.see_lamps(empty)
+    distance = np.linalg.norm(slot[:3])
+    facing = back @ np.array(slot[:3]) / distance
+    assert lamp.irradiance == pytest.approx(50 * area * facing / distance**2, rel=1e-3)
+    bpy.data.objects.remove(panel)
+    angles = np.arange(24) * 2 * np.pi / 24
+    emissive_plane(
+        empty, material, np.stack([np.cos(angles), 2 * np.sin(angles)], -1)
+    ).location.z = 6
+    (slot,) = slots(empty)
+    assert slot[9] == 4 and sorted(slot[10:12]) == pytest.approx([2, 4], rel=0.02)
+    bpy.data.objects.remove(bpy.data.objects["Panel"])
+    corner = [(0, 0), (2, 0), (2, 0.4), (0.4, 0.4), (0.4, 2), (0, 2)]
+    emissive_plane(empty, material, corner).location.z = 6
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and "neither flat, round nor small" in lamp.why
+
+
+def test_lamps_whose_light_differs_over_them(extension, ball, empty):
+    """Half a softbox is dark: a lobe would show all of it half as bright."""
+    item = add_lamp(empty, "AREA", "Softbox", shape="SQUARE", size=1.0)
+    item.data.use_nodes = True
+    tree = item.data.node_tree
+    (emission,) = (n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
+    warm = tree.nodes.new("ShaderNodeBlackbody")
+    tree.links.new(warm.outputs[0], emission.inputs["Color"])
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    tree.links.new(
+        tree.nodes.new("ShaderNodeNewGeometry").outputs["Parametric"], emission.inputs["Strength"]
+    )
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and lamp.why == "its light is not the same all over it"
+    item.data.size = 0.1  # too small to tell
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    item.data.type = "POINT"
+    bpy.data.objects.remove(item)
+    material, _ = emissive()
+    emissive_plane(empty, material, [(-1, -1), (1, -1), (1, 1), (-1, 1)]).location.z = 6
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    (emission,) = (n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeEmission")
+    image = material.node_tree.nodes.new("ShaderNodeTexImage")
+    material.node_tree.links.new(image.outputs[0], emission.inputs["Color"])
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [None]
+
+
+def test_lamps_that_are_not_normalised(extension, ball, empty):
+    """Their energy is for a size of 1."""
+    helpers.add_camera(empty)
+    empty.render.resolution_x = empty.render.resolution_y = 16
+    empty.cycles.samples = 64
+    settings = {
+        "POINT": ({"shadow_soft_size": 0.1}, 4 * math.pi * 0.1**2),
+        "SPOT": ({"shadow_soft_size": 0.1, "spot_size": 3.0}, 4 * math.pi * 0.1**2),
+        "AREA": ({"shape": "ELLIPSE", "size": 0.2, "size_y": 0.4}, math.pi / 4 * 0.08),
+        "SUN": ({"angle": 0.1}, math.pi * math.tan(0.05) ** 2),
+    }
+    for kind, (values, size) in settings.items():
+        item = add_lamp(empty, kind, **values)
+        if not hasattr(item.data, "normalize"):
+            pytest.skip("this Blender normalises all")
+        (whole,) = extension.api.see_lamps(empty)
+        item.data.normalize = False
+        (lamp,) = extension.api.see_lamps(empty)
+        assert lamp.irradiance == pytest.approx(size * whole.irradiance)
+        pictures = []
+        for normalize in (True, False):
+            item.data.normalize = normalize
+            pictures.append(helpers.render(empty)[..., :3].mean())
+        assert pictures[1] == pytest.approx(size * pictures[0], rel=0.05), f"{kind} in Cycles"
+        bpy.data.objects.remove(item)
+
+
+def test_scenes_within_the_picture(extension, ball, empty):
+    """The compositor shows another scene, whose lamps are aimed at as well."""
+    other = bpy.data.scenes.new("Other")
+    add_lamp(empty, "POINT", "Here")
+    add_lamp(other, "POINT", "There")
+    assert [lamp.name for lamp in extension.api.see_lamps(empty)] == ["Here"]
+    if hasattr(empty, "compositing_node_group"):
+        tree = empty.compositing_node_group = bpy.data.node_groups.new("C", "CompositorNodeTree")
+    else:
+        empty.use_nodes = True
+        tree = empty.node_tree
+    tree.nodes.new("CompositorNodeRLayers").scene = other
+    assert sorted(lamp.name for lamp in extension.api.see_lamps(empty)) == ["Here", "There"]
+    assert [lamp.name for lamp in extension.api.see_lamps(other)] == ["There"]
+    empty.render.use_compositing = False
+    assert [lamp.name for lamp in extension.api.see_lamps(empty)] == ["Here"]
+    strips = empty.sequence_editor_create().strips
+    strips.new_scene("Strip", other, 1, 1)
+    assert sorted(lamp.name for lamp in extension.api.see_lamps(empty)) == ["Here", "There"]
 
 
 def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, empty, monkeypatch):
@@ -595,7 +731,7 @@ def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, e
     monkeypatch.setattr(shared_group, "write", lambda s, v: (written.append(s), write(s, v)))
     sky(empty)
     _, _, node = environment(empty, spotted(np.array([0.6, 0, 0.8]), 0.03, 5000.0))
-    lamp = add_lamp(empty, "POINT", "Key")
+    lamp = add_lamp(empty, "POINT", "Key", shadow_soft_size=0.25)
     add_lamp(empty, "AREA", "Area", location=(5, 5, 5))
     glow = helpers.add_sphere(empty, emissive()[0], segments=8)
     glow.location, glow.scale = (4, 4, 4), (0.1, 0.1, 0.1)
@@ -603,7 +739,7 @@ def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, e
     written.clear()
     lamp.location.x = 3
     lamp.data.energy = 3
-    lamp.data.shadow_soft_size = 0.7
+    lamp.data.shadow_soft_size = 0.3  # so much that it changes no order
     ball.location.z = 0.5
     glow.location.x = 5
     ball.active_material.diffuse_color = (0, 0, 0, 1)
