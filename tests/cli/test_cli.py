@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 import pytest
-from support import MODELS, ROOT, TOOL, scene
+from support import LISTED, MODELS, ROOT, TOOL, scene
 
 EVAL_HEADER = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
 SAMPLE_HEADER = "wo_x,wo_y,wo_z,u1,u2,u3"
@@ -209,8 +209,7 @@ def test_wrong_usage_is_one_line_and_status_2(args, words):
 def test_sample_agrees_with_eval(model):
     wo = (0.36, -0.48, 0.8)
     args = ["--count", "200", "--seed", "7", "--wo", ",".join(map(str, wo))]
-    listed = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
-    if not listed[model]["scatter"]:
+    if not next(m for m in LISTED if m["name"] == model)["scatter"]:
         refused(run("sample", model, *args), model, "expected a model that scatters")
         return
     samples = rows(run("sample", model, *args))

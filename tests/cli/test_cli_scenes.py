@@ -11,7 +11,7 @@ import subprocess
 import time
 
 import pytest
-from support import MODELS, TOOL, scene
+from support import LISTED, MODELS, TOOL, scene
 
 DIRECTIONS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0.6,0.8\n0.6,0,0.8,0,0,1\n"
 
@@ -30,7 +30,7 @@ def table(*arguments, text=""):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_defaults_are_what_list_says(model):
-    entry = next(m for m in json.loads(brdfc("list", "--json").stdout) if m["name"] == model)
+    entry = next(m for m in LISTED if m["name"] == model)
     given = []
     for p in entry["parameters"]:
         value = p["default"]

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The package of `brdfc python`: its formulas against the tool's, its errors and page.
 
-The tool evaluates the C++ in double precision. Values agree to 1e-12 of themselves, for every
-model, at defaults, at random parameters and at the stiff ones of tests/models/cases.csv. A sample's
-density is given 1e-11: the narrowest lobes, of exponents of 1e8, multiply by 1e4 what their own
-direction is rounded by. NumPy's exp, sin and log differ from the C library's by a unit in the last
-place.
+The tool evaluates the C++ in double precision: of each model `brdfc eval` and `brdfc sample` one
+set of parameters, `brdfc probe` all others in one run. Values agree to 1e-12 of themselves, for
+every model, at defaults, at random parameters and at the stiff ones of tests/models/cases.csv. A
+sample's density is given 1e-11: the narrowest lobes, of exponents of 1e8, multiply by 1e4 what
+their own direction is rounded by. NumPy's exp, sin and log differ from the C library's by a unit in
+the last place.
 """
 
 import csv
@@ -118,42 +119,102 @@ def off(got, expected):
     )
 
 
+def in_double(model, points):
+    """What the tool says of points (values, wi, wo, u), for each an array by row: f, density, and
+    the sample's direction, weight and density. One run of it a combination of choices, for what
+    takes time is its start."""
+    p = model.parameters
+    is_choice = {name: type(p[name]).__name__ == "Choice" for name in p}
+    by_choices = {}
+    for i, (values, *_) in enumerate(points):
+        choices = tuple(f"{k}={v}" for k, v in values.items() if is_choice[k])
+        by_choices.setdefault(choices, []).append(i)
+    found = [None] * len(points)
+    for choices, which in by_choices.items():
+        header = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z", "u1", "u2", "u3"]
+        for name in p:
+            if type(p[name]).__name__ == "Color":
+                header += [f"{name}_{c}" for c in "rgb"]
+            elif not is_choice[name]:
+                header.append(name)
+        blocks = []
+        for i in which:
+            values, wi, wo, u = points[i]
+            # probe takes directions as they are.
+            vectors = [model._directions("wi", wi), model._directions("wo", wo), u]
+            for name in p:
+                if is_choice[name]:
+                    continue
+                value = np.atleast_1d(values.get(name, p[name].default)).astype(np.float64)
+                size = 3 if type(p[name]).__name__ == "Color" else 1
+                vectors.append(np.broadcast_to(value, (len(wi), size)))
+            blocks.append(np.hstack(vectors))
+        text = [",".join(map(repr, row)) for row in np.concatenate(blocks).tolist()]
+        done = subprocess.run(
+            [TOOL, "probe", model.name, *choices, "--run"],
+            input="\n".join([",".join(header), *text]),
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.startswith("double_f_r,")
+        rows = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)[:, :11]
+        ends = np.cumsum([len(block) for block in blocks])[:-1]
+        for i, part in zip(which, np.split(rows, ends), strict=True):
+            found[i] = part
+    return found
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_values_are_those_of_the_formulas_in_cpp(brdfc, name):
     model, random = brdfc.model(name), np.random.default_rng(5)
-    some = 0
+    points = []
     for values in all_values(model, random):
         wi, wo = pairs(random, 24)
-        header = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
-        expected = tool("eval", name, values, np.hstack([wi, wo]), header)
+        points.append((values, wi, wo, np.full_like(wi, 0.5)))
+    values, wi, wo, _ = points[0]
+    header = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
+    all_expected = [tool("eval", name, values, np.hstack([wi, wo]), header)]
+    scatters = next(iter(model.formulas.values())).eval is not None
+    if scatters:
+        all_expected += in_double(model, points[1:])
+    else:  # ideal reflection alone
+        assert not all_expected[0].any()
+        all_expected += [np.zeros((len(wi), 4)) for _, wi, _, _ in points[1:]]
+    some = 0
+    for (values, wi, wo, _), expected in zip(points, all_expected, strict=True):
         assert off(model.eval(wi, wo, **values), expected[:, :3]) <= 1e-12, values
         assert off(model.pdf(wi, wo, **values), expected[:, 3]) <= 1e-12, values
         some += np.count_nonzero(expected[:, 3])
-    scatters = next(iter(model.formulas.values())).eval is not None
     assert (some > 100) == scatters
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_samples_are_those_of_the_formulas_in_cpp(brdfc, name):
     model, random = brdfc.model(name), np.random.default_rng(6)
-    some = 0
+    points = []
     for values in all_values(model, random):
         u = random.uniform(size=(60, 3))
         wo = unit(random.normal(size=u.shape))
         if not model.two_sided:
             wo[:, 2] = np.abs(wo[:, 2])
-        s = model.sample(wo, u, **values)
-        if next(iter(model.formulas.values())).sample is None:
+        points.append((values, wo, wo, u))
+    if next(iter(model.formulas.values())).sample is None:
+        for values, _, wo, u in points:
+            s = model.sample(wo, u, **values)
             assert not s.pdf.any() and not s.weight.any()
-            continue
-        header = "wo_x,wo_y,wo_z,u1,u2,u3"
-        expected = tool("sample", name, values, np.hstack([wo, u]), header)
+        return
+    values, _, wo, u = points[0]
+    all_expected = [tool("sample", name, values, np.hstack([wo, u]), "wo_x,wo_y,wo_z,u1,u2,u3")]
+    all_expected += [rows[:, 4:] for rows in in_double(model, points[1:])]
+    some = 0
+    for (values, _, wo, u), expected in zip(points, all_expected, strict=True):
+        s = model.sample(wo, u, **values)
         assert np.abs(s.wi - expected[:, :3]).max() <= 1e-12, values
         assert off(s.weight, expected[:, 3:6]) <= 1e-12, values
         assert off(s.pdf, expected[:, 6]) <= 1e-11, values
         some += np.count_nonzero(s.pdf)
-    scatters = next(iter(model.formulas.values())).sample is not None
-    assert (some > 100) == scatters
+    assert some > 100
 
 
 @pytest.mark.parametrize("name", MODELS)
