@@ -82,6 +82,15 @@ def every_form(extension, tmp_path_factory):
     return SimpleNamespace(made=made, pixels=pixels, picture=picture, blend=blend)
 
 
+@pytest.fixture
+def made_forms(extension, every_form):
+    """(model, form, material) of all forms, of a file: to compile them anew takes seconds."""
+    bpy.ops.wm.open_mainfile(filepath=str(every_form.blend))
+    names = {f: n for f, n in every_form.made.items() if isinstance(n, str)}
+    assert names
+    return [(*form, bpy.data.materials[name]) for form, name in names.items()]
+
+
 def test_every_form_compiles_and_renders(extension, every_form, subtests):
     assert len(every_form.made) >= 4
     bpy.ops.wm.open_mainfile(filepath=str(every_form.blend))
@@ -245,10 +254,9 @@ def test_every_choice_reaches_the_shader(extension, empty, subtests):
     assert tested
 
 
-def test_sockets_equal_the_manifest(extension, empty, subtests):
+def test_sockets_equal_the_manifest(extension, made_forms, subtests):
     manifest = json.loads((extension.pack.root / "manifest.json").read_text())
-    for model, representation in forms(extension):
-        material = extension.api.new_material(model, representation)
+    for model, representation, material in made_forms:
         node = extension.nodes.group_nodes(material)[0]
         sockets = extension.nodes.sockets(node)
         interface = {
@@ -419,18 +427,17 @@ def scripts_of(node):
     return [n for n in found if n.name != "Runs"]
 
 
-def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, empty, subtests):
+def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, made_forms, subtests):
     """A file holds source and bytecode of each. Fits hold tables of their own; what two aimed forms
     hold for each of their many choices is more than it should be."""
     longer = {("ashikhmin_shirley", "aimed"): 152_000, ("radziszewski_alda", "aimed"): 192_000}
-    for model, form in forms(extension):
+    for model, form, material in made_forms:
         with subtests.test(model=model, form=form):
             source = extension.pack.source(model, form)[1]
             if form != "fitted":
                 assert len(source) <= longer.get((model, form), 108_000)
             apart = extension.pack.albedo_source(model, form)
             assert extension.nodes.has_albedo_script(model, form) == (apart is not None)
-            material = extension.api.new_material(model, form)
             node = extension.nodes.group_nodes(material)[0]
             assert [s.script.as_string() for s in scripts_of(node)] == [source]
 
@@ -966,13 +973,13 @@ def test_search_makes_a_node_or_a_material(extension, empty):
     assert target.active_material == material
 
 
-def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
-    for model, representation in forms(extension):
+def test_panel_shows_model_form_values_and_warnings(extension, made_forms, subtests):
+    scene = bpy.context.scene
+    scene.cycles.shading_system = False
+    for model, representation, material in made_forms:
         with subtests.test(model=model, representation=representation):
-            material = extension.api.new_material(model, representation)
-            empty.cycles.shading_system = False
             layout = helpers.Layout()
-            extension.ui.draw_material(layout, material, empty)
+            extension.ui.draw_material(layout, material, scene)
             text = "\n".join(layout.log)
             entry = extension.pack.model(model)
             assert entry["label"] in text
@@ -988,11 +995,11 @@ def test_panel_shows_model_form_values_and_warnings(extension, empty, subtests):
             assert "operator brdfc.enable_osl" in text
 
 
-def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, empty, monkeypatch):
+def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, made_forms, monkeypatch):
     """Of each form: a panel is drawn at every movement of the mouse over it."""
-    made = [extension.api.new_material(*form) for form in forms(extension)]
+    made = [material for *_, material in made_forms]
     for material in made:
-        extension.ui.draw_material(helpers.Layout(), material, empty)
+        extension.ui.draw_material(helpers.Layout(), material, bpy.context.scene)
 
     def refuse(*_, **__):
         raise AssertionError("the panel read a file or hashed one")
@@ -1001,7 +1008,7 @@ def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, empty, monk
         monkeypatch.setattr(module, name, refuse)
     for material in made:
         layout = helpers.Layout()
-        extension.ui.draw_material(layout, material, empty)
+        extension.ui.draw_material(layout, material, bpy.context.scene)
         assert any("Error:" in line for line in layout.log), "the group is not known"
 
 
