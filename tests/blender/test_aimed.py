@@ -12,7 +12,12 @@ from helpers import add_camera, add_lamp, add_sphere, add_world, evaluate, rende
 from mathutils import Vector
 
 #: Towards the sun; the camera is above.
-SUNS = [(0.5, 0.2, 0.8), (-0.7, 0.6, 0.15), (0.0, 0.1, 1.0)]
+SLOW = pytest.mark.slow
+SUNS = [
+    (0.5, 0.2, 0.8),
+    pytest.param((-0.7, 0.6, 0.15), marks=SLOW),
+    pytest.param((0.0, 0.1, 1.0), marks=SLOW),
+]
 FACETS = 150
 #: Defaults, and ends that are stiff.
 CASES = {
@@ -92,6 +97,7 @@ def test_a_sun_without_an_angle(extension, empty, tool, towards):
         assert off < max(1e-3, 8e-7 * exponent), f"{name} {values}: relative L1 {off:.3g}"
 
 
+@pytest.mark.slow
 def test_a_lamp_that_is_not_in_the_list(extension, empty, tool):
     """Costs noise and no light: with and without slots the picture has the same mean."""
     means = []
@@ -127,6 +133,7 @@ CONES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lamp", CONES)
 def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
     """f is averaged over what shines on the point, right to 2 %; over the whole lamp a ball would
@@ -193,6 +200,7 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
     assert error < 0.004 * alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["phong", "max_phong", "glossy_reflector"])
 def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
     """Over an exponent from 1 to 600, from one side of a ball to the other, the base of cones comes

@@ -40,6 +40,7 @@ def rows(extension, tool):
     return {row["closure"]: row for row in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", conformance.CASES, ids=lambda c: c.name)
 def test_closure_samples_what_it_evaluates_and_evaluates_what_we_define(rows, case):
     row = rows[case.name]
@@ -54,6 +55,7 @@ def test_closure_samples_what_it_evaluates_and_evaluates_what_we_define(rows, ca
     assert "sampling" in row["fault"]
 
 
+@pytest.mark.slow
 def test_the_fault_of_ashikhmin_shirley_is_large(rows):
     """The reason why no form uses the closure that would suit the model best."""
     assert rows["ashikhmin_shirley 0.4 0.4"]["sampling_share"] > 0.3
@@ -69,6 +71,7 @@ def calls(source):
     ]
 
 
+@pytest.mark.slow
 def test_forms_use_only_closures_that_conform(rows, extension):
     """Every closure that the pack's shaders call has a row, and that row has no fault."""
     sound = {}

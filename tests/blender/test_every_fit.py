@@ -190,6 +190,7 @@ def compare(form, model, name, seen, truth):
 
 
 # Versions differ in how facets that lean are sampled.
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [pytest.param("fitted", marks=FULL), "twin"])
 def test_closures_of_every_model(extension, fits, tool, subtests, form):
     """Cycles evaluates what the tool says under suns, and samples it: the mean in every world

@@ -211,6 +211,7 @@ def test_shaders_are_short(extension_zip, subtests):
                 assert 0 < found < most
 
 
+@pytest.mark.slow
 def test_every_choice_reaches_the_shader(extension, empty, subtests):
     """Each choice of a parameter gives a picture of its own, that of its index: the script node's
     own input set by hand must render the same as the group's socket."""
@@ -869,6 +870,7 @@ def test_warnings_reach_nested_groups(extension, empty):
 # Saved files
 
 
+@pytest.mark.slow
 def test_saved_file_renders_without_the_extension(every_form, tmp_path):
     expected = every_form.picture
     assert (expected[6:10, :, :3].max(axis=(0, 2)) > 0.01).all()

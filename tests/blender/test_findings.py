@@ -112,6 +112,7 @@ def test_no_material_is_an_error_that_says_so(extension, empty, given):
 # ---- lamps that materials do not aim at ----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(extension, empty):
     material = ball(extension, empty, "radziszewski_alda")  # which has no base to show them
     first = ring(empty, 8, shadow_soft_size=0.0, energy=50)
@@ -230,6 +231,7 @@ def test_a_world_that_can_not_be_followed(extension, empty):
     assert "Sky, bright spot 1" in messages["not_aimed"] and "followed" in messages["not_aimed"]
 
 
+@pytest.mark.slow
 def test_lamps_that_take_light_are_aimed_at(extension, empty):
     """No drawn direction meets one without a size: what it takes is what the closures say."""
     ball(extension, empty)

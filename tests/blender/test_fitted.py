@@ -60,6 +60,7 @@ def fitted(tool, name, wi, wo):
     return read_csv(text)[1]
 
 
+@pytest.mark.slow
 def test_a_sun_on_a_fitted_form(lean, tool):
     """Every pair is within 1e-3 of the largest value of what the tool says of the closures."""
     rng = np.random.default_rng(3)
@@ -98,6 +99,7 @@ def test_furnace_of_a_fitted_form(lean, tool):
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)
 
 
+@pytest.mark.slow
 def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
     """They turn from the viewer at the rims of smooth meshes, where closures of opposite signs turn
     black one before the other and left pixels of minus a half in a white world. The light is that
@@ -158,6 +160,7 @@ def along_sliders(extension):
     return cases
 
 
+@pytest.mark.slow
 def test_forms_of_the_extension_along_their_sliders(extension, tool):
     """A shader serves all values of one number and of what f is a polynomial of: of two materials,
     and from an attribute that varies over a third. Every pair is within 1e-3 of the largest value

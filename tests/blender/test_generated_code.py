@@ -58,13 +58,10 @@ def groups(parameters):
     return chosen
 
 
-def variants(parameters):
-    """Assignments of choices: the defaults, and each other choice by itself."""
+def other_choices(parameters):
+    """Assignments of choices: each that is no default by itself."""
     choices = [p for p in parameters if p["kind"] == "choice"]
-    found = [{}]
-    for p in choices:
-        found += [{p["name"]: c} for c in p["choices"] if c != p["default"]]
-    return found
+    return [{p["name"]: c} for p in choices for c in p["choices"] if c != p["default"]]
 
 
 def points_of(tool, model, choices, parameters, rng):
@@ -127,8 +124,17 @@ def probe_material(extension, name, source):
     return material
 
 
+PARTS = ["defaults", pytest.param("choices", marks=pytest.mark.slow)]
+
+
+@pytest.fixture(scope="module", params=PARTS)
+def chosen(request):
+    """Every model with its default choices, or with each other one."""
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def measured(extension, tool):
+def measured(extension, tool, chosen):
     """By (model, choices): groups, group of each point, runs by column, and Cycles' values."""
     rng = np.random.default_rng(7)
     scattering = {m["name"] for m in json.loads(tool("list", "--json")) if m.get("scatter", True)}
@@ -136,7 +142,7 @@ def measured(extension, tool):
     for model, entry in extension.api.models().items():
         if model not in scattering:
             continue
-        for choices in variants(entry["parameters"]):
+        for choices in [{}] if chosen == "defaults" else other_choices(entry["parameters"]):
             source = tool("probe", model, *arguments(choices))
             columns, group = points_of(tool, model, choices, entry["parameters"], rng)
             runs = run_probe(tool, model, choices, columns)
@@ -200,7 +206,7 @@ def _l1(a, b):
 
 
 @pytest.fixture(scope="module")
-def rows(measured):
+def rows(measured, chosen):
     """A row for each group and quantity: the error of each step."""
     found = []
     for (model, choices), (names, group, runs, cycles) in measured.items():
@@ -240,7 +246,7 @@ def rows(measured):
                 )
     folder = Path(os.environ["BRDFC_TOOL"]).resolve().parent / "generated_code"
     folder.mkdir(exist_ok=True)
-    with (folder / f"{VERSION}.csv").open("w", newline="") as file:
+    with (folder / f"{VERSION}-{chosen}.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, list(found[0]))
         writer.writeheader()
         writer.writerows(found)

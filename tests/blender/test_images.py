@@ -150,6 +150,7 @@ def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_pa
     assert test["passed"], f"see {tmp_path}: spheres are {', '.join(materials)}, row by row"
 
 
+@pytest.mark.slow
 def test_a_bias_of_one_percent_or_one_in_a_thousand_is_found(
     extension, extension_zip, tool, tmp_path, judge
 ):

@@ -16,7 +16,10 @@ ROOT = Path(__file__).parents[2]
 DRIVER = ROOT / "script" / "render_scene.py"
 SEEDS = 4
 #: Scenes with isotropic material of one model, and with four models.
-SCENES = ["room-radziszewski_alda", pytest.param("small-lamp", marks=pytest.mark.full)]
+SCENES = [
+    pytest.param("room-radziszewski_alda", marks=pytest.mark.slow),
+    pytest.param("small-lamp", marks=pytest.mark.full),
+]
 
 
 def small(name):
@@ -97,6 +100,7 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
         assert shaders_and_tables(cut) <= shaders_and_tables(extension_zip) / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["sampled", "fitted", "aimed"])
 def test_tables_of_the_views_that_occur_show_the_same(
     extension, empty, extension_zip, tool, tmp_path, form

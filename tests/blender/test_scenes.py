@@ -463,6 +463,7 @@ def test_driver_renders_and_reports(extension, extension_zip, empty, scene_file,
     assert "[3/3]" in done.stderr
 
 
+@pytest.mark.slow
 def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_path):
     """Of a pixel's first sample, which goes through its centre, a drawn form would make the same in
     both: a correlation of 0.84. Two pictures of one sphere have 0.03 to 0.12 in common."""
@@ -484,6 +485,7 @@ def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_p
     assert np.corrcoef(one, two)[0, 1] < 0.4
 
 
+@pytest.mark.slow
 def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, tool, tmp_path):
     """Gold, which Rec.709 does not hold, and a texture, as the reference has them; then a scene
     that names no space, in the one that Blender starts with."""

@@ -211,6 +211,7 @@ def expected(tool, model, info, wi, wo, numbers):
     return out
 
 
+@pytest.mark.slow
 def test_headers_give_what_the_models_do(folder, models, scene, tool, subtests):
     clear(scene)
     rng = np.random.default_rng(11)

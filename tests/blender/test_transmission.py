@@ -53,6 +53,7 @@ def test_slab_absorbs_along_the_way(extension, empty, thickness):
 VIEWS = [(1, 0.9), (1, 0.25), (-1, 0.9), (-1, 0.4)]  # side and cosine; the last is beyond the angle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "ior"), [(0.0, 1.5), (20.0, 1.3)])
 def test_sampled_refraction_in_a_world(extension, empty, tool, n, ior):
     """A quad seen from both sides in a world whose colour tells the direction."""

@@ -285,6 +285,7 @@ def test_a_twin_in_eevee(extension, use_pack, tmp_path):
         assert np.abs(apart).max() < 1.5, name
 
 
+@pytest.mark.slow
 def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
     material = lean.api.new_material("phong", "twin")
     found = {f.code for f in lean.api.warnings(material, empty)}

@@ -489,6 +489,7 @@ def test_base_prints_what_it_carries_and_leaves():
     assert "lambert: has no base" in run("base", "lambert").stderr
 
 
+@pytest.mark.slow
 def test_fit_prints_its_error_by_view_and_its_closures():
     result = run("fit", "phong", "e=20")
     table = rows(result)
@@ -553,6 +554,7 @@ def test_a_lamp_without_a_size_is_named_beside_the_form(tmp_path, radius, said):
         assert ("lights[0] without a size" in reason) == said
 
 
+@pytest.mark.slow
 def test_a_scene_of_camera_rays_alone_has_tables_of_the_views_that_occur(tmp_path):
     content = scene(
         camera={
@@ -611,6 +613,7 @@ def phong(tmp_path):
     return build
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "form"),
     [

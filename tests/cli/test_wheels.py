@@ -66,6 +66,7 @@ def run(environment, *arguments, **options):
     )
 
 
+@pytest.mark.slow
 def test_that_of_the_package_is_python_alone(wheels):
     assert wheels["brdfc"].name == f"brdfc-{VERSION}-py3-none-any.whl"
     with zipfile.ZipFile(wheels["brdfc"]) as archive:
@@ -78,6 +79,7 @@ def test_that_of_the_package_is_python_alone(wheels):
     assert all(name.endswith((".py", ".typed")) or ".dist-info/" in name for name in names)
 
 
+@pytest.mark.slow
 def test_that_of_the_tool_is_what_is_built_and_its_data(wheels):
     platform = re.sub(r"\W", "_", sysconfig.get_platform())
     assert wheels["brdfc_tool"].name == f"brdfc_tool-{VERSION}-py3-none-{platform}.whl"
@@ -90,6 +92,7 @@ def test_that_of_the_tool_is_what_is_built_and_its_data(wheels):
     assert {f"brdfc_tool/tree/share/brdfc/{file}" for file in kept} <= names
 
 
+@pytest.mark.slow
 def test_the_package_works_in_a_new_environment(environment):
     """No model is loaded before it is asked for."""
     code = (
@@ -103,6 +106,7 @@ def test_the_package_works_in_a_new_environment(environment):
     assert done.stdout.startswith(f"{VERSION} {len(MODELS)} [] (2, 3) {environment}")
 
 
+@pytest.mark.slow
 def test_the_tool_works_in_a_new_environment(environment, tmp_path):
     """With its own data. It stands where the extension looks: on the PATH, and where pip puts
     programs for the Python that runs."""
@@ -121,6 +125,7 @@ def test_the_tool_works_in_a_new_environment(environment, tmp_path):
     assert (done.returncode, done.stdout) == (2, "") and "rho" in done.stderr
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_said(environment, tmp_path, monkeypatch):
     """Libraries that are not there, by their names; a loader that isn't."""
     (tool,) = environment.glob("lib/python3*/site-packages/brdfc_tool")

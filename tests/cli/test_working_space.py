@@ -108,6 +108,7 @@ def comparison(*files):
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_compare_and_previews_convert_from_what_a_file_says(tmp_path):
     files = {s: render(tmp_path, s, "--preview", tmp_path / f"{s}.png") for s in SPACES}
     shown = [in_file(tmp_path / f"{s}.png")[0] for s in SPACES]

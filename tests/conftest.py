@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An option of all tests."""
+
+import pytest
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--few",
+        type=int,
+        metavar="N",
+        help="of each test with more cases than N take N: the first, the last, and between them",
+    )
+
+
+# After -m has left out what is marked: among what is left there are then as many.
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    few = config.getoption("few")
+    if few is None:
+        return
+    if few < 2:
+        raise pytest.UsageError(f"--few: expected 2 or more, got {few}")
+    tests = {}
+    for item in items:
+        tests.setdefault(item.nodeid.split("[")[0], []).append(item)
+    kept = set()
+    for cases in tests.values():
+        count = min(few, len(cases))
+        kept |= {cases[i * (len(cases) - 1) // max(count - 1, 1)] for i in range(count)}
+    config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+    items[:] = [item for item in items if item in kept]
