@@ -41,15 +41,20 @@ class Tool:
     def __init__(self, path):
         self.path = path
 
+    def ask(self, *arguments, stdin):
+        """What it prints."""
+        command = [str(self.path), *arguments]
+        done = subprocess.run(command, input=stdin, capture_output=True, text=True)
+        if done.returncode:
+            raise ValueError(done.stderr.strip())
+        return done.stdout
+
     def table(self, arguments, header, rows):
         rows = np.reshape(rows, (-1, len(header))).tolist()
         text = "\n".join([",".join(header), *(",".join(map(repr, r)) for r in rows)])
-        command = [str(self.path), *arguments]
-        done = subprocess.run(command, input=text + "\n", capture_output=True, text=True)
-        if done.returncode:
-            raise ValueError(done.stderr.strip())
-        names = next(csv.reader(io.StringIO(done.stdout)))
-        return names, np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+        printed = self.ask(*arguments, stdin=text + "\n")
+        names = next(csv.reader(io.StringIO(printed)))
+        return names, np.loadtxt(io.StringIO(printed), delimiter=",", skiprows=1, ndmin=2)
 
     def list(self):
         done = subprocess.run([str(self.path), "list", "--json"], capture_output=True, check=True)
