@@ -165,6 +165,7 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
     assert math.hypot(error, other) < 0.008 * drawn
 
 
+@pytest.mark.slow
 def test_a_small_lamp_before_a_large_one(extension, empty):
     """The lobe of the large one gives light of the small one, which drawn directions hardly ever
     meet to take it off again: so the small one comes later and is given less. Both at once show
