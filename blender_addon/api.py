@@ -11,6 +11,7 @@ number, choices by identifier.
 """
 
 import contextlib
+import functools
 import json
 import os
 from pathlib import Path
@@ -18,8 +19,21 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import checks, convert, kernel, lamp_checks, lamps, lean, library, nodes, pack, update
-from .checks import Finding, enable_osl, warnings
+from . import (
+    checks,
+    convert,
+    editable,
+    expected,
+    kernel,
+    lamp_checks,
+    lamps,
+    lean,
+    library,
+    nodes,
+    pack,
+    update,
+)
+from .checks import Finding
 from .i18n import say
 from .lamps import Lamp
 from .lean import PlanError
@@ -87,7 +101,11 @@ def _checked(model_name, representation, given):
 
 
 def prepare_material(material):
-    """Gives a material the settings that its models need; returns a sentence for each change."""
+    """Gives a material the settings that its models need; returns a sentence for each change.
+
+    Raises ValueError for a linked material, as do all that change one.
+    """
+    editable.check(expected.material(material))
     declared = set()
     for node in nodes.group_nodes(material):
         if entry := nodes.manifest_entry(node):
@@ -122,14 +140,9 @@ def new_material(model, representation="auto", **parameters):
     return material
 
 
-def _must_be_material(given):
-    if not isinstance(given, bpy.types.Material):
-        raise ValueError(say("Expected a material, got {given!r}", given=given))
-
-
 def _the_node(material):
     """The one node of this extension."""
-    _must_be_material(material)
+    expected.material(material)
     ours = nodes.group_nodes(material)
     if len(ours) != 1:
         raise ValueError(
@@ -151,6 +164,7 @@ def set_parameters(material, **parameters):
 
 
 def _set(node, what, parameters):
+    editable.check(node.id_data)
     model, representation = nodes.identity(node)
     lean_node = nodes.is_baked(node)
     _, values = _checked(model, "auto" if lean_node else representation, parameters)
@@ -176,7 +190,7 @@ def set_kernel(group, curve):
     Raises ValueError for another node, and where a height is not positive or too small beside the
     largest; nothing is changed then.
     """
-    if not nodes.is_ours(group) or nodes.identity(group)[0] != kernel.MODEL:
+    if not nodes.is_ours(expected.node(group)) or nodes.identity(group)[0] != kernel.MODEL:
         raise ValueError(
             say(
                 "Node {node!r}: expected a node of the model {model!r}",
@@ -184,7 +198,8 @@ def set_kernel(group, curve):
                 model=kernel.MODEL,
             )
         )
-    values = {"kernel": "table", **kernel.heights(curve)}
+    editable.check(group.id_data)
+    values = {"kernel": "table", **kernel.heights(expected.node(curve))}
     _set(group, say("node {name!r}", name=group.name), values)
 
 
@@ -201,7 +216,7 @@ def set_substance(material, substance, node=None, thickness=None):
     """
     from . import optical
 
-    node = node or _the_node(material)
+    node = _the_node(material) if node is None else expected.node(node)
     values = optical.parameters(nodes.identity(node)[0], optical.find(substance), thickness)
     _set(node, say("material {name!r}", name=material.name), values)
     return values
@@ -228,6 +243,12 @@ def switch_representation(material, representation):
     prepare_material(material)
 
 
+def _prepare_all():
+    for material in bpy.data.materials:
+        if editable.refusal(material) is None:
+            prepare_material(material)
+
+
 def update_materials():
     """Gives the models of the open file that another version of the extension made the shaders of
     this one; values, links and forms stay.
@@ -236,9 +257,7 @@ def update_materials():
     something stays as it is and is named there.
     """
     result = update.update()
-    for material in bpy.data.materials:
-        if material.library is None:
-            prepare_material(material)
+    _prepare_all()
     return result
 
 
@@ -246,7 +265,7 @@ def plan_conversion(materials):
     """For each Diffuse, Glossy, Principled or Glass node of these materials that is shown: which
     model comes nearest, with which values, and what part of the light that misplaces; or why none
     does. Nothing is changed. Returns [convert.Plan], with line() in words."""
-    return convert.plan(materials)
+    return convert.plan(expected.each(expected.material, materials))
 
 
 def convert_materials(plans):
@@ -255,6 +274,7 @@ def convert_materials(plans):
     The nodes of before stay in the materials, unlinked, for convert_back(). Raises CompileError;
     nothing is changed then.
     """
+    plans = expected.each(functools.partial(expected.plan, convert.Plan), plans)
     count = convert.apply(plans)
     for plan_ in plans:
         if not plan_.refusal:
@@ -265,7 +285,7 @@ def convert_materials(plans):
 def convert_back(material):
     """Puts Blender's own nodes back; where the ones of before are gone, the model's twin. Returns
     how many; ValueError where there is neither."""
-    return convert.restore(material)
+    return convert.restore(expected.material(material))
 
 
 def add_albedo(material):
@@ -383,7 +403,7 @@ def start_plan(error=None, time=None, fit=False):
     used = [
         (name, node, entry)
         for name, material, node, entry in _used()
-        if material.library is None and node.id_data.library is None
+        if editable.refusal(material, node.id_data) is None
     ]
     if not used:
         raise ValueError(_NO_MATERIAL)
@@ -415,13 +435,7 @@ def bake(made):
 
 def start_bake(made):
     """The same as a lean.Job, a model a step. Until the last one the file is as it was."""
-
-    def prepare_all():
-        for material in bpy.data.materials:
-            if material.library is None:
-                prepare_material(material)
-
-    return lean.Baking(made, prepare_all)
+    return lean.Baking(expected.plan(lean.Plan, made), _prepare_all)
 
 
 def see_lamps(scene):
@@ -431,12 +445,28 @@ def see_lamps(scene):
     Returns every lamp as a Lamp: name, slot from 1 or None, irradiance at the subject by which
     they are ranked, and why one is left out.
     """
-    return lamps.see(scene)
+    return lamps.see(expected.scene(scene))
+
+
+def warnings(material, scene):
+    """Everything that keeps a material from rendering as its models say. Changes nothing.
+
+    Returns an empty list when the material has no group of this extension.
+    """
+    return checks.warnings(expected.material(material), expected.scene(scene))
 
 
 def scene_warnings(scene):
     """What keeps any material of this extension from rendering in a scene."""
-    return checks.scene_warnings(scene)
+    return checks.scene_warnings(expected.scene(scene))
+
+
+def enable_osl(scene):
+    """Turns OSL on for a scene, with what it needs. Returns a sentence for each change made.
+
+    Raises RuntimeError when this Blender has no OSL.
+    """
+    return checks.enable_osl(expected.scene(scene))
 
 
 def enlarge_lamps(scene):
@@ -445,15 +475,15 @@ def enlarge_lamps(scene):
 
     Returns (names of those, names of the lamps of another file, which stay as they are).
     """
-    return lamp_checks.enlarge(scene)
+    return lamp_checks.enlarge(expected.scene(scene))
 
 
 def make_local(material):
-    """Makes a material that is linked from another file this file's own, with the groups that it is
-    made of, so that it aims at the lamps of this file. Returns the local one, which linked objects
-    do not have."""
-    _must_be_material(material)
-    if material.library is not None:
+    """Makes a material that is linked from another file, or is a library override, this file's own,
+    with the groups that it is made of, so that it can be changed and aims at this file's lamps.
+    Returns the local one, which linked objects do not have."""
+    expected.material(material)
+    if editable.refusal(material):
         material = material.make_local()
     nodes.make_local(material.node_tree)
     lamps.follow()

@@ -279,10 +279,7 @@ def why_not_run(material, scene):
 
 
 def warnings(material, scene):
-    """Everything that keeps a material from rendering as its models say. Changes nothing.
-
-    Returns an empty list when the material has no group of this extension.
-    """
+    """See api.warnings()."""
     ours = nodes.group_nodes(material)
     if not ours:
         return []
@@ -294,10 +291,7 @@ def warnings(material, scene):
 
 
 def enable_osl(scene):
-    """Turns OSL on for a scene, with what it needs. Returns a sentence for each change made.
-
-    Raises RuntimeError when this Blender has no OSL.
-    """
+    """See api.enable_osl()."""
     if not pack.osl_available():
         raise RuntimeError(pack.NO_OSL)
     done = []

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from . import nodes, pack
+from . import editable, nodes, pack
 from .i18n import Sentence, say
 from .native_bsdf import Native
 from .nearest_model import Target, candidates, nearest_factor, with_width
@@ -207,8 +207,8 @@ def plan(materials):
             if not any(socket.is_linked for socket in node.outputs):
                 continue
             try:
-                if material.library is not None or not material.is_editable:
-                    raise Refused(say("it is linked from another file"))
+                if why := editable.refusal(material):
+                    raise Refused(why)
                 if grouped:
                     raise Refused(say("its shader is inside this node group: ungroup it first"))
                 plans.append(_plan_node(material, node))
@@ -227,6 +227,7 @@ def apply(plans):
     All groups are made before anything is changed. Raises ValueError, CompileError.
     """
     wanted = [p for p in plans if not p.refusal]
+    editable.check(*(p.material for p in wanted))
     checked = [{k: pack.check_value(p.model, k, v) for k, v in p.values.items()} for p in wanted]
     # What is linked may have any value.
     forms = [
@@ -305,6 +306,7 @@ def _before(group):
 def restore(material):
     """Puts the nodes of before back; where they are gone, the twin, which Blender's own nodes are
     as well. Returns how many nodes were put back. Raises ValueError where there is neither."""
+    editable.check(material)
     if material.node_tree is None:
         return 0
     tree = material.node_tree

@@ -9,7 +9,7 @@ import json
 
 import bpy
 
-from . import compiler, lamps, pack, stand_in, twin
+from . import compiler, editable, lamps, pack, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, add_parameter, vector_socket
 from .i18n import say
@@ -448,7 +448,7 @@ def make_local(tree):
     for node in tree.nodes:
         for name in ("node_tree", "script", "image"):
             inner = getattr(node, name, None)
-            if inner is not None and inner.library is not None:
+            if inner is not None and editable.refusal(inner):
                 inner.make_local()
         if getattr(node, "node_tree", None) is not None:
             make_local(node.node_tree)
@@ -496,11 +496,21 @@ def remove_unused_groups(kept=()):
 def switch(node, representation):
     """Puts another representation of the same model into a group node; values and links stay.
 
-    Raises ValueError, CompileError; the node is then as it was.
+    Raises ValueError, also where the file would not keep that, CompileError; the node is then as it
+    was.
     """
+    editable.check(node.id_data)
     model_name, _ = identity(node)
     form = pack.resolve(model_name, representation, all_values(node))
-    replace_group(node, ensure_group(model_name, form, albedo=uses_albedo(node)))
+    _exchange(node, ensure_group(model_name, form, albedo=uses_albedo(node)))
+
+
+def _exchange(node, group):
+    """Puts another group into a node; that of before goes where nothing else has it."""
+    before = node.node_tree
+    replace_group(node, group)
+    if before.users == 0 and before.library is None:
+        remove_group(before)
 
 
 def uses_albedo(node):
@@ -511,8 +521,10 @@ def uses_albedo(node):
 def add_albedo(node):
     """Gives a group node the Albedo output, if it lacks that; values and links stay.
 
-    Raises ValueError for one that lacks it and is not of the installed extension, CompileError.
+    Raises ValueError for one that lacks it and is not of the installed extension, and where the
+    file would not keep that; CompileError.
     """
+    editable.check(node.id_data)
     if ALBEDO in node.outputs:
         return
     if is_baked(node) or manifest_entry(node) is None:
@@ -524,10 +536,7 @@ def add_albedo(node):
         raise ValueError(
             say("{node} is of another version of the extension: update it first", node=name)
         )
-    without = node.node_tree
-    replace_group(node, ensure_group(*identity(node), albedo=True))
-    if without.users == 0:
-        remove_group(without)
+    _exchange(node, ensure_group(*identity(node), albedo=True))
 
 
 def _curves(tree):

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.types import Menu, Panel
 
-from . import checks, color, convert, energy, kernel, lamps, nodes, optical, pack
+from . import checks, color, convert, editable, energy, kernel, lamps, nodes, optical, pack
 from .i18n import button, form_name, iface, of_error, say
 from .labels import wrapped
 
@@ -145,13 +145,13 @@ def energy_text(node):
     return ", ".join(numbers) or say("not at a view angle of this scene")
 
 
-def _draw_form(layout, node, form, scene, editable):
+def _draw_form(layout, node, form, scene, changes):
     model_name, representation = nodes.identity(node)
     if lean := nodes.is_baked(node):
         wrapped(layout, say("Lean: only what this file needs. A form brings the whole one back"))
     entry = pack.model(model_name)
     row = layout.row(align=True)
-    row.enabled = editable
+    row.enabled = changes
     values = {key: nodes.get_value(node, key) for key in pack.parameters(model_name)}
     refusals = []
     for name in entry["representations"]:
@@ -193,21 +193,22 @@ def _draw_values(layout, node):
             row.prop(socket, "default_value", text=socket.name, translate=False)
 
 
-def draw_node(layout, node, material, scene, editable=True):
+def draw_node(layout, node, scene):
     """Model, form, error, cost, energy and values of one group node."""
     model_name, _ = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
+    changes = editable.refusal(node.id_data) is None
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         column = layout.column(align=True)
         for said in filter(None, (entry["paper"], entry["equations"])):
             wrapped(column, said)
-        _draw_form(layout, node, made[0], scene, editable)
+        _draw_form(layout, node, made[0], scene, changes)
     _draw_values(layout, node)
+    layout = layout.column()
+    layout.enabled = changes
     if made and optical.can_have(model_name):
-        row = layout.row()
-        row.enabled = editable
-        menu = row.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
+        menu = layout.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
         menu.node = node.name
     if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
@@ -245,6 +246,7 @@ def draw_lamps(layout, material, scene):
 
 _DOWNLOAD = ("wm.url_open", button("Get Blender"), {"url": "https://www.blender.org/download/"})
 _ENLARGE = ("brdfc.enlarge_lamps", button("Give Lamps a Size"), {})
+_MAKE_LOCAL = ("brdfc.make_local", button("Make Local"), {})
 #: The button under a finding of each code: operator, text, properties.
 BUTTONS = {
     "blender_version": _DOWNLOAD,
@@ -258,7 +260,7 @@ BUTTONS = {
     "path_guiding": ("brdfc.no_guiding", button("Turn Off Path Guiding"), {}),
     "lost_lamps": _ENLARGE,
     "zero_size_lights": _ENLARGE,
-    "linked_lamps": ("brdfc.make_local", button("Make Local"), {}),
+    "linked_lamps": _MAKE_LOCAL,
 }
 
 
@@ -294,11 +296,16 @@ def draw_material(layout, material, scene):
     found = checks.warnings(material, scene)
     first = [f for f in found if f.severity == "ERROR" or f.code in checks.UNABLE]
     draw_findings(layout, first)
-    for node in nodes.group_nodes(material):
-        draw_node(layout.box(), node, material, scene)
+    ours = nodes.group_nodes(material)
+    if why := editable.refusal(material, *(node.id_data for node in ours)):
+        wrapped(layout.column(align=True), why, "LINKED")
+        if not any(BUTTONS.get(f.code) == _MAKE_LOCAL for f in found):
+            layout.operator(_MAKE_LOCAL[0], text=_MAKE_LOCAL[1], icon="CHECKMARK")
+    for node in ours:
+        draw_node(layout.box(), node, scene)
     draw_lamps(layout, material, scene)
     draw_findings(layout, [f for f in found if f not in first])
-    if any(convert.is_converted(node) for node in nodes.group_nodes(material)):
+    if any(convert.is_converted(node) for node in ours):
         layout.operator("brdfc.convert_back", icon="LOOP_BACK")
     layout.operator("brdfc.write_materials", icon="EXPORT")
     layout.operator("brdfc.bake", icon="MOD_DECIM")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.app.handlers import persistent
 
-from . import nodes, pack
+from . import editable, nodes, pack
 from .i18n import form_name, of_error, say
 
 
@@ -61,6 +61,8 @@ def refusal(material, node):
     for block in (material, node.id_data):
         if block.library is not None:
             return say("it is linked from {file}; update it there", file=block.library.filepath)
+    if why := editable.refusal(material, node.id_data):
+        return why
     if nodes.is_newer(node):
         return say(
             "{later} made it, and this is {own}",

@@ -6,8 +6,8 @@ from bpy.props import EnumProperty, StringProperty
 from bpy.types import Operator
 
 from .. import api, nodes, pack
-from ..i18n import rpt, say
-from .common import ERRORS, refused, report_osl
+from ..i18n import rpt, say, tip
+from .common import ERRORS, refused, report_osl, stays
 
 
 def _doc(properties):
@@ -44,7 +44,7 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
             and space.type == "NODE_EDITOR"
             and space.tree_type == "ShaderNodeTree"
             and space.edit_tree is not None
-            and space.edit_tree.is_editable
+            and stays(cls, *filter(None, (space.id, space.edit_tree)))
         )
 
     def execute(self, context):
@@ -72,6 +72,10 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
         return result
 
 
+#: Types of objects whose materials are surfaces. Those of Grease Pencil and volumes are others.
+SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD"}
+
+
 class BRDFC_OT_new_material(_ModelOperator, Operator):
     bl_idname = "brdfc.new_material"
     bl_label = "New Reflection Model Material"
@@ -79,8 +83,13 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
 
     @classmethod
     def poll(cls, context):
-        data = getattr(context.object, "data", None)
-        return data is not None and hasattr(data, "materials") and data.is_editable
+        target = context.object
+        if target is None or target.data is None:
+            return False
+        if target.type not in SURFACES:
+            cls.poll_message_set(tip(say("Objects of this type show no surface of a material")))
+            return False
+        return stays(cls, target.data)
 
     def execute(self, context):
         try:

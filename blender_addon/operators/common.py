@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators share: how they refuse, and whose material they are about."""
 
-from .. import checks, nodes, pack
-from ..i18n import Sentence, iface, of_error, rpt, say
+from .. import checks, editable, nodes, pack
+from ..i18n import Sentence, iface, of_error, rpt, say, tip
 
 ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
 
@@ -32,6 +32,19 @@ class OfActiveMaterial:
     @classmethod
     def poll(cls, context):
         return getattr(context.object, "active_material", None) is not None
+
+
+class ChangesActiveMaterial(OfActiveMaterial):
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and stays(cls, context.object.active_material)
+
+
+def stays(operator, *blocks):
+    """Whether a change to these is saved with the file; where not, the greyed button says why."""
+    if why := editable.refusal(*blocks):
+        operator.poll_message_set(tip(why))
+    return why is None
 
 
 def model_node(material, name):

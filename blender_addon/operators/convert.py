@@ -6,7 +6,7 @@ from bpy.types import Operator
 from .. import api, nodes
 from ..i18n import rpt, say
 from ..labels import wrapped
-from .common import ERRORS, OfActiveMaterial, refused, report_osl
+from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
 
 
 def _selected_materials(context):
@@ -59,7 +59,7 @@ class BRDFC_OT_convert(Operator):
         return {"FINISHED"} if count else {"CANCELLED"}
 
 
-class BRDFC_OT_convert_back(OfActiveMaterial, Operator):
+class BRDFC_OT_convert_back(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.convert_back"
     bl_label = "Back to Blender's Nodes"
     bl_description = (

@@ -7,13 +7,17 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
-from .. import api, color, kernel, nodes
+from .. import api, color, editable, kernel, nodes
 from ..i18n import iface, of_error, rpt, say, tip
 from ..labels import wrapped
-from .common import ERRORS, OfActiveMaterial, model_node, refused
+from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
 
 
-class BRDFC_OT_switch(OfActiveMaterial, Operator):
+def _stays(block):
+    return editable.refusal(block) is None
+
+
+class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.switch"
     bl_label = "Switch Form"
     bl_description = "Use another form of the same model; values and links stay"
@@ -37,10 +41,16 @@ class BRDFC_OT_switch(OfActiveMaterial, Operator):
         try:
             node = model_node(material, self.node)
             identity = nodes.identity(node)
-            for user in materials:
-                for other in nodes.group_nodes(user):
-                    if other == node or (self.all_users and nodes.identity(other) == identity):
-                        nodes.switch(other, self.representation)
+            editable.check(node.id_data)
+            for user in filter(_stays, materials):
+                # All are looked for before one is changed.
+                alike = [
+                    other
+                    for other in nodes.group_nodes(user)
+                    if _stays(other.id_data) and nodes.identity(other) == identity
+                ]
+                for other in alike if self.all_users else [node]:
+                    nodes.switch(other, self.representation)
                 api.prepare_material(user)
         except ERRORS as error:
             return refused(self, error)
@@ -122,7 +132,7 @@ class BRDFC_OT_update(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_add_albedo(OfActiveMaterial, Operator):
+class BRDFC_OT_add_albedo(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.add_albedo"
     bl_label = "Add Albedo Output"
     bl_description = (
@@ -141,7 +151,7 @@ class BRDFC_OT_add_albedo(OfActiveMaterial, Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_kernel(OfActiveMaterial, Operator):
+class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.kernel"
     bl_label = "Kernel from Float Curve"
     bl_description = (
@@ -207,7 +217,7 @@ def _substances(locale):
     return [*rows, (_FILE, iface(say("From File\u2026")), about)]
 
 
-class BRDFC_OT_substance(OfActiveMaterial, Operator):
+class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.substance"
     bl_label = "Metal or Glass from n, k"
     bl_description = (

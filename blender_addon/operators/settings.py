@@ -5,7 +5,7 @@ from bpy.types import Operator
 
 from .. import api, checks
 from ..i18n import rpt, say
-from .common import OfActiveMaterial, refused
+from .common import ChangesActiveMaterial, OfActiveMaterial, refused
 
 
 class BRDFC_OT_enable_osl(Operator):
@@ -24,7 +24,7 @@ class BRDFC_OT_enable_osl(Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_fix_material(OfActiveMaterial, Operator):
+class BRDFC_OT_fix_material(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.fix_material"
     bl_label = "Set Up Material"
     bl_description = "Give the active material the settings that its models need"
@@ -87,7 +87,7 @@ class BRDFC_OT_make_local(OfActiveMaterial, Operator):
     bl_label = "Make Local"
     bl_description = (
         "Make the active material this file's own, with object and data where they are linked, "
-        "so that it aims at the lamps of this file"
+        "so that it can be changed and aims at the lamps of this file"
     )
     bl_options = {"REGISTER", "UNDO"}
 

@@ -337,17 +337,20 @@ def modules_of_operators(extension):
 
 
 class Layout:
-    """Stands in for a UILayout and keeps what is drawn."""
+    """Stands in for a UILayout and keeps what is drawn, and the names of operators that are
+    greyed."""
 
-    def __init__(self, log=None):
+    def __init__(self, log=None, greyed=None, enabled=True):
         self.log = log if log is not None else []
-        self.alert = self.enabled = self.use_property_split = False
+        self.greyed = greyed if greyed is not None else set()
+        self.alert = self.use_property_split = False
+        self.enabled = enabled
 
     def label(self, text="", **_):
         self.log.append(text)
 
     def _sub(self, **_):
-        return Layout(self.log)
+        return Layout(self.log, self.greyed, self.enabled)
 
     row = column = box = _sub
 
@@ -362,6 +365,8 @@ class Layout:
 
     def operator(self, name, text="", **_):
         self.log.append(f"operator {name} {text}")
+        if not self.enabled:
+            self.greyed.add(name)
         return SimpleNamespace()
 
     def operator_menu_enum(self, name, choice, text="", **_):

@@ -1108,6 +1108,49 @@ def test_operator_new_material(extension, empty):
     assert target.active_material == material
 
 
+def drawing():
+    bpy.ops.object.grease_pencil_add(type="STROKE")  # which gives it a material
+    return bpy.context.object
+
+
+def cloud():
+    data = bpy.data.volumes.new("cloud")
+    data.materials.append(bpy.data.materials.new("smoke"))
+    item = bpy.data.objects.new("cloud", data)
+    bpy.context.scene.collection.objects.link(item)
+    return item
+
+
+@pytest.mark.parametrize("make", [drawing, cloud])
+def test_no_new_material_where_none_is_a_surface(extension, empty, make):
+    item = make()
+    material = item.active_material
+    bpy.context.view_layer.objects.active = item
+    with pytest.raises(RuntimeError, match="Objects of this type show no surface of a material"):
+        bpy.ops.brdfc.new_material(model="lambert")
+    assert not bpy.ops.brdfc.search.poll()
+    assert material is not None and item.active_material == material
+
+
+def surfaces():
+    mesh = bpy.data.meshes.new("mesh")
+    yield mesh
+    for kind in ("CURVE", "SURFACE", "FONT"):
+        yield bpy.data.curves.new(kind, kind)
+    yield bpy.data.metaballs.new("meta")
+    yield bpy.data.hair_curves.new("hair")
+    yield bpy.data.pointclouds.new("points")
+
+
+def test_new_material_of_all_that_has_a_surface(extension, empty):
+    for data in list(surfaces()):
+        item = bpy.data.objects.new(data.name, data)
+        empty.collection.objects.link(item)
+        bpy.context.view_layer.objects.active = item
+        assert bpy.ops.brdfc.new_material(model="lambert") == {"FINISHED"}
+        assert extension.nodes.group_nodes(item.active_material)
+
+
 def test_operator_switch(extension, empty):
     mesh = bpy.data.meshes.new("mesh")
     target = bpy.data.objects.new("target", mesh)

@@ -104,9 +104,38 @@ def test_no_material_is_an_error_that_says_so(extension, empty, given):
         lambda: api.get_parameters(given),
         lambda: api.switch_representation(given, "sampled"),
         lambda: api.make_local(given),
+        lambda: api.prepare_material(given),
+        lambda: api.add_albedo(given),
+        lambda: api.set_substance(given, "gold"),
+        lambda: api.convert_back(given),
+        lambda: api.warnings(given, empty),
+        lambda: api.plan_conversion([given]),
     ):
         with pytest.raises(ValueError, match=f"Expected a material, got {given!r}"):
             call()
+
+
+@pytest.mark.parametrize("given", [None, "Scene", 3])
+def test_no_scene_node_or_plan_is_an_error_that_says_so(extension, empty, given):
+    api = extension.api
+    material = api.new_material("lossless")
+    (node,) = extension.nodes.group_nodes(material)
+    for call, what in (
+        (lambda: api.warnings(material, given), "a scene"),
+        (lambda: api.scene_warnings(given), "a scene"),
+        (lambda: api.enable_osl(given), "a scene"),
+        (lambda: api.see_lamps(given), "a scene"),
+        (lambda: api.enlarge_lamps(given), "a scene"),
+        (lambda: api.set_kernel(given, node), "a node"),
+        (lambda: api.set_kernel(node, given), "a node"),
+        (lambda: api.bake(given), "a plan"),
+        (lambda: api.convert_materials([given]), "a plan"),
+    ):
+        with pytest.raises(ValueError, match=f"Expected {what}, got {given!r}"):
+            call()
+    for call in (api.plan_conversion, api.convert_materials):
+        with pytest.raises(ValueError, match="Expected a (list|material|plan), got"):
+            call(given)
 
 
 # ---- lamps that materials do not aim at ----------------------------------------------------------

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What scripts hand to api: anything but what a function takes is a ValueError with a sentence."""
+
+import bpy
+
+from .i18n import say
+
+
+def _of(kind, given, sentence):
+    if not isinstance(given, kind):
+        raise ValueError(sentence)
+    return given
+
+
+def material(given):
+    return _of(bpy.types.Material, given, say("Expected a material, got {given!r}", given=given))
+
+
+def scene(given):
+    return _of(bpy.types.Scene, given, say("Expected a scene, got {given!r}", given=given))
+
+
+def node(given):
+    return _of(bpy.types.Node, given, say("Expected a node, got {given!r}", given=given))
+
+
+def plan(kind, given):
+    """A plan of a class; there are two."""
+    return _of(kind, given, say("Expected a plan, got {given!r}", given=given))
+
+
+def each(check, given):
+    """What can be gone through, of things that pass a check, as a list."""
+    try:
+        found = list(given)
+    except TypeError:
+        raise ValueError(say("Expected a list, got {given!r}", given=given)) from None
+    return [check(item) for item in found]
