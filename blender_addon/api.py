@@ -457,7 +457,8 @@ def warnings(material, scene):
 
 
 def scene_warnings(scene):
-    """What keeps any material of this extension from rendering in a scene."""
+    """What keeps any material of this extension from rendering in a scene, and what of a scene Open
+    Shading Language spoils."""
     return checks.scene_warnings(expected.scene(scene))
 
 

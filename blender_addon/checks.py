@@ -7,7 +7,7 @@ import bpy
 
 from . import closure_pool, i18n, lamp_checks, nodes, pack, stand_in, update
 from .i18n import say
-from .setting_checks import DECLARED, clamp_highlight
+from .setting_checks import DECLARED, black_aovs, clamp_highlight
 
 BLENDER_MIN = (4, 5, 0)
 #: Devices other than the CPU whose kernels can run OSL.
@@ -132,7 +132,7 @@ def _twin_error(node):
 
 
 def scene_warnings(scene):
-    """What keeps any form from rendering in a scene."""
+    """What keeps any form from rendering in a scene, or what its shaders' language spoils."""
     found = []
     if bpy.app.version < BLENDER_MIN:
         found.append(
@@ -159,6 +159,13 @@ def scene_warnings(scene):
         return found
     if not scene.cycles.shading_system:
         found.append(Finding("osl_off", "ERROR", say("Open Shading Language is off")))
+    elif names := black_aovs(scene):
+        said = say(
+            "Open Shading Language is on: Cycles leaves AOVs black then ({names}); the picture "
+            "itself is right",
+            names=", ".join(names),
+        )
+        found.append(Finding("black_aovs", "WARNING", said))
     if backend := device_without_osl(scene):
         found.append(
             Finding(

@@ -68,7 +68,7 @@ def natives(node):
     """The node as Native, at one roughness or, where that is linked, at several. Raises Refused."""
     kind = KINDS[node.bl_idname]
     color = "Base Color" if kind == "principled" else "Color"
-    given = {"kind": kind, "color": tuple(min(max(c, 0.0), 1.0) for c in _color(node, color))}
+    given = {"kind": kind, "color": tuple(max(c, 0.0) for c in _color(node, color))}
     if kind in ("glossy", "principled"):
         if node.distribution not in ("GGX", "MULTI_GGX", "BECKMANN"):
             kind = node.bl_rna.properties["distribution"].enum_items[node.distribution].name

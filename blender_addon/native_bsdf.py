@@ -18,7 +18,8 @@ _SHARE = _SHARE * _MU
 
 @dataclass(frozen=True)
 class Native:
-    """A node with its values. `kind`: diffuse, glossy or principled; colours are (r, g, b)."""
+    """A node with its values. `kind`: diffuse, glossy or principled; colours are (r, g, b), which
+    may be above 1, where Cycles reflects more than there is."""
 
     kind: str
     color: tuple
@@ -55,13 +56,19 @@ def dielectric(f0, cosine):
     return 0.5 * a**2 * (1 + b**2)
 
 
+def _of_facets(color):
+    """The colour of a metal's facets, and of the light between grooves, Cycles holds to 1."""
+    return np.minimum(color, 1)
+
+
 def schlick(color, cosine):
-    return np.asarray(color) + (1 - np.asarray(color)) * (1 - np.clip(cosine, 0, 1)[..., None]) ** 5
+    color = _of_facets(color)
+    return color + (1 - color) * (1 - np.clip(cosine, 0, 1)[..., None]) ** 5
 
 
 def mean_schlick(color):
     """The mean of schlick() over all angles, by their cosines."""
-    return (20 * color + 1) / 21
+    return (20 * _of_facets(color) + 1) / 21
 
 
 def _shadow(w, alpha, beckmann):
@@ -160,7 +167,9 @@ def matte(wi, wo, color, roughness):
     t = (wi * wo).sum(-1) - nl * nv
     t = np.where(t > 0, t / np.maximum(np.maximum(nl, nv), 1e-9), t)
     mean = a * np.pi + (2 * np.pi - 5.6) / 3 * b
-    again = color**2 * (mean / (1 - mean)) / (1 - color * (1 - mean)) / np.pi
+    # Under OSL a Diffuse node's colour is held to 1 as a whole; files are made without.
+    held = _of_facets(color)
+    again = held**2 * (mean / (1 - mean)) / (1 - held * (1 - mean)) / np.pi
     lost = (1 - a * np.pi - b * _grooves(nv)) * (1 - a * np.pi - b * _grooves(nl))
     # The second term has the colour in it already; Cycles multiplies both by it.
     return nl[..., None] * ((a + b * t)[..., None] + again * lost[..., None]) * color

@@ -7,7 +7,7 @@ models come as NumPy with the extension.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -189,8 +189,10 @@ class Target:
 
 
 def with_width(candidate, native, factor):
-    """Values of a candidate whose width is `factor` times the power of the roughness."""
-    values, width = dict(candidate.values(native)), candidate.width
+    """Values of a candidate whose width is `factor` times the power of the roughness. No model's
+    colour is above 1."""
+    held = replace(native, color=tuple(min(c, 1.0) for c in native.color))
+    values, width = dict(candidate.values(held)), candidate.width
     if width is None:
         return values
     size = factor * max(native.roughness, 1e-3) ** width.power

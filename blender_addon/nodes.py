@@ -436,11 +436,17 @@ def trees_within(node):
     return trees
 
 
+def all_nodes(owner):
+    """Every node of a material or world, those in nested groups included, but for what groups of
+    this extension hold."""
+    trees = []
+    _trees(owner.node_tree, trees)
+    return [node for tree in trees for node in tree.nodes]
+
+
 def group_nodes(material):
     """Every group node of this extension in a material, nested groups included."""
-    trees = []
-    _trees(material.node_tree, trees)
-    return [node for tree in trees for node in tree.nodes if is_ours(node)]
+    return [node for node in all_nodes(material) if is_ours(node)]
 
 
 def make_local(tree):

@@ -174,6 +174,22 @@ def _leaning_facets(material, scene):
         )
 
 
+def black_aovs(scene):
+    """Names of the AOVs of a scene that OSL leaves black: Cycles does not run the nodes then that
+    write them. Tried in Blender 4.5, 5.0 and 5.2 (tests/blender/test_findings.py)."""
+    wanted = {aov.name for layer in scene.view_layers for aov in layer.aovs}
+    if not wanted:
+        return []
+    owners = [*bpy.data.materials, *([scene.world] if scene.world else [])]
+    written = {
+        node.aov_name
+        for owner in owners
+        for node in nodes.all_nodes(owner)
+        if node.bl_idname == "ShaderNodeOutputAOV"
+    }
+    return sorted(wanted & written)
+
+
 #: What a form may declare itself sensitive to in the manifest. A rule returns
 #: (severity, message), or None where nothing is wrong.
 DECLARED = {

@@ -21,6 +21,8 @@ class BRDFC_OT_enable_osl(Operator):
             return refused(self, error)
         for change in done or [say("Open Shading Language is on already")]:
             self.report({"INFO"}, rpt(change))
+        for finding in checks.scene_warnings(context.scene):
+            self.report({"WARNING"}, rpt(finding.message))
         return {"FINISHED"}
 
 

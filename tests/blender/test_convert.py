@@ -10,6 +10,7 @@ import pytest
 from goniometer import Goniometer, tilted, unit
 
 GOLD = (0.9, 0.6, 0.2)
+BRIGHT = (1.5, 1.0, 0.5)
 KINDS = {
     "diffuse": "ShaderNodeBsdfDiffuse",
     "glossy": "ShaderNodeBsdfAnisotropic",
@@ -59,6 +60,13 @@ UNDER_A_SUN = [
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.5, "IOR": 1.6}),
     ("principled", "MULTI_GGX", {"Base_Color": GOLD, "Roughness": 0.6, "Metallic": 1.0}),
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.5, "Metallic": 0.5}),
+    # Above 1: the whole of some nodes, of others the base alone.
+    ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.0}),
+    ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.7}),
+    ("glossy", "MULTI_GGX", {"Color": BRIGHT, "Roughness": 0.8}),
+    ("principled", "GGX", {"Base_Color": BRIGHT, "Roughness": 0.5, "Diffuse_Roughness": 0.6}),
+    ("principled", "MULTI_GGX", {"Base_Color": BRIGHT, "Roughness": 0.6, "Metallic": 1.0}),
+    ("principled", "MULTI_GGX", {"Base_Color": BRIGHT, "Roughness": 0.6, "Metallic": 0.5}),
 ]
 
 
@@ -66,6 +74,7 @@ UNDER_A_SUN = [
 def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distribution, inputs):
     material, node = material_of(kind, distribution, **inputs)
     (native,) = convert.natives(node)
+    empty.cycles.shading_system = False  # as files are made
     rng = np.random.default_rng(3)
     cosines = rng.choice(nearest_model(convert).VIEWS, 200)
     empty.cycles.max_bounces = 0
@@ -129,6 +138,32 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
                 other = dict(plan.values)
                 other[candidate.width.name] *= factor
                 assert target.error(plan.model, other) >= plan.error - 1e-6
+
+
+def test_the_error_is_that_of_the_bright_colour(convert):
+    """No model reflects more than there is: what is above 1 is lost, of what the node reflects."""
+    plan = only(convert.plan([material_of("diffuse", Color=(1.5, 1.0, 1.0), Roughness=0.0)[0]]))
+    assert plan.model == "lambert" and plan.values["rho"] == (1.0, 1.0, 1.0)
+    assert plan.error == pytest.approx(0.5 / 3.5, rel=1e-6)
+    smooth = material_of("glossy", "GGX", Color=(1.5, 1.5, 1.5), Roughness=0.0)[0]
+    assert only(convert.plan([smooth])).error == pytest.approx(0.5 / 1.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("color", [(1.5, 1.0, 1.0), (3.0, 0.5, 0.5)])
+def test_a_picture_of_a_bright_colour_is_off_as_is_said(extension, convert, empty, color):
+    material, _ = material_of("principled", "GGX", Base_Color=color, Roughness=0.5)
+    pictures, plan = [], only(convert.plan([material]))
+    copy = material.copy()
+    assert convert.apply(convert.plan([copy])) == 1
+    extension.api.enable_osl(empty)
+    empty.cycles.max_bounces = 1
+    helpers.sphere_scene(empty, material, samples=64)
+    for shown in (material, copy):
+        bpy.data.objects["Sphere"].data.materials[0] = shown
+        pictures.append(helpers.render(empty)[6:10, 6:10, :3])  # the ball alone
+    off = np.abs(pictures[0] - pictures[1]).sum() / pictures[0].sum()
+    print(f"light of the ball that is another: {off:.3g}, said: {plan.error:.3g}")
+    assert off == pytest.approx(plan.error, rel=0.1)  # of other views
 
 
 def test_the_error_is_that_of_the_pictures(extension, convert, empty):

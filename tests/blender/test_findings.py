@@ -352,6 +352,75 @@ def test_ray_visibility_of_lamps(extension, empty, rays):
     assert found(extension, material, empty) == {}
 
 
+# ---- AOVs, which OSL leaves black ----------------------------------------------------------------
+
+
+def write_aov(tree, name):
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    node.aov_name = name
+    node.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1)
+    return node
+
+
+def test_aovs_are_black_under_osl(extension, empty):
+    """Of a material that has nothing of this extension, too."""
+    material = bpy.data.materials.new("diffuse")
+    write_aov(helpers.empty_tree(material), "ID")
+    empty.view_layers[0].aovs.add().name = "ID"
+    helpers.sphere_scene(empty, material, size=8, samples=1)
+    for osl, seen in ((False, (0.2, 0.4, 0.6)), (True, (0, 0, 0))):
+        empty.cycles.shading_system = osl
+        assert helpers.render_passes(empty)["ID"][4, 4, :3] == pytest.approx(seen, abs=1e-6)
+
+
+def in_the_material(material):
+    write_aov(material.node_tree, "ID")
+
+
+def in_another_one(material):
+    write_aov(helpers.empty_tree(bpy.data.materials.new("other")), "ID")
+
+
+def in_a_group(material):
+    group = bpy.data.node_groups.new("group", "ShaderNodeTree")
+    write_aov(group, "ID")
+    material.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
+
+
+def in_the_world(material):
+    write_aov(helpers.add_world(bpy.context.scene)[0], "ID")
+
+
+@pytest.mark.parametrize("write", [in_the_material, in_another_one, in_a_group, in_the_world])
+def test_black_aovs_are_a_finding(extension, empty, write):
+    api = extension.api
+    material = ball(extension, empty)
+    layer = empty.view_layers[0]
+    layer.aovs.add().name = "ID"
+    layer.aovs.add().name = "nothing writes it"
+    assert found(extension, material, empty) == {}
+    write(material)
+    messages = found(extension, material, empty)
+    assert list(messages) == ["black_aovs"] and "black then (ID)" in messages["black_aovs"]
+    assert [f.severity for f in api.warnings(material, empty)] == ["WARNING"]
+    assert [f.code for f in api.scene_warnings(empty)] == ["black_aovs"]
+    empty.cycles.shading_system = False
+    assert [f.code for f in api.scene_warnings(empty)] == ["osl_off"]
+    empty.cycles.shading_system = True
+    layer.aovs.remove(layer.aovs[0])
+    assert found(extension, material, empty) == {}
+
+
+def test_turning_osl_on_says_that_aovs_will_be_black(extension, empty, capfd):
+    material = ball(extension, empty)
+    in_the_material(material)
+    empty.view_layers[0].aovs.add().name = "ID"
+    empty.cycles.shading_system = False
+    capfd.readouterr()
+    assert bpy.ops.brdfc.enable_osl() == {"FINISHED"}
+    assert "Cycles leaves AOVs black then (ID)" in "".join(capfd.readouterr())
+
+
 # ---- the console ---------------------------------------------------------------------------------
 
 
