@@ -89,7 +89,8 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         if target.type not in SURFACES:
             cls.poll_message_set(tip(say("Objects of this type show no surface of a material")))
             return False
-        return stays(cls, target.data)
+        # Which materials an overridden mesh has, a file keeps.
+        return target.data.is_editable or stays(cls, target.data)
 
     def execute(self, context):
         try:

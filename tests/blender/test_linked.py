@@ -221,6 +221,18 @@ def test_made_local_with_its_object(extension, library, tmp_path, get):
     changed_and_kept(extension, tmp_path)
 
 
+def test_new_materials_are_for_what_keeps_them(extension, library, tmp_path):
+    item = overridden(library, "objects", "Sphere")
+    bpy.context.view_layer.objects.active = item
+    with pytest.raises(RuntimeError, match=r"'Sphere' is linked from .*library\.blend"):
+        bpy.ops.brdfc.new_material(model="lambert")
+    item.data.override_create(remap_local_usages=True)
+    assert bpy.ops.brdfc.new_material(model="lambert") == {"FINISHED"}
+    name = item.active_material.name
+    reopened(tmp_path)
+    assert bpy.context.object.active_material.name == name
+
+
 def test_overrides_keep_no_values(library, tmp_path):
     """Why they are refused."""
     material = overridden(library, "materials", "phong")
