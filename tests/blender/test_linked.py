@@ -53,6 +53,12 @@ def put_on_a_ball(material):
     bpy.context.view_layer.objects.active = item
 
 
+def make_active(item):
+    if item.name not in bpy.context.scene.collection.objects:
+        bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.objects.active = item
+
+
 @pytest.fixture(params=[linked, overridden])
 def foreign(library, request):
     """foreign(name): a material of that file in a new one, the active one."""
@@ -213,17 +219,14 @@ def test_made_local_it_can_be_changed(extension, foreign, tmp_path):
 
 @pytest.mark.parametrize("get", [linked, overridden])
 def test_made_local_with_its_object(extension, library, tmp_path, get):
-    item = get(library, "objects", "Sphere")
-    if item.name not in bpy.context.scene.collection.objects:
-        bpy.context.scene.collection.objects.link(item)
-    bpy.context.view_layer.objects.active = item
+    make_active(get(library, "objects", "Sphere"))
     assert not bpy.ops.brdfc.switch.poll()
     changed_and_kept(extension, tmp_path)
 
 
 def test_new_materials_are_for_what_keeps_them(extension, library, tmp_path):
     item = overridden(library, "objects", "Sphere")
-    bpy.context.view_layer.objects.active = item
+    make_active(item)
     with pytest.raises(RuntimeError, match=r"'Sphere' is linked from .*library\.blend"):
         bpy.ops.brdfc.new_material(model="lambert")
     item.data.override_create(remap_local_usages=True)
