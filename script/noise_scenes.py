@@ -278,7 +278,7 @@ CONDITIONS = {
     "open_sky": Condition(
         "smooth sky, no floor", smooth_sky, "smooth_sky", (64, 1024), floor=False
     ),
-    "environment": Condition("environment image", environment_image, "smooth_sky"),
+    "environment": Condition("environment image", environment_image, "environment"),
     "interior": Condition("interior, indirect light", interior, "point"),
     "penumbra": Condition(
         "penumbra of a ball, area lamp", None, "point", (1024,), picked=True, penumbra=True
