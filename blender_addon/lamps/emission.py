@@ -35,28 +35,66 @@ _EMITTERS = {
 
 #: Nodes by which light differs from place to place, beside textures.
 _PLACES = {
-    "ShaderNodeNewGeometry",
-    "ShaderNodeUVMap",
-    "ShaderNodeAttribute",
-    "ShaderNodeVertexColor",
+    f"ShaderNode{name}"
+    for name in (
+        *("NewGeometry", "UVMap", "Attribute", "VertexColor", "Tangent", "Bevel", "Wireframe"),
+        *("AmbientOcclusion", "LayerWeight", "Fresnel", "CameraData", "Script"),
+    )
 }
+#: What goes through a node that joins shaders.
+_JOINTS = {"ShaderNodeMixShader": (0,), "ShaderNodeAddShader": ()}
 
 
-def _emitters(tree, output):
-    output = shader_trees.output(tree, output) if tree is not None else None
-    nodes = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []
-    return [node for node in nodes if node.bl_idname in _EMITTERS]
+def _differs(socket, seen):
+    """Whether a value differs from place to place."""
+    for link in socket.links:
+        node = link.from_node
+        if node.bl_idname == "ShaderNodeNewGeometry" and link.from_socket.name == "Backfacing":
+            continue  # the other side
+        if node.bl_idname.startswith("ShaderNodeTex") or node.bl_idname in _PLACES:
+            return True
+        if node not in seen:
+            seen.append(node)
+            ends = [node, *_group_outputs(node)]
+            if any(_differs(own, seen) for end in ends for own in end.inputs):
+                return True
+    return False
+
+
+def _group_outputs(node):
+    inner = getattr(node, "node_tree", None)
+    return [n for n in inner.nodes if n.bl_idname == "NodeGroupOutput"] if inner else []
+
+
+def _shines_unevenly(socket, seen):
+    """The same of the light of a shader. What does not emit does not count."""
+    for link in socket.links:
+        node = link.from_node
+        if node in seen:
+            continue
+        seen.append(node)
+        values = _JOINTS.get(node.bl_idname, ())
+        if node.bl_idname in _EMITTERS:
+            values = (*_EMITTERS[node.bl_idname], *(("Alpha",) if "Alpha" in node.inputs else ()))
+        if any(_differs(node.inputs[name], []) for name in values):
+            return True
+        groups = _group_outputs(node)
+        ends = [node, *groups]
+        for own in (own for end in ends for own in end.inputs):
+            if own.type == "SHADER" and _shines_unevenly(own, seen):
+                return True
+            # What a group makes of its inputs is not looked into.
+            if groups and own.type != "SHADER" and _differs(own, []):
+                return True
+    return False
 
 
 def is_even(owner):
     """Whether a light or a material emits the same at every place of it."""
-    kind = "ShaderNodeOutputMaterial" if isinstance(owner, bpy.types.Material) else None
-    return not any(
-        source.bl_idname.startswith("ShaderNodeTex") or source.bl_idname in _PLACES
-        for node in _emitters(shader_trees.shading(owner), kind or "ShaderNodeOutputLight")
-        for name in _EMITTERS[node.bl_idname]
-        for source in shader_trees.upstream(node.inputs[name])
-    )
+    kind = "Material" if isinstance(owner, bpy.types.Material) else "Light"
+    tree = shader_trees.shading(owner)
+    output = shader_trees.output(tree, f"ShaderNodeOutput{kind}") if tree is not None else None
+    return output is None or not _shines_unevenly(output.inputs["Surface"], [])
 
 
 def of_material(material):
@@ -64,9 +102,13 @@ def of_material(material):
     tree = shader_trees.shading(material)
     if tree is None or material.cycles.emission_sampling == "NONE":
         return 0.0
+    output = shader_trees.output(tree, "ShaderNodeOutputMaterial")
+    if output is None:
+        return 0.0
     return sum(
         _strength(node, *_EMITTERS[node.bl_idname])
-        for node in _emitters(tree, "ShaderNodeOutputMaterial")
+        for node in shader_trees.upstream(output.inputs["Surface"], "SHADER")
+        if node.bl_idname in _EMITTERS
     )
 
 

@@ -51,7 +51,7 @@ def device_changed(scene):
 
 
 def _worth_aiming(survey):
-    return [c for c in survey.candidates if not c.why]
+    return [c for c in survey.candidates if not c.why and c.rank > 0]
 
 
 def _listed(survey, chosen, why=None):
@@ -77,8 +77,9 @@ def _add_others(survey, scene):
     """Adds the lamps of scenes whose pictures are parts of the scene's: Blender calls handlers for
     the one alone. Each is ranked in its own."""
     for other in scenes.shown_with(scene):
-        names = {candidate.name for candidate in survey.candidates}
-        survey.candidates += [c for c in scenes.look(other, None).candidates if c.name not in names]
+        known = [(c.name, c.values) for c in survey.candidates]
+        found = scenes.look(other, None).candidates
+        survey.candidates += [c for c in found if (c.name, c.values) not in known]
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
 
 

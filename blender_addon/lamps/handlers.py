@@ -38,8 +38,10 @@ def _concerns(update, scene):
             )
         return False
     if isinstance(item, bpy.types.Material):
-        return emission.of_material(item.original) != survey.emission.get(
-            item.original.name_full, 0.0
+        known = survey.emission.get(item.original.name_full, 0.0)
+        even = item.original.name_full not in survey.uneven
+        return emission.of_material(item.original) != known or (
+            known > 0 and emission.is_even(item.original) != even
         )
     if isinstance(item, bpy.types.NodeTree):
         # Materials come with an update of their own.

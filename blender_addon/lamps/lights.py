@@ -94,8 +94,17 @@ def candidate_of(item, name, light, matrix):
         _irradiance(light, matrix),
         _looks(light, matrix),
         sizeless=is_sizeless(light),
-        uneven=light.type == "AREA" and not emission.is_even(light),
+        # A scaled spot has a cone that is none, which the shaders don't know.
+        uneven=not emission.is_even(light) or (light.type == "SPOT" and slots.is_stretched(matrix)),
     )
+
+
+def _inputs_of(modifier):
+    """Values of the inputs of geometry nodes."""
+    if hasattr(modifier, "properties"):  # since 5.2
+        inputs = modifier.properties.inputs
+        return [getattr(getattr(inputs, key), "value", None) for key in inputs.keys()]
+    return [modifier[key] for key in modifier.keys()]
 
 
 def places_lamps(item, depth=0):
@@ -113,8 +122,7 @@ def places_lamps(item, depth=0):
         return any(child.type == "LIGHT" for child in item.children)
     for modifier in item.modifiers:
         if modifier.type == "NODES" and modifier.node_group is not None:
-            for key in modifier.keys():  # noqa: SIM118 (a modifier is no dict)
-                value = modifier[key]
+            for value in _inputs_of(modifier):
                 if isinstance(value, bpy.types.Collection) and has_lights(value):
                     return True
                 if isinstance(value, bpy.types.Object) and value.type == "LIGHT":

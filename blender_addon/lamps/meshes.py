@@ -22,10 +22,24 @@ _FILLS_RECTANGLE, _FILLS_ELLIPSE, _THICK = 0.95, 0.7, 0.1
 TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
+def _evaluated(item, depsgraph):
+    """The object whose data has the faces: in Edit Mode Blender's evaluated one has none."""
+    return item.evaluated_get(depsgraph) if depsgraph is not None and item.mode != "EDIT" else item
+
+
+def materials_of(item, depsgraph):
+    """Materials of an object's faces, in the order of their indices, with those that geometry nodes
+    give it."""
+    if item.type == "MESH" and any(m.type == "NODES" for m in item.modifiers):
+        found = _evaluated(item, depsgraph).data.materials
+        return [m.original if m is not None else None for m in found]
+    return [s.material for s in item.material_slots]
+
+
 def _lit(item, materials, depsgraph):
     """Points of an object's faces of some materials, in its own space, (n, 3), and triangles of
     these points, (m, 3); no triangles of what is no mesh or too large a one to look at."""
-    own = item.evaluated_get(depsgraph) if depsgraph is not None else item
+    own = _evaluated(item, depsgraph)
     mesh = own.data
     none = np.empty((0, 3), np.int32)
     if item.type != "MESH" or len(mesh.vertices) == 0 or len(mesh.vertices) > 200000:
@@ -37,7 +51,7 @@ def _lit(item, materials, depsgraph):
     triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     triangles = triangles.reshape(-1, 3)
-    lit_slots = np.array([s.material in materials for s in item.material_slots])
+    lit_slots = np.array([m in materials for m in materials_of(item, depsgraph)])
     if lit_slots.all():
         return points, triangles
     index = np.empty(len(triangles), np.int32)
@@ -50,10 +64,9 @@ def _lit(item, materials, depsgraph):
 def _flat(points, triangles):
     """A flat mesh as a lamp: its kind, middle, axes as rows, the last across it, and two sizes;
     None of what is not flat, or neither a rectangle nor an ellipse. In the world's space."""
-    if not 0 < len(triangles) <= 20000:
+    if len(triangles) == 0:
         return None
-    edges = points[triangles[:, 1:]] - points[triangles[:, :1]]
-    areas = np.cross(edges[:, 0], edges[:, 1]) / 2
+    areas = _areas(points, triangles)
     across = areas[(areas**2).sum(-1).argmax()]
     size = np.linalg.norm(across)
     if not size > 0:
@@ -62,7 +75,10 @@ def _flat(points, triangles):
     # Each side of something thin by itself.
     area = max(np.maximum(side * areas @ across, 0).sum() for side in (1, -1))
     frame = np.array(Vector(across).to_track_quat("Z", "Y").to_matrix()).T
-    flat = ((points - points[0]) @ frame.T)[:, :2]
+    flat = (points - points[0]) @ frame.T
+    if np.ptp(flat[:, 2]) > _THICK * np.ptp(flat[:, :2], 0).max():
+        return None
+    flat = _outermost(flat[:, :2])
     turns = {
         slots.RECTANGLE: geometry.box_fit_2d([Vector(p) for p in flat]),
         slots.ELLIPSE: -_main_axis(flat),
@@ -80,10 +96,25 @@ def _flat(points, triangles):
             away = ((places - middle)[:, :2] / ((high - low)[:2] / 2)) ** 2
             fits = filled >= _FILLS_ELLIPSE and away.sum(-1).max() < 1.05
         else:
-            fits = filled >= _FILLS_RECTANGLE
+            fits = _FILLS_RECTANGLE <= filled <= 2 - _FILLS_RECTANGLE
         if fits:
             return kind, points[0] + middle @ turned, turned, (width, height)
     return None
+
+
+def _areas(points, triangles):
+    """Normals of triangles that are as long as these are large."""
+    edges = points[triangles[:, 1:]] - points[triangles[:, :1]]
+    return np.cross(edges[:, 0], edges[:, 1]) / 2
+
+
+def _outermost(places):
+    """Points, (n, 2), without most of those inside: the first along each of many directions."""
+    if len(places) <= 200:
+        return places
+    angles = np.arange(360) * np.pi / 180
+    reach = places @ np.array([np.cos(angles), np.sin(angles)])
+    return places[np.unique(reach.argmax(0))]
 
 
 def _main_axis(places):
@@ -97,9 +128,9 @@ def candidate_of(item, materials, matrix, depsgraph):
     points, triangles = _lit(item, materials, depsgraph)
     if len(points) == 0:
         return None
-    glowing = {s.material for s in item.material_slots} & set(materials)
+    glowing = set(materials_of(item, depsgraph)) & set(materials)
     radiance = sum(materials[m] for m in glowing)
-    uneven = not all(emission.is_even(m) for m in glowing)
+    uneven = len(glowing) > 1 or not all(emission.is_even(m) for m in glowing)
     world = points @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
     if flat := _flat(world, triangles):
         candidate = _sheet(item, radiance, *flat)
@@ -128,6 +159,10 @@ def candidate_of(item, materials, matrix, depsgraph):
     looks = slots.looks_like(middle, size)
     candidate = slots.Candidate(item.name, values, irradiance, looks, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
+    if len(triangles) > 0:
+        areas = _areas(world, triangles)
+        if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
+            extent = 0.0  # it is open: part of a ball
 
     def judge(points):
         distance = np.sqrt(((points - middle) ** 2).sum(-1)).min()

@@ -13,7 +13,7 @@ from . import emission, lights, meshes, slots, world
 
 #: Angular radius from which it counts that a lamp's light differs over it: what a lobe carries is
 #: the mean of the model over the lamp.
-_LOOKS_UNEVEN = 0.03
+_LOOKS_UNEVEN = 0.05
 
 
 @dataclass
@@ -22,6 +22,7 @@ class Survey:
 
     candidates: list = field(default_factory=list)
     emission: dict = field(default_factory=dict)  # of materials, by name
+    uneven: set = field(default_factory=set)  # names of those that emit unlike from place to place
     glowing: set = field(default_factory=set)  # names of objects that emit
     instancers: set = field(default_factory=set)  # names of objects that place lamps
     kinds: dict = field(
@@ -113,6 +114,7 @@ def look(scene, depsgraph, subject=None):
 
     survey.emission = {m.name_full: emission.of_material(m) for m in bpy.data.materials}
     emitting = {m: e for m in bpy.data.materials if (e := survey.emission[m.name_full]) > 0}
+    survey.uneven = {m.name_full for m in emitting if not emission.is_even(m)}
     shown = []
     for item in _rendered(scene):
         kind = item.type
@@ -124,7 +126,7 @@ def look(scene, depsgraph, subject=None):
         elif kind in meshes.TYPES:
             if item.hide_render:
                 continue
-            glows = emitting and any(s.material in emitting for s in item.material_slots)
+            glows = emitting and any(m in emitting for m in meshes.materials_of(item, depsgraph))
             if glows and (
                 made := meshes.candidate_of(item, emitting, matrices(item).copy(), depsgraph)
             ):
@@ -144,6 +146,8 @@ def look(scene, depsgraph, subject=None):
             candidate.judge(survey.subject)
         candidate.rank = float(np.mean(candidate.irradiance(survey.subject)))
         angle = float(np.mean(candidate.looks(survey.subject)))
+        if not math.isfinite(candidate.rank + angle):  # of a mesh with broken points
+            candidate.rank = angle = 0.0
         candidate.width = round(math.log2(max(angle, 1e-4)))
         if candidate.uneven and angle > _LOOKS_UNEVEN and not candidate.why:
             candidate.why = say("its light is not the same all over it")

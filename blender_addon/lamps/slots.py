@@ -115,9 +115,16 @@ def is_sheared(matrix):
     return max(abs(axes[i].dot(axes[j])) for i, j in ((0, 1), (1, 2), (2, 0))) > 1e-3
 
 
+def is_stretched(matrix):
+    """Whether a transform scales axes unlike."""
+    scales = [abs(s) for s in matrix.to_scale()]
+    return max(scales) > 1.01 * min(scales)
+
+
 def transform_kind(matrix):
-    """What of a transform the drivers are chosen by: whether it mirrors, and is oblique."""
-    return matrix.is_negative, is_sheared(matrix)
+    """What of a transform the drivers and lobes are chosen by: whether it mirrors, is oblique, and
+    scales axes unlike."""
+    return matrix.is_negative, is_sheared(matrix), is_stretched(matrix)
 
 
 def _upright(matrix):

@@ -33,6 +33,9 @@ def _turn_of(node):
         inputs = source.inputs
         if inputs["Rotation"].is_linked or inputs["Scale"].is_linked:
             return None
+        moves = inputs["Location"].is_linked or any(inputs["Location"].default_value)
+        if moves and source.vector_type in {"POINT", "TEXTURE"}:
+            return None
         turn = Euler(inputs["Rotation"].default_value).to_matrix()
         scale = Matrix.Diagonal(inputs["Scale"].default_value)
         try:
@@ -64,7 +67,7 @@ def forget_images():
 
 
 def _image_spots(image):
-    key = (image.name_full, image.filepath, tuple(image.size), image.source)
+    key = (image.session_uid, image.filepath, tuple(image.size), image.source)
     if key not in _spots:
         width, height = image.size
         pixels = np.empty(width * height * image.channels, np.float32)

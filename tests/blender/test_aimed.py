@@ -169,7 +169,7 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
 def test_a_small_lamp_before_a_large_one(extension, empty):
     """The lobe of the large one gives light of the small one, which drawn directions hardly ever
     meet to take it off again: so the small one comes later and is given less. Both at once show
-    what each shows alone; the other way round a ball was 18 % too bright."""
+    what each shows alone; the other way round a ball is 62 % too bright."""
     towards = unit((0.5, -0.62, 0.6))
     turn = Vector(-towards).to_track_quat("-Z", "Y").to_euler()
     large = add_lamp(
@@ -182,7 +182,7 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
     add_camera(empty)
     empty.render.resolution_x = empty.render.resolution_y = 40
     empty.cycles.samples = 512
-    add_sphere(empty, extension.api.new_material("radziszewski_alda", "aimed"))
+    add_sphere(empty, extension.api.new_material("radziszewski_alda", "aimed", n=1.0))
     light = {}
     for shown in ("large", "small", "both"):
         large.hide_render, small.hide_render = shown == "small", shown == "large"
@@ -198,7 +198,7 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
     error = np.linalg.norm([e for _, e in light.values()])
     print(f"{light['both'][0] / alone - 1:+.4f} +- {error / alone:.4f}")
     assert abs(light["both"][0] - alone) < 4.5 * error + 0.002 * alone
-    assert error < 0.004 * alone
+    assert error < 0.02 * alone
 
 
 @pytest.mark.slow

@@ -549,6 +549,8 @@ def test_spot_of_an_environment_image(extension, ball, empty):
     bright = extension.api.see_lamps(empty)[0].irradiance
     background.inputs["Strength"].default_value = 3.0
     assert extension.api.see_lamps(empty)[0].irradiance == pytest.approx(3 * bright)
+    mapping.inputs["Location"].default_value = (0.3, 0, 0)
+    assert slots(empty) == []
     noise = tree.nodes.new("ShaderNodeTexNoise")
     tree.links.new(noise.outputs["Color"], node.inputs["Vector"])
     assert slots(empty) == []
@@ -676,6 +678,225 @@ def test_lamps_whose_light_differs_over_them(extension, ball, empty):
     assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [None]
 
 
+def _mask(tree):
+    """1 on half of a mesh, 0 on the other."""
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    step = tree.nodes.new("ShaderNodeMath")
+    step.operation = "GREATER_THAN"
+    tree.links.new(place.outputs["Generated"], step.inputs[0])
+    return step.outputs[0]
+
+
+def _mixed(tree, emission, factor):
+    mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+    tree.links.new(factor, mix.inputs[0])
+    tree.links.new(emission.outputs[0], mix.inputs[1])
+    tree.links.new(clear.outputs[0], mix.inputs[2])
+    return mix.outputs[0]
+
+
+def _grouped(tree, emission, factor):
+    """The Emission in a group that takes its strength from outside."""
+    inner = bpy.data.node_groups.new("Glow", "ShaderNodeTree")
+    inner.interface.new_socket("Strength", in_out="INPUT", socket_type="NodeSocketFloat")
+    inner.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    node, ends = inner.nodes.new("ShaderNodeEmission"), []
+    for kind in ("NodeGroupInput", "NodeGroupOutput"):
+        ends.append(inner.nodes.new(kind))
+    inner.links.new(ends[0].outputs[0], node.inputs["Strength"])
+    inner.links.new(node.outputs[0], ends[1].inputs[0])
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = inner
+    tree.links.new(factor, group.inputs[0])
+    return group.outputs[0]
+
+
+def _principled(tree, emission, factor, socket="Alpha"):
+    node = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    node.inputs["Emission Strength"].default_value = 10
+    tree.links.new(factor, node.inputs[socket])
+    return node.outputs[0]
+
+
+def _backfacing(tree, emission, factor):
+    side = tree.nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"]
+    return _mixed(tree, emission, side)
+
+
+def _painted(tree, emission, factor):
+    return _principled(tree, emission, factor, "Roughness")
+
+
+@pytest.mark.parametrize(
+    "shader, even",
+    [
+        *((shader, False) for shader in (_mixed, _grouped, _principled)),
+        *((shader, True) for shader in (_backfacing, _painted)),
+    ],
+)
+def test_what_makes_light_differ(extension, ball, empty, shader, even):
+    material, strength = emissive()
+    tree = material.node_tree
+    surface = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial").inputs[0]
+    emissive_plane(empty, material, [(-1, -1), (1, -1), (1, 1), (-1, 1)]).location.z = 6
+    assert len(slots(empty)) == 1
+    tree.links.new(shader(tree, strength.node, _mask(tree)), surface)
+    assert len(slots(empty)) == even, "and handlers see it"
+
+
+def test_parts_of_balls_and_of_planes(extension, ball, empty):
+    """Whose light is not that of the whole."""
+    bright, dim = emissive()[0], emissive(5.0)[0]
+    square = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    panel = emissive_plane(empty, bright, [*square[:2], (1, 0), *square[2:], (-1, 0)])
+    panel.location.z = 6
+    assert len(slots(empty)) == 1
+    panel.data.clear_geometry()
+    corners = [(-1, -1, 0), (1, -1, 0), (1, 0, 0), (-1, 0, 0), (1, 1, 0), (-1, 1, 0)]
+    panel.data.from_pydata(corners, [], [(0, 1, 2, 3), (3, 2, 4, 5)])
+    panel.data.materials.append(dim)
+    panel.data.polygons[1].material_index = 1
+    panel.data.update()
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and "not the same" in lamp.why
+    bpy.data.objects.remove(panel)
+    glow = helpers.add_sphere(empty, bright, segments=16)
+    glow.location.z = 6
+    assert len(slots(empty)) == 1
+    glow.data.materials.append(bpy.data.materials.new("Dark"))
+    for polygon in glow.data.polygons:
+        polygon.material_index = int(polygon.center.x > 0)
+    glow.data.update()
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and "neither flat" in lamp.why
+
+
+def test_soft_lamps_with_textures_and_scaled_spots(extension, ball, empty):
+    item = add_lamp(empty, "POINT", shadow_soft_size=1.0)
+    item.data.use_nodes = True
+    tree = item.data.node_tree
+    (emission,) = (n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
+    tree.links.new(_mask(tree), emission.inputs["Strength"])
+    assert slots(empty) == []
+    item.data.shadow_soft_size = 0.1
+    assert len(slots(empty)) == 1
+    bpy.data.objects.remove(item)
+    item = add_lamp(empty, "SPOT", shadow_soft_size=0.8)
+    item.scale = (2, 2, 2)
+    assert len(slots(empty)) == 1
+    item.scale = (0.3, 1, 1)
+    assert slots(empty) == []
+
+
+def test_a_fine_grid_in_edit_mode(extension, ball, empty):
+    """Any number of faces make a plane, and one that is edited stays one."""
+    n = 160
+    mesh = bpy.data.meshes.new("Grid")
+    points = [(x / n - 0.5, y / n - 0.5, 0) for y in range(n + 1) for x in range(n + 1)]
+    row = n + 1
+    faces = [
+        (i, i + 1, i + 1 + row, i + row) for y in range(n) for i in range(y * row, y * row + n)
+    ]
+    mesh.from_pydata(points, [], faces)
+    mesh.materials.append(emissive()[0])
+    grid = bpy.data.objects.new("Grid", mesh)
+    grid.location.z, grid.rotation_euler = 5, (0.2, 0.3, 0.5)
+    empty.collection.objects.link(grid)
+    (slot,) = slots(empty)
+    assert slot[9] == 3 and slot[10:12] == pytest.approx([1, 1], abs=1e-3)
+    bpy.context.view_layer.objects.active = grid
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_materials_of_geometry_nodes(extension, ball, empty):
+    plain = bpy.data.materials.new("Plain")
+    panel = emissive_plane(empty, plain, [(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    panel.location.z = 6
+    assert slots(empty) == []
+    tree = bpy.data.node_groups.new("Paint", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    paint = tree.nodes.new("GeometryNodeSetMaterial")
+    paint.inputs["Material"].default_value = emissive()[0]
+    tree.links.new(start.outputs[0], paint.inputs[0])
+    tree.links.new(paint.outputs[0], end.inputs[0])
+    panel.modifiers.new("Paint", "NODES").node_group = tree
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+
+
+def test_lamps_that_geometry_nodes_place(extension, ball, empty):
+    """Of a collection that is the modifier's input."""
+    lamps = bpy.data.collections.new("Lamps")
+    data = bpy.data.lights.new("Bulb", "POINT")
+    data.shadow_soft_size = 0.1
+    bulb = bpy.data.objects.new("Bulb", data)
+    bulb.location.z = 4
+    lamps.objects.link(bulb)
+    tree = bpy.data.node_groups.new("Place", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    socket = tree.interface.new_socket(
+        "Collection", in_out="INPUT", socket_type="NodeSocketCollection"
+    )
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    info = tree.nodes.new("GeometryNodeCollectionInfo")
+    tree.links.new(start.outputs[0], info.inputs["Collection"])
+    tree.links.new(info.outputs[0], end.inputs[0])
+    item = bpy.data.objects.new("Fitting", bpy.data.meshes.new("Fitting"))
+    empty.collection.objects.link(item)
+    modifier = item.modifiers.new("Place", "NODES")
+    modifier.node_group = tree
+    assert slots(empty) == []
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, socket.identifier).value = lamps
+    else:
+        modifier[socket.identifier] = lamps
+    item.update_tag()
+    bpy.context.view_layer.update()
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot == 1 and lamp.name == "Fitting/Bulb"
+    assert slots(empty)[0][:3] == pytest.approx([0, 0, 4])
+
+
+def test_broken_and_empty_meshes(extension, ball, empty):
+    """Raise nothing and take no slot."""
+    material, _ = emissive()
+    for points, faces in (
+        ([], []),
+        ([(0, 0, 1)], []),
+        ([(0, 0, float("nan")), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]),
+        ([(0, 0, 1), (1, 0, 1), (2, 0, 1)], [(0, 1, 2)]),
+    ):
+        mesh = bpy.data.meshes.new("Broken")
+        mesh.from_pydata(points, [], faces)
+        mesh.materials.append(material)
+        empty.collection.objects.link(bpy.data.objects.new("Broken", mesh))
+    add_lamp(empty, "POINT", "Key")
+    assert [(lamp.name, lamp.slot) for lamp in extension.api.see_lamps(empty)][0] == ("Key", 1)
+    assert len(slots(empty)) == 1
+
+
+def test_images_of_another_file_with_the_same_name(extension, ball, empty, tmp_path):
+    directions = (0.6, 0, 0.8), (0, 0.6, 0.8)
+    for number, direction in enumerate(directions):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        helpers.add_sphere(scene, extension.api.new_material("ashikhmin_shirley", "aimed"), 8)
+        _, _, node = environment(scene, spotted(np.array(direction), 0.03, 5000.0))
+        node.image.pack()
+        (slot,) = slots(scene)
+        assert axes(slot)[:, 2] == pytest.approx(direction, abs=5e-3)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{number}.blend"))
+    for number in (0, 1, 0):
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / f"{number}.blend"))
+        (slot,) = slots(bpy.context.scene)
+        assert axes(slot)[:, 2] == pytest.approx(directions[number], abs=5e-3)
+
+
 def test_lamps_that_are_not_normalised(extension, ball, empty):
     """Their energy is for a size of 1."""
     helpers.add_camera(empty)
@@ -717,6 +938,15 @@ def test_scenes_within_the_picture(extension, ball, empty):
     tree.nodes.new("CompositorNodeRLayers").scene = other
     assert sorted(lamp.name for lamp in extension.api.see_lamps(empty)) == ["Here", "There"]
     assert [lamp.name for lamp in extension.api.see_lamps(other)] == ["There"]
+    suns = []
+    for scene, turn in ((empty, 0.0), (other, 2.5)):
+        suns.append(sky(scene))
+        suns[-1].sun_rotation = turn
+    assert len(extension.api.see_lamps(empty)) == 4, "of one name, and not the same"
+    suns[1].sun_rotation = 0.0
+    assert len(extension.api.see_lamps(empty)) == 3
+    for sun in suns:
+        sun.sun_disc = False
     empty.render.use_compositing = False
     assert [lamp.name for lamp in extension.api.see_lamps(empty)] == ["Here"]
     strips = empty.sequence_editor_create().strips
