@@ -245,7 +245,7 @@ def switch_representation(material, representation):
 
 def _prepare_all():
     for material in bpy.data.materials:
-        if editable.refusal(material) is None:
+        if editable.stays(material):
             prepare_material(material)
 
 
@@ -403,7 +403,7 @@ def start_plan(error=None, time=None, fit=False):
     used = [
         (name, node, entry)
         for name, material, node, entry in _used()
-        if editable.refusal(material, node.id_data) is None
+        if editable.stays(material, node.id_data)
     ]
     if not used:
         raise ValueError(_NO_MATERIAL)

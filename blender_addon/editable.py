@@ -35,6 +35,11 @@ def refusal(*blocks):
     return None
 
 
+def stays(*blocks):
+    """Whether there is no refusal()."""
+    return refusal(*blocks) is None
+
+
 def check(*blocks):
     """Raises ValueError where there is a refusal()."""
     if why := refusal(*blocks):

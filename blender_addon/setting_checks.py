@@ -31,6 +31,10 @@ def _far_orthographic(scene):
     return _pixel_size(scene) < FAR_PIXEL * distance
 
 
+def _warning(wrong, message):
+    return ("WARNING", message) if wrong else None
+
+
 def _bump_correction(material, scene):
     if material.cycles.use_bump_map_correction:
         return (
@@ -49,75 +53,67 @@ def _path_guiding(material, scene):
 
 def _clamp_indirect(material, scene):
     clamp = scene.cycles.sample_clamp_indirect
-    if clamp > 0:
-        return (
-            "WARNING",
-            say(
-                "Indirect Light is clamped to {clamp}: it darkens bright reflections of this form; "
-                "0 is exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
+    return _warning(
+        clamp > 0,
+        say(
+            "Indirect Light is clamped to {clamp}: it darkens bright reflections of this form; "
+            "0 is exact",
+            clamp=f"{clamp:g}",
+        ),
+    )
 
 
 def _clamp_mirror(material, scene):
     clamp = scene.cycles.sample_clamp_indirect
-    if clamp > 0:
-        return (
-            "WARNING",
-            say(
-                "Indirect Light is clamped to {clamp}: it darkens bright lights in this mirror; "
-                "0 is exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
+    return _warning(
+        clamp > 0,
+        say(
+            "Indirect Light is clamped to {clamp}: it darkens bright lights in this mirror; "
+            "0 is exact",
+            clamp=f"{clamp:g}",
+        ),
+    )
 
 
 def _clamp_direct(material, scene):
     clamp = scene.cycles.sample_clamp_direct
-    if clamp > 0:
-        return (
-            "WARNING",
-            say(
-                "Direct Light is clamped to {clamp}: it darkens highlights of this form; 0 is "
-                "exact",
-                clamp=f"{clamp:g}",
-            ),
-        )
+    return _warning(
+        clamp > 0,
+        say(
+            "Direct Light is clamped to {clamp}: it darkens highlights of this form; 0 is exact",
+            clamp=f"{clamp:g}",
+        ),
+    )
 
 
 def _far_camera(material, scene):
-    if _far_orthographic(scene):
-        return (
-            "WARNING",
-            say(
-                "The orthographic camera is so far away that the noise of this form shows "
-                "patterns: move it closer"
-            ),
-        )
+    return _warning(
+        _far_orthographic(scene),
+        say(
+            "The orthographic camera is so far away that the noise of this form shows "
+            "patterns: move it closer"
+        ),
+    )
 
 
 def _caustics(material, scene):
-    if not scene.cycles.caustics_reflective:
-        return (
-            "WARNING",
-            say(
-                "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
-                "is lost"
-            ),
-        )
+    return _warning(
+        not scene.cycles.caustics_reflective,
+        say(
+            "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
+            "is lost"
+        ),
+    )
 
 
 def _filter_glossy(material, scene):
-    if scene.cycles.blur_glossy > 0:
-        return (
-            "WARNING",
-            say(
-                "Filter Glossy is {value}: it darkens repeated reflections of this form; "
-                "0 is exact",
-                value=f"{scene.cycles.blur_glossy:g}",
-            ),
-        )
+    return _warning(
+        scene.cycles.blur_glossy > 0,
+        say(
+            "Filter Glossy is {value}: it darkens repeated reflections of this form; 0 is exact",
+            value=f"{scene.cycles.blur_glossy:g}",
+        ),
+    )
 
 
 def _albedo_passes(material, scene):

@@ -19,6 +19,13 @@ def output(tree, kind):
     return next((n for n in fits if n.is_active_output), fits[0] if fits else None)
 
 
+def ends(node):
+    """Nodes whose inputs the outputs of one hang on: itself, and what ends the group in it."""
+    inner = getattr(node, "node_tree", None)
+    inside = inner.nodes if inner is not None else ()
+    return [node, *(end for end in inside if end.bl_idname == "NodeGroupOutput")]
+
+
 def upstream(socket, kind=None, seen=None):
     """Every node that a socket hangs on, by links of one type of socket if it is given; groups are
     looked into, but for those of models, which are large and hold neither lamps nor
@@ -29,13 +36,9 @@ def upstream(socket, kind=None, seen=None):
         if node in seen:
             continue
         seen.append(node)
-        ends = [node]
-        inner = getattr(node, "node_tree", None)
-        if inner is not None:
-            if pack.TAG in inner:
-                continue
-            ends += [end for end in inner.nodes if end.bl_idname == "NodeGroupOutput"]
-        for end in ends:
+        if pack.TAG in (getattr(node, "node_tree", None) or ()):
+            continue
+        for end in ends(node):
             for own in end.inputs:
                 if (kind is None or own.type == kind) and own.is_linked:
                     upstream(own, kind, seen)

@@ -197,7 +197,7 @@ def draw_node(layout, node, scene):
     """Model, form, error, cost, energy and values of one group node."""
     model_name, _ = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
-    changes = editable.refusal(node.id_data) is None
+    changes = editable.stays(node.id_data)
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         column = layout.column(align=True)

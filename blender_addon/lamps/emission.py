@@ -55,15 +55,10 @@ def _differs(socket, seen):
             return True
         if node not in seen:
             seen.append(node)
-            ends = [node, *_group_outputs(node)]
+            ends = shader_trees.ends(node)
             if any(_differs(own, seen) for end in ends for own in end.inputs):
                 return True
     return False
-
-
-def _group_outputs(node):
-    inner = getattr(node, "node_tree", None)
-    return [n for n in inner.nodes if n.bl_idname == "NodeGroupOutput"] if inner else []
 
 
 def _shines_unevenly(socket, seen):
@@ -78,38 +73,46 @@ def _shines_unevenly(socket, seen):
             values = (*_EMITTERS[node.bl_idname], *(("Alpha",) if "Alpha" in node.inputs else ()))
         if any(_differs(node.inputs[name], []) for name in values):
             return True
-        groups = _group_outputs(node)
-        ends = [node, *groups]
+        ends = shader_trees.ends(node)
         for own in (own for end in ends for own in end.inputs):
-            if own.type == "SHADER" and _shines_unevenly(own, seen):
-                return True
+            if own.type == "SHADER":
+                if _shines_unevenly(own, seen):
+                    return True
             # What a group makes of its inputs is not looked into.
-            if groups and own.type != "SHADER" and _differs(own, []):
+            elif len(ends) > 1 and _differs(own, []):
                 return True
     return False
 
 
-def is_even(owner):
-    """Whether a light or a material emits the same at every place of it."""
+def _surface(owner):
+    """The socket by which nodes shade a light or a material, or None."""
     kind = "Material" if isinstance(owner, bpy.types.Material) else "Light"
     tree = shader_trees.shading(owner)
     output = shader_trees.output(tree, f"ShaderNodeOutput{kind}") if tree is not None else None
-    return output is None or not _shines_unevenly(output.inputs["Surface"], [])
+    return output.inputs["Surface"] if output is not None else None
+
+
+def is_even(owner):
+    """Whether a light or a material emits the same at every place of it."""
+    surface = _surface(owner)
+    return surface is None or not _shines_unevenly(surface, [])
 
 
 def of_material(material):
     """Radiance of a material that light sampling looks for, 0 of most."""
-    tree = shader_trees.shading(material)
-    if tree is None or material.cycles.emission_sampling == "NONE":
-        return 0.0
-    output = shader_trees.output(tree, "ShaderNodeOutputMaterial")
-    if output is None:
+    surface = _surface(material)
+    if surface is None or material.cycles.emission_sampling == "NONE":
         return 0.0
     return sum(
         _strength(node, *_EMITTERS[node.bl_idname])
-        for node in shader_trees.upstream(output.inputs["Surface"], "SHADER")
+        for node in shader_trees.upstream(surface, "SHADER")
         if node.bl_idname in _EMITTERS
     )
+
+
+def sides(light):
+    """Names of the properties that are an area lamp's two sizes."""
+    return "size", "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
 
 
 def _size(light):
@@ -119,19 +122,19 @@ def _size(light):
         return math.pi * math.tan(min(light.angle, 3.0) / 2) ** 2
     if light.type != "AREA":
         return 4 * math.pi * light.shadow_soft_size**2
-    other = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
-    return light.size * other * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1.0)
+    width, height = (getattr(light, side) for side in sides(light))
+    return width * height * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1.0)
 
 
 def of_light(light):
     """Energy of a light times its colour, negative as it is positive: closures aim at lamps that
     take light as at others. Of a dark one that may light up, next to nothing."""
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
-    if not getattr(light, "normalize", True):  # since 4.5
+    if not light.normalize:
         power *= _size(light) or 1.0
-    if tree := shader_trees.shading(light):
-        output = shader_trees.output(tree, "ShaderNodeOutputLight")
-        nodes = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []
+    if shader_trees.shading(light):
+        surface = _surface(light)
+        nodes = shader_trees.upstream(surface, "SHADER") if surface else []
         power *= sum(
             _strength(n, "Color", "Strength") for n in nodes if n.bl_idname == "ShaderNodeEmission"
         )

@@ -73,21 +73,22 @@ memory = SimpleNamespace(
 )
 
 
-def _add_others(survey, scene):
-    """Adds the lamps of scenes whose pictures are parts of the scene's: Blender calls handlers for
-    the one alone. Each is ranked in its own."""
+def _survey(scene, depsgraph, subject=None):
+    """scenes.look() with the lamps of scenes whose pictures are parts of the scene's: Blender calls
+    handlers for the one alone. Each is ranked in its own."""
+    survey = scenes.look(scene, depsgraph, subject)
     for other in scenes.shown_with(scene):
         known = [(c.name, c.values) for c in survey.candidates]
         found = scenes.look(other, None).candidates
         survey.candidates += [c for c in found if (c.name, c.values) not in known]
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
+    return survey
 
 
 def _fill(scene, depsgraph, subject=None, keep=True):
     """Brings the shared group, if there is one, up to date; returns [slots.Lamp]. `keep`: lamps
     stay in their slots where that is possible."""
-    survey = scenes.look(scene, depsgraph, subject)
-    _add_others(survey, scene)
+    survey = _survey(scene, depsgraph, subject)
     limit = limit_of(scene)
     group = shared_group.the_one()
     now = shared_group.written(group) if group else []
@@ -165,7 +166,7 @@ def seen(scene, group=None):
     looked = memory.scene == scene.session_uid
     if looked and group is None:
         return memory.lamps
-    survey = memory.survey if looked else scenes.look(scene, scene.view_layers[0].depsgraph)
+    survey = memory.survey if looked else _survey(scene, scene.view_layers[0].depsgraph)
     worth = _worth_aiming(survey)
     if group is None:
         return _listed(survey, _arranged(worth[: limit_of(scene)], []))
@@ -176,5 +177,5 @@ def seen(scene, group=None):
 
 def count():
     """How many lamps there are to aim at, in the scene of the open file that has most."""
-    surveys = [scenes.look(scene, _depsgraph(scene)) for scene in bpy.data.scenes]
+    surveys = [_survey(scene, _depsgraph(scene)) for scene in bpy.data.scenes]
     return max(len(_worth_aiming(survey)) for survey in surveys)

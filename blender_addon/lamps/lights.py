@@ -45,8 +45,7 @@ def _values(light, item, matrix):
         radius = slots.Driven(light, "shadow_soft_size")
         return slots.numbers(kind, place, turn, scale, (radius, cone))
     round_ = light.shape in {"DISK", "ELLIPSE"}
-    other = "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
-    sizes = slots.Driven(light, "size"), slots.Driven(light, other)
+    sizes = tuple(slots.Driven(light, side) for side in emission.sides(light))
     kind = slots.ELLIPSE if round_ else slots.RECTANGLE
     spread = slots.Driven(light, "spread", -0.5 / math.pi, kind + 0.5)
     return slots.numbers(spread, place, turn, scale, sizes)
@@ -76,12 +75,13 @@ def _irradiance(light, matrix):
 def _looks(light, matrix):
     if light.type == "SUN":
         return slots.looks_alike(light.angle)
-    radius = light.shadow_soft_size if light.type != "AREA" else 0.0
-    if light.type == "AREA":
-        scale = matrix.to_scale()
-        other = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
-        radius = math.hypot(light.size * scale.x, other * scale.y) / 2
-    return slots.looks_like(matrix.translation, radius)
+    if light.type != "AREA":
+        return slots.looks_like(matrix.translation, light.shadow_soft_size)
+    scaled = (
+        getattr(light, side) * scale
+        for side, scale in zip(emission.sides(light), matrix.to_scale(), strict=False)
+    )
+    return slots.looks_like(matrix.translation, math.hypot(*scaled) / 2)
 
 
 def candidate_of(item, name, light, matrix):

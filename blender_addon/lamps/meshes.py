@@ -61,12 +61,12 @@ def _lit(item, materials, depsgraph):
     return points[kept], triangles.reshape(-1, 3)
 
 
-def _flat(points, triangles):
+def _flat(points, areas):
     """A flat mesh as a lamp: its kind, middle, axes as rows, the last across it, and two sizes;
-    None of what is not flat, or neither a rectangle nor an ellipse. In the world's space."""
-    if len(triangles) == 0:
+    None of what is not flat, or neither a rectangle nor an ellipse. In the world's space; `areas`:
+    see _areas()."""
+    if len(areas) == 0:
         return None
-    areas = _areas(points, triangles)
     across = areas[(areas**2).sum(-1).argmax()]
     size = np.linalg.norm(across)
     if not size > 0:
@@ -132,7 +132,8 @@ def candidate_of(item, materials, matrix, depsgraph):
     radiance = sum(materials[m] for m in glowing)
     uneven = len(glowing) > 1 or not all(emission.is_even(m) for m in glowing)
     world = points @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
-    if flat := _flat(world, triangles):
+    areas = _areas(world, triangles)
+    if flat := _flat(world, areas):
         candidate = _sheet(item, radiance, *flat)
         candidate.uneven = uneven
         return candidate
@@ -159,10 +160,8 @@ def candidate_of(item, materials, matrix, depsgraph):
     looks = slots.looks_like(middle, size)
     candidate = slots.Candidate(item.name, values, irradiance, looks, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
-    if len(triangles) > 0:
-        areas = _areas(world, triangles)
-        if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
-            extent = 0.0  # it is open: part of a ball
+    if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
+        extent = 0.0  # it is open: part of a ball
 
     def judge(points):
         distance = np.sqrt(((points - middle) ** 2).sum(-1)).min()

@@ -13,10 +13,6 @@ from ..labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
 
 
-def _stays(block):
-    return editable.refusal(block) is None
-
-
 class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.switch"
     bl_label = "Switch Form"
@@ -42,12 +38,12 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
             node = model_node(material, self.node)
             identity = nodes.identity(node)
             editable.check(node.id_data)
-            for user in filter(_stays, materials):
+            for user in filter(editable.stays, materials):
                 # All are looked for before one is changed.
                 alike = [
                     other
                     for other in nodes.group_nodes(user)
-                    if _stays(other.id_data) and nodes.identity(other) == identity
+                    if editable.stays(other.id_data) and nodes.identity(other) == identity
                 ]
                 for other in alike if self.all_users else [node]:
                     nodes.switch(other, self.representation)

@@ -910,8 +910,6 @@ def test_lamps_that_are_not_normalised(extension, ball, empty):
     }
     for kind, (values, size) in settings.items():
         item = add_lamp(empty, kind, **values)
-        if not hasattr(item.data, "normalize"):
-            pytest.skip("this Blender normalises all")
         (whole,) = extension.api.see_lamps(empty)
         item.data.normalize = False
         (lamp,) = extension.api.see_lamps(empty)
@@ -938,6 +936,10 @@ def test_scenes_within_the_picture(extension, ball, empty):
     tree.nodes.new("CompositorNodeRLayers").scene = other
     assert sorted(lamp.name for lamp in extension.api.see_lamps(empty)) == ["Here", "There"]
     assert [lamp.name for lamp in extension.api.see_lamps(other)] == ["There"]
+    filling = import_module(f"{extension.package}.lamps.filling")
+    assert filling.count() == 2, "lean materials have room for both"
+    filling.memory.scene = None
+    assert sorted(lamp.name for lamp in filling.seen(empty)) == ["Here", "There"]
     suns = []
     for scene, turn in ((empty, 0.0), (other, 2.5)):
         suns.append(sky(scene))
