@@ -119,7 +119,7 @@ def _size(light):
     """Area of a light, of a sun its solid angle: what the energy of one counts for each of that is
     not normalised; 0 where it has no size."""
     if light.type == "SUN":
-        return math.pi * math.tan(min(light.angle, 3.0) / 2) ** 2
+        return math.pi * math.sin(light.angle / 2) ** 2
     if light.type != "AREA":
         return 4 * math.pi * light.shadow_soft_size**2
     width, height = (getattr(light, side) for side in sides(light))

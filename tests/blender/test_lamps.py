@@ -906,7 +906,7 @@ def test_lamps_that_are_not_normalised(extension, ball, empty):
         "POINT": ({"shadow_soft_size": 0.1}, 4 * math.pi * 0.1**2),
         "SPOT": ({"shadow_soft_size": 0.1, "spot_size": 3.0}, 4 * math.pi * 0.1**2),
         "AREA": ({"shape": "ELLIPSE", "size": 0.2, "size_y": 0.4}, math.pi / 4 * 0.08),
-        "SUN": ({"angle": 0.1}, math.pi * math.tan(0.05) ** 2),
+        "SUN": ({"angle": 1.2}, math.pi * math.sin(0.6) ** 2),
     }
     for kind, (values, size) in settings.items():
         item = add_lamp(empty, kind, **values)
