@@ -106,6 +106,7 @@ def hidden(scene):
     item.hide_viewport = True
     bpy.context.view_layer.update()
     item.location = 3.0 * TOWARDS
+    # Which Blender does not work out of what is hidden.
     item.matrix_world = Matrix.LocRotScale(item.location, item.rotation_euler, None)
     return [item]
 
@@ -120,6 +121,7 @@ def settings_that_change_nothing(scene):
     item.lightgroup = "Group"
     portal = lit(scene, "AREA", at=2.0 * TOWARDS, shape="SQUARE", size=2.0)
     portal.data.cycles.is_portal = True
+    add_world(scene, strength=0.0)  # without one Blender 5.2 crashes where there is a portal
     other = lit(scene, "POINT", at=3.3 * TOWARDS, energy=5000.0, shadow_soft_size=0.6)
     receivers = bpy.data.collections.new("Receivers")
     receivers.objects.link(bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing")))
@@ -224,7 +226,8 @@ FULL_KINDS = {
 WIDE_CASES = [("cook_torrance", {"m": 0.3}), ("radziszewski_alda", {"n": 1.0}), ("phong", {})]
 #: Of lamps without a size pictures have next to no noise.
 SHARP = {"point without a size", "instance", "hidden"}
-#: Where light is bounded within the lamp (docs/aimed.md).
+#: Where light is bounded within the lamp. Of one half below the horizon this is so in 4.5 alone
+#: (docs/aimed.md).
 BOUNDED = {"edge of a spot": 0.08, "half below the horizon": 0.04}
 WITH_MARKS = [
     *KINDS,
@@ -290,10 +293,11 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
         whole = got.sum() / want.sum() - 1
         of_whole = z * math.sqrt(((noise + rough) * want**2).sum()) / want.sum() + off
         name, worst = case[0] if case else "Diffuse", np.argmax(np.abs(error) / allowed)
+        noise, rough = (math.sqrt(np.median(a)) for a in (noise, rough))
         print(
             f"{name}: {whole:+.3f} ({of_whole:.3f} allowed), worst of {len(want)} blocks "
-            f"{error[worst]:+.3f} ({allowed[worst]:.3f}); medians: {np.median(allowed):.3f} allowed, "
-            f"noise {math.sqrt(np.median(noise)):.3f}, quadrature {math.sqrt(np.median(rough)):.3f}"
+            f"{error[worst]:+.3f} ({allowed[worst]:.3f}); median {np.median(allowed):.3f}, "
+            f"noise {noise:.3f}, quadrature {rough:.3f}"
         )
         assert np.median(allowed) - off < POWER, f"{name}: too few samples to tell"
         if (np.abs(error) > allowed).any() or abs(whole) > of_whole:
