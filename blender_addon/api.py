@@ -261,11 +261,13 @@ def update_materials():
     return result
 
 
-def plan_conversion(materials):
+def plan_conversion(materials, limit=convert.LIMIT):
     """For each Diffuse, Glossy, Principled or Glass node of these materials that is shown: which
     model comes nearest, with which values, and what part of the light that misplaces; or why none
-    does. Nothing is changed. Returns [convert.Plan], with line() in words."""
-    return convert.plan(expected.each(expected.material, materials))
+    does, as where it would misplace more than `limit`. Nothing is changed. Returns [convert.Plan],
+    with line() in words."""
+    limit = expected.number(limit)
+    return [p.within(limit) for p in convert.plan(expected.each(expected.material, materials))]
 
 
 def convert_materials(plans):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 
 from . import closure_pool, i18n, lamp_checks, nodes, pack, stand_in, update
-from .i18n import say
+from .i18n import Sentence, say
 from .setting_checks import DECLARED, black_aovs, clamp_highlight
 
 BLENDER_MIN = (4, 5, 0)
@@ -38,6 +38,12 @@ def device_without_osl(scene):
     if scene.cycles.device != "GPU" or backend == "NONE" or backend in OSL_DEVICES:
         return None
     return backend
+
+
+def device_of_elsewhere(scene):
+    """Whether a scene renders on the CPU for want of a GPU in the preferences, which its file does
+    not hold: a computer that has one would take that."""
+    return scene.cycles.device == "GPU" and gpu_backend() == "NONE"
 
 
 def runs_on_optix(scene):
@@ -174,6 +180,12 @@ def scene_warnings(scene):
                 say("{backend} devices can't run these shaders", backend=backend),
             )
         )
+    if device_of_elsewhere(scene):
+        said = say(
+            "The device is GPU Compute: a computer whose preferences have a GPU renders on that, "
+            "and few can run these shaders"
+        )
+        found.append(Finding("device_elsewhere", "WARNING", said))
     if OPTIX_RUN is None and runs_on_optix(scene):
         found.append(
             Finding(
@@ -305,7 +317,9 @@ def enable_osl(scene):
     if scene.render.engine != "CYCLES":
         done.append(say("Render engine changed from {engine} to Cycles", engine=engine_name(scene)))
         scene.render.engine = "CYCLES"
-    if backend := device_without_osl(scene):
+    backend = device_without_osl(scene)
+    if backend or device_of_elsewhere(scene):
+        backend = backend or Sentence("GPU Compute")
         done.append(say("Device changed from {backend} to the CPU", backend=backend))
         scene.cycles.device = "CPU"
     if not scene.cycles.shading_system:

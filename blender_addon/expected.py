@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What scripts hand to api: anything but what a function takes is a ValueError with a sentence."""
 
+from numbers import Real
+
 import bpy
 
 from .i18n import say
@@ -22,6 +24,10 @@ def scene(given):
 
 def node(given):
     return _of(bpy.types.Node, given, say("Expected a node, got {given!r}", given=given))
+
+
+def number(given):
+    return _of(Real, given, say("Expected a number, got {given!r}", given=given))
 
 
 def plan(kind, given):

@@ -545,17 +545,31 @@ def add_albedo(node):
     _exchange(node, ensure_group(*identity(node), albedo=True))
 
 
+def _strips(strips):
+    for strip in strips:
+        yield strip
+        yield from _strips(strip.strips)  # of a meta strip
+
+
 def _curves(tree):
-    """The curves and drivers of a tree's animation."""
+    """The curves and drivers of a tree's animation, of its action and of strips of other ones."""
     data = tree.animation_data
     if data is None:
         return
     yield from data.drivers
-    for layer in data.action.layers if data.action else ():
-        for strip in layer.strips:
-            for bag in strip.channelbags:
-                if bag.slot == data.action_slot:
-                    yield from bag.fcurves
+    users = [data, *(s for track in data.nla_tracks for s in _strips(track.strips))]
+    # A strip or two may play the same action.
+    for action, slot in {(u.action, u.action_slot): None for u in users if u.action}:
+        for layer in action.layers:
+            for strip in layer.strips:
+                for bag in strip.channelbags:
+                    if bag.slot == slot:
+                        yield from bag.fcurves
+
+
+def animated_paths(tree):
+    """The paths of what curves and drivers of a tree move."""
+    return {curve.data_path for curve in _curves(tree) if not curve.mute}
 
 
 def replace_group(node, group):

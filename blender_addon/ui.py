@@ -254,6 +254,7 @@ BUTTONS = {
     "engine": ("brdfc.enable_osl", button("Use Cycles"), {}),
     "osl_off": ("brdfc.enable_osl", button("Turn On OSL"), {}),
     "device": ("brdfc.enable_osl", button("Use the CPU"), {}),
+    "device_elsewhere": ("brdfc.enable_osl", button("Use the CPU"), {}),
     "outdated": ("brdfc.update", button("Update Materials"), {}),
     "newer": ("screen.userpref_show", button("Look for Updates"), {"section": "EXTENSIONS"}),
     "bump_correction": ("brdfc.fix_material", button("Set Up Material"), {}),

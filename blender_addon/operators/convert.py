@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that put models in place of Blender's own nodes, and back."""
 
+import math
+
+from bpy.props import FloatProperty
 from bpy.types import Operator
 
-from .. import api, nodes
+from .. import api, convert, nodes
 from ..i18n import rpt, say
 from ..labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
@@ -24,13 +27,26 @@ class BRDFC_OT_convert(Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
+    limit: FloatProperty(
+        name="Largest Error",
+        description="Nodes stay whose nearest model sends more of the light elsewhere",
+        subtype="PERCENTAGE",
+        default=100 * convert.LIMIT,
+        min=0,
+        soft_max=100,
+        max=200,
+    )
+
     @classmethod
     def poll(cls, context):
         return bool(_selected_materials(context))
 
+    def _within(self):
+        return [made.within(self.limit / 100) for made in self._plans]
+
     def invoke(self, context, event):
         try:
-            self._plans = api.plan_conversion(_selected_materials(context))
+            self._plans = api.plan_conversion(_selected_materials(context), math.inf)
         except ERRORS as error:
             return refused(self, error)
         if not self._plans:
@@ -39,16 +55,17 @@ class BRDFC_OT_convert(Operator):
         return context.window_manager.invoke_props_dialog(self, width=600)
 
     def draw(self, context):
+        self.layout.prop(self, "limit")
         column = self.layout.column(align=True)
-        for made in self._plans:
+        for made in self._within():
             icon = "ERROR" if made.refusal else "CHECKMARK"
             wrapped(column, made.line(), icon, pixels=560)
 
     def execute(self, context):
         try:
-            plans = getattr(self, "_plans", None)
-            if plans is None:
-                plans = api.plan_conversion(_selected_materials(context))
+            if getattr(self, "_plans", None) is None:
+                self._plans = api.plan_conversion(_selected_materials(context), math.inf)
+            plans = self._within()
             count = api.convert_materials(plans)
         except ERRORS as error:
             return refused(self, error)

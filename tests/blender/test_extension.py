@@ -622,8 +622,7 @@ def test_warning_engine_and_osl(extension, empty):
 
 
 @pytest.mark.parametrize(
-    ("backend", "works"),
-    [("CUDA", False), ("HIP", False), ("METAL", False), ("OPTIX", True), ("NONE", True)],
+    ("backend", "works"), [("CUDA", False), ("HIP", False), ("METAL", False), ("OPTIX", True)]
 )
 def test_warning_device(extension, empty, monkeypatch, backend, works):
     # This machine may not have the device: only the preference is pretended.
@@ -635,6 +634,19 @@ def test_warning_device(extension, empty, monkeypatch, backend, works):
     extension.api.enable_osl(empty)
     assert empty.cycles.device == ("GPU" if works else "CPU")
     assert codes(extension, material, empty) == untested
+
+
+def test_warning_device_of_another_computer(extension, empty, monkeypatch):
+    """Without a GPU in the preferences Cycles takes the CPU, and the file keeps GPU Compute."""
+    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "NONE")
+    material = clean(extension, empty, "glass")
+    empty.cycles.device = "GPU"
+    (finding,) = extension.api.warnings(material, empty)
+    assert (finding.code, finding.severity) == ("device_elsewhere", "WARNING")
+    assert "GPU Compute" in finding.message
+    assert extension.api.enable_osl(empty) == ["Device changed from GPU Compute to the CPU"]
+    assert empty.cycles.device == "CPU"
+    assert codes(extension, material, empty) == []
 
 
 def test_gpu_backend_is_the_preference(extension, empty):
