@@ -2,12 +2,14 @@
 """The extension as a user meets it: installation, nodes, menus, panels, operators, saved files."""
 
 import contextlib
+import dataclasses
 import hashlib
 import json
 import math
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -952,6 +954,33 @@ def test_menus_cite_papers_as_the_page_of_models_does(extension, subtests):
             assert papers.split("; ")[0] == cited
     with pytest.raises(extension.pack.PackError, match="expected authors, a colon"):
         extension.pack.citation({"label": "X", "paper": "J. H. Lambert, Photometria, 1760"})
+
+
+def test_the_page_of_models_has_their_forms(extension):
+    page = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*) \|$", page, re.M))
+    for name, entry in extension.api.models().items():
+        assert rows[name] == ", ".join(form for form in entry["representations"] if form != "twin")
+
+
+def test_the_page_says_what_scripts_are_given(extension):
+    """Every attribute of what is returned, and keys that there are."""
+    page = (Path(__file__).parents[2] / "docs" / "blender.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| (.*) \| (`.*) \|$", page.split("### What they return")[1], re.M))
+    said = {of: re.findall(r"`(\w+)`", has) for of, has in rows.items()}
+    convert = import_module(f"{extension.package}.convert")
+    for kind in (extension.api.Finding, extension.api.Lamp, extension.api.Update, convert.Plan):
+        (of,) = (of for of in said if of.endswith(f": `{kind.__name__}`"))
+        assert said[of] == [field.name for field in dataclasses.fields(kind)]
+    for model in extension.api.models().values():
+        assert set(said["`models()[NAME]`"]) <= model.keys()
+        (of,) = (of for of in said if of.endswith(", a list"))
+        for parameter in model["parameters"]:
+            kind = {"number": {"choices"}, "choice": {"min", "max"}, "color": {"choices"}}
+            assert set(said[of]) - kind[parameter["kind"]] <= parameter.keys()
+        for form in model["representations"].values():
+            assert set(said['`models()[NAME]["representations"][FORM]`']) <= form.keys()
+            assert set(said["its `error`"]) - {"None"} <= form["error"].keys()
 
 
 def test_search_finds_models_by_name_author_title_and_year(extension, empty):
