@@ -242,6 +242,15 @@ def node_warnings(node, material, scene):
                     high=f"{parameter['max']:g}",
                 )
                 found.append(Finding("out_of_range", "ERROR", _of(label, said)))
+    values = nodes.all_values(node)
+    for name, choice in pack.unread(schema, values).items():
+        said = say(
+            "{parameter} has no effect while {choice} is {value}",
+            parameter=schema[name]["label"],
+            choice=schema[choice]["label"],
+            value=pack.value_text(values[choice]),
+        )
+        found.append(Finding("no_effect", "WARNING", _of(label, said)))
     if axis := form.get("axis"):
         value = nodes.get_value(node, axis["name"])
         slack = 1e-6 * axis["max"]

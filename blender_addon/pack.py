@@ -189,6 +189,19 @@ def parameters(model_name):
     return {p["name"]: p for p in model(model_name)["parameters"]}
 
 
+def unread(schema, values):
+    """Parameters that no formula reads under these choices, and are not at their default:
+    {name: a choice that makes it so}. A value that a link controls is None."""
+    found = {}
+    for name, parameter in schema.items():
+        value, needs = values.get(name), parameter.get("needs", {})
+        if needs and not same(value, canonical(parameter)["default"]):
+            for choice, needed in needs.items():
+                if choice in schema and values.get(choice) not in (None, *needed):
+                    found[name] = choice
+    return found
+
+
 def fixed(model_name):
     """Parameters that this pack was built without, and the values they have in it."""
     return canonical(model(model_name).get("fixed", {}))

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
 #include <optional>
 #include <set>
 
 #include "fit/roles.h"
 #include "measure/bound_model.h"
 #include "model/choices.h"
+#include "trace/program.h"
 
 namespace brdfc::pack {
 
@@ -17,6 +20,31 @@ Json looks_json() {
   for (const Look look : {Look::Matte, Look::Glossy, Look::Metal, Look::Glass, Look::Special})
     names.push_back(name_of(look));
   return names;
+}
+
+namespace {
+
+/// By parameter that some choices leave unread: for each choice, those under which a formula reads it.
+using Readers = std::map<std::string, std::vector<std::set<int>>>;
+
+Readers readers(const Model& model) {
+  const ModelInfo& info = model.info();
+  Readers found;
+  for (const Choices& choices : choice_combinations(info)) {
+    Recorder recorder(Precision::Double);
+    const std::unique_ptr<Brdf<Expr>> brdf = model.record(with_choices(info, choices));
+    const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
+    Program light;
+    if (model.has_scatter()) light.output("f", brdf->eval(wi, wo));
+    if (model.has_mirror()) light.output("mirror", brdf->mirror(wo));
+    if (model.has_transmit()) light.output("transmit", brdf->transmit(wo));
+    for (const std::string& name : light.inputs()) {
+      auto& by_choice = found[name];
+      by_choice.resize(choices.size());
+      for (std::size_t i = 0; i < choices.size(); ++i) by_choice[i].insert(choices[i]);
+    }
+  }
+  return found;
 }
 
 Json parameter_json(const ParamInfo& p) {
@@ -46,6 +74,29 @@ Json parameter_json(const ParamInfo& p) {
   j["doc"] = p.doc;
   if (p.optical != Optical::None) j["optical"] = name_of(p.optical);
   return j;
+}
+
+}  // namespace
+
+Json parameters_json(const Model& model, const ParamValues& fixed) {
+  Json list = Json::array();
+  const Readers found = readers(model);
+  for (const ParamInfo& p : model.info().params) {
+    if (fixed.count(p.name)) continue;
+    Json j = parameter_json(p), needs = Json::object();
+    if (const auto reader = found.find(p.name); reader != found.end()) {
+      std::size_t k = 0;
+      for (const ParamInfo& choice : model.info().params) {
+        if (choice.kind != ParamKind::Choice) continue;
+        const std::set<int>& under = reader->second[k++];
+        if (under.size() == choice.choices.size()) continue;
+        for (const int i : under) needs[choice.name].push_back(choice.choices[std::size_t(i)]);
+      }
+    }
+    if (!needs.empty()) j["needs"] = needs;
+    list.push_back(j);
+  }
+  return list;
 }
 
 Json error_json(const forms::FormError& e) {

@@ -17,7 +17,8 @@ using Json = nlohmann::ordered_json;
 
 /// Every look that a model may declare, in the order of menus.
 Json looks_json();
-Json parameter_json(const ParamInfo&);
+/// Of what is not fixed. `needs` of one: by choice, those without which no formula reads it.
+Json parameters_json(const Model&, const ParamValues& fixed);
 Json values_json(const ParamValues&);
 Json error_json(const forms::FormError&);
 /// Without what is fixed. `file`: where the pack has the table as an image.

@@ -115,9 +115,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
        {"doc", info.doc},
        {"isotropic", info.properties.isotropic},
        {"scatter", model.has_scatter()}};
-  j["parameters"] = Json::array();
-  for (const ParamInfo& p : info.params)
-    if (!plan.fixed.count(p.name)) j["parameters"].push_back(parameter_json(p));
+  j["parameters"] = parameters_json(model, plan.fixed);
   j["fixed"] = values_json(plan.fixed);
   if (!plan.views.all()) j["view_cosines"] = {plan.views.low, plan.views.high};
 

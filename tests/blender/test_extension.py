@@ -656,6 +656,50 @@ def test_gpu_backend_is_the_preference(extension, empty):
     assert extension.checks.gpu_backend() == preferences.compute_device_type
 
 
+def test_warning_of_a_parameter_without_effect(extension, empty):
+    made = extension.api.new_material
+    material = made("radziszewski_alda", n_theta=12.0, ior=1.5)
+    extension.api.prepare_material(material)
+
+    def said():
+        found = extension.api.warnings(material, empty)
+        return [str(f.message) for f in found if f.code == "no_effect"]
+
+    extension.api.enable_osl(empty)
+    node = "Radziszewski-Alda"
+    assert said() == [f"{node}: Latitudinal Glossiness has no effect while Proportion is Paper"], (
+        "the other is at its default"
+    )
+    (group,) = extension.nodes.group_nodes(material)
+    tree = material.node_tree
+    source = tree.nodes.new("ShaderNodeValue")
+    tree.links.new(source.outputs[0], extension.nodes.sockets(group)["ior"])
+    assert any(f"{node}: IOR has no effect while" in line for line in said())
+    extension.api.set_parameters(material, proportion="custom", around="refraction")
+    assert said() == []
+    extension.api.set_parameters(material, n=9.0)
+    assert said() == [f"{node}: Glossiness has no effect while Proportion is Custom"]
+
+
+def test_only_choices_leave_parameters_unread(extension):
+    needs = {
+        (model, parameter["name"]): parameter["needs"]
+        for model, entry in extension.api.models().items()
+        for parameter in entry["parameters"]
+        if "needs" in parameter
+    }
+    drawn = {("lossless", f"h{i}"): {"kernel": ["table"]} for i in range(4)}
+    proportion = {"proportion": ["custom"]}
+    assert needs == {
+        ("ashikhmin_shirley", "rd"): {"part": ["both", "diffuse"]},
+        **drawn,
+        ("radziszewski_alda", "n"): {"proportion": ["paper", "equal"]},
+        ("radziszewski_alda", "n_theta"): proportion | {"part": ["product", "latitudinal"]},
+        ("radziszewski_alda", "n_phi"): proportion | {"part": ["product", "longitudinal"]},
+        ("radziszewski_alda", "ior"): {"around": ["refraction"]},
+    }
+
+
 def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
     material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
     monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
@@ -977,7 +1021,7 @@ def test_the_page_says_what_scripts_are_given(extension):
         (of,) = (of for of in said if of.endswith(", a list"))
         for parameter in model["parameters"]:
             kind = {"number": {"choices"}, "choice": {"min", "max"}, "color": {"choices"}}
-            assert set(said[of]) - kind[parameter["kind"]] <= parameter.keys()
+            assert set(said[of]) - kind[parameter["kind"]] - {"needs"} <= parameter.keys()
         for form in model["representations"].values():
             assert set(said['`models()[NAME]["representations"][FORM]`']) <= form.keys()
             assert set(said["its `error`"]) - {"None"} <= form["error"].keys()
