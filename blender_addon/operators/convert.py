@@ -41,8 +41,11 @@ class BRDFC_OT_convert(Operator):
     def poll(cls, context):
         return bool(_selected_materials(context))
 
+    #: Of the dialog; None before it and after, where undo may have taken their nodes away.
+    _plans = None
+
     def _within(self):
-        return [made.within(self.limit / 100) for made in self._plans]
+        return [made.within(self.limit / 100) for made in self._plans or ()]
 
     def invoke(self, context, event):
         try:
@@ -63,9 +66,9 @@ class BRDFC_OT_convert(Operator):
 
     def execute(self, context):
         try:
-            if getattr(self, "_plans", None) is None:
+            if self._plans is None:
                 self._plans = api.plan_conversion(_selected_materials(context), math.inf)
-            plans = self._within()
+            plans, self._plans = self._within(), None
             count = api.convert_materials(plans)
         except ERRORS as error:
             return refused(self, error)

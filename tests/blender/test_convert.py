@@ -2,6 +2,7 @@
 """Blender's own materials as the nearest model, and back."""
 
 from importlib import import_module
+from types import SimpleNamespace
 
 import bpy
 import helpers
@@ -538,6 +539,23 @@ def test_the_button_has_a_limit(extension, item):
     shown = shown_nodes()
     assert shown["principled"] == start["principled"] and node.outputs[0].is_linked
     assert shown["diffuse"] != start["diffuse"]
+
+
+def test_a_limit_that_is_changed_afterwards_plans_anew(extension, item):
+    """In the panel of the last operator, which undoes it first: nodes of before may be gone."""
+    operator = import_module(f"{extension.package}.operators.convert").BRDFC_OT_convert
+    said = []
+    last = SimpleNamespace(limit=35.0, _plans=None, report=lambda kind, text: said.append(text))
+    last.layout = helpers.Layout()
+    last._within = lambda: operator._within(last)
+    assert operator.execute(last, bpy.context) == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="Convert")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    last.limit = 1.0
+    operator.draw(last, bpy.context)
+    assert last.layout.log == ["value : 1.0"]
+    assert operator.execute(last, bpy.context) == {"FINISHED"}
+    assert ["stays" in line for line in said] == [False, False, False, True]
 
 
 def test_nothing_to_convert(extension, item):
