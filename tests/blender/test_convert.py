@@ -193,7 +193,7 @@ def test_a_picture_under_a_wide_lamp_is_off_as_is_said(extension, convert, empty
     material, _ = material_of(kind, "GGX", **inputs)
     plan = only(convert.plan([material]))
     copy = material.copy()
-    assert convert.apply(convert.plan([copy])) == 1
+    assert extension.api.convert_materials(convert.plan([copy])) == 1
     extension.api.enable_osl(empty)
     empty.cycles.max_bounces = 1
     helpers.sphere_scene(empty, material, size=12, samples=2048)
