@@ -14,10 +14,10 @@ import contextlib
 import functools
 import json
 import os
+from numbers import Real
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from . import (
     checks,
@@ -32,6 +32,7 @@ from . import (
     nodes,
     pack,
     update,
+    usage,
 )
 from .checks import Finding
 from .i18n import say
@@ -265,7 +266,7 @@ def plan_conversion(materials, limit=convert.LIMIT):
     """For each Diffuse, Glossy, Principled or Glass node of these materials that is shown: which
     model comes nearest, with which values, and what part of the light that misplaces; or why none
     does, as where it would misplace more than `limit`. Nothing is changed. Returns [convert.Plan],
-    with line() in words."""
+    with line() in words; the error of what has no model near is infinite."""
     limit = expected.number(limit)
     return [p.within(limit) for p in convert.plan(expected.each(expected.material, materials))]
 
@@ -273,8 +274,8 @@ def plan_conversion(materials, limit=convert.LIMIT):
 def convert_materials(plans):
     """Puts the models of plan_conversion() in place of the nodes; links stay. Returns how many.
 
-    The nodes of before stay in the materials, unlinked, for convert_back(). Raises CompileError;
-    nothing is changed then.
+    The nodes of before stay in the materials, unlinked, for convert_back(). Raises ValueError where
+    a node is not what the plan was made of any more, CompileError; nothing is changed then.
     """
     plans = expected.each(functools.partial(expected.plan, convert.Plan), plans)
     count = convert.apply(plans)
@@ -318,43 +319,18 @@ def albedo(model, cos_theta_o, **parameters):
     """Directional albedo (r, g, b) from the model's table. Raises ValueError."""
     from . import energy
 
-    if not 0 < cos_theta_o <= 1:
+    if not isinstance(cos_theta_o, Real) or not 0 < cos_theta_o <= 1:
         raise ValueError(f"cos_theta_o: expected a number in (0, 1], got {cos_theta_o!r}")
     return energy.albedo(model, _checked(model, "auto", parameters)[1], cos_theta_o)
-
-
-def _as_typed(value):
-    """0.9 for the float that is next to it, so that a value is again the one that was given."""
-    if isinstance(value, tuple):
-        return [_as_typed(channel) for channel in value]
-    return float(str(np.float32(value))) if isinstance(value, float) else value
-
-
-def _used():
-    """[(id, material, node, entry)]; see used_materials()."""
-    found = []
-    for material in bpy.data.materials:
-        ours = nodes.group_nodes(material)
-        for node in ours:
-            model_name, representation = nodes.identity(node)
-            parameters = dict(pack.fixed(model_name))
-            for name in pack.parameters(model_name):
-                value = nodes.get_value(node, name)
-                parameters[name] = {"varies": True} if value is None else _as_typed(value)
-            entry = {"model": model_name, "representation": representation}
-            entry["parameters"] = parameters
-            name = material.name if len(ours) == 1 else f"{material.name}/{node.name}"
-            found.append((name, material, node, entry))
-    return found
 
 
 def used_materials():
     """How the open file uses the models, by material: as `materials` of a scene file has it.
 
-    A parameter that a link controls is {"varies": True}. A material with several model nodes
-    has an entry for each, MATERIAL/NODE.
+    A parameter that a link controls, a curve animates or a driver sets is {"varies": True}. A
+    material with several model nodes has an entry for each, MATERIAL/NODE.
     """
-    return {name: entry for name, _, _, entry in _used()}
+    return {name: use.entry for name, use in usage.uses().items()}
 
 
 def _beside(path):
@@ -380,12 +356,13 @@ def write_materials(path):
     except PermissionError as failed:
         said = say(
             "{file} can't be written: it may be open in another program, or write-protected",
-            more=str(failed),
+            more=failed.strerror,
             file=path,
         )
         raise PermissionError(said) from failed
     except OSError as failed:
-        raise OSError(say("{file} can't be written", more=str(failed), file=path)) from failed
+        # Its own text names the file beside, which nobody asked for.
+        raise OSError(say("{file} can't be written", more=failed.strerror, file=path)) from failed
     finally:
         # What is in the way of writing is so of removing, and nothing to be told twice.
         with contextlib.suppress(OSError):
@@ -396,20 +373,22 @@ def write_materials(path):
 def start_plan(error=None, time=None, fit=False):
     """Starts the program brdfc on a plan for the open file; a lean.Job, whose result is the Plan.
 
-    `error` in percent and `time` in units of Blender's Glossy node let it choose the forms. With
+    `error` in percent and `time` in units of Blender's Glossy node let it choose the forms: 5 or
+    "5%", 1.2 or "1.2x". What is linked, animated or driven stays an input of the lean shaders. With
     `fit` aimed forms get closures fitted to these materials for a base, which takes seconds to
     minutes a material and leaves less noise under skies and images.
-    Nothing is changed. Raises ValueError where no material has a model, PlanError without the
-    program.
+    Nothing is changed. Raises ValueError for another budget and where no material has a model,
+    PlanError without the program.
     """
-    used = [
-        (name, node, entry)
-        for name, material, node, entry in _used()
-        if editable.stays(material, node.id_data)
-    ]
+    budget = lean.budget(error, time)
+    used = {
+        name: use
+        for name, use in usage.uses().items()
+        if editable.stays(use.material, use.node.id_data)
+    }
     if not used:
         raise ValueError(_NO_MATERIAL)
-    return lean.Planning(used, error, time, fit)
+    return lean.Planning(used, *budget, fit)
 
 
 def plan(error=None, time=None, fit=False):
@@ -429,8 +408,9 @@ def bake(made):
     """Gives every material groups that hold what the open file needs and no more: as plan() made.
 
     Returns how many nodes have one now; switch_representation() goes back to the extension's own.
-    Raises CompileError, and PlanError where brdfc is of another version than the extension; the
-    file is then as it was.
+    Raises ValueError where values, links, animation, forms or lamps are not those that the plan was
+    made for, which is also so once it has been baked; CompileError; PlanError where brdfc is of
+    another version than the extension. The file is then as it was.
     """
     return start_bake(made).wait()
 

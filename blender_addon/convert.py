@@ -4,14 +4,16 @@
 Nothing is changed before apply().
 """
 
+import math
 from dataclasses import dataclass, field, replace
 
 import bpy
 
-from . import editable, nodes, pack
+from . import animation, editable, nodes, pack
 from .i18n import Sentence, say
 from .native_bsdf import Native
 from .nearest_model import Target, candidates, nearest_factor, with_width
+from .seen_node import SeenNode
 
 #: Roughnesses at which a model is to be near where a texture gives it.
 ROUGHNESSES = (0.2, 0.5, 0.8)
@@ -54,7 +56,7 @@ class _Inputs:
     """What a node's sockets have. Raises Refused for what varies in a way that no model follows."""
 
     def __init__(self, node):
-        self._node, self._moved = node, nodes.animated_paths(node.id_data)
+        self._node, self._moved = node, animation.moved(node)
 
     def __contains__(self, name):
         return name in self._node.inputs
@@ -64,7 +66,7 @@ class _Inputs:
         socket = self._node.inputs[name]
         if socket.is_linked:
             return True
-        if socket.path_from_id("default_value") in self._moved:
+        if (socket.as_pointer(), "default_value") in self._moved:
             raise Refused(say("{socket} is animated", socket=Sentence(name)))
         return False
 
@@ -82,7 +84,7 @@ class _Inputs:
 
     def setting(self, name):
         """Of the node itself."""
-        if self._node.path_from_id(name) in self._moved:
+        if (self._node.as_pointer(), name) in self._moved:
             label = self._node.bl_rna.properties[name].name
             raise Refused(say("{socket} is animated", socket=Sentence(label)))
         return getattr(self._node, name)
@@ -142,12 +144,15 @@ class Plan:
     values: dict = field(default_factory=dict)
     #: Part of the light that goes elsewhere, as a picture of lamps that are as wide as windows
     #: shows; seen from 0.95 to 0.25 in cosine.
-    error: float = 0.0
+    #: Infinite with a refusal that knows of no model.
+    error: float = math.inf
     #: Parameter by the node's socket.
     links: dict = field(default_factory=dict)
     #: Parameters that follow a linked roughness: (name, factor, power).
     widths: tuple = ()
     refusal: str = ""
+    #: What the plan was made of.
+    seen: SeenNode | None = None
 
     def within(self, limit):
         """The same, refused where its error is above a limit."""
@@ -252,9 +257,10 @@ def plan(materials):
                     raise Refused(why)
                 if grouped:
                     raise Refused(say("its shader is inside this node group: ungroup it first"))
-                plans.append(_plan_node(material, node))
+                made = _plan_node(material, node)
             except Refused as why:
-                plans.append(Plan(material, node, refusal=why.args[0]))
+                made = Plan(material, node, refusal=why.args[0])
+            plans.append(replace(made, seen=SeenNode(material, node)))
     return plans
 
 
@@ -265,9 +271,10 @@ def apply(plans):
     """Puts the models into the materials: links stay, and the nodes of before, which nothing shows
     any more, so that restore() finds them. Returns how many nodes were converted.
 
-    All groups are made before anything is changed. Raises ValueError, CompileError.
+    All groups are made before anything is changed. Raises ValueError, also where a node is not
+    what the plan was made of any more, CompileError.
     """
-    wanted = [p for p in plans if not p.refusal]
+    wanted = [replace(p, node=p.seen.now()) for p in plans if not p.refusal]
     editable.check(*(p.material for p in wanted))
     checked = [{k: pack.check_value(p.model, k, v) for k, v in p.values.items()} for p in wanted]
     # What is linked may have any value.

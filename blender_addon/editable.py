@@ -6,7 +6,7 @@ import bpy
 from .i18n import say
 
 
-def _named(block):
+def named(block):
     """The material that a tree is part of, for such a tree has no name of its own."""
     if not block.is_embedded_data:
         return block
@@ -16,7 +16,7 @@ def _named(block):
 def refusal(*blocks):
     """Why a change to one of these materials or trees would be gone in the saved file; None where
     it stays."""
-    for block in map(_named, blocks):
+    for block in map(named, blocks):
         if block.library is not None:
             file = block.library.filepath
             return say(

@@ -6,15 +6,17 @@ What can be left out the program brdfc knows, which the extension does not conta
 
 import contextlib
 import json
+import math
 import os
 import re
 import shutil
 import sysconfig
+from numbers import Real
 from pathlib import Path
 
 import bpy
 
-from . import lamp_checks, lamps, nodes, pack
+from . import lamp_checks, lamps, nodes, pack, usage
 from .i18n import say
 from .jobs import Job, ProgramJob
 
@@ -53,6 +55,27 @@ def program():
     )
 
 
+def budget(error, time):
+    """(percent or None, units of Blender's Glossy node or None), as numbers or as the program takes
+    them: 5, "5" or "5%", 1.2, "1.2" or "1.2x". Raises ValueError."""
+    percent = _number(error, "%")
+    if error is not None and not (percent is not None and 0 <= percent <= 100):
+        raise ValueError(f"error: expected percent from 0 to 100, as 5 or '5%', got {error!r}")
+    units = _number(time, "x")
+    if time is not None and not (units is not None and 0 < units < math.inf):
+        raise ValueError(f"time: expected a positive number, as 1.2 or '1.2x', got {time!r}")
+    return percent, units
+
+
+def _number(given, unit):
+    if isinstance(given, bool) or not isinstance(given, str | Real):
+        return None
+    try:
+        return float(given.removesuffix(unit) if isinstance(given, str) else given)
+    except ValueError:
+        return None
+
+
 def needs(materials):
     """Content of a file for `brdfc build --materials`: `materials` as those of a scene file, and
     what of the lamps of the open file its forms hang on: which have no size, and how many there
@@ -71,17 +94,17 @@ class Planning(ProgramJob):
     failure = PlanError
 
     def __init__(self, used, error=None, time=None, fit=False):
-        """`used`: [(id, group node, entry)], entries as `materials` of a scene file has them.
-        Budgets leave the form open; without one each keeps its own. `fit`: aimed forms get closures
-        fitted to the materials for a base. Raises PlanError."""
-        budget = error is not None or time is not None
-        self._used = [(node, _open(entry) if budget else entry) for _, node, entry in used]
+        """`used`: {name: usage.Use}. `error` and `time` as budget() has them leave the form open;
+        without one each keeps its own. `fit`: aimed forms get closures fitted to the materials for
+        a base. Raises PlanError."""
         options = [] if error is None else ["--error", f"{error:.17g}"]
         options += [] if time is None else ["--time", f"{time:.17g}x"]
+        materials = {name: _open(use.entry) if options else use.entry for name, use in used.items()}
         options += ["--fit"] if fit else []
-        materials = {name: entry for (name, _, _), (_, entry) in zip(used, self._used, strict=True)}
         self._program = program()
-        content = json.dumps(needs(materials))
+        asked = needs(materials)
+        self._used, self._materials, self._lamps = used, materials, asked.get("lamps")
+        content = json.dumps(asked)
         folder = self._open_folder("brdfc-lean-", {"materials.json": content})
         command = [self._program, "build", "--materials", folder / "materials.json", "--explain"]
         command += [*options, "--out", folder]
@@ -100,7 +123,7 @@ class Planning(ProgramJob):
         except ValueError as bad:
             more = f"{self._program}: expected an explanation: {bad}"
             raise PlanError(say("The program brdfc made no plan", more=more)) from bad
-        return Plan(self._used, explanation, self._folder)
+        return Plan(self._used, self._materials, self._lamps, explanation, self._folder)
 
     def _share(self, log):
         """Of the models that the program says it has begun."""
@@ -114,11 +137,32 @@ def _open(entry):
 
 
 class Plan:
-    """What a pack of the open file alone holds, and the pack."""
+    """What a pack of the open file alone holds, and the pack.
 
-    def __init__(self, used, explanation, folder):
-        self.used, self.explanation, self._folder = used, explanation, folder
+    `materials`: what it was made for, by name, as `materials` of a scene file has it, forms that
+    the budget leaves open being "auto". `explanation`: as `brdfc build --explain` prints it.
+    """
+
+    def __init__(self, used, materials, lamps_, explanation, folder):
+        self.materials, self.explanation = materials, explanation
+        self._used, self._lamps, self._folder = used, lamps_, folder
         self.pack = Path(folder.name) / "brdfc_shaders"
+
+    def nodes(self):
+        """{name: group node} in the open file. Raises ValueError where that is not what the plan
+        was made for any more."""
+        found = usage.check(self._used)
+        forms = {form["form"] for model in self.explanation["models"] for form in model["forms"]}
+        if "aimed" in forms and (count := lamps.count()) != self._lamps:
+            raise ValueError(
+                say(
+                    "The lamps have changed since the plan was made: there were {before} and there "
+                    "are {after}. Make a new plan",
+                    before=self._lamps,
+                    after=count,
+                )
+            )
+        return {name: use.node for name, use in found.items()}
 
     def lines(self):
         """What is taken and left out, and what that saves, in words."""
@@ -161,7 +205,8 @@ class Plan:
 
 class Baking(Job):
     """Puts the lean groups of a Plan into the materials; values and links stay. The result is how
-    many nodes have one now. Steps raise PlanError, CompileError, PackError."""
+    many nodes have one now. Steps raise ValueError where the file has changed since the plan was
+    made, PlanError, CompileError, PackError."""
 
     def __init__(self, plan, afterwards):
         """`afterwards` is called when all is in place."""
@@ -188,34 +233,38 @@ class Baking(Job):
 
     def _work(self):
         """A group a step, and then all of them at once into their nodes."""
-        before, swaps = pack.manifest(), []
-        for node, entry in self._plan.used:
-            with _taken(self._plan.pack):
-                swaps.append((node, self._group(node, entry, before)))
-            yield len(swaps) / len(self._plan.used)
-        for node, group in swaps:
-            nodes.replace_group(node, group)
+        before, groups = pack.manifest(), {}
+        albedo = {name: nodes.uses_albedo(node) for name, node in self._plan.nodes().items()}
+        for name, entry in self._plan.materials.items():
+            groups[name] = self._group(entry, albedo[name], before)
+            yield len(groups) / len(albedo)
+        found = self._plan.nodes()  # which may have changed meanwhile
+        for name, node in found.items():
+            if (has := nodes.uses_albedo(node)) != albedo[name]:
+                groups[name] = self._group(self._plan.materials[name], has, before)
+        for name, node in found.items():
+            nodes.replace_group(node, groups[name])
         nodes.remove_unused_groups()
         self._afterwards()
-        self.result = sum(nodes.is_baked(node) for node, _ in swaps)
+        self.result = sum(map(nodes.is_baked, found.values()))
 
-    def _group(self, node, entry, before):
-        if pack.manifest()["generator"] != before["generator"]:
-            raise PlanError(
-                say(
-                    "{program} is {version}, the extension was made by {own}",
-                    program=program(),
-                    version=pack.manifest()["generator"],
-                    own=before["generator"],
+    def _group(self, entry, albedo, before):
+        with _taken(self._plan.pack):
+            if pack.manifest()["generator"] != before["generator"]:
+                raise PlanError(
+                    say(
+                        "{program} is {version}, the extension was made by {own}",
+                        program=program(),
+                        version=pack.manifest()["generator"],
+                        own=before["generator"],
+                    )
                 )
-            )
-        # A linked value is None to pack.refusal().
-        given = {k: None if isinstance(v, dict) else v for k, v in entry["parameters"].items()}
-        model = entry["model"]
-        form = pack.resolve(model, entry["representation"], given)
-        known = set(bpy.data.node_groups)
-        albedo = nodes.uses_albedo(node)
-        group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
+            # What varies is None to pack.refusal().
+            given = {k: None if v == usage.VARIES else v for k, v in entry["parameters"].items()}
+            model = entry["model"]
+            form = pack.resolve(model, entry["representation"], given)
+            known = set(bpy.data.node_groups)
+            group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
         # The list of lamps, which may be new as well, goes with the last group that reads it.
         self._made += [group] if group not in known else []
         return group

@@ -9,7 +9,7 @@ import json
 
 import bpy
 
-from . import compiler, editable, lamps, pack, stand_in, twin
+from . import animation, compiler, editable, lamps, pack, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, add_parameter, vector_socket
 from .i18n import say
@@ -419,6 +419,20 @@ def get_value(node, name):
     return socket.default_value
 
 
+def _animated(node):
+    """{path: parameter} of what animates or drives sockets of a group node."""
+    names = {s.identifier: name for name, s in sockets(node).items()}
+    found = {path: names.get(s.identifier) for path, s in animation.paths(node).items()}
+    return {path: name for path, name in found.items() if name is not None}
+
+
+def varying(node):
+    """Parameters of a group node that are not constant: what a link controls, a curve animates or a
+    driver sets."""
+    linked = {name for name, s in sockets(node).items() if s.is_linked}
+    return linked | set(_animated(node).values())
+
+
 def _trees(tree, seen):
     if tree is None or tree in seen:
         return
@@ -467,6 +481,11 @@ def all_values(node):
     return {name: get_value(node, name) for name in names}
 
 
+def constants(node):
+    """The same, and None for what is varying()."""
+    return all_values(node) | dict.fromkeys(varying(node))
+
+
 def remove_group(group):
     """Takes a group out of the file, and its texts, images and twin, if nothing else has them."""
     texts = {n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script}
@@ -507,7 +526,7 @@ def switch(node, representation):
     """
     editable.check(node.id_data)
     model_name, _ = identity(node)
-    form = pack.resolve(model_name, representation, all_values(node))
+    form = pack.resolve(model_name, representation, constants(node))
     _exchange(node, ensure_group(model_name, form, albedo=uses_albedo(node)))
 
 
@@ -545,41 +564,13 @@ def add_albedo(node):
     _exchange(node, ensure_group(*identity(node), albedo=True))
 
 
-def _strips(strips):
-    for strip in strips:
-        yield strip
-        yield from _strips(strip.strips)  # of a meta strip
-
-
-def _curves(tree):
-    """The curves and drivers of a tree's animation, of its action and of strips of other ones."""
-    data = tree.animation_data
-    if data is None:
-        return
-    yield from data.drivers
-    users = [data, *(s for track in data.nla_tracks for s in _strips(track.strips))]
-    # A strip or two may play the same action.
-    for action, slot in {(u.action, u.action_slot): None for u in users if u.action}:
-        for layer in action.layers:
-            for strip in layer.strips:
-                for bag in strip.channelbags:
-                    if bag.slot == slot:
-                        yield from bag.fcurves
-
-
-def animated_paths(tree):
-    """The paths of what curves and drivers of a tree move."""
-    return {curve.data_path for curve in _curves(tree) if not curve.mute}
-
-
 def replace_group(node, group):
     """Puts another group of the same model into a group node; values, links and animation stay.
     Animation of what the group has no socket of is muted."""
     if group == node.node_tree:
         return
     tree = node.id_data
-    paths = {s.path_from_id("default_value"): name for name, s in sockets(node).items()}
-    animated = [(c, paths[c.data_path]) for c in _curves(tree) if c.data_path in paths]
+    animated = _animated(node)
     values = all_values(node)
     incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
     outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
@@ -595,8 +586,4 @@ def replace_group(node, group):
             tree.links.new(source, present[name])
     for name, target in outgoing:
         tree.links.new(node.outputs[name], target)
-    for curve, name in animated:  # which knows sockets by their number
-        if name in present:
-            curve.data_path = present[name].path_from_id("default_value")
-        else:
-            curve.mute = True
+    animation.move(tree, {path: present.get(name) for path, name in animated.items()})

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Metals and glass of measured refractive index as parameters of a model, in the working space."""
 
+import os
+
 import bpy
 
 from . import color, pack
@@ -32,6 +34,9 @@ def find(name):
     Raises ValueError that names file, line and what was expected."""
     from .brdfc import optics  # NumPy's formulas, when they are first needed
 
+    if not isinstance(name, str | os.PathLike):
+        raise ValueError(f"expected the name of a substance or a file NAME.csv, got {name!r}")
+    name = os.fspath(name)
     if not name.endswith(".csv"):
         return optics.substance(name)
     try:

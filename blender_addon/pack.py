@@ -122,8 +122,8 @@ def refusal(model_name, name, values):
     for key, only in form_values(model_name, name).items():
         if key in values and not same(values[key], only):
             got = values[key]
-            shown = say("a linked value") if got is None else value_text(got)
-            given = "a linked value" if got is None else repr(got)
+            shown = say("a linked or animated value") if got is None else value_text(got)
+            given = "a linked or animated value" if got is None else repr(got)
             return say(
                 "{form} is only for {parameter} = {only}, not for {got}",
                 more=f"model {model_name!r} has the form {name!r} only for {key}={only!r}, not "

@@ -245,7 +245,7 @@ def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
     api.set_parameters(material, cz=0.8)
     value = material.node_tree.nodes.new("ShaderNodeValue")
     material.node_tree.links.new(value.outputs[0], nodes.sockets(node)["cz"])
-    with pytest.raises(ValueError, match="only for cz=0.8, not for a linked value"):
+    with pytest.raises(ValueError, match="only for cz=0.8, not for a linked or animated value"):
         api.switch_representation(material, "fitted")
     assert nodes.sockets(node)["cz"].is_linked
 
