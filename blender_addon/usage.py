@@ -42,9 +42,11 @@ def _use(material, node):
     return Use(material, node, entry, (node.node_tree[nodes.TAG]["digest"], nodes.is_baked(node)))
 
 
-def _names(material, node):
-    """What the only model of a material is called, and one of several: groups inside a material may
-    have nodes of one name."""
+def _names(material, node, alone):
+    """What a model of a material is called: groups inside it may have nodes of one name, and
+    materials of two files one name."""
+    if alone:
+        yield material.name
     yield f"{material.name}/{node.name}"
     yield f"{material.name}/{node.id_data.name}/{node.name}"
     count = 2
@@ -56,10 +58,10 @@ def _names(material, node):
 def uses():
     """{MATERIAL: Use} of the open file; of a material with several model nodes MATERIAL/NODE."""
     found = {}
-    for material in bpy.data.materials:
+    for material in sorted(bpy.data.materials, key=lambda m: m.library is not None):
         ours = nodes.group_nodes(material)
         for node in ours:
-            names = iter([material.name]) if len(ours) == 1 else _names(material, node)
+            names = _names(material, node, len(ours) == 1)
             found[next(name for name in names if name not in found)] = _use(material, node)
     return found
 
