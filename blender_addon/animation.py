@@ -41,7 +41,7 @@ def _curves(owner):
 
 
 def _moves(node):
-    """(curve, what it moves a property of, that property) of a node and what else lies there."""
+    """(curve, its block, what it moves a property of, that property), also of other nodes."""
     for owner in _owners(node.id_data):
         for curve in _curves(owner):
             # Paths may name nodes and sockets or count them.
@@ -51,49 +51,49 @@ def _moves(node):
             except ValueError:  # of what is no more
                 continue
             if hasattr(found, "as_pointer"):
-                yield curve, found, name
+                yield curve, owner, found, name
 
 
 def moved(node):
     """{(pointer of the node or a socket, name of a property)} of what is animated or driven."""
     own = {item.as_pointer() for item in (node, *node.inputs)}
-    moves = ((found.as_pointer(), name) for curve, found, name in _moves(node) if not curve.mute)
-    return {(pointer, name) for pointer, name in moves if pointer in own}
+    found = {(item.as_pointer(), name) for c, _, item, name in _moves(node) if not c.mute}
+    return {(pointer, name) for pointer, name in found if pointer in own}
 
 
-def paths(node):
-    """{path: input socket} of a node's inputs that are animated or driven. Muted curves count: to
-    unmute one later must not be without effect."""
+def _of_inputs(node):
     inputs = {socket.as_pointer(): socket for socket in node.inputs}
-    return {
-        curve.data_path: inputs[found.as_pointer()]
-        for curve, found, name in _moves(node)
-        if name == _VALUE and found.as_pointer() in inputs
-    }
+    for curve, owner, found, name in _moves(node):
+        if name == _VALUE and found.as_pointer() in inputs:
+            yield curve, owner, inputs[found.as_pointer()].identifier
+
+
+def inputs(node):
+    """Identifiers of a node's input sockets that are animated or driven. Muted curves count: to
+    unmute one later must not be without effect."""
+    return {identifier for _, _, identifier in _of_inputs(node)}
+
+
+def hold(node):
+    """[(curve, its block, identifier)] of what animates or drives inputs of a node whose sockets
+    are about to have other numbers: Blender 5.2 changes paths by itself, and to wrong ones."""
+    for owner in _owners(node.id_data) if inputs(node) else ():
+        data = owner.animation_data
+        for holder in _holders(data) if data else ():
+            _make_own(owner, holder)
+    return list(_of_inputs(node))
+
+
+def follow(curve, owner, socket):
+    """Has a curve or driver animate a socket of a tree."""
+    prefix = "" if owner == socket.id_data else "node_tree."
+    curve.data_path = prefix + socket.path_from_id(_VALUE)
 
 
 def _make_own(owner, holder):
     """Copies of a material share its action, and are to keep their paths."""
     action, slot = holder.action, holder.action_slot
-    if action.library is None and all(user == owner for user in slot.users()):
+    if slot is None or (action.library is None and all(user == owner for user in slot.users())):
         return
     holder.action = action.copy()
     holder.action_slot = holder.action.slots[slot.identifier]
-
-
-def move(tree, sockets):
-    """Has curves and drivers follow sockets that have other numbers now. `sockets`: {path of
-    before: socket}; what animates one that is no more, None, is muted."""
-    for owner in _owners(tree):
-        data = owner.animation_data
-        for holder in _holders(data) if data else ():
-            if any(curve.data_path in sockets for curve in _of_holder(holder)):
-                _make_own(owner, holder)
-        prefix = "" if owner == tree else "node_tree."
-        for curve in _curves(owner):
-            if curve.data_path not in sockets:
-                continue
-            if socket := sockets[curve.data_path]:
-                curve.data_path = prefix + socket.path_from_id(_VALUE)
-            else:
-                curve.mute = True

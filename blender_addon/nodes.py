@@ -419,18 +419,11 @@ def get_value(node, name):
     return socket.default_value
 
 
-def _animated(node):
-    """{path: parameter} of what animates or drives sockets of a group node."""
-    names = {s.identifier: name for name, s in sockets(node).items()}
-    found = {path: names.get(s.identifier) for path, s in animation.paths(node).items()}
-    return {path: name for path, name in found.items() if name is not None}
-
-
 def varying(node):
     """Parameters of a group node that are not constant: what a link controls, a curve animates or a
     driver sets."""
-    linked = {name for name, s in sockets(node).items() if s.is_linked}
-    return linked | set(_animated(node).values())
+    moved = animation.inputs(node)
+    return {name for name, s in sockets(node).items() if s.is_linked or s.identifier in moved}
 
 
 def _trees(tree, seen):
@@ -570,7 +563,8 @@ def replace_group(node, group):
     if group == node.node_tree:
         return
     tree = node.id_data
-    animated = _animated(node)
+    names = {s.identifier: name for name, s in sockets(node).items()}
+    animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.hold(node)]
     values = all_values(node)
     incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
     outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
@@ -586,4 +580,8 @@ def replace_group(node, group):
             tree.links.new(source, present[name])
     for name, target in outgoing:
         tree.links.new(node.outputs[name], target)
-    animation.move(tree, {path: present.get(name) for path, name in animated.items()})
+    for curve, owner, name in animated:  # which knows sockets by their number
+        if name in present:
+            animation.follow(curve, owner, present[name])
+        else:
+            curve.mute = True
