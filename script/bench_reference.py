@@ -142,6 +142,8 @@ def mitsuba_scene(mi, folder, args):
     depth = resolved["settings"]["max_bounces"] + 2
     scene = {
         "type": "scene",
+        # Neither lets rays through the edges between triangles.
+        "embree_use_robust_intersections": True,
         "integrator": {"type": "path", "max_depth": depth, "rr_depth": 5, "hide_emitters": True},
         "sensor": {
             "type": "perspective",

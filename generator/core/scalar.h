@@ -3,9 +3,10 @@
 //
 //   double  truth            float  what OSL computes
 //   Wide    113-bit mantissa Expr   records the formula (trace/expr.h)
+//   Pack    eight doubles at once (core/pack.h)
 //
 // A model formula is a template over the scalar T and uses only the functions named here, so that one
-// text serves all four. There are no data-dependent branches: select() evaluates both arms, hence guard
+// text serves all five. There are no data-dependent branches: select() evaluates both arms, hence guard
 // the arguments of an arm, not its result.
 #pragma once
 
@@ -21,6 +22,11 @@ namespace brdfc::inline core {
 /// float, double, Wide: types whose comparisons are decided at once.
 template <class T>
 concept Numeric = std::floating_point<T> || std::same_as<T, Wide>;
+
+class Pack;
+/// Those and Pack: types that hold values and record nothing.
+template <class T>
+concept Arithmetic = Numeric<T> || std::same_as<T, Pack>;
 
 using std::abs;
 using std::atan;
@@ -63,7 +69,8 @@ template <class T> T pow5(const T& x) {
 template <class T> T clamp01(const T& x) { return minimum(maximum(x, T(0)), T(1)); }
 
 /// Runs state = step(state) `count` times. The recorded form is an OSL loop, never unrolled.
-template <Numeric T, std::size_t N, class Step> std::array<T, N> iterate(int count, std::array<T, N> state, Step step) {
+template <Arithmetic T, std::size_t N, class Step>
+std::array<T, N> iterate(int count, std::array<T, N> state, Step step) {
   for (int i = 0; i < count; ++i) state = step(state);
   return state;
 }
@@ -73,6 +80,6 @@ template <Numeric T, std::size_t N, class Step> std::array<T, N> iterate(int cou
 template <class T> int newton_steps() { return std::same_as<T, float> ? 10 : 24; }
 
 /// Gives a subexpression the name it has in the paper; only the recorded form keeps it.
-template <Numeric T> const T& named(const char*, const T& x) { return x; }
+template <Arithmetic T> const T& named(const char*, const T& x) { return x; }
 
 }  // namespace brdfc::inline core

@@ -51,26 +51,26 @@ template <class T> struct Rgb {
   T r{}, g{}, b{};
 
   Rgb() = default;
-  Rgb(T r_, T g_, T b_) : r(r_), g(g_), b(b_) {}
+  Rgb(const T& r_, const T& g_, const T& b_) : r(r_), g(g_), b(b_) {}
   explicit Rgb(const T& grey) : r(grey), g(grey), b(grey) {}
 };
 
-template <Numeric T> Rgb<T> operator+(const Rgb<T>& a, const Rgb<T>& b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }
-template <Numeric T> Rgb<T> operator-(const Rgb<T>& a, const Rgb<T>& b) { return {a.r - b.r, a.g - b.g, a.b - b.b}; }
-template <Numeric T> Rgb<T> operator*(const Rgb<T>& a, const Rgb<T>& b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
-template <Numeric T> Rgb<T> operator*(const Rgb<T>& a, const T& s) { return {a.r * s, a.g * s, a.b * s}; }
-template <Numeric T> Rgb<T> operator*(const T& s, const Rgb<T>& a) { return a * s; }
-template <Numeric T> Rgb<T> operator/(const Rgb<T>& a, const T& s) { return {a.r / s, a.g / s, a.b / s}; }
-template <Numeric T> Rgb<T> operator/(const Rgb<T>& a, const Rgb<T>& b) { return {a.r / b.r, a.g / b.g, a.b / b.b}; }
-template <Numeric T> Rgb<T>& operator+=(Rgb<T>& a, const Rgb<T>& b) { return a = a + b; }
+template <Arithmetic T> Rgb<T> operator+(const Rgb<T>& a, const Rgb<T>& b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }
+template <Arithmetic T> Rgb<T> operator-(const Rgb<T>& a, const Rgb<T>& b) { return {a.r - b.r, a.g - b.g, a.b - b.b}; }
+template <Arithmetic T> Rgb<T> operator*(const Rgb<T>& a, const Rgb<T>& b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
+template <Arithmetic T> Rgb<T> operator*(const Rgb<T>& a, const T& s) { return {a.r * s, a.g * s, a.b * s}; }
+template <Arithmetic T> Rgb<T> operator*(const T& s, const Rgb<T>& a) { return a * s; }
+template <Arithmetic T> Rgb<T> operator/(const Rgb<T>& a, const T& s) { return {a.r / s, a.g / s, a.b / s}; }
+template <Arithmetic T> Rgb<T> operator/(const Rgb<T>& a, const Rgb<T>& b) { return {a.r / b.r, a.g / b.g, a.b / b.b}; }
+template <Arithmetic T> Rgb<T>& operator+=(Rgb<T>& a, const Rgb<T>& b) { return a = a + b; }
 template <Numeric T> Rgb<T> select(bool condition, const Rgb<T>& a, const Rgb<T>& b) { return condition ? a : b; }
-template <Numeric T> T max_component(const Rgb<T>& c) { return maximum(c.r, maximum(c.g, c.b)); }
+template <Arithmetic T> T max_component(const Rgb<T>& c) { return maximum(c.r, maximum(c.g, c.b)); }
 
-template <Numeric T> Rgb<T> magnitude(const Rgb<T>& c) { return {abs(c.r), abs(c.g), abs(c.b)}; }
+template <Arithmetic T> Rgb<T> magnitude(const Rgb<T>& c) { return {abs(c.r), abs(c.g), abs(c.b)}; }
 
 /// Luminance of linear Rec.709 primaries (ITU-R BT.709), used only to choose between lobes.
-template <Numeric T> T luminance(const Rgb<T>& c) { return T(0.2126) * c.r + T(0.7152) * c.g + T(0.0722) * c.b; }
-template <Numeric T> const Rgb<T>& named(const char*, const Rgb<T>& c) { return c; }
+template <Arithmetic T> T luminance(const Rgb<T>& c) { return T(0.2126) * c.r + T(0.7152) * c.g + T(0.0722) * c.b; }
+template <Arithmetic T> const Rgb<T>& named(const char*, const Rgb<T>& c) { return c; }
 
 /// u and v of an orthonormal frame (u, v, w) that varies smoothly with w, for w.z >= 0.
 template <class T> std::array<Vec3<T>, 2> across_axis(const Vec3<T>& w) {

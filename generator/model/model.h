@@ -28,6 +28,7 @@
 
 #include "closures/closure.h"
 #include "core/error.h"
+#include "core/pack.h"
 #include "core/vec.h"
 #include "model/schema.h"
 #include "trace/expr.h"
@@ -41,12 +42,6 @@ template <class T> struct Sample {
   T pdf;          ///< per solid angle
 };
 
-/// A BRDF and the density of sampling it, for one pair of directions.
-template <class T> struct Evaluation {
-  Rgb<T> f;
-  T pdf;
-};
-
 /// A model with its parameters bound.
 template <class T> class Brdf {
  public:
@@ -55,8 +50,6 @@ template <class T> class Brdf {
   virtual Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
   /// Density of sample() per solid angle.
   virtual T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
-  /// eval() and pdf(), which have much in common: for double faster than one after the other, with the same values.
-  virtual Evaluation<T> evaluate(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
   /// u: three numbers in [0, 1): lobe choice, and two for the direction.
   virtual Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const = 0;
   /// Weight of ideal reflection; 0 for a model without a mirror term.
@@ -82,6 +75,27 @@ template <class T> class Brdf {
   virtual void assign(const std::string& name, const std::array<double, 3>& value) = 0;
 };
 
+/// A BRDF and the density of sampling it.
+struct PackedEvaluation {
+  Rgb<Pack> f;
+  Pack pdf;
+};
+
+/// A model with its parameters bound that takes eight directions at once; its functions are Brdf's.
+class PackedBrdf {
+ public:
+  virtual ~PackedBrdf() = default;
+  /// eval() and pdf(), which have much in common.
+  virtual PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const = 0;
+  virtual Sample<Pack> sample(const Vec3<Pack>& wo, const Vec3<Pack>& u) const = 0;
+  virtual Rgb<Pack> mirror(const Vec3<Pack>& wo) const = 0;
+  virtual Rgb<Pack> transmit(const Vec3<Pack>& wo) const = 0;
+  virtual Rgb<Pack> transmittance(const Pack& distance) const = 0;
+  virtual Pack ior() const = 0;
+  virtual std::array<Pack, 3> channel_iors() const = 0;
+  virtual void assign(const std::string& name, const std::array<Pack, 3>& value) = 0;
+};
+
 /// A registered model.
 class Model {
  public:
@@ -105,6 +119,7 @@ class Model {
   virtual std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const = 0;
   virtual std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const = 0;
   virtual std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const = 0;
+  virtual std::unique_ptr<PackedBrdf> make_packed(const ParamValues&) const = 0;
   /// Parameters in `fixed` become constants, other numbers and colours become inputs named after them.
   /// A choice that is not fixed takes its default. A Recorder must be active.
   virtual std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const = 0;
@@ -139,9 +154,9 @@ template <class T> struct BindVisitor {
 };
 
 /// Binds one number or colour.
-template <class T> struct AssignVisitor {
+template <class T, class Value> struct AssignVisitor {
   const std::string& name;
-  const std::array<double, 3>& value;
+  const std::array<Value, 3>& value;
   void operator()(T& member, const NumberSpec& s) const {
     if (name == s.name) member = T(value[0]);
   }
@@ -227,14 +242,8 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
     else
       return T(0);
   }
-  Evaluation<T> evaluate(const Vec3<T>& wi, const Vec3<T>& wo) const override {
-    if constexpr (kScatters && std::same_as<T, double>)
-      return in_one(m_, wi, wo);
-    else
-      return {eval(wi, wo), pdf(wi, wo)};
-  }
   void assign(const std::string& name, const std::array<double, 3>& value) override {
-    m_.parameters(AssignVisitor<T>{name, value});
+    m_.parameters(AssignVisitor<T, double>{name, value});
   }
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const override {
     if constexpr (kScatters)
@@ -294,12 +303,6 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
   }
 
  private:
-  /// All is inlined, so that the compiler sees what both compute.
-  [[gnu::flatten]] static Evaluation<double> in_one(const M<double>& m, const Vec3<double>& wi,
-                                                    const Vec3<double>& wo) {
-    return {m.eval(wi, wo), m.pdf(wi, wo)};
-  }
-
   ClosureSum<T> delta_terms(const Vec3<T>& wo) const {
     ClosureSum<T> sum;
     if constexpr (HasMirror<M<double>>) sum.emplace_back(ClosureKind::Reflection, mirror(wo));
@@ -324,6 +327,69 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
   M<T> m_;
 };
 
+template <template <class> class M> class PackedOf final : public PackedBrdf {
+  using V = Vec3<Pack>;
+  using Color = Rgb<Pack>;
+
+ public:
+  explicit PackedOf(M<Pack> m) : m_(std::move(m)) {}
+  PackedEvaluation evaluate(const V& wi, const V& wo) const override {
+    PackedEvaluation out{Color(Pack(0)), Pack(0)};
+    if constexpr (HasScatter<M<double>>) evaluate(m_, wi, wo, out);
+    return out;
+  }
+  Sample<Pack> sample(const V& wo, const V& u) const override {
+    Sample<Pack> out{{Pack(0), Pack(0), Pack(1)}, Color(Pack(0)), Pack(0)};
+    if constexpr (HasScatter<M<double>>) sample(m_, wo, u, out);
+    return out;
+  }
+  Color mirror(const V& wo) const override {
+    Color out(Pack(0));
+    if constexpr (HasMirror<M<double>>) mirror(m_, wo, out);
+    return out;
+  }
+  Color transmit(const V& wo) const override {
+    Color out(Pack(0));
+    if constexpr (HasTransmit<M<double>>) transmit(m_, wo, out);
+    return out;
+  }
+  Color transmittance(const Pack& distance) const override {
+    Color out(Pack(1));
+    if constexpr (HasMedium<M<double>>) transmittance(m_, distance, out);
+    return out;
+  }
+  Pack ior() const override {
+    if constexpr (HasTransmit<M<double>> || HasThrough<M<double>>)
+      return m_.ior();
+    else
+      return Pack(1);
+  }
+  std::array<Pack, 3> channel_iors() const override {
+    if constexpr (HasDispersion<M<double>>)
+      return m_.channel_iors();
+    else
+      return {ior(), ior(), ior()};
+  }
+  void assign(const std::string& name, const std::array<Pack, 3>& value) override {
+    m_.parameters(AssignVisitor<Pack, Pack>{name, value});
+  }
+
+ private:
+  BRDFC_VECTORISED static void evaluate(const M<Pack>& m, const V& wi, const V& wo, PackedEvaluation& out) {
+    out = {m.eval(wi, wo), m.pdf(wi, wo)};
+  }
+  BRDFC_VECTORISED static void sample(const M<Pack>& m, const V& wo, const V& u, Sample<Pack>& out) {
+    out = m.sample(wo, u);
+  }
+  BRDFC_VECTORISED static void mirror(const M<Pack>& m, const V& wo, Color& out) { out = m.mirror(wo); }
+  BRDFC_VECTORISED static void transmit(const M<Pack>& m, const V& wo, Color& out) { out = m.transmit(wo); }
+  BRDFC_VECTORISED static void transmittance(const M<Pack>& m, const Pack& distance, Color& out) {
+    out = m.transmittance(distance);
+  }
+
+  M<Pack> m_;
+};
+
 template <template <class> class M> class ModelOf final : public Model {
  public:
   ModelOf() : info_(M<double>::info()) {
@@ -341,6 +407,9 @@ template <template <class> class M> class ModelOf final : public Model {
   std::unique_ptr<Brdf<double>> make_double(const ParamValues& v) const override { return make<double>(v); }
   std::unique_ptr<Brdf<float>> make_float(const ParamValues& v) const override { return make<float>(v); }
   std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues& v) const override { return make<Wide>(v); }
+  std::unique_ptr<PackedBrdf> make_packed(const ParamValues& v) const override {
+    return std::make_unique<PackedOf<M>>(bind<Pack>(v));
+  }
   std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const override {
     const ParamValues values = complete(info_, fixed);
     M<Expr> m;
@@ -349,11 +418,14 @@ template <template <class> class M> class ModelOf final : public Model {
   }
 
  private:
-  template <class T> std::unique_ptr<Brdf<T>> make(const ParamValues& v) const {
+  template <class T> M<T> bind(const ParamValues& v) const {
     const ParamValues values = complete(info_, v);
     M<T> m;
     m.parameters(BindVisitor<T>{values});
-    return std::make_unique<BrdfOf<M, T>>(std::move(m));
+    return m;
+  }
+  template <class T> std::unique_ptr<Brdf<T>> make(const ParamValues& v) const {
+    return std::make_unique<BrdfOf<M, T>>(bind<T>(v));
   }
   ModelInfo info_;
 };

@@ -18,6 +18,19 @@ template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int coun
   }
   return state;
 }
+/// Each lane ends by itself: what it gives does not depend on its neighbours.
+template <std::size_t N, class Step>
+std::array<Pack, N> settle(int count, const std::array<Pack, N>& begin, Step step) {
+  std::array<Pack, N> state = begin;
+  Mask settled(false);
+  for (int i = 0; i < count && !settled.all(); ++i) {
+    const std::array<Pack, N> next = step(state);
+    const Mask ends = abs(next[N - 1] - state[N - 1]) <= Pack(1e-10) * abs(next[N - 1]);
+    for (std::size_t n = 0; n < N; ++n) state[n] = select(settled, state[n], next[n]);
+    settled = settled || ends;
+  }
+  return state;
+}
 template <std::size_t N, class Step>
 std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step step) {
   return iterate(count, state, step);

@@ -1,22 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Structures of arrays: loops over paths of which compilers make vector instructions.
-//
-// A function that has such loops is BRDFC_VECTORISED: it is compiled for several instruction sets, of which the
-// machine's is taken when the program starts. Values are the same in all of them: no product is contracted with a sum.
+// Structures of arrays: loops over paths of which compilers make vector instructions (core/vectorised.h).
 #pragma once
 
 #include <array>
 #include <cstddef>
 
-#include "core/vec.h"
-
-#if !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-#define BRDFC_VECTORISED [[gnu::flatten, gnu::target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")]]
-#define BRDFC_INDEPENDENT _Pragma("GCC ivdep")
-#else
-#define BRDFC_VECTORISED
-#define BRDFC_INDEPENDENT
-#endif
+#include "core/pack.h"
 
 namespace brdfc::reference {
 
@@ -32,6 +21,10 @@ template <class T> struct VectorsOf {
   Vec3<double> operator[](std::size_t k) const { return {x[k], y[k], z[k]}; }
   template <class A> void set(std::size_t k, const A& v) { x[k] = T(v[0]), y[k] = T(v[1]), z[k] = T(v[2]); }
   void set(std::size_t k, const Vec3<double>& v) { x[k] = T(v.x), y[k] = T(v.y), z[k] = T(v.z); }
+  /// The lanes from `first` on.
+  Vec3<Pack> pack(std::size_t first) const {
+    return {Pack::from(&x[first]), Pack::from(&y[first]), Pack::from(&z[first])};
+  }
 };
 using Vectors = VectorsOf<double>;
 
@@ -47,7 +40,7 @@ struct Rays {
 };
 
 /// `count` rounded up to whole vectors.
-inline std::size_t lanes_for(std::size_t count) { return (count + 7) / 8 * 8; }
+inline std::size_t lanes_for(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
 /// Calls body(k) for the lanes from `begin` to before `end`, which do not depend on each other.
 template <class Body> void for_lanes(std::size_t begin, std::size_t end, const Body& body) {

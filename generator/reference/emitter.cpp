@@ -81,10 +81,9 @@ EmittedRay Emitter::emit(double choice, const std::array<double, 3>& where, cons
   if (i == scene_.lights.size()) {
     if (!image_)
       return from_far(sample_cone({0, 0, 1}, 2, way[0], way[1]), scene_.environment.color, chance / (4 * kPi), place);
-    double pdf, u, v;
-    const Vector from = image_->sample(where[2], way[0], way[1], pdf, u, v);
-    if (!(pdf > 0)) return {};
-    return from_far(-from, scene_.environment.radiance(u, v), pdf * chance, place);
+    const EnvironmentSampler::Choice from = image_->choose(where[2], way[0], way[1]);
+    if (!(from.pdf > 0)) return {};
+    return from_far(-from.direction(), scene_.environment.radiance(from.u, from.v()), from.pdf * chance, place);
   }
   const Light& light = scene_.lights[i];
   switch (light.kind) {

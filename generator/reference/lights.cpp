@@ -71,18 +71,12 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(
     for (const int i : rest) cells_[i].keep = 1;
 }
 
-Vec3<double> EnvironmentSampler::sample(double u1, double u2, double u3, double& pdf, double& u, double& v) const {
-  pdf = u = v = 0;
-  if (cells_.empty()) return {0, 0, 1};
+EnvironmentSampler::Choice EnvironmentSampler::choose(double u1, double u2, double u3) const {
+  if (cells_.empty()) return {};
   const unsigned cell = this->cell(u1);
   const int x = int(cell % unsigned(width_)), y = int(cell / unsigned(width_));
   const double top = y == 0 ? 1.0 : z_[y - 1];
-  const double z = top + (z_[y] - top) * u3;
-  u = (x + u2) / width_;
-  v = asin(z) / kPi + 0.5;
-  const double phi = kPi * (1 - 2 * u), s = sqrt(std::max(1 - z * z, 0.0));
-  pdf = cells_[cell].density;
-  return {s * cos(phi), s * sin(phi), z};
+  return {(x + u2) / width_, top + (z_[y] - top) * u3, cells_[cell].density};
 }
 
 std::size_t EnvironmentSampler::cell_at(double u, double v) const {
@@ -139,23 +133,22 @@ Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_
   if (sampled_environment_) ++count_;
 }
 
-std::array<double, 2> Lights::place(const Vector& direction) const {
-  if (!image_) return {};
-  double u, v;
-  direction_to_equirectangular(direction, u, v);
-  image_->fetch(u, v);
-  return {u, v};
+BRDFC_VECTORISED void Lights::places(const Vectors& direction, const Numbers& distance, std::size_t count, Numbers& u,
+                                     Numbers& v) const {
+  if (std::none_of(distance.begin(), distance.begin() + count, [](double d) { return d == kInfinity; })) return;
+  for_lanes(count, [&](std::size_t k) { direction_to_equirectangular(direction[k], u[k], v[k]); });
+  for (std::size_t k = 0; k < count; ++k)
+    if (distance[k] == kInfinity) image_->fetch(u[k], v[k]);
 }
 
-Rgb<double> Lights::environment(const Vector& direction, const std::array<double, 2>& place, const Vector& normal,
-                                double* pdf) const {
+Rgb<double> Lights::environment(const Vector& direction, double u, double v, const Vector& normal, double* pdf) const {
   const Environment& e = scene_.environment;
   if (!e.image) {
     if (pdf) *pdf = dot(direction, normal) > 0 ? 1 / (2 * kPi) : 0.0;
     return e.color;
   }
-  if (pdf) *pdf = image_->pdf(place[0], place[1]);
-  return e.radiance(place[0], place[1]);
+  if (pdf) *pdf = image_->pdf(u, v);
+  return e.radiance(u, v);
 }
 
 template <class Body> void Lights::of_kind(Light::Kind kind, const Body& body) {
@@ -301,6 +294,8 @@ BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, st
       while (i + 1 < count_ && choice >= chance[k][i]) choice -= chance[k][i++];
     }
   const std::size_t lamps = lamps_.size();
+  Lanes<bool> in_image{};
+  Numbers image_u{}, image_z{};
   for (std::size_t begin = 0, end; begin < count; begin = end) {
     const std::size_t i = chosen[begin];
     end = begin + 1;
@@ -322,9 +317,9 @@ BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, st
         out.distance[k] = kInfinity;
         if (!lit[k]) continue;
         if (image_) {
-          double x, y;
-          out.wi.set(k, image_->sample(u.u1[k], u.u2[k], u.u3[k], out.pdf[k], x, y));
-          out.radiance.set(k, scene_.environment.radiance(x, y));
+          const auto [x, z, pdf] = image_->choose(u.u1[k], u.u2[k], u.u3[k]);
+          in_image[k] = true;
+          image_u[k] = x, image_z[k] = z, out.pdf[k] = pdf;
         } else {
           out.wi.set(k, sample_cone(normal[k], 1, u.u1[k], u.u2[k]));
           out.radiance.set(k, scene_.environment.color);
@@ -332,6 +327,20 @@ BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, st
         }
       }
     }
+  }
+  if (std::find(in_image.begin(), in_image.end(), true) != in_image.end()) {
+    Vectors wi;
+    Numbers image_v;
+    for_lanes(count, [&](std::size_t k) {
+      const EnvironmentSampler::Choice choice{image_u[k], image_z[k]};
+      wi.set(k, choice.direction());
+      image_v[k] = choice.v();
+    });
+    for (std::size_t k = 0; k < count; ++k)
+      if (in_image[k]) {
+        out.wi.set(k, wi[k]);
+        out.radiance.set(k, scene_.environment.radiance(image_u[k], image_v[k]));
+      }
   }
   // By rounding the last light may be chosen without a chance.
   for (std::size_t k = 0; k < count; ++k) out.pdf[k] = lit[k] ? out.pdf[k] * chance[k][chosen[k]] : 0;

@@ -33,13 +33,22 @@ struct LightNumbers {
 class EnvironmentSampler {
  public:
   explicit EnvironmentSampler(const Environment& environment);
-  /// A direction, its density per solid angle, 0 if the image is black, and its place in the image, as
-  /// direction_to_equirectangular() gives it.
-  Vec3<double> sample(double u1, double u2, double u3, double& pdf, double& u, double& v) const;
+  struct Choice {
+    double u = 0,
+           z = 0;    ///< place along the image, as direction_to_equirectangular() gives it, and sine of the latitude
+    double pdf = 0;  ///< per solid angle; 0 if the image is black
+
+    double v() const { return vectorised::asin(z) / kPi + 0.5; }
+    Vec3<double> direction() const {
+      const double phi = kPi * (1 - 2 * u), s = sqrt(maximum(1 - z * z, 0.0));
+      return {s * vectorised::cos(phi), s * vectorised::sin(phi), z};
+    }
+  };
+  Choice choose(double u1, double u2, double u3) const;
   /// Density of the direction at that place.
   double pdf(double u, double v) const;
   /// Images are larger than caches. These fetch what will be read soon: pdf() and the colour at a place; and, in two
-  /// steps, each some time after the other, sample() with this u1.
+  /// steps, each some time after the other, choose() with this u1.
   void fetch(double u, double v) const;
   void fetch_slot(double u1) const { __builtin_prefetch(&cells_[slot(u1 * double(cells_.size()))]); }
   void fetch_cell(double u1) const;
@@ -107,14 +116,12 @@ class Lights {
       for (std::size_t k = 0; k < count; ++k)
         if (pdf[k] > 0) found(k, light.radiance, chance[k] ? pdf[k] * chance[k][i] : 0.0);
     }
-    Lanes<std::array<double, 2>> places;
-    if (image_)
-      for (std::size_t k = 0; k < count; ++k)
-        if (distance[k] == kInfinity) places[k] = place(rays.direction[k]);
+    Numbers u, v;
+    if (image_) places(rays.direction, distance, count, u, v);
     for (std::size_t k = 0; k < count; ++k) {
       if (distance[k] < kInfinity) continue;
       double of_environment = 0;
-      const Rgb<double> radiance = environment(rays.direction[k], places[k], normal[k],
+      const Rgb<double> radiance = environment(rays.direction[k], u[k], v[k], normal[k],
                                                chance[k] && sampled_environment_ ? &of_environment : nullptr);
       if (max_component(radiance) > 0)
         found(k, radiance, of_environment > 0 ? of_environment * chance[k][scene_.lights.size()] : 0.0);
@@ -153,11 +160,12 @@ class Lights {
   static double pdf_of_hit(const Lamp& lamp, const Vec3<double>& p, const Vec3<double>& direction, double distance);
   void pdfs_of_hit(std::size_t i, const Rays& rays, const Numbers& distance, std::size_t count, Numbers& pdf) const;
 
-  /// Where in the environment's image a ray ends that leaves the scene, as direction_to_equirectangular() gives it;
-  /// what is there will be read soon.
-  std::array<double, 2> place(const Vec3<double>& direction) const;
-  /// Radiance from the environment, and where asked for the density of sampling that direction.
-  Rgb<double> environment(const Vec3<double>& direction, const std::array<double, 2>& place, const Vec3<double>& normal,
+  /// Where in the environment's image rays end that leave the scene, as direction_to_equirectangular() gives it; what
+  /// is there will be read soon.
+  void places(const Vectors& direction, const Numbers& distance, std::size_t count, Numbers& u, Numbers& v) const;
+  /// Radiance from the environment, which for an image is at this place, and where asked for the density of sampling
+  /// that direction.
+  Rgb<double> environment(const Vec3<double>& direction, double u, double v, const Vec3<double>& normal,
                           double* pdf) const;
 
   const Scene& scene_;

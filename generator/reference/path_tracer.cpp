@@ -105,11 +105,12 @@ void PathTracer::sort_by_material(Wave& wave) const {
     wave.order[std::size_t(wave.places[std::size_t(tracer_.material(wave.meetings[i]) + 1)]++)] = int(i);
 }
 
-void PathTracer::gather(int from, int end, Wave& wave) const {
+BRDFC_VECTORISED void PathTracer::gather(int from, int end, Wave& wave) const {
   Block& b = *wave.block;
   b.count = std::min(kBlock, std::size_t(end - from));
-  for (std::size_t k = 0; k < b.count; ++k) {
-    const std::size_t i = std::size_t(wave.order[std::size_t(from) + k]);
+  // The last one fills up the vector that it is in.
+  for (std::size_t k = 0; k < lanes_for(b.count); ++k) {
+    const std::size_t i = std::size_t(wave.order[std::size_t(from) + std::min(k, b.count - 1)]);
     const Path& path = *(b.paths[k] = wave.active[i]);
     b.keys[k] = path.random.random_key();
     b.sampled[k] = path.sampled;
@@ -173,7 +174,7 @@ void PathTracer::fetch(const Wave& wave, std::size_t place, int bounce, void (Li
 
 void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const {
   const Surface& surface = surfaces_[std::size_t(material)];
-  Brdf<double>* const scratch = wave.scratch.of(material);
+  Surface::Scratch& scratch = wave.scratch.of(material);
   Block& b = *wave.block;
   const std::uint64_t dimension = dimension_of(bounce);
   make_frames(surface.has_transmit() || surface.scatters_through(), b);
@@ -187,13 +188,15 @@ void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const 
     draw(b, dimension + 2, b.u, b.v);
   }
   Lanes<bool> on;
-  for (std::size_t k = 0; k < b.count; ++k) {
-    if (lights_.choose_more()) {
-      fetch(wave, std::size_t(place) + k + 2 * kBlock, bounce, &Lights::fetch_slot);
-      fetch(wave, std::size_t(place) + k + kBlock, bounce, &Lights::fetch_cell);
-    }
-    const auto [u, v] = scratch ? tracer_.texture_place(b.meetings[k]) : std::array<double, 2>{};
-    on[k] = choose(surface, surface.at(u, v, scratch), k, bounce, wave);
+  on.fill(true);
+  for (std::size_t first = 0; first < b.count; first += kLanes) {
+    if (lights_.choose_more())
+      for (std::size_t k = first; k < first + kLanes; ++k) {
+        fetch(wave, std::size_t(place) + k + 2 * kBlock, bounce, &Lights::fetch_slot);
+        fetch(wave, std::size_t(place) + k + kBlock, bounce, &Lights::fetch_cell);
+      }
+    const auto texture_place = [&](std::size_t k) { return tracer_.texture_place(b.meetings[first + k]); };
+    choose(surface, surface.at(texture_place, scratch), first, bounce, wave, on);
   }
   turn_to_world(b);
   for (std::size_t k = 0; k < b.count; ++k) {
@@ -266,80 +269,110 @@ BRDFC_VECTORISED void PathTracer::turn_to_world(Block& b) {
   });
 }
 
-bool PathTracer::choose(const Surface& surface, const Brdf<double>& brdf, std::size_t k, int bounce, Wave& wave) const {
+BRDFC_VECTORISED void PathTracer::choose(const Surface& surface, const PackedBrdf& brdf, std::size_t first, int bounce,
+                                         Wave& wave, Lanes<bool>& on) const {
   Block& b = *wave.block;
-  Path& path = *b.paths[k];
-  Color& throughput = path.throughput;
-  const Vector wo = b.wo[k];
-  if (b.hits.side[k] < 0 && surface.has_medium()) {
-    const Color left = brdf.transmittance(b.hits.distance[k]);
-    surface.check("transmittance", -wo, wo, left);
-    throughput = throughput * left;
+  const std::size_t lanes = std::min(kLanes, b.count - first);
+  const Vec3<Pack> wo = b.wo.pack(first);
+  if (surface.has_medium()) {
+    const Rgb<Pack> left = brdf.transmittance(Pack::from(&b.hits.distance[first]));
+    for (std::size_t k = 0; k < lanes; ++k) {
+      if (!(b.hits.side[first + k] < 0)) continue;
+      surface.check("transmittance", -lane(wo, k), lane(wo, k), lane(left, k));
+      Color& throughput = b.paths[first + k]->throughput;
+      throughput = throughput * lane(left, k);
+    }
   }
-  Color mirror(0), transmit(0);
-  if (surface.has_mirror()) {
-    mirror = brdf.mirror(wo);
-    surface.check("mirror", {-wo.x, -wo.y, wo.z}, wo, mirror);
-  }
-  if (surface.has_transmit()) {
-    transmit = brdf.transmit(wo);
-    surface.check("transmit", refract(wo, brdf.ior()), wo, transmit);
-  }
-  const double delta_chance =
-      surface.has_mirror() || surface.has_transmit() ? surface.delta_chance(mirror + transmit, wo.z) : 0;
+  const bool has_mirror = surface.has_mirror(), has_transmit = surface.has_transmit();
+  const bool crosses = has_transmit || surface.scatters_through();
+  const Pack ior = crosses ? brdf.ior() : Pack(1);
+  const std::array<Pack, 3> iors = has_transmit ? brdf.channel_iors() : std::array<Pack, 3>{};
+  Rgb<Pack> mirror(Pack(0)), transmit(Pack(0));
+  if (has_mirror) mirror = brdf.mirror(wo);
+  if (has_transmit) transmit = brdf.transmit(wo);
+  std::array<double, kLanes> delta_chances{};
+  if (has_mirror || has_transmit)
+    for (std::size_t k = 0; k < lanes; ++k) {
+      const Vector w = lane(wo, k);
+      surface.check("mirror", {-w.x, -w.y, w.z}, w, lane(mirror, k));
+      surface.check("transmit", refract(w, ior[k]), w, lane(transmit, k));
+      delta_chances[k] = surface.delta_chance(lane(mirror, k) + lane(transmit, k), w.z);
+    }
   // What crossing does to radiance.
-  const auto crossing_by = [&](double ior) {
-    return !settings_.scale_radiance ? 1 : wo.z > 0 ? 1 / sqr(ior) : sqr(ior);
+  const auto crossing_by = [&](double index, std::size_t k) {
+    return !settings_.scale_radiance ? 1 : wo.z[k] > 0 ? 1 / sqr(index) : sqr(index);
   };
-  double crossing = settings_.scale_radiance ? crossing_by(brdf.ior()) : 1;
 
   for (std::size_t far = 0; far < 2; ++far) {
     const Block::Side& side = b.sides[far];
-    if (!side.lit[k] || !(side.lights.pdf[k] > 0)) continue;
-    const bool delta = side.lights.delta[k];
-    if (strategy_ == Strategy::Brdf && !delta) continue;
-    const Vector wi = side.wi[k];
-    const auto [f, pdf] = brdf.evaluate(wi, wo);
-    surface.check("f", wi, wo, f);
-    const Color value = f * side.lights.radiance[k] * std::abs(wi.z);
-    if (!(max_component(value) > 0)) continue;
-    const double light_pdf = side.lights.pdf[k];
-    const double weight = delta ? 1 : power_heuristic(light_pdf, pdf * (1 - delta_chance));
-    wave.shadows.push_back({&path, throughput * (far ? crossing : 1) * (value * (weight / light_pdf))});
-    // A little short of a lamp, which may lie in a surface.
-    wave.shadow_rays.push_back({side.from[k], side.lights.wi[k], side.lights.distance[k] * (1 - 0x1p-18)});
+    const auto counts = [&](std::size_t k) {
+      return side.lit[first + k] && side.lights.pdf[first + k] > 0 &&
+             (strategy_ != Strategy::Brdf || side.lights.delta[first + k]);
+    };
+    bool any = false;
+    for (std::size_t k = 0; k < lanes; ++k) any |= counts(k);
+    if (!any) continue;
+    const auto [f, pdf] = brdf.evaluate(side.wi.pack(first), wo);
+    for (std::size_t k = 0; k < lanes; ++k) {
+      if (!counts(k)) continue;
+      const std::size_t at = first + k;
+      const Vector wi = side.wi[at];
+      surface.check("f", wi, lane(wo, k), lane(f, k));
+      const Color value = lane(f, k) * side.lights.radiance[at] * std::abs(wi.z);
+      if (!(max_component(value) > 0)) continue;
+      const double light_pdf = side.lights.pdf[at];
+      const double weight = side.lights.delta[at] ? 1 : power_heuristic(light_pdf, pdf[k] * (1 - delta_chances[k]));
+      Path& path = *b.paths[at];
+      wave.shadows.push_back(
+          {&path, path.throughput * (far ? crossing_by(ior[k], k) : 1) * (value * (weight / light_pdf))});
+      // A little short of a lamp, which may lie in a surface.
+      wave.shadow_rays.push_back({side.from[at], side.lights.wi[at], side.lights.distance[at] * (1 - 0x1p-18)});
+    }
   }
 
-  Vector wi;
-  path.sampled = nullptr;
-  if (const double u = delta_chance > 0 ? path.random.one(dimension_of(bounce)) : 1; u < delta_chance) {
-    const double share = luminance(mirror) / luminance(mirror + transmit);
-    if (u < delta_chance * share) {
-      wi = {-wo.x, -wo.y, wo.z};
-      throughput = throughput * mirror / (delta_chance * share);
+  const Sample<Pack> samples =
+      brdf.sample(wo, {Pack::from(&b.lobe[first]), Pack::from(&b.u[first]), Pack::from(&b.v[first])});
+  for (std::size_t k = 0; k < lanes; ++k) {
+    const std::size_t at = first + k;
+    Path& path = *b.paths[at];
+    Color& throughput = path.throughput;
+    const Vector out = lane(wo, k);
+    const double delta_chance = delta_chances[k];
+    double crossing = crosses ? crossing_by(ior[k], k) : 1;
+    Vector wi;
+    path.sampled = nullptr;
+    if (const double u = delta_chance > 0 ? path.random.one(dimension_of(bounce)) : 1; u < delta_chance) {
+      const Color reflected = lane(mirror, k), refracted = lane(transmit, k);
+      const double share = luminance(reflected) / luminance(reflected + refracted);
+      if (u < delta_chance * share) {
+        wi = {-out.x, -out.y, out.z};
+        throughput = throughput * reflected / (delta_chance * share);
+      } else {
+        throughput = throughput * refracted / (delta_chance * (1 - share));
+        const Bent bent =
+            bend({iors[0][k], iors[1][k], iors[2][k]}, throughput, (u / delta_chance - share) / (1 - share));
+        wi = refract(out, bent.ior);
+        crossing = crossing_by(bent.ior, k);
+        throughput = bent.throughput;
+      }
     } else {
-      throughput = throughput * transmit / (delta_chance * (1 - share));
-      const Bent bent = bend(brdf.channel_iors(), throughput, (u / delta_chance - share) / (1 - share));
-      wi = refract(wo, bent.ior);
-      crossing = crossing_by(bent.ior);
-      throughput = bent.throughput;
+      const Color weight = lane(samples.weight, k);
+      const double pdf = samples.pdf[k];
+      wi = lane(samples.wi, k);
+      surface.check("sample weight", wi, out, weight);
+      if (!(pdf > 0)) {
+        if (pdf != 0) surface.bad_value("sample pdf", wi, out, Color(pdf));
+        on[at] = false;
+        continue;
+      }
+      throughput = throughput * weight * (1 / (1 - delta_chance));
+      path.scattered_pdf = pdf * (1 - delta_chance);
+      const Block::Side& side = b.sides[wi.z * out.z < 0];
+      if (side.lit[at]) path.sampled = side.chances[at];
     }
-  } else {
-    const Sample<double> s = brdf.sample(wo, {b.lobe[k], b.u[k], b.v[k]});
-    surface.check("sample weight", s.wi, wo, s.weight);
-    if (!(s.pdf > 0)) {
-      if (s.pdf == 0) return false;
-      surface.bad_value("sample pdf", s.wi, wo, Color(s.pdf));
-    }
-    wi = s.wi;
-    throughput = throughput * s.weight * (1 / (1 - delta_chance));
-    path.scattered_pdf = s.pdf * (1 - delta_chance);
-    const Block::Side& side = b.sides[wi.z * wo.z < 0];
-    if (side.lit[k]) path.sampled = side.chances[k];
+    if (wi.z * out.z < 0) throughput = throughput * crossing;
+    b.wi.set(at, wi);
   }
-  if (wi.z * wo.z < 0) throughput = throughput * crossing;
-  b.wi.set(k, wi);
-  return true;
 }
 
 }  // namespace brdfc::reference

@@ -54,8 +54,10 @@ class PathTracer {
   void fetch(const Wave& wave, std::size_t place, int bounce, void (Lights::*what)(double) const) const;
   /// Chooses lights on one side, and directions towards them.
   void aim(bool far, int bounce, Wave& wave) const;
-  /// Takes the light that aim() has found for path k, and chooses where the path goes on, or returns false if it ends.
-  bool choose(const Surface& surface, const Brdf<double>& brdf, std::size_t k, int bounce, Wave& wave) const;
+  /// Takes the light that aim() has found for the paths in the lanes from `first` on, and chooses where they go on, or
+  /// clears `on` where they end.
+  void choose(const Surface& surface, const PackedBrdf& brdf, std::size_t first, int bounce, Wave& wave,
+              Lanes<bool>& on) const;
 
   /// Loops over a block: the rays from the camera through points of the film; random numbers; the frames of points;
   /// directions to lights into the frames; directions where paths go out of them.

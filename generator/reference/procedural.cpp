@@ -7,11 +7,6 @@
 
 namespace brdfc::reference {
 
-void direction_to_equirectangular(const Vec3<double>& d, double& u, double& v) {
-  u = 0.5 - atan2(d.y, d.x) / (2 * kPi);
-  v = atan2(d.z, sqrt(d.x * d.x + d.y * d.y)) / kPi + 0.5;
-}
-
 Vec3<double> equirectangular_to_direction(double u, double v) {
   const double phi = kPi * (1 - 2 * u), latitude = kPi * (v - 0.5);
   return {cos(latitude) * cos(phi), cos(latitude) * sin(phi), sin(latitude)};

@@ -2,13 +2,17 @@
 // Environments and textures made by this project's own code; no third-party art.
 #pragma once
 
+#include "core/vectorised.h"
 #include "reference/image.h"
 
 namespace brdfc::reference {
 
 /// Blender's equirectangular convention, seen from inside: u = 1/2 - atan2(y, x) / (2 pi), so that +x is the
 /// middle of the picture and +y a quarter to the left; v = atan2(z, hypot(x, y)) / pi + 1/2.
-void direction_to_equirectangular(const Vec3<double>& direction, double& u, double& v);
+inline void direction_to_equirectangular(const Vec3<double>& d, double& u, double& v) {
+  u = 0.5 - vectorised::atan2(d.y, d.x) / (2 * kPi);
+  v = vectorised::atan2(d.z, sqrt(d.x * d.x + d.y * d.y)) / kPi + 0.5;
+}
 Vec3<double> equirectangular_to_direction(double u, double v);
 
 /// Radiance of the named environment in a direction: "sky", "interior" or "checker".

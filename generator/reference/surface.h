@@ -37,6 +37,7 @@ class Surface {
   explicit Surface(const Material& material)
       : material_(material),
         brdf_(material.model->make_double(material.values)),
+        packed_(material.model->make_packed(material.values)),
         has_scatter_(material.model->has_scatter()),
         has_mirror_(material.model->has_mirror()),
         has_transmit_(material.model->has_transmit()),
@@ -73,22 +74,41 @@ class Surface {
     return std::min(std::max(m / (m + rest), 0.05), 0.95);
   }
 
-  /// A BRDF to bind anew at each place, for a thread; nullptr if it is the same everywhere.
-  std::unique_ptr<Brdf<double>> make_scratch() const {
-    return material_.textures.empty() ? nullptr : material_.model->make_double(material_.values);
+  /// BRDFs to bind anew at each place, for a thread; nullptr if they are the same everywhere.
+  struct Scratch {
+    std::unique_ptr<Brdf<double>> brdf;
+    std::unique_ptr<PackedBrdf> packed;
+  };
+  Scratch make_scratch() const {
+    if (material_.textures.empty()) return {};
+    return {material_.model->make_double(material_.values), material_.model->make_packed(material_.values)};
   }
   /// The BRDF at texture coordinates, until `scratch` is bound to other ones.
-  const Brdf<double>& at(double u, double v, Brdf<double>* scratch) const {
-    if (!scratch) return *brdf_;
+  const Brdf<double>& at(double u, double v, Scratch& scratch) const {
+    if (!scratch.brdf) return *brdf_;
     for (const auto& [name, image] : material_.textures) {
       const Rgb<double> c = bilinear(*image, u, v, Wrap::Repeat, Wrap::Repeat);
-      scratch->assign(name, {c.r, c.g, c.b});
+      scratch.brdf->assign(name, {c.r, c.g, c.b});
     }
-    return *scratch;
+    return *scratch.brdf;
+  }
+  /// The same for as many places as there are lanes; place(k) gives texture coordinates.
+  template <class Place> const PackedBrdf& at(const Place& place, Scratch& scratch) const {
+    if (!scratch.packed) return *packed_;
+    for (const auto& [name, image] : material_.textures) {
+      std::array<Pack, 3> value;
+      for (std::size_t k = 0; k < kLanes; ++k) {
+        const auto [u, v] = place(k);
+        const Rgb<double> c = bilinear(*image, u, v, Wrap::Repeat, Wrap::Repeat);
+        value[0][k] = c.r, value[1][k] = c.g, value[2][k] = c.b;
+      }
+      scratch.packed->assign(name, value);
+    }
+    return *scratch.packed;
   }
 
-  [[noreturn]] void bad_value(const char* what, const Vec3<double>& wi, const Vec3<double>& wo,
-                              const Rgb<double>& value) const {
+  [[noreturn, gnu::noinline]] void bad_value(const char* what, const Vec3<double>& wi, const Vec3<double>& wo,
+                                             const Rgb<double>& value) const {
     throw ValueError(fmt::format(
         "{} {}: {} = ({:.9g}, {:.9g}, {:.9g}) at wi = ({:.17g}, {:.17g}, {:.17g}), wo = ({:.17g}, {:.17g}, {:.17g})",
         material_.model->info().name, format_values(material_.model->info(), material_.values), what, value.r, value.g,
@@ -105,6 +125,7 @@ class Surface {
   static constexpr int kCosines = 32, kSamples = 128;
   const Material& material_;
   std::unique_ptr<Brdf<double>> brdf_;
+  std::unique_ptr<PackedBrdf> packed_;
   const bool has_scatter_, has_mirror_, has_transmit_, has_medium_, through_;
   std::array<double, kCosines> albedo_{};
 };
@@ -116,10 +137,10 @@ class SurfaceScratch {
     for (const Surface& s : surfaces) brdfs_.push_back(s.make_scratch());
   }
   /// What Surface::at() asks for.
-  Brdf<double>* of(int material) const { return brdfs_[std::size_t(material)].get(); }
+  Surface::Scratch& of(int material) { return brdfs_[std::size_t(material)]; }
 
  private:
-  std::vector<std::unique_ptr<Brdf<double>>> brdfs_;
+  std::vector<Surface::Scratch> brdfs_;
 };
 
 }  // namespace brdfc::reference

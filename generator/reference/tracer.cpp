@@ -16,7 +16,7 @@ using Vector = Vec3<double>;
 template <class A> Vector to_vector(const A& a) { return {a[0], a[1], a[2]}; }
 std::array<float, 3> to_floats(const Vector& v) { return {float(v.x), float(v.y), float(v.z)}; }
 
-constexpr std::size_t kPacket = 8;
+constexpr std::size_t kPacket = 16;
 
 void put(const Ray& from, RTCRay& to) {
   to.org_x = float(from.origin.x), to.org_y = float(from.origin.y), to.org_z = float(from.origin.z);
@@ -26,7 +26,7 @@ void put(const Ray& from, RTCRay& to) {
   to.mask = ~0u;
   to.id = to.flags = 0;
 }
-void put(const Ray& from, RTCRay8& to, std::size_t k) {
+void put(const Ray& from, RTCRay16& to, std::size_t k) {
   to.org_x[k] = float(from.origin.x), to.org_y[k] = float(from.origin.y), to.org_z[k] = float(from.origin.z);
   to.dir_x[k] = float(from.direction.x), to.dir_y[k] = float(from.direction.y), to.dir_z[k] = float(from.direction.z);
   to.tfar[k] = float(from.distance);
@@ -36,7 +36,7 @@ void put(const Ray& from, RTCRay8& to, std::size_t k) {
 }
 
 /// Which rays of a packet count: the first `count`.
-struct alignas(32) Valid {
+struct alignas(64) Valid {
   int lanes[kPacket];
   explicit Valid(std::size_t count) {
     for (std::size_t k = 0; k < kPacket; ++k) lanes[k] = k < count ? -1 : 0;
@@ -113,12 +113,12 @@ void Tracer::intersect(std::span<const Ray> rays, bool from_camera, std::span<Me
       break;
     }
     const Valid valid(count);
-    RTCRayHit8 query;
+    RTCRayHit16 query;
     for (std::size_t k = 0; k < kPacket; ++k) {
       put(rays[i + std::min(k, count - 1)], query.ray, k);
       query.hit.geomID[k] = query.hit.primID[k] = query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     }
-    rtcIntersect8(valid.lanes, scene, &context, &query);
+    rtcIntersect16(valid.lanes, scene, &context, &query);
     for (std::size_t k = 0; k < count; ++k)
       meetings[i + k] = {query.hit.geomID[k], query.hit.primID[k], query.hit.u[k], query.hit.v[k]};
   }
@@ -137,9 +137,9 @@ void Tracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> hidden)
       break;
     }
     const Valid valid(count);
-    RTCRay8 query;
+    RTCRay16 query;
     for (std::size_t k = 0; k < kPacket; ++k) put(rays[i + std::min(k, count - 1)], query, k);
-    rtcOccluded8(valid.lanes, scene_, &context, &query);
+    rtcOccluded16(valid.lanes, scene_, &context, &query);
     for (std::size_t k = 0; k < count; ++k) hidden[i + k] = query.tfar[k] < 0;
   }
 }

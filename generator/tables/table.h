@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/axis_scale.h"
+#include "core/pack.h"
 #include "core/scalar.h"
 #include "core/vec.h"
 
@@ -70,11 +71,21 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
   return sum;
 }
 
+template <std::size_t D> Pack lookup(const std::shared_ptr<const Table>& table, const std::array<Pack, D>& x) {
+  Pack out;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    std::array<double, D> at;
+    for (std::size_t d = 0; d < D; ++d) at[d] = x[d][k];
+    out[k] = lookup(table, at);
+  }
+  return out;
+}
+
 /// Throws std::logic_error unless formulas can look this table up at so many coordinates.
 void require_lookup(const Table&, std::size_t coordinates);
 
 /// The same where only the table says how many coordinates there are.
-template <Numeric T> T lookup(const std::shared_ptr<const Table>& table, const std::vector<T>& x) {
+template <Arithmetic T> T lookup(const std::shared_ptr<const Table>& table, const std::vector<T>& x) {
   const auto of = [&]<std::size_t D>(std::array<T, D> at) {
     std::copy_n(x.begin(), D, at.begin());
     return lookup(table, at);

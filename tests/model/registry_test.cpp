@@ -21,6 +21,7 @@ struct Declared : Model {
   std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override { return nullptr; }
   std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override { return nullptr; }
   std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override { return nullptr; }
+  std::unique_ptr<PackedBrdf> make_packed(const ParamValues&) const override { return nullptr; }
   std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { return nullptr; }
   ModelInfo own;
 };

@@ -248,14 +248,15 @@ TEST(Reference, EnvironmentDensityIsNormalised) {
     }
   EXPECT_NEAR(sum, 1, 2e-3);
   for (int i = 0; i < 1000; ++i) {
-    double pdf, u, v, found_u, found_v;
+    double found_u, found_v;
     const double t = (i + 0.5) / 1000;
-    const Vec3<double> w = sampler.sample(t, std::fmod(t * 37, 1), std::fmod(t * 91, 1), pdf, u, v);
+    const EnvironmentSampler::Choice choice = sampler.choose(t, std::fmod(t * 37, 1), std::fmod(t * 91, 1));
+    const Vec3<double> w = choice.direction();
     EXPECT_NEAR(dot(w, w), 1, 1e-12);
     direction_to_equirectangular(w, found_u, found_v);
-    EXPECT_NEAR(found_u, u, 1e-12);
-    EXPECT_NEAR(found_v, v, 1e-8);
-    EXPECT_NEAR(sampler.pdf(found_u, found_v), pdf, 1e-9 * pdf);
+    EXPECT_NEAR(found_u, choice.u, 1e-12);
+    EXPECT_NEAR(found_v, choice.v(), 1e-8);
+    EXPECT_NEAR(sampler.pdf(found_u, found_v), choice.pdf, 1e-9 * choice.pdf);
   }
 }
 

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Eight numbers at once: a scalar whose every operation is a loop that compilers turn into one vector instruction.
+//
+// A formula over it gives the values of double, but for the last digits of exp(), sin() and the like, which are those
+// of glibc's vector library (4 units in the last place) where there is one. A lane's value depends on that lane alone.
+// Comparisons give a Mask, which converts to nothing: what a formula may do is what it may do with Expr.
+//
+// Functions that compute with it are to be BRDFC_VECTORISED (core/vectorised.h).
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+
+#include "core/scalar.h"
+#include "core/vec.h"
+#include "core/vectorised.h"
+
+namespace brdfc::inline core {
+
+#define BRDFC_LANES BRDFC_INDEPENDENT for (std::size_t k = 0; k < kLanes; ++k)
+
+inline constexpr std::size_t kLanes = 8;
+
+/// Which lanes something holds for.
+class Mask {
+ public:
+  Mask() = default;
+  explicit Mask(bool all) { BRDFC_LANES lanes_[k] = all ? -1 : 0; }
+  bool operator[](std::size_t k) const { return lanes_[k]; }
+  void set(std::size_t k, bool holds) { lanes_[k] = holds ? -1 : 0; }
+  bool all() const {
+    long long both = -1;
+    BRDFC_LANES both &= lanes_[k];
+    return both;
+  }
+  operator bool() const = delete;
+
+  friend Mask operator&&(const Mask& a, const Mask& b) {
+    Mask out;
+    BRDFC_LANES out.lanes_[k] = a.lanes_[k] & b.lanes_[k];
+    return out;
+  }
+  friend Mask operator||(const Mask& a, const Mask& b) {
+    Mask out;
+    BRDFC_LANES out.lanes_[k] = a.lanes_[k] | b.lanes_[k];
+    return out;
+  }
+  friend Mask operator!(const Mask& a) {
+    Mask out;
+    BRDFC_LANES out.lanes_[k] = ~a.lanes_[k];
+    return out;
+  }
+
+ private:
+  alignas(sizeof(long long) * kLanes) long long lanes_[kLanes]{};  // as wide as what it chooses; 0 or -1
+};
+
+class Pack {
+ public:
+  Pack() = default;
+  template <class N>
+  requires(std::integral<N> || std::floating_point<N>) Pack(N v) {  // NOLINT: formulas mix literals and scalars
+    BRDFC_LANES lanes_[k] = double(v);
+  }
+  /// The next numbers of an array.
+  static Pack from(const double* numbers) {
+    Pack out;
+    BRDFC_LANES out.lanes_[k] = numbers[k];
+    return out;
+  }
+  double operator[](std::size_t k) const { return lanes_[k]; }
+  double& operator[](std::size_t k) { return lanes_[k]; }
+
+ private:
+  alignas(sizeof(double) * kLanes) double lanes_[kLanes]{};
+};
+
+/// f in each lane.
+template <class F> Pack lane_by_lane(const Pack& a, const F& f) {
+  Pack out;
+  BRDFC_LANES out[k] = f(a[k]);
+  return out;
+}
+template <class F> Pack lane_by_lane(const Pack& a, const Pack& b, const F& f) {
+  Pack out;
+  BRDFC_LANES out[k] = f(a[k], b[k]);
+  return out;
+}
+template <class F> Mask compare(const Pack& a, const Pack& b, const F& f) {
+  Mask out;
+  BRDFC_LANES out.set(k, f(a[k], b[k]));
+  return out;
+}
+
+inline Pack operator-(const Pack& a) {
+  return lane_by_lane(a, [](double x) { return -x; });
+}
+inline Pack operator+(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return x + y; });
+}
+inline Pack operator-(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return x - y; });
+}
+inline Pack operator*(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return x * y; });
+}
+inline Pack operator/(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return x / y; });
+}
+inline Mask operator<(const Pack& a, const Pack& b) {
+  return compare(a, b, [](double x, double y) { return x < y; });
+}
+inline Mask operator<=(const Pack& a, const Pack& b) {
+  return compare(a, b, [](double x, double y) { return x <= y; });
+}
+inline Mask operator>(const Pack& a, const Pack& b) { return b < a; }
+inline Mask operator>=(const Pack& a, const Pack& b) { return b <= a; }
+
+inline Pack select(const Mask& condition, const Pack& a, const Pack& b) {
+  Pack out;
+  BRDFC_LANES out[k] = condition[k] ? a[k] : b[k];
+  return out;
+}
+inline Rgb<Pack> select(const Mask& condition, const Rgb<Pack>& a, const Rgb<Pack>& b) {
+  return {select(condition, a.r, b.r), select(condition, a.g, b.g), select(condition, a.b, b.b)};
+}
+/// One lane of a vector or colour.
+inline Vec3<double> lane(const Vec3<Pack>& v, std::size_t k) { return {v.x[k], v.y[k], v.z[k]}; }
+inline Rgb<double> lane(const Rgb<Pack>& c, std::size_t k) { return {c.r[k], c.g[k], c.b[k]}; }
+inline Pack minimum(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return y < x ? y : x; });
+}
+inline Pack maximum(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return x < y ? y : x; });
+}
+inline Pack abs(const Pack& a) {
+  return lane_by_lane(a, [](double x) { return std::abs(x); });
+}
+inline Pack sqrt(const Pack& a) {
+  return lane_by_lane(a, [](double x) { return std::sqrt(x); });
+}
+
+#define BRDFC_FUNCTION(name)                                              \
+  inline Pack name(const Pack& a) {                                       \
+    return lane_by_lane(a, [](double x) { return vectorised::name(x); }); \
+  }
+BRDFC_FUNCTION(atan)
+BRDFC_FUNCTION(cbrt)
+BRDFC_FUNCTION(cos)
+BRDFC_FUNCTION(exp)
+BRDFC_FUNCTION(expm1)
+BRDFC_FUNCTION(log)
+BRDFC_FUNCTION(log1p)
+BRDFC_FUNCTION(sin)
+#undef BRDFC_FUNCTION
+inline Pack pow(const Pack& a, const Pack& b) {
+  return lane_by_lane(a, b, [](double x, double y) { return vectorised::pow(x, y); });
+}
+#undef BRDFC_LANES
+
+}  // namespace brdfc::inline core
