@@ -143,8 +143,7 @@ class Plan:
     model: str = ""
     values: dict = field(default_factory=dict)
     #: Part of the light that goes elsewhere, as a picture of lamps that are as wide as windows
-    #: shows; seen from 0.95 to 0.25 in cosine.
-    #: Infinite with a refusal that knows of no model.
+    #: shows; seen from 0.95 to 0.25 in cosine. Infinite with a refusal that knows of no model.
     error: float = math.inf
     #: Parameter by the node's socket.
     links: dict = field(default_factory=dict)
