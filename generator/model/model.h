@@ -332,7 +332,7 @@ template <template <class> class M> class PackedOf final : public PackedBrdf {
   using Color = Rgb<Pack>;
 
  public:
-  explicit PackedOf(M<Pack> m) : m_(std::move(m)) {}
+  explicit PackedOf(const M<Pack>& m) : m_(m) {}
   PackedEvaluation evaluate(const V& wi, const V& wo) const override {
     PackedEvaluation out{Color(Pack(0)), Pack(0)};
     if constexpr (HasScatter<M<double>>) evaluate(m_, wi, wo, out);
