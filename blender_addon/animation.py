@@ -54,6 +54,11 @@ def _moves(node):
                 yield curve, owner, found, name
 
 
+def value_of(socket):
+    """A socket's value, as moved() has it."""
+    return socket.as_pointer(), _VALUE
+
+
 def moved(node):
     """{(pointer of the node or a socket, name of a property)} of what is animated or driven."""
     own = {item.as_pointer() for item in (node, *node.inputs)}

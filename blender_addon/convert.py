@@ -66,7 +66,7 @@ class _Inputs:
         socket = self._node.inputs[name]
         if socket.is_linked:
             return True
-        if (socket.as_pointer(), "default_value") in self._moved:
+        if animation.value_of(socket) in self._moved:
             raise Refused(say("{socket} is animated", socket=Sentence(name)))
         return False
 

@@ -14,7 +14,7 @@ def _settings(node):
     for socket in node.inputs:
         if socket.is_linked:
             value = "linked"
-        elif (socket.as_pointer(), "default_value") in moved:
+        elif animation.value_of(socket) in moved:
             value = "animated"
         else:
             value = getattr(socket, "default_value", None)

@@ -124,9 +124,6 @@ inline Pack select(const Mask& condition, const Pack& a, const Pack& b) {
 inline Rgb<Pack> select(const Mask& condition, const Rgb<Pack>& a, const Rgb<Pack>& b) {
   return {select(condition, a.r, b.r), select(condition, a.g, b.g), select(condition, a.b, b.b)};
 }
-/// One lane of a vector or colour.
-inline Vec3<double> lane(const Vec3<Pack>& v, std::size_t k) { return {v.x[k], v.y[k], v.z[k]}; }
-inline Rgb<double> lane(const Rgb<Pack>& c, std::size_t k) { return {c.r[k], c.g[k], c.b[k]}; }
 inline Pack minimum(const Pack& a, const Pack& b) {
   return lane_by_lane(a, b, [](double x, double y) { return y < x ? y : x; });
 }
@@ -140,18 +137,15 @@ inline Pack sqrt(const Pack& a) {
   return lane_by_lane(a, [](double x) { return std::sqrt(x); });
 }
 
+/// One lane of a vector or colour.
+inline Vec3<double> lane(const Vec3<Pack>& v, std::size_t k) { return {v.x[k], v.y[k], v.z[k]}; }
+inline Rgb<double> lane(const Rgb<Pack>& c, std::size_t k) { return {c.r[k], c.g[k], c.b[k]}; }
+
 #define BRDFC_FUNCTION(name)                                              \
   inline Pack name(const Pack& a) {                                       \
     return lane_by_lane(a, [](double x) { return vectorised::name(x); }); \
   }
-BRDFC_FUNCTION(atan)
-BRDFC_FUNCTION(cbrt)
-BRDFC_FUNCTION(cos)
-BRDFC_FUNCTION(exp)
-BRDFC_FUNCTION(expm1)
-BRDFC_FUNCTION(log)
-BRDFC_FUNCTION(log1p)
-BRDFC_FUNCTION(sin)
+BRDFC_FORMULA_FUNCTIONS(BRDFC_FUNCTION)
 #undef BRDFC_FUNCTION
 inline Pack pow(const Pack& a, const Pack& b) {
   return lane_by_lane(a, b, [](double x, double y) { return vectorised::pow(x, y); });

@@ -40,15 +40,10 @@ namespace brdfc::vectorised {
 #define BRDFC_FUNCTION_OF_TWO(name)   \
   BRDFC_DECLARE(name, double, double) \
   inline double name(double a, double b) { return BRDFC_CALL(name)(a, b); }
+// Those of one number that formulas call: core/pack.h has the same of a Pack.
+#define BRDFC_FORMULA_FUNCTIONS(F) F(atan) F(cbrt) F(cos) F(exp) F(expm1) F(log) F(log1p) F(sin)
+BRDFC_FORMULA_FUNCTIONS(BRDFC_FUNCTION)
 BRDFC_FUNCTION(asin)
-BRDFC_FUNCTION(atan)
-BRDFC_FUNCTION(cbrt)
-BRDFC_FUNCTION(cos)
-BRDFC_FUNCTION(exp)
-BRDFC_FUNCTION(expm1)
-BRDFC_FUNCTION(log)
-BRDFC_FUNCTION(log1p)
-BRDFC_FUNCTION(sin)
 BRDFC_FUNCTION_OF_TWO(atan2)
 BRDFC_FUNCTION_OF_TWO(pow)
 #undef BRDFC_DECLARE

@@ -34,8 +34,8 @@ class EnvironmentSampler {
  public:
   explicit EnvironmentSampler(const Environment& environment);
   struct Choice {
-    double u = 0,
-           z = 0;    ///< place along the image, as direction_to_equirectangular() gives it, and sine of the latitude
+    double u = 0;    ///< place along the image, as direction_to_equirectangular() gives it
+    double z = 0;    ///< sine of the latitude
     double pdf = 0;  ///< per solid angle; 0 if the image is black
 
     double v() const { return vectorised::asin(z) / kPi + 0.5; }

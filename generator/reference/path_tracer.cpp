@@ -295,7 +295,7 @@ BRDFC_VECTORISED void PathTracer::choose(const Surface& surface, const PackedBrd
     for (std::size_t k = 0; k < lanes; ++k) {
       const Vector w = lane(wo, k);
       surface.check("mirror", {-w.x, -w.y, w.z}, w, lane(mirror, k));
-      surface.check("transmit", refract(w, ior[k]), w, lane(transmit, k));
+      if (has_transmit) surface.check("transmit", refract(w, ior[k]), w, lane(transmit, k));
       delta_chances[k] = surface.delta_chance(lane(mirror, k) + lane(transmit, k), w.z);
     }
   // What crossing does to radiance.

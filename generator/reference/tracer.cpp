@@ -202,7 +202,7 @@ BRDFC_VECTORISED void Tracer::at(const Rays& rays, const Lanes<Meeting>& meeting
     Lanes<float> u, v;
   } places;
   for (std::size_t k = 0; k < lanes_for(count); ++k) {
-    const Meeting& m = meetings[std::min(k, count - 1)];
+    const Meeting& m = meetings[k];
     const auto from = corners(m);
     for (std::size_t i = 0; i < 3; ++i) {
       places.corners[i].set(k, from[i]->p);

@@ -62,7 +62,7 @@ class Tracer {
   int material(const Meeting& meeting) const {
     return meeting.part == RTC_INVALID_GEOMETRY_ID ? -1 : parts_[meeting.part].material;
   }
-  /// The points of meetings, all of which there are.
+  /// The points of meetings, all of which there are, as many as fill whole vectors.
   void at(const Rays& rays, const Lanes<Meeting>& meetings, std::size_t count, Hits& hits) const;
   /// Texture coordinates there.
   std::array<double, 2> texture_place(const Meeting& meeting) const;

@@ -18,7 +18,7 @@ from helpers import (
     add_world,
     albedo_and_mirror,
     draw,
-    empty_tree,
+    node_material,
     render,
     render_passes,
 )
@@ -99,25 +99,14 @@ def representatives(extension, listed):
 
 def material_of(extension, form):
     if form == DIFFUSE:
-        return _node_material("ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1))
+        return node_material("ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1))
     if form == GLOSSY:
-        return _node_material("ShaderNodeBsdfAnisotropic", Color=(0.8, 0.8, 0.8, 1), Roughness=0.3)
+        return node_material("ShaderNodeBsdfAnisotropic", Color=(0.8, 0.8, 0.8, 1), Roughness=0.3)
     return extension.api.new_material(form.model, form.form, **form.values)
 
 
-def _node_material(kind, **inputs):
-    material = bpy.data.materials.new(kind)
-    tree = empty_tree(material)
-    node = tree.nodes.new(kind)
-    for name, value in inputs.items():
-        node.inputs[name].default_value = value
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(node.outputs[0], output.inputs["Surface"])
-    return material
-
-
 def _plain(grey):
-    return _node_material("ShaderNodeBsdfDiffuse", Color=(grey, grey, grey, 1))
+    return node_material("ShaderNodeBsdfDiffuse", Color=(grey, grey, grey, 1))
 
 
 class Grooves:

@@ -15,7 +15,7 @@ import math
 import bpy
 import numpy as np
 from goniometer import Goniometer, frame, tilted, unit
-from helpers import empty_tree, pairs_csv, read_csv, script_material
+from helpers import node_material, pairs_csv, read_csv, script_material
 from worlds import gradient, spot, white
 
 #: Coloured. diffuse_ramp is drawn in proportion to the cosine, which it does not contain: where its
@@ -282,12 +282,8 @@ def _square(meter, centre, half, sampled):
 def _emitter():
     if found := bpy.data.materials.get("emitter"):
         return found
-    material = bpy.data.materials.new("emitter")
-    tree = empty_tree(material)
-    emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Color"].default_value = (1, 1, 1, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    material = node_material("ShaderNodeEmission", Color=(1, 1, 1, 1))
+    material.name = "emitter"
     material.cycles.emission_sampling = "NONE"
     return material
 

@@ -182,6 +182,18 @@ def empty_tree(owner):
     return owner.node_tree
 
 
+def node_material(kind, **inputs):
+    """A material of one of Blender's own nodes."""
+    material = bpy.data.materials.new(kind)
+    tree = empty_tree(material)
+    node = tree.nodes.new(kind)
+    for name, value in inputs.items():
+        node.inputs[name].default_value = value
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material
+
+
 def add_world(scene, strength=1.0):
     """A white world; returns its node tree and the Background node."""
     world = bpy.data.worlds.new("World")

@@ -15,7 +15,7 @@ import highlights
 import numpy as np
 import pytest
 from goniometer import unit
-from helpers import add_lamp, add_sphere, add_world, empty_tree, render
+from helpers import add_lamp, add_sphere, add_world, node_material, render
 from mathutils import Matrix, Vector
 
 #: A wide base and next to no rest, a narrow lobe without a base, and cones.
@@ -129,21 +129,11 @@ def settings_that_change_nothing(scene):
     return [item]
 
 
-def glowing(strength):
-    material = bpy.data.materials.new("Glowing")
-    tree = empty_tree(material)
-    emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Strength"].default_value = strength
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(emission.outputs[0], output.inputs["Surface"])
-    return material
-
-
 def sheet(scene):
     """A flat mesh, behind which nothing is."""
     mesh = bpy.data.meshes.new("Sheet")
     mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
-    mesh.materials.append(glowing(50.0))
+    mesh.materials.append(node_material("ShaderNodeEmission", Strength=50.0))
     item = bpy.data.objects.new("Sheet", mesh)
     item.matrix_world = Matrix.LocRotScale(3.0 * Vector(TOWARDS), turned(TOWARDS), (0.7, 0.4, 1))
     scene.collection.objects.link(item)
@@ -151,7 +141,7 @@ def sheet(scene):
 
 
 def ball_of_light(scene):
-    item = add_sphere(scene, glowing(50.0), segments=128)
+    item = add_sphere(scene, node_material("ShaderNodeEmission", Strength=50.0), segments=128)
     item.location, item.scale = 3.0 * TOWARDS, (0.4, 0.4, 0.4)
     return [highlights.sphere(np.array(item.location), 0.4, 50.0 * math.pi * 0.4**2)]
 
@@ -237,16 +227,6 @@ WITH_MARKS = [
 ALL_KINDS = KINDS | SLOW_KINDS | FULL_KINDS
 
 
-def white():
-    material = bpy.data.materials.new("White")
-    tree = empty_tree(material)
-    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
-    return material
-
-
 def measured(scene, stage, samples):
     """Means by block and their variances."""
     scene.cycles.samples = 2 * samples
@@ -269,7 +249,7 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
     extension.api.enable_osl(scene)
     made = [extension.api.new_material(model, form, **values) for model, values in stage.cases[1:]]
-    stage.dress([white(), *made])
+    stage.dress([node_material("ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1)), *made])
     bpy.context.view_layer.update()
     sends = [lamp if callable(lamp) else highlights.of_light(lamp) for lamp in lamps]
     found, variance = measured(scene, stage, samples)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import bpy
 import helpers
 import pytest
-from helpers import add_lamp, add_sphere, counts, empty_tree
+from helpers import add_lamp, add_sphere, counts, empty_tree, node_material
 
 
 @pytest.fixture
@@ -273,12 +273,9 @@ def test_models_of_one_name_in_two_groups_are_two(extension, api):
 
 @pytest.fixture
 def native(api):
-    material = bpy.data.materials.new("Native")
-    tree = empty_tree(material)
-    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
-    return material, node
+    material = node_material("ShaderNodeBsdfDiffuse")
+    material.name = "Native"
+    return material, material.node_tree.nodes["Diffuse BSDF"]
 
 
 def paint(material, node):
