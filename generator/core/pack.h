@@ -5,7 +5,8 @@
 // of glibc's vector library (4 units in the last place) where there is one. A lane's value depends on that lane alone.
 // Comparisons give a Mask, which converts to nothing: what a formula may do is what it may do with Expr.
 //
-// Functions that compute with it are to be BRDFC_VECTORISED (core/vectorised.h).
+// Functions that compute with it are to be BRDFC_VECTORISED or in a source that is compiled for each instruction set
+// (core/vectorised.h).
 #pragma once
 
 #include <concepts>
@@ -17,9 +18,11 @@
 
 namespace brdfc::inline core {
 
-#define BRDFC_LANES BRDFC_INDEPENDENT for (std::size_t k = 0; k < kLanes; ++k)
-
 inline constexpr std::size_t kLanes = 8;
+
+inline namespace BRDFC_INSTRUCTION_SET {
+
+#define BRDFC_LANES BRDFC_INDEPENDENT for (std::size_t k = 0; k < kLanes; ++k)
 
 /// Which lanes something holds for.
 class Mask {
@@ -151,5 +154,7 @@ inline Pack pow(const Pack& a, const Pack& b) {
   return lane_by_lane(a, b, [](double x, double y) { return vectorised::pow(x, y); });
 }
 #undef BRDFC_LANES
+
+}  // namespace BRDFC_INSTRUCTION_SET
 
 }  // namespace brdfc::inline core

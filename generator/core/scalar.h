@@ -15,6 +15,7 @@
 #include <concepts>
 #include <type_traits>
 
+#include "core/vectorised.h"
 #include "core/wide.h"
 
 namespace brdfc::inline core {
@@ -23,7 +24,9 @@ namespace brdfc::inline core {
 template <class T>
 concept Numeric = std::floating_point<T> || std::same_as<T, Wide>;
 
+inline namespace BRDFC_INSTRUCTION_SET {
 class Pack;
+}
 /// Those and Pack: types that hold values and record nothing.
 template <class T>
 concept Arithmetic = Numeric<T> || std::same_as<T, Pack>;

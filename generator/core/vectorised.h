@@ -2,8 +2,13 @@
 // Loops of which compilers make vector instructions.
 //
 // A function that has such loops is BRDFC_VECTORISED: it is compiled for several instruction sets, of which the
-// machine's is taken when the program starts. Sums, products and roots are the same in all of them: no product is
-// contracted with a sum.
+// machine's is taken when the program starts, together with every function that it calls. Sums, products and roots are
+// the same in all of them: no product is contracted with a sum.
+//
+// The formulas of models call too much for that: with all of it in one function, a model took up to three minutes to
+// compile. Instead, their sources are compiled once for each instruction set (generator/CMakeLists.txt), and what such
+// a source computes with stands in an inline namespace BRDFC_INSTRUCTION_SET. So the linker can't mistake a function
+// for one of the same name that needs another processor; a test reads the names in the object files.
 #pragma once
 
 #include <cmath>
@@ -19,10 +24,18 @@
 #define BRDFC_HAS_VECTOR_MATH 0
 #endif
 
+#ifndef BRDFC_INSTRUCTION_SET
+#define BRDFC_INSTRUCTION_SET baseline
+/// Whether this is a source's main compilation, not one of those for further instruction sets.
+#define BRDFC_BASELINE 1
+#else
+#define BRDFC_BASELINE 0
+#endif
+
 /// The C library's functions, of which a loop calls that for a whole vector: values differ in the last digits (4 units
 /// in the last place), by whether and for how wide a vector. What must not depend on a number's place in a loop is
 /// computed in loops over whole vectors alone.
-namespace brdfc::vectorised {
+namespace brdfc::vectorised::inline BRDFC_INSTRUCTION_SET {
 
 #if BRDFC_HAS_VECTOR_MATH
 // Under names of our own: declared by those of the library's header they would be called by every loop of whoever
@@ -51,4 +64,4 @@ BRDFC_FUNCTION_OF_TWO(pow)
 #undef BRDFC_FUNCTION
 #undef BRDFC_FUNCTION_OF_TWO
 
-}  // namespace brdfc::vectorised
+}  // namespace brdfc::vectorised::inline BRDFC_INSTRUCTION_SET

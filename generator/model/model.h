@@ -75,6 +75,8 @@ template <class T> class Brdf {
   virtual void assign(const std::string& name, const std::array<double, 3>& value) = 0;
 };
 
+inline namespace BRDFC_INSTRUCTION_SET {
+
 /// A BRDF and the density of sampling it.
 struct PackedEvaluation {
   Rgb<Pack> f;
@@ -95,6 +97,22 @@ class PackedBrdf {
   virtual std::array<Pack, 3> channel_iors() const = 0;
   virtual void assign(const std::string& name, const std::array<Pack, 3>& value) = 0;
 };
+
+}  // namespace BRDFC_INSTRUCTION_SET
+
+/// The formulas of a model over Pack, compiled for one instruction set. Arguments and results are passed by address,
+/// for each instruction set has a type Pack of its own; their layouts are the same. `model` is an M<Pack>. Null where
+/// the model lacks the term.
+struct PackedFormulas {
+  void (*evaluate)(const void* model, const void* wi, const void* wo, void* evaluation);  ///< to a PackedEvaluation
+  void (*sample)(const void* model, const void* wo, const void* u, void* sample);         ///< to a Sample<Pack>
+  void (*mirror)(const void* model, const void* wo, void* weight);                        ///< to an Rgb<Pack>
+  void (*transmit)(const void* model, const void* wo, void* weight);                      ///< to an Rgb<Pack>
+  void (*transmittance)(const void* model, const void* distance, void* share);            ///< to an Rgb<Pack>
+};
+/// Those that this machine's processor runs fastest.
+const PackedFormulas* fastest(const PackedFormulas* baseline, const PackedFormulas* x86_64_v3,
+                              const PackedFormulas* x86_64_v4);
 
 /// A registered model.
 class Model {
@@ -327,35 +345,71 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
   M<T> m_;
 };
 
+inline namespace BRDFC_INSTRUCTION_SET {
+
+template <template <class> class M> constexpr PackedFormulas packed_formulas() {
+  using Of = M<Pack>;
+  using V = Vec3<Pack>;
+  using Color = Rgb<Pack>;
+  PackedFormulas out{};
+  if constexpr (HasScatter<M<double>>) {
+    out.evaluate = [](const void* m, const void* wi, const void* wo, void* evaluation) {
+      const Of& model = *static_cast<const Of*>(m);
+      const V &in = *static_cast<const V*>(wi), &view = *static_cast<const V*>(wo);
+      *static_cast<PackedEvaluation*>(evaluation) = {model.eval(in, view), model.pdf(in, view)};
+    };
+    out.sample = [](const void* m, const void* wo, const void* u, void* sample) {
+      *static_cast<Sample<Pack>*>(sample) =
+          static_cast<const Of*>(m)->sample(*static_cast<const V*>(wo), *static_cast<const V*>(u));
+    };
+  }
+  if constexpr (HasMirror<M<double>>)
+    out.mirror = [](const void* m, const void* wo, void* weight) {
+      *static_cast<Color*>(weight) = static_cast<const Of*>(m)->mirror(*static_cast<const V*>(wo));
+    };
+  if constexpr (HasTransmit<M<double>>)
+    out.transmit = [](const void* m, const void* wo, void* weight) {
+      *static_cast<Color*>(weight) = static_cast<const Of*>(m)->transmit(*static_cast<const V*>(wo));
+    };
+  if constexpr (HasMedium<M<double>>)
+    out.transmittance = [](const void* m, const void* distance, void* share) {
+      *static_cast<Color*>(share) = static_cast<const Of*>(m)->transmittance(*static_cast<const Pack*>(distance));
+    };
+  return out;
+}
+template <template <class> class M> inline constexpr PackedFormulas kPackedFormulas = packed_formulas<M>();
+
+}  // namespace BRDFC_INSTRUCTION_SET
+
 template <template <class> class M> class PackedOf final : public PackedBrdf {
   using V = Vec3<Pack>;
   using Color = Rgb<Pack>;
 
  public:
-  explicit PackedOf(const M<Pack>& m) : m_(m) {}
+  PackedOf(const M<Pack>& m, const PackedFormulas& formulas) : m_(m), formulas_(formulas) {}
   PackedEvaluation evaluate(const V& wi, const V& wo) const override {
     PackedEvaluation out{Color(Pack(0)), Pack(0)};
-    if constexpr (HasScatter<M<double>>) evaluate(m_, wi, wo, out);
+    if (formulas_.evaluate) formulas_.evaluate(&m_, &wi, &wo, &out);
     return out;
   }
   Sample<Pack> sample(const V& wo, const V& u) const override {
     Sample<Pack> out{{Pack(0), Pack(0), Pack(1)}, Color(Pack(0)), Pack(0)};
-    if constexpr (HasScatter<M<double>>) sample(m_, wo, u, out);
+    if (formulas_.sample) formulas_.sample(&m_, &wo, &u, &out);
     return out;
   }
   Color mirror(const V& wo) const override {
     Color out(Pack(0));
-    if constexpr (HasMirror<M<double>>) mirror(m_, wo, out);
+    if (formulas_.mirror) formulas_.mirror(&m_, &wo, &out);
     return out;
   }
   Color transmit(const V& wo) const override {
     Color out(Pack(0));
-    if constexpr (HasTransmit<M<double>>) transmit(m_, wo, out);
+    if (formulas_.transmit) formulas_.transmit(&m_, &wo, &out);
     return out;
   }
   Color transmittance(const Pack& distance) const override {
     Color out(Pack(1));
-    if constexpr (HasMedium<M<double>>) transmittance(m_, distance, out);
+    if (formulas_.transmittance) formulas_.transmittance(&m_, &distance, &out);
     return out;
   }
   Pack ior() const override {
@@ -375,24 +429,15 @@ template <template <class> class M> class PackedOf final : public PackedBrdf {
   }
 
  private:
-  BRDFC_VECTORISED static void evaluate(const M<Pack>& m, const V& wi, const V& wo, PackedEvaluation& out) {
-    out = {m.eval(wi, wo), m.pdf(wi, wo)};
-  }
-  BRDFC_VECTORISED static void sample(const M<Pack>& m, const V& wo, const V& u, Sample<Pack>& out) {
-    out = m.sample(wo, u);
-  }
-  BRDFC_VECTORISED static void mirror(const M<Pack>& m, const V& wo, Color& out) { out = m.mirror(wo); }
-  BRDFC_VECTORISED static void transmit(const M<Pack>& m, const V& wo, Color& out) { out = m.transmit(wo); }
-  BRDFC_VECTORISED static void transmittance(const M<Pack>& m, const Pack& distance, Color& out) {
-    out = m.transmittance(distance);
-  }
-
   M<Pack> m_;
+  const PackedFormulas& formulas_;
 };
 
 template <template <class> class M> class ModelOf final : public Model {
  public:
-  ModelOf() : info_(M<double>::info()) {
+  /// `formulas`: for a further instruction set, if the model is compiled for any.
+  explicit ModelOf(const PackedFormulas* formulas = &kPackedFormulas<M>)
+      : info_(M<double>::info()), packed_formulas_(*formulas) {
     M<double> prototype;
     prototype.parameters(SchemaVisitor{info_.params});
   }
@@ -408,7 +453,7 @@ template <template <class> class M> class ModelOf final : public Model {
   std::unique_ptr<Brdf<float>> make_float(const ParamValues& v) const override { return make<float>(v); }
   std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues& v) const override { return make<Wide>(v); }
   std::unique_ptr<PackedBrdf> make_packed(const ParamValues& v) const override {
-    return std::make_unique<PackedOf<M>>(bind<Pack>(v));
+    return std::make_unique<PackedOf<M>>(bind<Pack>(v), packed_formulas_);
   }
   std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const override {
     const ParamValues values = complete(info_, fixed);
@@ -428,14 +473,34 @@ template <template <class> class M> class ModelOf final : public Model {
     return std::make_unique<BrdfOf<M, T>>(bind<T>(v));
   }
   ModelInfo info_;
+  const PackedFormulas& packed_formulas_;
 };
 
 }  // namespace detail
 
 /// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this. It sees the
 /// variable as well: of two models with one class name it would else keep one class for both, without a word.
+#if !BRDFC_BASELINE
+#define BRDFC_MODEL(M)                                                                           \
+  namespace packed::BRDFC_INSTRUCTION_SET {                                                      \
+  extern constinit const PackedFormulas M = ::brdfc::model::detail::kPackedFormulas<::brdfc::M>; \
+  }
+#elif BRDFC_FURTHER_INSTRUCTION_SETS
+#define BRDFC_MODEL(M)                                                                                 \
+  namespace packed::x86_64_v3 {                                                                        \
+  extern const PackedFormulas M;                                                                       \
+  }                                                                                                    \
+  namespace packed::x86_64_v4 {                                                                        \
+  extern const PackedFormulas M;                                                                       \
+  }                                                                                                    \
+  bool only_one_model_has_the_class_##M = ::brdfc::register_model(                                     \
+      std::make_unique<::brdfc::model::detail::ModelOf<M>>(::brdfc::fastest(                           \
+          &::brdfc::model::detail::kPackedFormulas<M>, &packed::x86_64_v3::M, &packed::x86_64_v4::M)), \
+      __FILE_NAME__);
+#else
 #define BRDFC_MODEL(M)                    \
   bool only_one_model_has_the_class_##M = \
       ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>(), __FILE_NAME__);
+#endif
 
 }  // namespace brdfc::inline model

@@ -268,6 +268,7 @@ template <class T> struct AshikhminShirley {
   }
 };
 
+#if BRDFC_BASELINE  // tables are made once
 namespace {
 
 constexpr double kNarrowest = 1e-4;  // the width of a lobe with the largest exponents
@@ -372,6 +373,7 @@ const MeanTables& mean_tables() {
           })};
   return tables;
 }
+#endif
 
 BRDFC_MODEL(AshikhminShirley)
 

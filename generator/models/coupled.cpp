@@ -56,6 +56,7 @@ template <class T> struct FullCoat {
   T S() const { return named("S", lookup(table_of_S(), std::array<T, 1>{sqrt(nu)})); }
 };
 
+#if BRDFC_BASELINE  // tables are made once
 const std::shared_ptr<const Table>& table_of_S() {
   static const std::shared_ptr<const Table> table = [] {
     constexpr int kKnots = 4097;
@@ -72,6 +73,7 @@ const std::shared_ptr<const Table>& table_of_S() {
   }();
   return table;
 }
+#endif
 
 template <class T> struct Coupled {
   T r0;

@@ -62,4 +62,9 @@ Rgb<double> interpolate(const Table& t, const std::vector<double>& x) {
   return sum;
 }
 
+template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 1>&);
+template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 2>&);
+template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 3>&);
+template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 4>&);
+
 }  // namespace brdfc::inline tables

@@ -71,6 +71,12 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
   return sum;
 }
 
+// Compiled in table.cpp alone, not in every source for each of its instruction sets.
+extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 1>&);
+extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 2>&);
+extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 3>&);
+extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 4>&);
+
 template <std::size_t D> Pack lookup(const std::shared_ptr<const Table>& table, const std::array<Pack, D>& x) {
   Pack out;
   for (std::size_t k = 0; k < kLanes; ++k) {

@@ -219,7 +219,11 @@ def compiled(tool, tmp_path):
     said."""
     build = tool.parent
     commands = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
-    (entry,) = (c for c in commands if c["file"].endswith("models/minnaert.cpp"))
+    (entry,) = (
+        c
+        for c in commands
+        if c["file"].endswith("models/minnaert.cpp") and "/brdfc_models.dir/" in c["command"]
+    )
     words = shlex.split(entry["command"])
     words[words.index("-c") + 1] = source = str(tmp_path / "draft.cpp")
 

@@ -210,8 +210,9 @@ def faulty_program():
         source = folder / original.name
         text = original.read_text(encoding="utf-8")
         source.write_text(replaced_once(text, pattern, replacement, path), encoding="utf-8")
-        (compile_,) = (c for c in commands if c.endswith(f"-c {original}"))
-        (old,) = re.findall(rf"\S*/{re.escape(original.name)}\.o\b", link)
+        # Not the objects for further instruction sets, which hold no formula over double.
+        (old,) = re.findall(rf"\S*/brdfc_models\.dir/\S*/{re.escape(original.name)}\.o\b", link)
+        (compile_,) = (c for c in commands if c.endswith(f"-o {old} -c {original}"))
         new = source.with_suffix(".o")
         link = link.replace(old, str(new))
         words = [w.replace(old, str(new)) for w in shlex.split(compile_)[:-1]]

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Models are compiled for several instruction sets, and their functions keep apart."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from support import TOOL
+
+SETS = ["x86_64_v3", "x86_64_v4"]
+
+
+@pytest.mark.parametrize("instructions", SETS)
+def test_code_for_a_newer_processor_has_names_of_its_own(instructions):
+    """Of two functions of one name the linker keeps any: on an older processor the wrong one ends
+    in an illegal instruction."""
+    folder = Path(TOOL).parent / "generator" / "CMakeFiles" / f"brdfc_models_{instructions}.dir"
+    objects = sorted(folder.glob("models/*.o"))
+    if not objects:
+        pytest.skip("this compiler makes one version of each model")
+    lines = subprocess.run(
+        ["nm", "--demangle", "--defined-only", "--extern-only", *objects],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.splitlines()
+    names = [match[1] for line in lines if (match := re.match(r"[0-9a-f]* +[A-Za-z] (.*)", line))]
+    assert len(names) > len(objects)
+    assert [name for name in names if instructions not in name] == []
