@@ -145,6 +145,16 @@ setup_farm() {
 
 # ---- build -----------------------------------------------------------------------------------------------
 
+# slowest_sources FOLDER: the five that took longest to compile, seconds by the clock, of all that the log of Ninja has in
+# FOLDER. Those that a compiler's cache had take next to nothing.
+slowest_sources() {
+  [ -f "$1/.ninja_log" ] || return 0
+  note "The slowest sources of ${1#"$ROOT"/}, in seconds:"
+  awk -F '\t' '$4 ~ /\.o$/ { seconds[$4] = ($2 - $1) / 1000 }
+    END { for (object in seconds) printf "%8.1f  %s\n", seconds[object], object }' "$1/.ninja_log" |
+    sort -rn | sed -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 5q
+}
+
 build_preset() { # build_preset PRESET [TARGET...]
   local preset=$1 log=$BUILD/logs/configure-$1.log
   shift

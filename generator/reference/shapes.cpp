@@ -33,7 +33,7 @@ void add_grid(Mesh& mesh, std::size_t rows, std::size_t columns) {
 /// A number in [0, 1) that is the same everywhere, which std::uniform_real_distribution does not promise.
 double uniform(std::mt19937& random) { return random() * 0x1p-32; }
 
-using Point = Vec3<double>;
+using Position = Vec3<double>;
 
 }  // namespace
 
@@ -111,7 +111,7 @@ Mesh make_cylinder(double radius, double height, int segments, bool smooth) {
     const double phi = 2 * kPi * (i % segments) / segments;
     return std::pair(cos(phi), sin(phi));
   };
-  const auto add = [&](const Point& p, const Point& normal, double u, double v) {
+  const auto add = [&](const Position& p, const Position& normal, double u, double v) {
     mesh.vertices.push_back(to_float(p.x, p.y, p.z));
     mesh.normals.push_back(to_float(normal.x, normal.y, normal.z));
     mesh.uvs.push_back({float(u), float(v)});
@@ -122,7 +122,7 @@ Mesh make_cylinder(double radius, double height, int segments, bool smooth) {
     const auto [c0, s0] = at(i);
     const auto [c1, s1] = at(i + 1);
     const auto [cm, sm] = std::pair(cos(2 * kPi * (i + 0.5) / segments), sin(2 * kPi * (i + 0.5) / segments));
-    const Point n0 = smooth ? Point{c0, s0, 0} : Point{cm, sm, 0}, n1 = smooth ? Point{c1, s1, 0} : n0;
+    const Position n0 = smooth ? Position{c0, s0, 0} : Position{cm, sm, 0}, n1 = smooth ? Position{c1, s1, 0} : n0;
     const double u0 = double(i) / segments, u1 = double(i + 1) / segments, top = height / 2;
     const auto a = add({radius * c0, radius * s0, -top}, n0, u0, 0);
     const auto b = add({radius * c1, radius * s1, -top}, n1, u1, 0);
@@ -132,7 +132,7 @@ Mesh make_cylinder(double radius, double height, int segments, bool smooth) {
     add_triangle(mesh, a, c, d);
   }
   for (const double side : {-1.0, 1.0}) {
-    const Point normal{0, 0, side};
+    const Position normal{0, 0, side};
     const auto centre = add({0, 0, side * height / 2}, normal, 0.5, 0.5);
     for (int i = 0; i < segments; ++i) {
       const auto [c, s] = at(i);
@@ -149,19 +149,19 @@ Mesh make_cylinder(double radius, double height, int segments, bool smooth) {
 Mesh make_knot(int p, int q, double tube, int ripples, int segments, int sides) {
   const auto centre = [&](double t) {
     const double r = 1 + 0.4 * cos(q * t);
-    return Point{r * cos(p * t), r * sin(p * t), 0.4 * sin(q * t)};
+    return Position{r * cos(p * t), r * sin(p * t), 0.4 * sin(q * t)};
   };
   const auto along = [&](double t) {
     const double r = 1 + 0.4 * cos(q * t), dr = -0.4 * q * sin(q * t);
-    return Point{dr * cos(p * t) - p * r * sin(p * t), dr * sin(p * t) + p * r * cos(p * t), 0.4 * q * cos(q * t)};
+    return Position{dr * cos(p * t) - p * r * sin(p * t), dr * sin(p * t) + p * r * cos(p * t), 0.4 * q * cos(q * t)};
   };
   const double turn = 2 * kPi;
   const auto surface = [&](double t, double angle) {
     // The frame about the direction outwards from the ring closes after a whole turn, as Frenet's would, and does not
     // flip where the curve is straight.
-    const Point tangent = normalize(along(t));
-    const Point outwards = centre(t) - Point{cos(p * t), sin(p * t), 0};
-    const Point side = normalize(outwards - tangent * dot(outwards, tangent)), up = cross(tangent, side);
+    const Position tangent = normalize(along(t));
+    const Position outwards = centre(t) - Position{cos(p * t), sin(p * t), 0};
+    const Position side = normalize(outwards - tangent * dot(outwards, tangent)), up = cross(tangent, side);
     const double radius = tube * (1 + 0.25 * cos(ripples * t));
     return centre(t) + side * (radius * cos(angle)) + up * (radius * sin(angle));
   };
@@ -171,10 +171,10 @@ Mesh make_knot(int p, int q, double tube, int ripples, int segments, int sides) 
       const double t = turn * (j % segments) / segments, angle = turn * (i % sides) / sides;
       // Central differences: the step's error, 1e-10 of the normal, is below a float's.
       const double step = 1e-5;
-      const Point x = surface(t, angle);
-      const Point n = normalize(cross(surface(t, angle + step) - surface(t, angle - step),
-                                      surface(t + step, angle) - surface(t - step, angle)));
-      const Point out = dot(n, x - centre(t)) < 0 ? n * -1.0 : n;
+      const Position x = surface(t, angle);
+      const Position n = normalize(cross(surface(t, angle + step) - surface(t, angle - step),
+                                         surface(t + step, angle) - surface(t - step, angle)));
+      const Position out = dot(n, x - centre(t)) < 0 ? n * -1.0 : n;
       mesh.vertices.push_back(to_float(x.x, x.y, x.z));
       mesh.normals.push_back(to_float(out.x, out.y, out.z));
       mesh.uvs.push_back({float(double(i) / sides), float(double(j) / segments)});
@@ -217,7 +217,7 @@ Mesh make_tiles(int count, double relief, double joint, int resolution, int seed
         const double y0 = std::max(y - dy, 0.0), y1 = std::min(y + dy, 1.0);
         return (height(ti, tj, x1, y1) - height(ti, tj, x0, y0)) / (x1 - x0 + y1 - y0);
       };
-      const Point n = normalize(Point{-slope(kStep, 0), -slope(0, kStep), 1});
+      const Position n = normalize(Position{-slope(kStep, 0), -slope(0, kStep), 1});
       mesh.vertices.push_back(
           to_float(double(i) / resolution - count / 2.0, double(j) / resolution - count / 2.0, height(ti, tj, x, y)));
       mesh.normals.push_back(to_float(n.x, n.y, n.z));

@@ -16,7 +16,7 @@ def test_code_for_a_newer_processor_has_names_of_its_own(instructions):
     """Of two functions of one name the linker keeps any: on an older processor the wrong one ends
     in an illegal instruction."""
     folder = Path(TOOL).parent / "generator" / "CMakeFiles" / f"brdfc_models_{instructions}.dir"
-    objects = sorted(folder.glob("models/*.o"))
+    objects = sorted(folder.rglob("*.o"))
     if not objects:
         pytest.skip("this compiler makes one version of each model")
     lines = subprocess.run(
