@@ -561,7 +561,7 @@ def limits(extension):
 def table(evaluated, deviations):
     """Rows for people and for the report: what was measured, and the verdict it leads to."""
     rows = []
-    for case in CASES:
+    for case in (c for c in CASES if c.name in deviations):
         d = deviations[case.name]
         row = {"closure": case.name, "osl": case.osl}
         bad = []

@@ -49,6 +49,7 @@ def rows(extension, tool, forms):
     return found
 
 
+@pytest.mark.evidence
 def test_the_panel_warns_where_a_form_is_biased(rows):
     native = {str(form) for form in conditions.NATIVE}
     silent = [
@@ -64,6 +65,7 @@ def test_the_panel_is_silent_under_clean_settings(extension, forms):
     assert conditions.panel_warns(extension, grooves) == [set() for _ in forms]
 
 
+@pytest.mark.evidence
 def test_conditions_can_tell(rows):
     """A sun without size, which drawn rays never meet, must show as a bias of sampled forms: of
     those whose noise elsewhere does not hide it, and in all as less light."""

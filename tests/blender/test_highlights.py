@@ -196,7 +196,7 @@ SLOW_KINDS = {
     ),
     "instance": instance,
 }
-FULL_KINDS = {
+EVIDENCE_KINDS = {
     "point without soft falloff": one("POINT", shadow_soft_size=0.5, use_soft_falloff=False),
     "wide sun": one("SUN", angle=0.5, normalize=False),
     "rectangle": one("AREA", shape="RECTANGLE", size=0.8, size_y=1.2, normalize=False),
@@ -222,9 +222,12 @@ BOUNDED = {"edge of a spot": 0.08, "half below the horizon": 0.04}
 WITH_MARKS = [
     *KINDS,
     *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW_KINDS),
-    *(pytest.param(name, marks=pytest.mark.full) for name in FULL_KINDS),
+    *(
+        pytest.param(name, marks=[pytest.mark.evidence, pytest.mark.full])
+        for name in EVIDENCE_KINDS
+    ),
 ]
-ALL_KINDS = KINDS | SLOW_KINDS | FULL_KINDS
+ALL_KINDS = KINDS | SLOW_KINDS | EVIDENCE_KINDS
 
 
 def measured(scene, stage, samples):
@@ -293,6 +296,7 @@ def test_highlights(extension, empty, tool, kind):
     hold(extension, tool, empty, stage, lamps, samples=samples, off=BOUNDED.get(kind, OFF))
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 def test_balls(extension, empty, tool):
     """Every angle between the lamp and the surface, and the horizon."""
@@ -302,6 +306,7 @@ def test_balls(extension, empty, tool):
     hold(extension, tool, empty, stage, [lamp])
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 def test_drawn_directions_show_the_same(extension, empty, tool):
     """Of a wide lamp, by a form that knows of none."""
