@@ -29,7 +29,7 @@ PathTracer::PathTracer(const Scene& scene, const RenderOptions& options)
       settings_(options.settings),
       strategy_(options.settings.strategy),
       points_(options.settings.pattern, options.settings.spp),
-      tracer_(scene),
+      tracer_(scene, options.most_copies),
       lights_(scene, strategy_ == Strategy::Light) {
   surfaces_.reserve(scene.materials.size());
   for (const Material& m : scene.materials) surfaces_.emplace_back(m);

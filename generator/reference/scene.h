@@ -127,6 +127,9 @@ struct Scene {
   std::string hash;
 };
 
+/// Triangles that renderers may copy because objects share a mesh: a quarter of a gigabyte.
+inline constexpr std::size_t kMostCopies = std::size_t(1) << 21;
+
 /// Throws InputError naming the file, the key and what was expected.
 Scene load_scene(const std::filesystem::path& path);
 
