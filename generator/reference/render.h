@@ -39,6 +39,7 @@ struct RenderOptions {
   /// Triangles that may be copies, so that rays are quick; with more, equal meshes are stored once
   /// (reference/tracer.h).
   std::size_t most_copies = kMostCopies;
+  std::size_t most_weighed = kMostWeighed;        ///< lamps of which each is weighed; of more a tree chooses
   const std::atomic<bool>* cancel = nullptr;      ///< set from anywhere: stop soon and keep what is done
   std::function<void(const Progress&)> progress;  ///< called now and then, from the calling thread
 };
