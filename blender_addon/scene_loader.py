@@ -132,6 +132,24 @@ def build_mesh(name, vertices, triangles, normals=None, uvs=None):
     return mesh
 
 
+def _mesh_arrays(shape):
+    """What build_mesh() takes, from the files that a shape names."""
+    if shape.get("type").text() != "mesh" or not shape.has("vertices"):
+        raise shape.error("a mesh of arrays; resolve the scene first")
+    vertices = _array(shape.get("vertices"), 3)
+    triangles = _array(shape.get("triangles"), 3)
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise shape.get("triangles").error(f"indices from 0 to {len(vertices) - 1}")
+    extra = {
+        key: _array(shape.get(key), columns) if shape.has(key) else None
+        for key, columns in (("normals", 3), ("uvs", 2))
+    }
+    for key, array in extra.items():
+        if array is not None and len(array) != len(vertices):
+            raise shape.get(key).error(f"{len(vertices)} rows, one a vertex")
+    return {"vertices": vertices, "triangles": triangles, **extra}
+
+
 def _transform(view):
     if not view.has("transform"):
         return Matrix.Identity(4)
@@ -482,27 +500,25 @@ def load_scene(path, representation=None, name=None, native=None):
         key: _material(key, entry, representation, native or {})
         for key, entry in view.get("materials").items()
     }
+    # Objects of equal shape and material share a mesh, which Cycles then stores once.
+    meshes = {}
     for index, entry in view.get("objects").items():
         shape = entry.get("shape")
-        if shape.get("type").text() != "mesh" or not shape.has("vertices"):
-            raise shape.error("a mesh of arrays; resolve the scene first")
-        vertices = _array(shape.get("vertices"), 3)
-        triangles = _array(shape.get("triangles"), 3)
-        if triangles.min() < 0 or triangles.max() >= len(vertices):
-            raise shape.get("triangles").error(f"indices from 0 to {len(vertices) - 1}")
-        extra = {
-            key: _array(shape.get(key), columns) if shape.has(key) else None
-            for key, columns in (("normals", 3), ("uvs", 2))
-        }
-        for key, array in extra.items():
-            if array is not None and len(array) != len(vertices):
-                raise shape.get(key).error(f"{len(vertices)} rows, one a vertex")
         label = entry.get("name").text() if entry.has("name") else f"object{index}"
-        mesh = build_mesh(label, vertices, triangles, **extra)
         material = entry.get("material").text()
         if material not in materials:
             raise entry.get("material").error(f"one of {', '.join(materials)}")
-        mesh.materials.append(materials[material])
+        of_shape = meshes.setdefault(json.dumps(shape.value, sort_keys=True), {})
+        mesh = of_shape.get(material)
+        if mesh is None:
+            if of_shape:
+                mesh = next(iter(of_shape.values())).copy()
+                mesh.name = label
+                mesh.materials.clear()
+            else:
+                mesh = build_mesh(label, **_mesh_arrays(shape))
+            mesh.materials.append(materials[material])
+            of_shape[material] = mesh
         item = _link(scene, label, mesh, _transform(entry))
         if entry.flag("camera_only"):
             for ray in ("diffuse", "glossy", "transmission", "volume_scatter", "shadow"):

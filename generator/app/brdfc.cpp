@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <system_error>
 
 #include "app/commands.h"
@@ -53,6 +54,9 @@ int main(int argc, char** argv) {
     // A file or pipe that the system refuses to read or write: no fault of a model's.
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 2;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "brdfc: out of memory: this takes more than the machine, or a limit set on it, has left\n");
+    return 1;
   } catch (const std::exception& e) {
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 1;

@@ -2,7 +2,13 @@
 #include "core/process.h"
 
 #define BOOST_DLL_USE_STD_FS
+#include <algorithm>
 #include <boost/dll/runtime_symbol_info.hpp>
+#include <fstream>
+#include <initializer_list>
+#include <limits>
+#include <sstream>
+#include <string>
 
 #ifdef _WIN32
 #include <io.h>
@@ -34,6 +40,34 @@ fs::path program_file() {
   std::error_code error;
   const fs::path program = boost::dll::program_location(error);
   return error ? fs::path() : fs::weakly_canonical(program, error);
+}
+
+std::size_t available_memory() {
+  constexpr std::size_t unknown = std::numeric_limits<std::size_t>::max();
+  /// The numbers after these words, each at the start of a line.
+  const auto sum_of = [](const char* file, std::initializer_list<const char*> keys) {
+    std::size_t sum = 0, number;
+    std::ifstream in(file);
+    for (std::string line, key; std::getline(in, line);) {
+      std::istringstream words(line);
+      if (words >> key >> number && std::find(keys.begin(), keys.end(), key) != keys.end()) sum += number;
+    }
+    return sum;
+  };
+  const auto number_in = [](const char* file) {
+    std::size_t number;
+    return std::ifstream(file) >> number ? number : unknown;
+  };
+  std::size_t available = unknown;
+  if (const std::size_t kibibytes = sum_of("/proc/meminfo", {"MemAvailable:", "SwapFree:"}))
+    available = kibibytes * 1024;
+  const std::size_t limit = number_in("/sys/fs/cgroup/memory.max"), used = number_in("/sys/fs/cgroup/memory.current");
+  if (limit != unknown && used != unknown) {
+    // Copies of files count as used, but give way.
+    const std::size_t free = limit > used ? limit - used : 0;
+    available = std::min(available, free + sum_of("/sys/fs/cgroup/memory.stat", {"active_file", "inactive_file"}));
+  }
+  return available;
 }
 
 bool exchange([[maybe_unused]] const fs::path& a, [[maybe_unused]] const fs::path& b) {

@@ -3,6 +3,7 @@
 // Windows.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 
 namespace brdfc::inline core {
@@ -13,6 +14,10 @@ long process_id();
 bool process_is_over(long id);
 /// The file of the running program, links followed; empty where the system does not tell.
 std::filesystem::path program_file();
+
+/// Bytes that a program may still take before the system ends one to get more: what is free or can be freed, and within
+/// the limit of a container. The largest number where the system does not tell.
+std::size_t available_memory();
 
 enum class Stream { In, Err };
 /// Whether a person sits at it.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reference/emitter.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "reference/cone.h"
@@ -61,6 +62,8 @@ Emitter::Emitter(const Scene& scene, const Sphere& bounds) : scene_(scene), boun
     for (double& c : chances_) c /= sum;
   else
     chances_.clear();
+  ends_.resize(chances_.size());
+  std::partial_sum(chances_.begin(), chances_.end(), ends_.begin());
 }
 
 EmittedRay Emitter::from_far(const Vector& direction, const Color& radiance, double pdf,
@@ -73,8 +76,8 @@ EmittedRay Emitter::from_far(const Vector& direction, const Color& radiance, dou
 }
 
 EmittedRay Emitter::emit(double choice, const std::array<double, 3>& where, const std::array<double, 2>& way) const {
-  std::size_t i = 0;
-  while (i + 1 < chances_.size() && choice >= chances_[i]) choice -= chances_[i++];
+  const auto end = std::upper_bound(ends_.begin(), ends_.end() - 1, choice);
+  const std::size_t i = std::size_t(end - ends_.begin());
   if (!(chances_[i] > 0)) return {};  // rounding: the last one may have no chance
   const double chance = chances_[i];
   const std::array<double, 2> place{where[0], where[1]};

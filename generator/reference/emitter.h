@@ -35,7 +35,7 @@ class Emitter {
   const Scene& scene_;
   const Sphere bounds_;
   std::unique_ptr<EnvironmentSampler> image_;
-  std::vector<double> chances_;  // of the lamps, then of the environment
+  std::vector<double> chances_, ends_;  // of the lamps, then of the environment; their sums up to each of them
 };
 
 }  // namespace brdfc::reference

@@ -35,7 +35,7 @@ class LightTracer {
       : scene_(scene),
         settings_(options.settings),
         swapped_(options.origin == Origin::LampsSwapped),
-        tracer_(scene),
+        tracer_(scene, options.most_copies),
         emitter_(scene, tracer_.bounds()),
         pixel_(2 * scene.camera.half_height / options.settings.height) {
     surfaces_.reserve(scene.materials.size());

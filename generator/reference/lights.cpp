@@ -104,7 +104,8 @@ void EnvironmentSampler::fetch_cell(double u1) const {
   fetch_texels(int(cell % unsigned(width_)), int(cell / unsigned(width_)));
 }
 
-Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_(scene.lights.size()) {
+Lights::Lights(const Scene& scene, bool sample_constant, std::size_t most_weighed)
+    : scene_(scene), count_(scene.lights.size()) {
   for (const Light& light : scene.lights) {
     Lamp l{light.position, light.direction, light.u, light.v, light.radius, light.radiance};
     if (light.kind == Light::Kind::Rectangle || light.kind == Light::Kind::Disk) {
@@ -120,6 +121,12 @@ Lights::Lights(const Scene& scene, bool sample_constant) : scene_(scene), count_
       l.cone_pdf = 1 / (2 * kPi * l.one_minus_cos);
     }
     lamps_.push_back(l);
+    camera_sees_ |= light.camera_visible;
+  }
+  if (lamps_.size() > most_weighed) {
+    std::vector<LampBounds> bounds;
+    for (std::size_t i = 0; i < lamps_.size(); ++i) bounds.push_back(bounds_of(scene.lights[i], lamps_[i]));
+    tree_.emplace(bounds);
   }
   const Environment& e = scene.environment;
   if (e.image) {
@@ -259,6 +266,7 @@ inline double Lights::pdf_of_hit(const Lamp& lamp, const Vector& p, const Vector
 
 BRDFC_VECTORISED void Lights::chances(const Vectors& p, const Vectors& normal, std::size_t count,
                                       const Lanes<double*>& chance, Lanes<bool>& lit) const {
+  if (tree_) return weigh_in_tree(p, normal, count, chance, lit);
   Numbers sum, mine;
   sum.fill(sampled_environment_ ? environment_weight_ : 0);
   for (std::size_t i = 0; i < lamps_.size(); ++i) {
@@ -286,7 +294,10 @@ BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, st
                                      const Lanes<double*>& chance, const Lanes<bool>& lit, const LightNumbers& u,
                                      LightSamples& out) const {
   Lanes<std::size_t> chosen{};
-  if (choose())
+  Numbers chance_of_chosen;
+  if (tree_)
+    choose_in_tree(count, chance, lit, u.choice, chosen, chance_of_chosen);
+  else if (choose())
     for (std::size_t k = 0; k < count; ++k) {
       if (!lit[k]) continue;
       double choice = u.choice[k];
@@ -343,7 +354,88 @@ BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, st
       }
   }
   // By rounding the last light may be chosen without a chance.
-  for (std::size_t k = 0; k < count; ++k) out.pdf[k] = lit[k] ? out.pdf[k] * chance[k][chosen[k]] : 0;
+  for (std::size_t k = 0; k < count; ++k)
+    out.pdf[k] = lit[k] ? out.pdf[k] * (tree_ ? chance_of_chosen[k] : chance[k][chosen[k]]) : 0;
+}
+
+LampBounds Lights::bounds_of(const Light& light, const Lamp& lamp) {
+  LampBounds b;
+  b.power = lamp.luminance;
+  b.can_be_met = !lamp.delta;
+  switch (light.kind) {
+    case Light::Kind::Sun:
+      b.far = true;
+      b.centre = -light.direction;
+      b.radius = sqrt(2 * lamp.one_minus_cos);  // the longest chord from its centre
+      break;
+    case Light::Kind::Point:
+      b.centre = light.position;
+      b.radius = light.radius;
+      break;
+    default:
+      b.centre = light.position;
+      b.radius = light.kind == Light::Kind::Disk ? std::max(length(light.u), length(light.v))
+                                                 : sqrt(dot(light.u, light.u) + dot(light.v, light.v));
+      b.direction = light.direction;
+      b.cos_cone = 1;
+  }
+  return b;
+}
+
+BRDFC_VECTORISED void Lights::weigh_in_tree(const Vectors& p, const Vectors& normal, std::size_t count,
+                                            const Lanes<double*>& kept, Lanes<bool>& lit) const {
+  const LightTree& tree = *tree_;
+  const double environment = sampled_environment_ ? environment_weight_ : 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    double* const to = kept[k];
+    to[kPoint] = p.x[k], to[kPoint + 1] = p.y[k], to[kPoint + 2] = p.z[k];
+    to[kNormal] = normal.x[k], to[kNormal + 1] = normal.y[k], to[kNormal + 2] = normal.z[k];
+    const double sum = environment + tree.weigh_root(p[k], normal[k], to + kRoot);
+    lit[k] = sum > 0;
+    to[kEnvironment] = lit[k] ? environment / sum : 0;
+  }
+}
+
+BRDFC_VECTORISED void Lights::choose_in_tree(std::size_t count, const Lanes<double*>& kept, const Lanes<bool>& lit,
+                                             const Numbers& choice, Lanes<std::size_t>& chosen, Numbers& chance) const {
+  const LightTree& tree = *tree_;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!lit[k]) continue;
+    const double* const from = kept[k];
+    const double of_environment = from[kEnvironment];
+    if (choice[k] < of_environment) {
+      chosen[k] = scene_.lights.size();
+      chance[k] = of_environment;
+      continue;
+    }
+    const double rest = 1 - of_environment;
+    const LightTree::Choice lamp = tree.choose(vector_at(from + kPoint), vector_at(from + kNormal), from + kRoot,
+                                               (choice[k] - of_environment) / rest);
+    chosen[k] = lamp.lamp;
+    chance[k] = lamp.chance * rest;
+  }
+}
+
+BRDFC_VECTORISED void Lights::meet_in_tree(const Rays& rays, const Numbers& distance, std::size_t count,
+                                           std::vector<std::size_t>& lamps, Lanes<std::size_t>& ends) const {
+  const LightTree& tree = *tree_;
+  for (std::size_t k = 0; k < count; ++k) {
+    tree.meet(rays.origin[k], rays.direction[k], distance[k], lamps);
+    ends[k] = lamps.size();
+  }
+}
+
+BRDFC_VECTORISED double Lights::chance(std::size_t i, const double* kept) const {
+  if (!tree_) return kept[i];
+  if (i == lamps_.size()) return kept[kEnvironment];
+  return (1 - kept[kEnvironment]) * tree_->chance(i, vector_at(kept + kPoint), vector_at(kept + kNormal), kept + kRoot);
+}
+
+double Lights::pdf_of_hit(std::size_t i, const Vector& p, const Vector& direction, double distance) const {
+  if (lamps_[i].delta) return 0;
+  double pdf = 0;
+  of_kind(scene_.lights[i].kind, [&](auto kind) { pdf = pdf_of_hit<kind>(lamps_[i], p, direction, distance); });
+  return pdf;
 }
 
 BRDFC_VECTORISED void Lights::pdfs_of_hit(std::size_t i, const Rays& rays, const Numbers& distance, std::size_t count,

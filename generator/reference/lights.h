@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "reference/block.h"
+#include "reference/light_tree.h"
 #include "reference/scene.h"
 
 namespace brdfc::reference {
@@ -82,16 +85,20 @@ class Lights {
  public:
   /// `sample_constant`: take directions also from an environment of one colour, which is otherwise left to the
   /// BRDF's own sampling.
-  Lights(const Scene& scene, bool sample_constant);
+  Lights(const Scene& scene, bool sample_constant, std::size_t most_weighed = kMostWeighed);
 
   bool empty() const { return count_ == 0; }
-  std::size_t count() const { return count_; }
+  /// Numbers that chances() keeps for a point.
+  std::size_t kept() const { return tree_ ? std::size_t(kKept) : count_; }
 
-  /// Chance of each light for points with these geometric normals, about in proportion to what it can contribute; 0
-  /// only for a light that is wholly below the surface or shows its back. `lit` is false where no light can contribute.
-  /// At each `chance` there is room for count() of them.
+  /// Finds with which chances lights are chosen at points with these geometric normals: about in proportion to what
+  /// each can contribute; 0 only for a light that is wholly below the surface or shows its back. `lit` is false where
+  /// no light can contribute. At each `chance` there is room for kept() numbers.
   void chances(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& chance,
                Lanes<bool>& lit) const;
+
+  /// The chance of light i, the environment being the last one, by what chances() keeps.
+  double chance(std::size_t i, const double* kept) const;
 
   /// Where `lit` holds. Of `numbers` those are read that choose() and choose_more() ask for, and where.
   void sample(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& chance,
@@ -103,13 +110,25 @@ class Lights {
   void fetch_slot(double u1) const { image_->fetch_slot(u1); }
   void fetch_cell(double u1) const { image_->fetch_cell(u1); }
 
-  /// Calls found(k, radiance, pdf) for every light that ray k meets before its distance; `chance` as given to sample()
+  /// Calls found(k, radiance, pdf) for every light that ray k meets before its distance; `chance` as chances() made it
   /// at its origin, nullptr for the camera or after a mirror (pdf is 0 then), where the surface has that normal. Lamps
   /// do not hide each other.
   template <class Found> void meet(const Rays& rays, const Numbers& distance, std::size_t count, const Vectors& normal,
                                    const Lanes<const double*>& chance, bool from_camera, const Found& found) const {
+    if (tree_ && (!from_camera || camera_sees_)) {
+      std::vector<std::size_t> lamps;
+      Lanes<std::size_t> ends;
+      meet_in_tree(rays, distance, count, lamps, ends);
+      for (std::size_t k = 0, at = 0; k < count; ++k)
+        for (; at < ends[k]; ++at) {
+          const Light& light = scene_.lights[lamps[at]];
+          if (from_camera && !light.camera_visible) continue;
+          const double pdf = pdf_of_hit(lamps[at], rays.origin[k], rays.direction[k], distance[k]);
+          if (pdf > 0) found(k, light.radiance, chance[k] ? pdf * this->chance(lamps[at], chance[k]) : 0.0);
+        }
+    }
     Numbers pdf;
-    for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
+    for (std::size_t i = 0; i < scene_.lights.size() && !tree_; ++i) {
       const Light& light = scene_.lights[i];
       if (from_camera && !light.camera_visible) continue;
       pdfs_of_hit(i, rays, distance, count, pdf);
@@ -124,7 +143,7 @@ class Lights {
       const Rgb<double> radiance = environment(rays.direction[k], u[k], v[k], normal[k],
                                                chance[k] && sampled_environment_ ? &of_environment : nullptr);
       if (max_component(radiance) > 0)
-        found(k, radiance, of_environment > 0 ? of_environment * chance[k][scene_.lights.size()] : 0.0);
+        found(k, radiance, of_environment > 0 ? of_environment * chance[k][environment_place()] : 0.0);
     }
   }
 
@@ -159,6 +178,22 @@ class Lights {
   template <Light::Kind kKind>
   static double pdf_of_hit(const Lamp& lamp, const Vec3<double>& p, const Vec3<double>& direction, double distance);
   void pdfs_of_hit(std::size_t i, const Rays& rays, const Numbers& distance, std::size_t count, Numbers& pdf) const;
+  double pdf_of_hit(std::size_t i, const Vec3<double>& p, const Vec3<double>& direction, double distance) const;
+
+  /// What is kept for a point where a tree chooses: the point and its normal, the chance of the environment, and the
+  /// weights of the tree's root.
+  enum Kept { kPoint = 0, kNormal = 3, kEnvironment = 6, kRoot = 8, kKept = kRoot + LightTree::kWidth };
+  static Vec3<double> vector_at(const double* v) { return {v[0], v[1], v[2]}; }
+  /// Where the chance of the environment is kept.
+  std::size_t environment_place() const { return tree_ ? std::size_t(kEnvironment) : scene_.lights.size(); }
+  void weigh_in_tree(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& kept,
+                     Lanes<bool>& lit) const;
+  void choose_in_tree(std::size_t count, const Lanes<double*>& kept, const Lanes<bool>& lit, const Numbers& choice,
+                      Lanes<std::size_t>& chosen, Numbers& chance) const;
+  /// Lamps that rays may meet, ray by ray, and how many there are up to each ray.
+  void meet_in_tree(const Rays& rays, const Numbers& distance, std::size_t count, std::vector<std::size_t>& lamps,
+                    Lanes<std::size_t>& ends) const;
+  static LampBounds bounds_of(const Light& light, const Lamp& lamp);
 
   /// Where in the environment's image rays end that leave the scene, as direction_to_equirectangular() gives it; what
   /// is there will be read soon.
@@ -170,6 +205,8 @@ class Lights {
 
   const Scene& scene_;
   std::vector<Lamp> lamps_;
+  std::optional<LightTree> tree_;  // of many lamps
+  bool camera_sees_ = false;       // any lamp
   std::unique_ptr<EnvironmentSampler> image_;
   bool sampled_environment_ = false;
   double environment_weight_ = 0;

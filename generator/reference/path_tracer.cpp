@@ -29,8 +29,8 @@ PathTracer::PathTracer(const Scene& scene, const RenderOptions& options)
       settings_(options.settings),
       strategy_(options.settings.strategy),
       points_(options.settings.pattern, options.settings.spp),
-      tracer_(scene),
-      lights_(scene, strategy_ == Strategy::Light) {
+      tracer_(scene, options.most_copies),
+      lights_(scene, strategy_ == Strategy::Light, options.most_weighed) {
   surfaces_.reserve(scene.materials.size());
   for (const Material& m : scene.materials) surfaces_.emplace_back(m);
 }
@@ -42,7 +42,7 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
   wave.paths.reserve(starts.size());
   wave.active.clear();
   wave.rays.clear();
-  wave.chances.resize(2 * lights_.count() * starts.size());
+  wave.chances.resize(2 * lights_.kept() * starts.size());
   Block& b = *wave.block;
   for (std::size_t from = 0; from < starts.size(); from += kBlock) {
     b.count = std::min(kBlock, starts.size() - from);
@@ -230,7 +230,7 @@ void PathTracer::aim(bool far, int bounce, Wave& wave) const {
   Block& b = *wave.block;
   Block::Side& side = b.sides[far];
   for (std::size_t k = 0; k < b.count; ++k) {
-    side.chances[k] = wave.chances.data() + (2 * std::size_t(b.paths[k] - wave.paths.data()) + far) * lights_.count();
+    side.chances[k] = wave.chances.data() + (2 * std::size_t(b.paths[k] - wave.paths.data()) + far) * lights_.kept();
     side.facing.set(k, b.hits.geometric[k] * (far ? -1.0 : 1.0));
   }
   lights_.chances(b.hits.p, side.facing, b.count, side.chances, side.lit);

@@ -33,10 +33,14 @@ struct Progress {
 struct RenderOptions {
   RenderSettings settings;
   Origin origin = Origin::Camera;
-  int threads = 0;                            ///< 0: all cores
-  double max_seconds = 0;                     ///< 0: no limit; else stops early, after at least one sample a pixel
-  int wave = 0;                               ///< paths followed together; 0: as many as is fast. Changes no picture
-  const std::atomic<bool>* cancel = nullptr;  ///< set from anywhere: stop soon and keep what is done
+  int threads = 0;         ///< 0: all cores
+  double max_seconds = 0;  ///< 0: no limit; else stops early, after at least one sample a pixel
+  int wave = 0;            ///< paths followed together; 0: as many as is fast. Changes no picture
+  /// Triangles that may be copies, so that rays are quick; with more, equal meshes are stored once
+  /// (reference/tracer.h).
+  std::size_t most_copies = kMostCopies;
+  std::size_t most_weighed = kMostWeighed;        ///< lamps of which each is weighed; of more a tree chooses
+  const std::atomic<bool>* cancel = nullptr;      ///< set from anywhere: stop soon and keep what is done
   std::function<void(const Progress&)> progress;  ///< called now and then, from the calling thread
 };
 

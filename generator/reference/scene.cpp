@@ -304,7 +304,16 @@ class Loader {
     return sum;
   }
 
-  std::shared_ptr<const Mesh> read_shape(const JsonView& j, json& resolved) {
+  /// A mesh as objects have it, and what the resolved scene says of it.
+  struct Shape {
+    std::shared_ptr<const Mesh> mesh;
+    json resolved;
+  };
+
+  /// Shapes of the same text are read or made once.
+  const Shape& read_shape(const JsonView& j) {
+    const std::string text = j.json().dump();
+    if (const auto known = shapes_.find(text); known != shapes_.end()) return known->second;
     std::vector<std::string> types = shape_types();
     types.push_back("mesh");
     const std::string type = j.at("type").choice(types);
@@ -329,12 +338,15 @@ class Loader {
       }
     }
     const std::string stem = mesh_name(mesh);
+    Shape& shape = shapes_[text];
+    json& resolved = shape.resolved;
     resolved = {{"type", "mesh"}, {"vertices", stem + "_vertices.npy"}, {"triangles", stem + "_triangles.npy"}};
     if (!mesh.normals.empty()) resolved["normals"] = stem + "_normals.npy";
     if (!mesh.uvs.empty()) resolved["uvs"] = stem + "_uvs.npy";
     auto& slot = scene_.mesh_files[stem];
     if (!slot) slot = std::make_shared<const Mesh>(std::move(mesh));
-    return slot;
+    shape.mesh = slot;
+    return shape;
   }
 
   template <class T, std::size_t N> void read_array(const JsonView& j, std::vector<std::array<T, N>>& out) {
@@ -348,7 +360,9 @@ class Loader {
     Object object;
     object.name = j.at("name").text();
     json resolved{{"name", object.name}};
-    object.mesh = read_shape(j.at("shape"), resolved["shape"]);
+    const Shape& shape = read_shape(j.at("shape"));
+    object.mesh = shape.mesh;
+    resolved["shape"] = shape.resolved;
     object.transform = read_transform(j.find("transform"), resolved["transform"]);
     const JsonView material = j.at("material");
     const std::string id = material.text();
@@ -522,6 +536,7 @@ class Loader {
   bool materials_alone_ = false;
   std::optional<ColorConfig> with_working_space_;
   Scene scene_;
+  std::map<std::string, Shape> shapes_;  // by their text
 };
 
 template <class T, std::size_t N> void write_array(const fs::path& path, const std::vector<std::array<T, N>>& data) {

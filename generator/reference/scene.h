@@ -127,6 +127,12 @@ struct Scene {
   std::string hash;
 };
 
+/// Triangles that renderers may copy because objects share a mesh: a quarter of a gigabyte.
+inline constexpr std::size_t kMostCopies = std::size_t(1) << 21;
+
+/// Lamps up to which each of them is weighed wherever one is chosen; of more a tree chooses.
+inline constexpr std::size_t kMostWeighed = 8;
+
 /// Throws InputError naming the file, the key and what was expected.
 Scene load_scene(const std::filesystem::path& path);
 

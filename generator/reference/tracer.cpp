@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <stdexcept>
 
 #include "reference/cone.h"
@@ -17,6 +18,9 @@ template <class A> Vector to_vector(const A& a) { return {a[0], a[1], a[2]}; }
 std::array<float, 3> to_floats(const Vector& v) { return {float(v.x), float(v.y), float(v.z)}; }
 
 constexpr std::size_t kPacket = 16;
+
+/// Triangles that a mesh has at least that is shared: of fewer a copy is small.
+constexpr std::size_t kLeastShared = 256;
 
 void put(const Ray& from, RTCRay& to) {
   to.org_x = float(from.origin.x), to.org_y = float(from.origin.y), to.org_z = float(from.origin.z);
@@ -43,58 +47,236 @@ struct alignas(64) Valid {
   }
 };
 
+/// The lanes of a packet that count, `count` of them; behind these the last one again.
+struct Active {
+  unsigned lanes[kPacket], count = 0;
+  Active(const int* valid, unsigned all) {
+    for (unsigned k = 0; k < all; ++k)
+      if (valid[k]) lanes[count++] = k;
+    for (unsigned k = count; k < kPacket; ++k) lanes[k] = count ? lanes[count - 1] : 0;
+  }
+};
+
 }  // namespace
 
-Tracer::Tracer(const Scene& scene) {
-  device_ = rtcNewDevice(nullptr);
-  if (!device_) throw std::runtime_error("Embree can't start on this machine");
-  parts_.reserve(scene.objects.size());
-  for (const Object& object : scene.objects) {
-    const Mesh& mesh = *object.mesh;
-    Part part{&mesh, std::vector<Corner>(mesh.vertices.size()), {}, {}, object.material};
-    for (std::size_t i = 0; i < part.corners.size(); ++i) {
-      Corner& corner = part.corners[i];
-      corner.p = to_floats(object.transform.point(to_vector(mesh.vertices[i])));
-      if (!mesh.normals.empty()) corner.normal = to_floats(object.transform.normal(to_vector(mesh.normals[i])));
-      if (!mesh.uvs.empty()) corner.uv = mesh.uvs[i];
-    }
-    part.x_axis = normalize(object.transform.vector({1, 0, 0}));
-    part.z_axis = normalize(object.transform.vector({0, 0, 1}));
-    parts_.push_back(std::move(part));
-  }
-  const auto build = [&](bool for_camera) {
-    RTCScene out = rtcNewScene(device_);
-    rtcSetSceneFlags(out, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(out, RTC_BUILD_QUALITY_HIGH);
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (scene.objects[i].camera_only && !for_camera) continue;
-      const Part& part = parts_[i];
-      RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-      // Embree may read 16 bytes at a vertex, which a corner has, and at the last triangle.
-      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, part.corners.data(), 0,
-                                 sizeof(Corner), part.corners.size());
-      auto* indices = static_cast<std::int32_t*>(rtcSetNewGeometryBuffer(
-          geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, part.mesh->triangles.size()));
-      if (!indices) throw std::bad_alloc();
-      std::copy_n(part.mesh->triangles.front().data(), 3 * part.mesh->triangles.size(), indices);
-      rtcCommitGeometry(geometry);
-      rtcAttachGeometryByID(out, geometry, unsigned(i));
-      rtcReleaseGeometry(geometry);
-    }
-    rtcCommitScene(out);
-    return out;
-  };
-  camera_scene_ = build(true);
-  const bool split =
-      std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return o.camera_only; });
-  scene_ = split ? build(false) : camera_scene_;
-  if (rtcGetDeviceError(device_) != RTC_ERROR_NONE) throw std::runtime_error("Embree could not build the scene");
+Tracer::Corner Tracer::corner(const Mesh& mesh, std::size_t vertex, const Transform& transform) {
+  Corner corner;
+  corner.p = to_floats(transform.point(to_vector(mesh.vertices[vertex])));
+  if (!mesh.normals.empty()) corner.normal = to_floats(transform.normal(to_vector(mesh.normals[vertex])));
+  if (!mesh.uvs.empty()) corner.uv = mesh.uvs[vertex];
+  return corner;
 }
 
-Tracer::~Tracer() {
+bool Tracer::take_memory(void* of, ssize_t bytes, bool) {
+  Tracer& tracer = *static_cast<Tracer*>(of);
+  return (tracer.taken_ += bytes) <= std::ptrdiff_t(tracer.memory_) || bytes < 0;
+}
+
+template <class Fill> RTCScene Tracer::build(const Fill& fill) {
+  RTCScene out = rtcNewScene(device_);
+  rtcSetSceneFlags(out, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(out, RTC_BUILD_QUALITY_HIGH);
+  fill(out);
+  rtcCommitScene(out);
+  return out;
+}
+
+template <class SetVertices>
+void Tracer::attach_triangles(RTCScene scene, unsigned id, const Mesh& mesh, const SetVertices& set_vertices) const {
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  set_vertices(geometry);
+  // Copied, since Embree may read 16 bytes at the last triangle.
+  if (void* indices =
+          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()))
+    std::copy_n(mesh.triangles.front().data(), 3 * mesh.triangles.size(), static_cast<std::int32_t*>(indices));
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
+RTCScene Tracer::shape(const Mesh& mesh) {
+  RTCScene& out = shapes_[&mesh];
+  if (!out)
+    out = build([&](RTCScene scene) {
+      attach_triangles(scene, 0, mesh, [&](RTCGeometry geometry) {
+        if (void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12,
+                                                     mesh.vertices.size()))
+          std::copy_n(mesh.vertices.front().data(), 3 * mesh.vertices.size(), static_cast<float*>(vertices));
+      });
+    });
+  return out;
+}
+
+Tracer::Tracer(const Scene& scene, std::size_t most_copies, std::size_t memory) : memory_(memory) {
+  std::map<const Mesh*, std::size_t> users;
+  for (const Object& object : scene.objects) ++users[object.mesh.get()];
+  const auto copies = [&](const Mesh* mesh) { return (users[mesh] - 1) * mesh->triangles.size(); };
+  std::size_t all_copies = 0;
+  for (const auto& [mesh, count] : users) all_copies += copies(mesh);
+  const auto is_shared = [&](const Mesh* mesh) {
+    return all_copies > most_copies && copies(mesh) > 0 && mesh->triangles.size() >= kLeastShared;
+  };
+
+  device_ = rtcNewDevice(nullptr);
+  if (!device_) throw std::runtime_error("Embree can't start on this machine");
+  rtcSetDeviceMemoryMonitorFunction(device_, take_memory, this);
+  try {
+    parts_.reserve(scene.objects.size());
+    for (const Object& object : scene.objects) {
+      const Mesh& mesh = *object.mesh;
+      Part part{&mesh, {}, {}, {}, object.material};
+      const auto column = [&](std::size_t k) {
+        const auto& m = object.transform.matrix;
+        return Vector{m[0][k], m[1][k], m[2][k]};
+      };
+      const Vector a = column(0), b = column(1), c = column(2);
+      const double determinant = dot(a, cross(b, c));
+      if (is_shared(&mesh) && determinant != 0) {
+        part.shape = shape(mesh);
+        part.transform = &object.transform;
+        part.inverse = {cross(b, c) / determinant, cross(c, a) / determinant, cross(a, b) / determinant};
+      } else {
+        part.corners.reserve(mesh.vertices.size());
+        for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
+          part.corners.push_back(corner(mesh, i, object.transform));
+      }
+      part.x_axis = normalize(object.transform.vector({1, 0, 0}));
+      part.z_axis = normalize(object.transform.vector({0, 0, 1}));
+      parts_.push_back(std::move(part));
+    }
+    const auto build_for = [&](bool camera) {
+      return build([&](RTCScene out) {
+        for (std::size_t i = 0; i < parts_.size(); ++i) {
+          if (scene.objects[i].camera_only && !camera) continue;
+          Part& part = parts_[i];
+          if (part.shape) {
+            RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
+            rtcSetGeometryUserPrimitiveCount(geometry, 1);
+            rtcSetGeometryUserData(geometry, &part);
+            rtcSetGeometryBoundsFunction(geometry, bounds_of_part, nullptr);
+            rtcSetGeometryIntersectFunction(geometry, intersect_part);
+            rtcSetGeometryOccludedFunction(geometry, occluded_part);
+            rtcCommitGeometry(geometry);
+            rtcAttachGeometryByID(out, geometry, unsigned(i));
+            rtcReleaseGeometry(geometry);
+          } else {
+            // Embree may read 16 bytes at a vertex, which a corner has.
+            attach_triangles(out, unsigned(i), *part.mesh, [&](RTCGeometry geometry) {
+              rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, part.corners.data(), 0,
+                                         sizeof(Corner), part.corners.size());
+            });
+          }
+        }
+      });
+    };
+    camera_scene_ = build_for(true);
+    const bool split =
+        std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return o.camera_only; });
+    scene_ = split ? build_for(false) : camera_scene_;
+    switch (rtcGetDeviceError(device_)) {
+      case RTC_ERROR_NONE:
+        break;
+      case RTC_ERROR_OUT_OF_MEMORY:
+        throw std::bad_alloc();
+      default:
+        throw std::runtime_error("Embree could not build the scene");
+    }
+  } catch (...) {
+    release();
+    throw;
+  }
+}
+
+void Tracer::release() {
   if (scene_ && scene_ != camera_scene_) rtcReleaseScene(scene_);
   if (camera_scene_) rtcReleaseScene(camera_scene_);
+  for (const auto& [mesh, shape] : shapes_) rtcReleaseScene(shape);
   if (device_) rtcReleaseDevice(device_);
+}
+
+Tracer::~Tracer() { release(); }
+
+Ray Tracer::into(const Part& part, RTCRayN* rays, unsigned count, unsigned k) {
+  const Vector from =
+                   Vector{RTCRayN_org_x(rays, count, k), RTCRayN_org_y(rays, count, k), RTCRayN_org_z(rays, count, k)} -
+                   part.transform->translation,
+               way{RTCRayN_dir_x(rays, count, k), RTCRayN_dir_y(rays, count, k), RTCRayN_dir_z(rays, count, k)};
+  const auto& [x, y, z] = part.inverse;
+  return {{dot(x, from), dot(y, from), dot(z, from)},
+          {dot(x, way), dot(y, way), dot(z, way)},
+          RTCRayN_tfar(rays, count, k)};
+}
+
+void Tracer::bounds_of_part(const RTCBoundsFunctionArguments* arguments) {
+  const Part& part = *static_cast<const Part*>(arguments->geometryUserPtr);
+  Vector low{kInfinity, kInfinity, kInfinity}, high = -low;
+  for (const auto& vertex : part.mesh->vertices) {
+    const Vector p = part.transform->point(to_vector(vertex));
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  // Rays are rounded to float.
+  const auto margin = [](double a, double b) { return std::max(std::abs(a), std::abs(b)) * 0x1p-20; };
+  const Vector m{margin(low.x, high.x), margin(low.y, high.y), margin(low.z, high.z)};
+  const auto [x0, y0, z0] = to_floats(low - m);
+  const auto [x1, y1, z1] = to_floats(high + m);
+  RTCBounds& out = *arguments->bounds_o;
+  out.lower_x = x0, out.lower_y = y0, out.lower_z = z0;
+  out.upper_x = x1, out.upper_y = y1, out.upper_z = z1;
+}
+
+void Tracer::intersect_part(const RTCIntersectFunctionNArguments* arguments) {
+  const Part& part = *static_cast<const Part*>(arguments->geometryUserPtr);
+  const unsigned all = arguments->N;
+  RTCRayN* rays = RTCRayHitN_RayN(arguments->rayhit, all);
+  RTCHitN* hits = RTCRayHitN_HitN(arguments->rayhit, all);
+  const Active active(arguments->valid, all);
+  const auto take = [&](unsigned to, float distance, unsigned triangle, float u, float v) {
+    RTCRayN_tfar(rays, all, to) = distance;
+    RTCHitN_geomID(hits, all, to) = arguments->geomID;
+    RTCHitN_primID(hits, all, to) = triangle;
+    RTCHitN_instID(hits, all, to, 0) = RTC_INVALID_GEOMETRY_ID;
+    RTCHitN_u(hits, all, to) = u;
+    RTCHitN_v(hits, all, to) = v;
+  };
+  if (active.count == 1) {
+    RTCRayHit query;
+    put(into(part, rays, all, active.lanes[0]), query.ray);
+    query.hit.geomID = query.hit.primID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(part.shape, arguments->context, &query);
+    if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID)
+      take(active.lanes[0], query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v);
+    return;
+  }
+  const Valid valid(active.count);
+  RTCRayHit16 query;
+  for (unsigned k = 0; k < kPacket; ++k) {
+    put(into(part, rays, all, active.lanes[k]), query.ray, k);
+    query.hit.geomID[k] = query.hit.primID[k] = query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+  }
+  rtcIntersect16(valid.lanes, part.shape, arguments->context, &query);
+  for (unsigned k = 0; k < active.count; ++k)
+    if (query.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
+      take(active.lanes[k], query.ray.tfar[k], query.hit.primID[k], query.hit.u[k], query.hit.v[k]);
+}
+
+void Tracer::occluded_part(const RTCOccludedFunctionNArguments* arguments) {
+  const Part& part = *static_cast<const Part*>(arguments->geometryUserPtr);
+  const unsigned all = arguments->N;
+  const Active active(arguments->valid, all);
+  if (active.count == 1) {
+    RTCRay query;
+    put(into(part, arguments->ray, all, active.lanes[0]), query);
+    rtcOccluded1(part.shape, arguments->context, &query);
+    if (query.tfar < 0) RTCRayN_tfar(arguments->ray, all, active.lanes[0]) = query.tfar;
+    return;
+  }
+  const Valid valid(active.count);
+  RTCRay16 query;
+  for (unsigned k = 0; k < kPacket; ++k) put(into(part, arguments->ray, all, active.lanes[k]), query, k);
+  rtcOccluded16(valid.lanes, part.shape, arguments->context, &query);
+  for (unsigned k = 0; k < active.count; ++k)
+    if (query.tfar[k] < 0) RTCRayN_tfar(arguments->ray, all, active.lanes[k]) = query.tfar[k];
 }
 
 void Tracer::intersect(std::span<const Ray> rays, bool from_camera, std::span<Meeting> meetings) const {
@@ -149,7 +331,8 @@ bool Tracer::intersect(const Ray& ray, bool from_camera, Hit& hit) const {
   intersect({&ray, 1}, from_camera, {&meeting, 1});
   if (material(meeting) < 0) return false;
   const Part& part = parts_[meeting.part];
-  const auto [a, b, c] = corners(meeting);
+  std::array<Corner, 3> made;
+  const auto [a, b, c] = corners(meeting, made);
   static_cast<Point&>(hit) = point({{to_vector(a->p), to_vector(b->p), to_vector(c->p)},
                                     {to_vector(a->normal), to_vector(b->normal), to_vector(c->normal)},
                                     part.x_axis,
@@ -170,7 +353,8 @@ bool Tracer::occluded(const Ray& ray) const {
 }
 
 std::array<double, 2> Tracer::texture_place(const Meeting& meeting) const {
-  const auto [a, b, c] = corners(meeting);
+  std::array<Corner, 3> made;
+  const auto [a, b, c] = corners(meeting, made);
   const double wb = meeting.u, wc = meeting.v, wa = 1 - wb - wc;
   return {a->uv[0] * wa + b->uv[0] * wb + c->uv[0] * wc, a->uv[1] * wa + b->uv[1] * wb + c->uv[1] * wc};
 }
@@ -203,7 +387,8 @@ BRDFC_VECTORISED void Tracer::at(const Rays& rays, const Lanes<Meeting>& meeting
   } places;
   for (std::size_t k = 0; k < lanes_for(count); ++k) {
     const Meeting& m = meetings[k];
-    const auto from = corners(m);
+    std::array<Corner, 3> made;
+    const auto from = corners(m, made);
     for (std::size_t i = 0; i < 3; ++i) {
       places.corners[i].set(k, from[i]->p);
       places.normals[i].set(k, from[i]->normal);

@@ -228,6 +228,34 @@ def test_normals_are_kept_in_single_precision(extension, empty, scene_file):
     assert np.abs(normals.reshape(-1, 3) - vertices[corners]).max() < 1e-6
 
 
+def test_equal_shapes_of_one_material_share_a_mesh(extension, empty, scene_file):
+    def at(index, **more):
+        transform = {"translate": [index, 0, 1], "rotate_degrees": [0, 0, 0], "scale": [1, 1, 1]}
+        return ball() | {"name": f"ball{index}", "transform": transform} | more
+
+    white = {"model": "lambert", "parameters": {"rho": 0.5}, "representation": "auto"}
+    path = scene_file(
+        objects=[floor(), at(0), at(1), at(2, material="black"), at(3, material="black")],
+        materials={"white": white, "black": white | {"parameters": {"rho": 0}}},
+        settings={"width": 32, "height": 8, "spp": 16, "max_bounces": 0},
+        camera={"type": "orthographic", "position": [1.5, 0, 9], "look_at": [1.5, 0, 0]}
+        | {"up": [0, 1, 0], "height": 1},
+        environment={"color": [1, 1, 1], "strength": 1},
+    )
+    scene = extension.scene_loader.load_scene(path)
+    meshes = [scene.objects[f"ball{index}"].data for index in range(4)]
+    assert meshes[0] == meshes[1] and meshes[2] == meshes[3] and meshes[0] != meshes[2]
+    assert [m.materials[0].name for m in meshes] == ["white", "white", "black", "black"]
+    # A copy has the normals of the first.
+    normals = np.empty((2, 3 * len(meshes[0].loops)), np.float32)
+    for mesh, into in zip(meshes[::2], normals, strict=True):
+        mesh.corner_normals.foreach_get("vector", into)
+    assert np.array_equal(normals[0], normals[1])
+    row = render(scene)[4, :, 0]
+    assert row[4] == pytest.approx(0.5, rel=0.1) and row[12] == pytest.approx(0.5, rel=0.1)
+    assert row[20] == row[28] == 0
+
+
 def test_camera_only_objects_do_not_meet_other_rays(extension, empty, scene_file):
     world = {"color": [1, 1, 1], "strength": 1}
     settings = {"width": 9, "height": 9, "spp": 64, "max_bounces": 1}

@@ -7,6 +7,7 @@ test_cli.py has list, eval, sample, albedo and check.
 import csv
 import io
 import json
+import resource
 import subprocess
 import time
 
@@ -116,6 +117,32 @@ def test_render_and_compare(tmp_path):
     assert same["max"] == 0
     other = json.loads(brdfc("compare", tmp_path / "a.exr", tmp_path / "c.exr", "--json").stdout)
     assert 0 < other["relmse"] < 0.1
+
+
+def test_running_out_of_memory_is_said(tmp_path):
+    (tmp_path / "s.json").write_text(json.dumps(scene()))
+    out = tmp_path / "a.exr"
+    command = [
+        TOOL,
+        "render",
+        tmp_path / "s.json",
+        "--out",
+        out,
+        "--width",
+        16384,
+        "--height",
+        16384,
+    ]
+    limit = 4 << 30
+    done = subprocess.run(
+        [str(c) for c in command],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("brdfc: out of memory") and done.stderr.count("\n") == 1
+    assert not out.exists()
 
 
 def test_a_resolved_scene_is_the_same_bytes_again(tmp_path):

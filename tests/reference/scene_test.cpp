@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <ctime>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -82,6 +83,26 @@ TEST_F(SceneTest, AcceptsAValidScene) {
   EXPECT_EQ(s.lights.size(), 4u);
   EXPECT_EQ(s.objects[0].mesh->triangles.size(), 8u * (2 * 4 - 2));
   EXPECT_DOUBLE_EQ(s.environment.color.g, 0.5);
+}
+
+TEST_F(SceneTest, EqualShapesAreMadeOnce) {
+  const auto seconds = [&](int count) {
+    json scene = valid();
+    scene["objects"][0]["shape"] = {{"type", "sphere"}};
+    for (int i = 1; i < count; ++i) {
+      scene["objects"].push_back(scene["objects"][0]);
+      scene["objects"][std::size_t(i)]["name"] = std::to_string(i);
+    }
+    const fs::path file = write(scene.dump());
+    const std::clock_t begin = std::clock();
+    const Scene s = load_scene(file);
+    EXPECT_EQ(s.mesh_files.size(), 1u);
+    EXPECT_EQ(s.objects.back().mesh, s.objects.front().mesh);
+    EXPECT_EQ(s.resolved["objects"].back()["shape"], s.resolved["objects"][0]["shape"]);
+    return double(std::clock() - begin) / CLOCKS_PER_SEC;
+  };
+  const double one = seconds(1);
+  EXPECT_LT(seconds(200), 20 * one);
 }
 
 TEST_F(SceneTest, NamesFileKeyAndExpectation) {
