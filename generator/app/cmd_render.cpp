@@ -129,6 +129,7 @@ void add_render_command(CLI::App& app) {
                     reference::ColorConfig::current().file().string());
     }
     const reference::Scene scene = reference::load_scene(options->scene);
+    print_notes(scene.notes);
     reference::RenderOptions r;
     r.settings = scene.settings;
     if (options->spp) r.settings.spp = options->spp;

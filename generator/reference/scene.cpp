@@ -175,6 +175,11 @@ class Loader {
     out["up"] = {up.x, up.y, up.z};
   }
 
+  /// Says something once.
+  void note(const std::string& text) {
+    if (std::ranges::find(scene_.notes, text) == scene_.notes.end()) scene_.notes.push_back(text);
+  }
+
   std::shared_ptr<const Image> keep(Image image, std::string& name) {
     name = image_name(image);
     auto& slot = scene_.image_files[name];
@@ -312,10 +317,13 @@ class Loader {
     if (type != "mesh") {
       mesh = read_shape_of_numbers(j, type);
     } else if (j.has("file")) {
-      j.only({"type", "file", "smooth"});
-      const auto smooth = j.find("smooth");
+      j.only({"type", "file", "smooth", "of_material"});
+      const auto smooth = j.find("smooth"), of_material = j.find("of_material");
       const bool s = smooth ? smooth->boolean() : true;
-      mesh = read_file(j.at("file"), [s](const fs::path& f) { return read_mesh(f, s); });
+      const std::string part = of_material ? of_material->text() : "";
+      std::vector<std::string> notes;
+      mesh = read_file(j.at("file"), [&](const fs::path& f) { return read_mesh(f, s, part, &notes); });
+      for (const std::string& text : notes) note(text);
     } else {
       j.only({"type", "vertices", "normals", "uvs", "triangles"});
       read_array(j.at("vertices"), mesh.vertices);
@@ -360,6 +368,9 @@ class Loader {
       material.fail(fmt::format("one of the materials {}", fmt::join(known, ", ")));
     }
     object.material = int(found - list.begin());
+    if (!found->textures.empty() && object.mesh->uvs.empty())
+      note(fmt::format("{}: the mesh has no UVs: the textures of \"{}\" show the colour of their lower left corner",
+                       j.key(), id));
     resolved["material"] = id;
     if (const auto v = j.find("camera_only")) object.camera_only = v->boolean();
     resolved["camera_only"] = object.camera_only;
