@@ -325,7 +325,7 @@ BAD = {
     "wl,n,k\n0.3,1\n": " line 2: expected 3 numbers, a wavelength in µm and n and k, got '0.3,1'",
     "wl,n\n0,1.5\n0.4,1.5\n": " line 2: expected a wavelength above 0, got 0",
     "wl,n\n0.4,0\n": " line 2: expected n in (0, 100], got 0",
-    "wl,n\n0.4,1\nwl,k\n0.4,-2\n": " line 4: expected k in [0, 100], got -2",
+    "wl,n\n0.3,1\n0.8,1\nwl,k\n0.4,-2\n": " line 5: expected k in [0, 100], got -2",
     "wl,n\n0.45,1.5\n0.78,1.5\n": ": expected n from 0.43 to 0.65 µm, got 0.45 to 0.78",
     "wl,n\n1,0\n2,0\n": ": expected n in the visible, found none",
     "wl,n\n0.3,1\n0.8,1\nwl,k\n0.5,1\n": ": expected k from 0.43 to 0.65 µm, got 0.5 to 0.5",
