@@ -211,14 +211,17 @@ def set_substance(material, substance, node=None, thickness=None):
     after `thickness`, in metres (0.01). The others stay.
 
     `substance`: one of substances(), or a file NAME.csv as refractiveindex.info exports it. Returns
-    the parameters that were set. Raises ValueError for another name, a file that can't be read,
-    naming line and what was expected, a model without such parameters, and a thickness of what
-    absorbs nothing; nothing is changed then.
+    the parameters that were set; what was assumed of a file is printed. Raises ValueError for
+    another name, a file that can't be read, naming line and what was expected, a model without such
+    parameters, and a thickness of what absorbs nothing; nothing is changed then.
     """
     from . import optical
 
     node = _the_node(material) if node is None else expected.node(node)
-    values = optical.parameters(nodes.identity(node)[0], optical.find(substance), thickness)
+    found = optical.find(substance)
+    values = optical.parameters(nodes.identity(node)[0], found, thickness)
+    for note in found.notes:
+        print(f"brdfc: {note}")
     _set(node, say("material {name!r}", name=material.name), values)
     return values
 

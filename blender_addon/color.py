@@ -12,6 +12,14 @@ import bpy
 import numpy as np
 from mathutils import Color
 
+#: What sRGB is called by Blender, and by the configurations of ACES 1.3, 2.0 and before.
+_SRGB = (
+    "sRGB",
+    "sRGB - Texture",
+    "sRGB Encoded Rec.709 (sRGB)",
+    "Utility - sRGB - Texture",
+)
+
 #: Values of sRGB at which its curve is taken: those of eight bits, and three between any two.
 _ENCODED = np.linspace(0, 1, 4 * 255 + 1)
 
@@ -25,10 +33,32 @@ def working_space():
     return "Linear Rec.709" if usual else "scene_linear of the OpenColorIO configuration"
 
 
+def set_srgb(image):
+    """Has an image read as sRGB, by the name that the OpenColorIO configuration has for it.
+    ValueError that lists its spaces if it has none."""
+    settings = image.colorspace_settings
+    known = settings.bl_rna.properties["name"].enum_items.keys()
+    for name in _SRGB:
+        if name in known:
+            settings.name = name
+            return
+    raise ValueError(
+        f"the OpenColorIO configuration has no sRGB under a name that is known here: {known}"
+    )
+
+
+def set_view(settings, name):
+    """The view transform of that name; where the display has none, its default stays."""
+    try:
+        settings.view_transform = name
+    except TypeError:  # names of views are not those of the class, but of the display
+        pass
+
+
 def set_working_space(name):
     """Makes a space of that name the working space of the open file. What is in it keeps its look.
     ValueError that lists the names, or says which Blender has a choice."""
-    if name == working_space():
+    if working_space() in (name, f"{name} (sRGB)"):
         return
     if not hasattr(bpy.data, "colorspace"):
         raise ValueError(
@@ -36,6 +66,8 @@ def set_working_space(name):
             f"{name!r} needs Blender 5.0 or later"
         )
     known = bpy.data.colorspace.bl_rna.properties["working_space"].enum_items.keys()
+    if f"{name} (sRGB)" in known:  # as configurations of ACES call Rec.709
+        name = f"{name} (sRGB)"
     if name not in known:
         raise ValueError(f"expected one of {', '.join(known)}, got {name!r}")
     bpy.ops.wm.set_working_color_space(working_space=name, convert_colors=True)

@@ -234,7 +234,11 @@ def _load_image(path, space="auto"):
     """The picture; `auto`: floats are linear, integers sRGB, as in the reference renderer."""
     image = bpy.data.images.load(str(path), check_existing=True)
     linear = image.is_float if space == "auto" else space == "linear"
-    image.colorspace_settings.name = "Non-Color" if linear else "sRGB"
+    if linear:
+        # As it is; what that is called differs between configurations of OpenColorIO.
+        image.colorspace_settings.is_data = True
+    else:
+        color.set_srgb(image)
     return image
 
 
@@ -454,7 +458,8 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
     render.image_settings.color_depth = "32"
     render.image_settings.exr_codec = "ZIP"
     view = scene.view_settings
-    view.view_transform, view.look, view.exposure, view.gamma = "Raw", "None", 0.0, 1.0
+    color.set_view(view, "Raw")
+    view.look, view.exposure, view.gamma = "None", 0.0, 1.0
 
 
 def load_scene(path, representation=None, name=None, native=None):

@@ -232,7 +232,7 @@ def environment_image(scene, folder):
     pixels = np.ones((height, 2 * height, 4), np.float32)
     pixels[..., :3] = radiance
     image = bpy.data.images.new("sky", 2 * height, height, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
+    image.colorspace_settings.is_data = True
     image.pixels.foreach_set(pixels.ravel())
     image.file_format, image.filepath_raw = "OPEN_EXR", str(folder / "sky.exr")
     image.save()
@@ -240,7 +240,7 @@ def environment_image(scene, folder):
     tree, background = world(scene, strength=1.0)
     node = tree.nodes.new("ShaderNodeTexEnvironment")
     node.image = bpy.data.images.load(str(folder / "sky.exr"))
-    node.image.colorspace_settings.name = "Non-Color"
+    node.image.colorspace_settings.is_data = True
     tree.links.new(node.outputs["Color"], background.inputs["Color"])
 
 

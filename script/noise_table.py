@@ -170,7 +170,7 @@ def render(scene, samples, seed, read=True):
         return seconds, None
     image = bpy.data.images.load(str(path))
     try:
-        image.colorspace_settings.name = "Non-Color"
+        image.colorspace_settings.is_data = True
         pixels = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
         return seconds, pixels.reshape(image.size[1], image.size[0], 4)[..., :3].astype(np.float64)

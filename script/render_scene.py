@@ -112,11 +112,15 @@ def timed_render(bpy, samples, path=None):
         return cpu_seconds() - cpu, time.perf_counter() - wall
 
 
-def for_eyes(scene, path, view):
-    """A picture to look at in place of an EXR to measure: bytes, through Blender's own view."""
+def for_eyes(loader, scene, path, view):
+    """A picture to look at in place of an EXR to measure: bytes, through Blender's own view; of
+    None through Standard, or what the display has in its place."""
     images = scene.render.image_settings
     images.file_format = PICTURES[path.suffix]
     images.color_mode, images.color_depth, images.quality = "RGB", "8", 92
+    if view is None:
+        loader.color.set_view(scene.view_settings, "Standard")
+        return
     try:
         scene.view_settings.view_transform = view
     except TypeError as error:
@@ -147,7 +151,7 @@ def render_once(bpy, loader, job, repetition, threads=None):
     partial = out.with_name(f".{out.stem}.{uuid.uuid4().hex}{out.suffix}")
     scene.cycles.use_denoising = job["denoise"]
     if out.suffix in PICTURES:
-        for_eyes(scene, out, job["view"])
+        for_eyes(loader, scene, out, job["view"])
     out.parent.mkdir(parents=True, exist_ok=True)
     cpu, wall = timed_render(bpy, samples, partial if repetition == 0 else None)
     factor = samples / max(samples - 1, 1)
@@ -305,7 +309,10 @@ def main():
         "--out",
         help="EXR to write, 32-bit float, scene linear; or a .png or .jpg, as --view shows it",
     )
-    parser.add_argument("--view", default="Standard", help="Blender's view transform (Standard)")
+    parser.add_argument(
+        "--view",
+        help="Blender's view transform; default: Standard, or the display's own where there is none",
+    )
     parser.add_argument("--denoise", action="store_true", help="by Blender's denoiser")
     parser.add_argument("--jobs", help="JSON file with a list of jobs")
     parser.add_argument(

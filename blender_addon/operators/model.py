@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
-from .. import api, color, editable, kernel, nodes
+from .. import api, color, editable, kernel, nodes, optical
 from ..i18n import iface, of_error, rpt, say, tip
 from ..labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
@@ -262,6 +262,8 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
             values = api.set_substance(material, name, node, self.thickness if stated else None)
         except ERRORS as error:
             return refused(self, error)
+        for note in optical.find(name).notes:
+            self.report({"INFO"}, note)
         space = color.working_space()
         said = say("Set in {space}: {names}", space=space, names=", ".join(values))
         self.report({"INFO"}, rpt(said))

@@ -230,6 +230,7 @@ void run(const Options& options) {
   std::vector<plan::PlannedModel> plan;
   if (!options.scene.empty()) {
     const reference::Scene scene = reference::load_scene(options.scene);
+    print_notes(scene.notes);
     for (const reference::Light& l : scene.lights)
       if ((l.kind == reference::Light::Kind::Point || l.kind == reference::Light::Kind::Sun) && l.radius == 0)
         budget.sizeless.push_back(l.key);

@@ -35,6 +35,12 @@ Json describe(const Substance& s, double thickness) {
   return j;
 }
 
+/// Says what was assumed of a file.
+Substance with_notes(Substance s) {
+  print_notes(s.notes);
+  return s;
+}
+
 std::string three(const Json& j) {
   return fmt::format("{:.4f} {:.4f} {:.4f}", j[0].get<double>(), j[1].get<double>(), j[2].get<double>());
 }
@@ -84,7 +90,7 @@ void add_optical_command(CLI::App& app) {
     if (o->name.empty())
       for (const Substance& s : substances()) all.push_back(describe(s, o->thickness));
     else
-      all.push_back(describe(find_substance(o->name, ""), o->thickness));
+      all.push_back(describe(with_notes(find_substance(o->name, "")), o->thickness));
     if (o->json) {
       fmt::print("{}\n", (o->name.empty() ? all : all[0]).dump(1));
       return;

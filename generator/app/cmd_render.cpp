@@ -75,7 +75,7 @@ class ProgressLine {
 
 void add_render_command(CLI::App& app) {
   struct Options {
-    std::string scene, out, preview, view = "Standard", strategy, pattern, from = "camera";
+    std::string scene, out, preview, view, strategy, pattern, from = "camera";
     int spp = 0, seed = -1, threads = 0, width = 0, height = 0;
     double max_seconds = 0, scale = 1, exposure = 0;
   };
@@ -110,25 +110,24 @@ void add_render_command(CLI::App& app) {
       ->check(CLI::IsMember({"camera", "lamps", "lamps-swapped"}))
       ->capture_default_str();
   command->add_option("--preview", options->preview, "Write a PNG as well, as a display shows it");
-  command
-      ->add_option(
-          "--view", options->view,
-          "View transform of the preview, of the OpenColorIO configuration that the environment variable OCIO\n"
-          "names, such as AgX of Blender's own")
-      ->capture_default_str();
+  command->add_option(
+      "--view", options->view,
+      "View transform of the preview, of the OpenColorIO configuration that the environment variable OCIO\n"
+      "names, such as AgX of Blender's own (default: Standard, or the display's own where there is none)");
   command->add_option("--exposure", options->exposure, "Stops, for the preview")->check(CLI::Range(-64.0, 64.0));
   command->callback([options] {
     const std::filesystem::path out(options->out);
     if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());
     if (!options->preview.empty() && std::filesystem::path(options->preview).extension() != ".png")
       input_error("--preview {}: expected a file name that ends in .png", options->preview);
-    if (!options->preview.empty()) {
+    if (!options->preview.empty() && !options->view.empty()) {
       const std::vector<std::string> views = reference::ColorConfig::current().views();
       if (std::find(views.begin(), views.end(), options->view) == views.end())
         input_error("--view {}: expected one of {}, the views of {}", options->view, fmt::join(views, ", "),
                     reference::ColorConfig::current().file().string());
     }
     const reference::Scene scene = reference::load_scene(options->scene);
+    print_notes(scene.notes);
     reference::RenderOptions r;
     r.settings = scene.settings;
     if (options->spp) r.settings.spp = options->spp;

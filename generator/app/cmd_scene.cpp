@@ -17,6 +17,7 @@ void add_scene_command(CLI::App& app) {
   command->add_option("--out", options->out, "Folder to write scene.json to")->required();
   command->callback([options] {
     const reference::Scene scene = reference::load_scene(options->scene);
+    print_notes(scene.notes);
     reference::write_resolved(scene, options->out);
     fmt::print(stderr, "{}: {} objects, {} meshes, {} images, hash {} -> {}\n", scene.name, scene.objects.size(),
                scene.mesh_files.size(), scene.image_files.size(), scene.hash,

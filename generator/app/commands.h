@@ -3,8 +3,12 @@
 // InputError (exit 2) or ValueError / CheckFailed (exit 1). Tables go to stdout, messages to stderr.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace brdfc::app {
 
@@ -12,6 +16,11 @@ namespace brdfc::app {
 struct CheckFailed : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// What was assumed of the input or left out of it: lines on stderr.
+inline void print_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) fmt::print(stderr, "brdfc: {}\n", note);
+}
 
 void add_list_command(CLI::App&);
 void add_where_command(CLI::App&);

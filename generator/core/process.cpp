@@ -30,10 +30,28 @@ namespace fs = std::filesystem;
 long process_id() { return _getpid(); }
 bool process_is_over(long) { return false; }
 bool is_terminal(Stream stream) { return _isatty(stream == Stream::In ? 0 : 2); }
+QuietErrors::QuietErrors() = default;
+QuietErrors::~QuietErrors() = default;
 #else
 long process_id() { return getpid(); }
 bool process_is_over(long id) { return id > 0 && kill(pid_t(id), 0) != 0 && errno == ESRCH; }
 bool is_terminal(Stream stream) { return isatty(stream == Stream::In ? STDIN_FILENO : STDERR_FILENO); }
+
+QuietErrors::QuietErrors() {
+  fflush(stderr);
+  const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  if (nowhere < 0) return;
+  kept_ = fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 0);
+  if (kept_ >= 0) dup2(nowhere, STDERR_FILENO);
+  close(nowhere);
+}
+
+QuietErrors::~QuietErrors() {
+  if (kept_ < 0) return;
+  fflush(stderr);
+  dup2(kept_, STDERR_FILENO);
+  close(kept_);
+}
 #endif
 
 fs::path program_file() {

@@ -23,6 +23,19 @@ enum class Stream { In, Err };
 /// Whether a person sits at it.
 bool is_terminal(Stream);
 
+/// While it lives nothing that is written to the standard error stream is seen, for libraries that write there by
+/// themselves. Without effect on Windows.
+class QuietErrors {
+ public:
+  QuietErrors();
+  ~QuietErrors();
+  QuietErrors(const QuietErrors&) = delete;
+  QuietErrors& operator=(const QuietErrors&) = delete;
+
+ private:
+  int kept_ = -1;
+};
+
 /// Exchanges two names in one step. False, and nothing is changed, where the file system or the system can't.
 bool exchange(const std::filesystem::path&, const std::filesystem::path&);
 

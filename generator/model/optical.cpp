@@ -14,22 +14,100 @@ namespace brdfc::inline model {
 namespace fs = std::filesystem;
 namespace {
 
-void add_row(Curve& curve, char letter, double um, double value, const std::string& where) {
-  const double nm = um * 1000;
-  if (!curve.nm.empty() && !(nm > curve.nm.back()))
-    input_error("{}: expected wavelengths that increase, got {:g} after {:g}", where, um, curve.nm.back() / 1000);
-  const bool good = letter == 'n' ? value > 0 : value >= 0;
-  if (!good || !(value <= kMaxIndex))
-    input_error("{}: expected {} in {}0, {:g}], got {:g}", where, letter, letter == 'n' ? '(' : '[', kMaxIndex, value);
-  curve.nm.push_back(nm);
-  curve.values.push_back(value);
-}
+struct Row {
+  double wavelength, value;
+  int line;
+};
 
-void check_span(const Curve& curve, char letter, const std::string& file) {
-  if (curve.nm.front() > kNeededMin || curve.nm.back() < kNeededMax)
-    input_error("{}: expected {} from {:g} to {:g} \xc2\xb5m, got {:g} to {:g}", file, letter, kNeededMin / 1000,
-                kNeededMax / 1000, curve.nm.front() / 1000, curve.nm.back() / 1000);
-}
+/// What is said of a file on the way from its rows to a curve.
+class Cleaner {
+ public:
+  Cleaner(std::string file, std::vector<std::string>& notes) : file_(std::move(file)), notes_(notes) {}
+
+  /// Whether wavelengths are nanometres.
+  bool in_nanometres(const std::vector<Row>& n, const std::vector<Row>& k) {
+    for (const auto* rows : {&n, &k})
+      for (const Row& r : *rows) {
+        if (!(r.wavelength > 0))
+          input_error("{} line {}: expected a wavelength above 0, got {:g}", file_, r.line, r.wavelength);
+        if (r.wavelength < kNanometres) return false;
+      }
+    note("wavelengths of 100 and more are taken for nanometres");
+    return true;
+  }
+
+  Curve curve(std::vector<Row> rows, char letter, bool nanometres) {
+    const double unit = nanometres ? 1 : 1000;
+    for (Row& r : rows) r.wavelength *= unit;
+    drop_bad(rows, letter);
+    std::ranges::stable_sort(rows, {}, &Row::wavelength);
+    Curve out;
+    std::size_t twice = 0;
+    double first = 0;
+    for (std::size_t i = 0; i < rows.size();) {
+      std::size_t end = i;
+      double sum = 0;
+      for (; end < rows.size() && rows[end].wavelength == rows[i].wavelength; ++end) sum += rows[end].value;
+      if (end - i > 1 && twice++ == 0) first = rows[i].wavelength;
+      out.nm.push_back(rows[i].wavelength);
+      out.values.push_back(sum / double(end - i));
+      i = end;
+    }
+    if (twice)
+      note("{} of {} stand{} twice, the first {:g} \xc2\xb5m: the mean is taken",
+           twice == 1 ? "1 wavelength" : fmt::format("{} wavelengths", twice), letter, twice == 1 ? "s" : "",
+           first / 1000);
+    check_span(out, letter);
+    return out;
+  }
+
+ private:
+  template <class... Args> void note(fmt::format_string<Args...> format, Args&&... args) {
+    notes_.push_back(file_ + ": " + fmt::format(format, std::forward<Args>(args)...));
+  }
+
+  void drop_bad(std::vector<Row>& rows, char letter) {
+    std::size_t dropped = 0, negative = 0;
+    double least = 0;
+    std::erase_if(rows, [&](Row& r) {
+      if (letter == 'k' && r.value < 0 && r.value >= -kNoiseOfK) {
+        ++negative;
+        least = std::min(least, r.value);
+        r.value = 0;
+      }
+      if ((letter == 'n' ? r.value > 0 : r.value >= 0) && r.value <= kMaxIndex) return false;
+      if (r.wavelength >= kSeenMin && r.wavelength <= kSeenMax)
+        input_error("{} line {}: expected {} in {}0, {:g}], got {:g}", file_, r.line, letter, letter == 'n' ? '(' : '[',
+                    kMaxIndex, r.value);
+      ++dropped;
+      return true;
+    });
+    if (negative)
+      note("{} below 0, the least {:g}: taken for 0",
+           negative == 1 ? "1 value of k is" : fmt::format("{} values of k are", negative), least);
+    if (dropped)
+      note("{} of {} outside of {}0, {:g}] and of the visible: left out",
+           dropped == 1 ? "1 value" : fmt::format("{} values", dropped), letter, letter == 'n' ? '(' : '[', kMaxIndex);
+  }
+
+  void check_span(Curve& curve, char letter) {
+    if (curve.nm.empty()) return;
+    const double front = curve.nm.front(), back = curve.nm.back();
+    if (letter == 'k' && (front > kSeenMax || back < kSeenMin)) {
+      note("k from {:g} to {:g} \xc2\xb5m, outside of the visible: left out", front / 1000, back / 1000);
+      curve = {};
+      return;
+    }
+    if (front > kNeededMin || back < kNeededMax)
+      input_error("{}: expected {} from {:g} to {:g} \xc2\xb5m, got {:g} to {:g}", file_, letter, kNeededMin / 1000,
+                  kNeededMax / 1000, front / 1000, back / 1000);
+    if (front > kExpectedMin || back < kExpectedMax)
+      note("{} from {:g} to {:g} \xc2\xb5m: taken for constant beyond", letter, front / 1000, back / 1000);
+  }
+
+  std::string file_;
+  std::vector<std::string>& notes_;
+};
 
 }  // namespace
 
@@ -71,7 +149,8 @@ Substance read_substance(const fs::path& path) {
   std::ifstream in(path);
   std::error_code ignored;
   if (!in || fs::is_directory(path, ignored)) input_error("{}: cannot be read", file);
-  Substance out{file, path.stem().string(), "", {}, {}};
+  Substance out{file, path.stem().string(), "", {}, {}, {}};
+  std::vector<Row> rows_of_n, rows_of_k;
   std::vector<char> block;  // the columns beside wl
   int number = 0, comments = 0;
   for (std::string text; std::getline(in, text);) {
@@ -90,7 +169,7 @@ Substance read_substance(const fs::path& path) {
       for (std::size_t i = 1; i < fields.size(); ++i) {
         if (fields[i] != "n" && fields[i] != "k") break;
         const char letter = fields[i][0];
-        if (!(letter == 'n' ? out.n : out.k).nm.empty() || std::count(block.begin(), block.end(), letter))
+        if (!(letter == 'n' ? rows_of_n : rows_of_k).empty() || std::count(block.begin(), block.end(), letter))
           input_error("{}: expected {} once", where, letter);
         block.push_back(letter);
       }
@@ -105,11 +184,14 @@ Substance read_substance(const fs::path& path) {
       input_error("{}: expected {} numbers, a wavelength in \xc2\xb5m and {}, got '{}'", where, block.size() + 1,
                   fmt::join(block, " and "), line);
     for (std::size_t i = 0; i < block.size(); ++i)
-      add_row(block[i] == 'n' ? out.n : out.k, block[i], row[0], row[i + 1], where);
+      (block[i] == 'n' ? rows_of_n : rows_of_k).push_back({row[0], row[i + 1], number});
   }
-  if (out.n.nm.empty()) input_error("{}: expected a line wl,n and rows below it, found no n", file);
-  check_span(out.n, 'n', file);
-  if (!out.k.nm.empty()) check_span(out.k, 'k', file);
+  if (rows_of_n.empty()) input_error("{}: expected a line wl,n and rows below it, found no n", file);
+  Cleaner cleaner(file, out.notes);
+  const bool nanometres = cleaner.in_nanometres(rows_of_n, rows_of_k);
+  out.n = cleaner.curve(std::move(rows_of_n), 'n', nanometres);
+  if (out.n.nm.empty()) input_error("{}: expected n in the visible, found none", file);
+  out.k = cleaner.curve(std::move(rows_of_k), 'k', nanometres);
   return out;
 }
 

@@ -34,8 +34,17 @@ namespace brdfc::inline model {
 inline constexpr double kBrightest = 0.999;
 /// Cosine of the angle near the horizon whose reflectance a channel's index has as well.
 inline constexpr double kGrazing = 0.1;
-/// Wavelengths in nm that a substance's measurements must span; beyond their ends they go on as they end.
-inline constexpr double kNeededMin = 400, kNeededMax = 700;
+/// Wavelengths in nm that a substance's measurements must span: beyond them is less than a tenth of what the eye sees
+/// of white in any of X, Y and Z. Measurements go on as they end, which is said of those that end within kExpected.
+inline constexpr double kNeededMin = 430, kNeededMax = 650;
+inline constexpr double kExpectedMin = 400, kExpectedMax = 700;
+/// Wavelengths in nm outside of which nothing is seen: a bad value there is left out.
+inline constexpr double kSeenMin = 380, kSeenMax = 780;
+/// The wavelength, whatever its unit, from which on all of a file's are taken for nanometres: the infrared of 100 um
+/// colours nothing.
+inline constexpr double kNanometres = 100;
+/// Measured k below 0 down to this much are noise about 0.
+inline constexpr double kNoiseOfK = 1e-3;
 /// The k from which on a substance is a conductor: it lets no light through that one could see.
 inline constexpr double kConductor = 0.01;
 
@@ -59,10 +68,11 @@ struct Curve {
 
 /// A metal, a glass, a liquid.
 struct Substance {
-  std::string name;    ///< "gold", or the path of a file
-  std::string label;   ///< "Gold"; of a file without one its name
-  std::string source;  ///< who measured it; may be empty
-  Curve n, k;          ///< k is empty where none is given
+  std::string name;                ///< "gold", or the path of a file
+  std::string label;               ///< "Gold"; of a file without one its name
+  std::string source;              ///< who measured it; may be empty
+  Curve n, k;                      ///< k is empty where none is given
+  std::vector<std::string> notes;  ///< of a file: what was assumed, or left out of it
 
   /// Whether its mean k, as the eye weighs it, is that of a conductor.
   bool conductor() const;
@@ -79,7 +89,9 @@ struct Substance {
 
 /// Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in micrometres and n, then the
 /// same of wl,k, which may be missing; or wl,n,k. Lines that start with # are skipped; the first is the label, the
-/// second the source. Throws InputError naming file, line and what was expected.
+/// second the source. Wavelengths of 100 and more are nanometres; rows may come in any order, and of a wavelength that
+/// stands twice the mean is taken. What was assumed is said in Substance::notes. Throws InputError naming file, line
+/// and what was expected.
 Substance read_substance(const std::filesystem::path&);
 
 /// Those of data/optical, by name.

@@ -184,6 +184,9 @@ std::string optics_module() {
   out += fmt::format("GRAZING = {}\nNEEDED = ({}, {})\nCONDUCTOR = {}\nMAX_INDEX = {}\n", python_number(kGrazing),
                      python_number(kNeededMin), python_number(kNeededMax), python_number(kConductor),
                      python_number(kMaxIndex));
+  out += fmt::format("EXPECTED = ({}, {})\nSEEN = ({}, {})\nNANOMETRES, NOISE_OF_K = {}, {}\n",
+                     python_number(kExpectedMin), python_number(kExpectedMax), python_number(kSeenMin),
+                     python_number(kSeenMax), python_number(kNanometres), python_number(kNoiseOfK));
   out += fmt::format("DISPERSION = {}\n", python_number(kDispersion));
   out += fmt::format("THICKNESS, DARKEST = {}, {}\n", python_number(kThickness), python_number(kDarkest));
   out += fmt::format("THICKNESSES = ({}, {})\n", python_number(kThinnest), python_number(kThickest));

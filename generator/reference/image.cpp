@@ -10,7 +10,6 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
-#include <set>
 
 #include "core/error.h"
 #include "core/process.h"
@@ -68,6 +67,34 @@ struct File {
   }
 };
 
+struct Format {
+  const char* name;
+  std::vector<std::string> endings;
+  std::vector<std::string> magic;  ///< one of these begins a file
+};
+
+const std::vector<Format>& formats() {
+  static const std::vector<Format> all{
+      {"OpenEXR", {".exr"}, {"\x76\x2f\x31\x01"}},
+      {"Radiance", {".hdr"}, {"#?"}},
+      {"PNG", {".png"}, {"\x89PNG"}},
+      {"JPEG", {".jpg", ".jpeg"}, {"\xff\xd8"}},
+      {"TIFF",
+       {".tif", ".tiff"},
+       {std::string("II*\0", 4), std::string("MM\0*", 4), std::string("II+\0", 4), std::string("MM\0+", 4)}}};
+  return all;
+}
+
+/// The format whose files begin so; nullptr if it is none of formats().
+const Format* format_of_content(const fs::path& path) {
+  std::string start(4, '\0');
+  std::ifstream(path, std::ios::binary).read(start.data(), std::streamsize(start.size()));
+  for (const Format& f : formats())
+    for (const std::string& magic : f.magic)
+      if (start.starts_with(magic)) return &f;
+  return nullptr;
+}
+
 /// What OpenImageIO says, on one line.
 std::string reason(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -92,17 +119,25 @@ void check_exr_header(const fs::path& path) {
 
 File read_file(const fs::path& path) {
   if (!fs::exists(path)) input_error("{}: no such image file", path.string());
-  static const std::set<std::string> types{".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff"};
   const std::string type = ending(path);
-  if (!types.count(type))
-    input_error("{}: expected an image file that ends in one of {}", path.string(), fmt::join(types, ", "));
+  std::vector<std::string> types;
+  const Format* format = nullptr;
+  for (const Format& f : formats())
+    for (const std::string& e : f.endings) {
+      types.push_back(e);
+      if (e == type) format = &f;
+    }
+  if (!format) input_error("{}: expected an image file that ends in one of {}", path.string(), fmt::join(types, ", "));
+  if (const Format* content = format_of_content(path); content != format)
+    input_error("{}: not {} {} file, as its name says{}", path.string(), format->name[0] == 'O' ? "an" : "a",
+                format->name, content ? fmt::format(", but {}", content->name) : "");
   if (type == ".exr") check_exr_header(path);
   // The reader for that ending and no other: else each of some thirty tries its luck with a damaged file.
   const auto in = OIIO::ImageInput::create(type.substr(1));
   File file;
+  const QuietErrors quiet;  // libpng and libtiff say it as well
   if (!in || !in->open(path.string(), file.spec))
-    input_error("{}: not an image that OpenImageIO can read ({})", path.string(),
-                reason(in ? in->geterror() : OIIO::geterror()));
+    input_error("{}: damaged {} file: its header can't be read", path.string(), format->name);
   const auto& s = file.spec;
   if (s.width < 1 || s.height < 1 || s.width > kMaxSide || s.height > kMaxSide || s.depth > 1 || s.nchannels < 1 ||
       s.nchannels > 1024 || std::size_t(s.width) * s.height * s.nchannels > kMaxPixels)
@@ -116,7 +151,7 @@ File read_file(const fs::path& path) {
                 s.height, s.nchannels, fs::file_size(path));
   file.data.resize(values);
   if (!in->read_image(0, 0, 0, s.nchannels, OIIO::TypeDesc::FLOAT, file.data.data()))
-    input_error("{}: damaged image ({})", path.string(), reason(in->geterror()));
+    input_error("{}: damaged {} file: its pixels can't be read to the end", path.string(), format->name);
   return file;
 }
 
@@ -149,7 +184,7 @@ OIIO::ImageSpec exr_spec(int width, int height, std::vector<std::string> names) 
 
 /// The working space that a file says its colours are in; empty if it says none.
 std::string stated_working_space(const OIIO::ImageSpec& spec, const fs::path& path) {
-  std::array<float, 8> chromaticities;
+  Chromaticities chromaticities;
   const bool known = spec.getattribute("chromaticities", kChromaticities, chromaticities.data());
   const std::string id = spec.get_string_attribute("colorInteropID");
   if (id.empty() && !known) return "";
@@ -169,6 +204,46 @@ std::string stated_working_space(const OIIO::ImageSpec& spec, const fs::path& pa
 ColorConfig config_of(const Rendering& r) {
   const ColorConfig& current = ColorConfig::current();
   return current.with_working_space(r.working_space.empty() ? current.working_space() : r.working_space);
+}
+
+/// Primaries and white that a file says its colours are numbers of; nothing if it says none, or that they are data.
+std::optional<Chromaticities> stated_primaries(const OIIO::ImageSpec& spec, const fs::path& path) {
+  const std::string id = spec.get_string_attribute("colorInteropID");
+  if (id == "data" || id == "unknown") return std::nullopt;
+  if (!id.empty()) {
+    std::vector<std::string> known;
+    for (const LinearSpace& s : linear_spaces()) {
+      if (id == s.interop_id) return s.chromaticities;
+      known.push_back(s.interop_id);
+    }
+    input_error("{}: its colours are in '{}', expected one of {}, or a \"colorspace\" that says what they are",
+                path.string(), id, fmt::join(known, ", "));
+  }
+  Chromaticities stated;
+  if (!spec.getattribute("chromaticities", kChromaticities, stated.data())) return std::nullopt;
+  // Coordinates of a triangle with an area, and a white that has a luminance.
+  const double area =
+      double(stated[2] - stated[0]) * (stated[5] - stated[1]) - double(stated[4] - stated[0]) * (stated[3] - stated[1]);
+  if (!(std::abs(area) > 1e-6) || !(stated[7] > 0) ||
+      !std::ranges::all_of(stated, [](float x) { return std::isfinite(x); }))
+    input_error("{}: expected chromaticities of three primaries and a white, found {}", path.string(),
+                fmt::join(stated, " "));
+  return stated;
+}
+
+/// As Cycles of Blender 5.2 reads images; in 4.5 such channels alone are 0.
+void blacken_what_is_not_finite(Image& image, const std::string& name, std::vector<std::string>* notes) {
+  std::size_t bad = 0, first = 0;
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+    float* p = &image.rgb[i];
+    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])) continue;
+    if (bad++ == 0) first = i / 3;
+    p[0] = p[1] = p[2] = 0;
+  }
+  if (bad && notes)
+    notes->push_back(fmt::format("{}: {} NaN or infinite, the first at ({}, {}), taken for black as in Cycles", name,
+                                 bad == 1 ? "1 pixel is" : fmt::format("{} pixels are", bad), first % image.width,
+                                 first / image.width));
 }
 
 void check_finite(const Image& image, const std::string& name) {
@@ -276,16 +351,22 @@ void to_working_space_of(Rendering& rendering, const Rendering& other) {
   rendering.working_space = other.working_space;
 }
 
-Image read_image(const fs::path& path, const ColorConfig& colors, const std::string& space) {
+Image read_image(const fs::path& path, const ColorConfig& colors, const std::string& space,
+                 std::vector<std::string>* notes) {
   const File file = read_file(path);
   const Channels channels = find_channels(file.spec);
   if (channels.r < 0)
     input_error("{}: expected channels R, G, B or one grey channel, found {}", path.string(),
                 fmt::join(file.spec.channelnames, ", "));
   Image image = file.extract(channels);
-  check_finite(image, path.string());
-  const bool encoded = space == "auto" ? !file.spec.format.is_floating_point() : space != "linear";
-  if (encoded) colors.to_scene_linear(image, space == "auto" || space == "srgb" ? "sRGB" : space);
+  blacken_what_is_not_finite(image, path.string(), notes);
+  if (space == "srgb" || (space == "auto" && !file.spec.format.is_floating_point())) {
+    colors.srgb_to_scene_linear(image);
+  } else if (space == "auto") {
+    if (const auto primaries = stated_primaries(file.spec, path)) colors.to_scene_linear(image, *primaries);
+  } else if (space != "linear") {
+    colors.to_scene_linear(image, space);
+  }
   return image;
 }
 

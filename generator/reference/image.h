@@ -60,9 +60,11 @@ void write_rendering(const std::filesystem::path& path, const Rendering& renderi
 void to_working_space_of(Rendering& rendering, const Rendering& other);
 
 /// Reads an image for use as texture or environment, as scene-linear colours; grey is repeated. `space`: "linear", as
-/// stored; a colour space of the configuration, where "srgb" is "sRGB"; "auto", sRGB for integer pixels and linear
-/// for floating point. Throws InputError naming the file, also for values that are not finite.
-Image read_image(const std::filesystem::path& path, const ColorConfig&, const std::string& space = "auto");
+/// stored; "srgb"; a colour space of the configuration, by name, alias or role; "auto", sRGB for integer pixels and,
+/// for floating point, the primaries that the file states, or linear where it states none. A pixel with a value that is
+/// not finite becomes black, as in Cycles, which is added to `notes` as a line. Throws InputError naming the file.
+Image read_image(const std::filesystem::path& path, const ColorConfig&, const std::string& space = "auto",
+                 std::vector<std::string>* notes = nullptr);
 /// Writes float EXR without metadata: equal pixels give equal files.
 void write_image(const std::filesystem::path& path, const Image& image);
 
@@ -86,9 +88,10 @@ nlohmann::json to_json(const Comparison& c);
 /// darker, full colour at a difference of `scale` times the mean of b.
 Image difference_image(const Image& a, const Image& b, double scale = 0.25);
 
-/// Writes 8 bits: colours are multiplied by 2^exposure and shown through a view transform of ColorConfig::current().
+/// Writes 8 bits: colours are multiplied by 2^exposure and shown through a view transform of ColorConfig::current(),
+/// or its standard_view() where none is named.
 void write_preview(const std::filesystem::path& path, const Rendering& rendering, double exposure = 0,
-                   const std::string& view = "Standard");
+                   const std::string& view = "");
 /// Writes 8 bits from values that are already display-referred, in [0, 1].
 void write_display(const std::filesystem::path& path, const Image& display);
 

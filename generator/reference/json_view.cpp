@@ -40,7 +40,10 @@ nlohmann::json read_json(const std::filesystem::path& path) {
   std::stringstream text;
   text << in.rdbuf();
   if (!in) input_error("{}: can't read this file", name);
+  return parse_json(text.str(), name);
+}
 
+nlohmann::json parse_json(std::string_view text, const std::string& name) {
   std::vector<std::set<std::string>> keys;
   const nlohmann::json::parser_callback_t check = [&](int depth, nlohmann::json::parse_event_t event,
                                                       nlohmann::json& value) {
@@ -53,7 +56,7 @@ nlohmann::json read_json(const std::filesystem::path& path) {
     return true;
   };
   try {
-    return nlohmann::json::parse(text.str(), check);
+    return nlohmann::json::parse(text, check);
   } catch (const nlohmann::json::exception& e) {
     input_error("{}: not valid JSON: {}", name, plain_message(e.what()));
   }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -16,6 +17,8 @@ namespace brdfc::reference {
 /// Reads a whole file. Throws InputError for a missing file, bad syntax (with line and column), a key given
 /// twice in one object, a number that double can't hold, and nesting deeper than 32 levels.
 nlohmann::json read_json(const std::filesystem::path& path);
+/// The same of a text, which messages call `name`.
+nlohmann::json parse_json(std::string_view text, const std::string& name);
 
 /// One value inside a JSON file, with its place. The view must not outlive the JSON.
 class JsonView {

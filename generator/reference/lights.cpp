@@ -14,6 +14,9 @@ namespace {
 
 using Vector = Vec3<double>;
 
+/// Colours out of the working space's gamut have negative components, which need samples as well.
+Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.g), std::abs(c.b)}; }
+
 }  // namespace
 
 EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(*environment.image) {
@@ -34,7 +37,7 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(
       for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i)
           sum += (i == 0 ? 0.75 : 0.125) * (j == 0 ? 0.75 : 0.125) *
-                 luminance(image.color((x + i + width_) % width_, std::clamp(y + j, 0, height_ - 1)));
+                 luminance(magnitude(image.color((x + i + width_) % width_, std::clamp(y + j, 0, height_ - 1))));
       weight[std::size_t(y) * width_ + x] = sum * solid_angle;
       total += sum * solid_angle;
     }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace brdfc::reference {
@@ -17,9 +18,12 @@ struct Mesh {
   std::vector<std::array<std::int32_t, 3>> triangles;
 };
 
-/// OBJ, PLY or another format that assimp reads. `smooth`: normals of the file, or averaged where it has none;
-/// otherwise flat. Throws InputError naming the file.
-Mesh read_mesh(const std::filesystem::path& path, bool smooth);
+/// An OBJ, PLY, STL or glTF file (.gltf, .glb). `smooth`: normals of the file, or averaged where an OBJ or PLY file has
+/// none; otherwise flat. `of_material`: only the faces of that material of the file, if it is not empty. To `notes` are
+/// added lines that start with the file's name: how many triangles it has, what of the file is left out or assumed.
+/// Throws InputError naming the file.
+Mesh read_mesh(const std::filesystem::path& path, bool smooth, const std::string& of_material = {},
+               std::vector<std::string>* notes = nullptr);
 
 /// NumPy's format 1.0, C order, little endian: float32 or int32 of shape (rows, columns).
 template <class T>

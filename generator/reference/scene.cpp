@@ -175,6 +175,11 @@ class Loader {
     out["up"] = {up.x, up.y, up.z};
   }
 
+  /// Says something once.
+  void note(const std::string& text) {
+    if (std::ranges::find(scene_.notes, text) == scene_.notes.end()) scene_.notes.push_back(text);
+  }
+
   std::shared_ptr<const Image> keep(Image image, std::string& name) {
     name = image_name(image);
     auto& slot = scene_.image_files[name];
@@ -182,31 +187,64 @@ class Loader {
     return slot;
   }
 
-  std::shared_ptr<const Image> read_texture(const JsonView& j, json& resolved) {
+  Image read_picture(const JsonView& j, const std::string& space) {
+    std::vector<std::string> notes;
+    Image image = read_file(j, [&](const fs::path& f) { return read_image(f, colors(), space, &notes); });
+    for (const std::string& text : notes) note(text);
+    return image;
+  }
+
+  /// What an image's "colorspace" says, "auto" without it.
+  std::string read_colorspace(const JsonView& j) {
+    const auto v = j.find("colorspace");
+    if (!v) return "auto";
+    const std::string space = v->text();
+    std::vector<std::string> known{"auto", "linear", "srgb"};
+    if (std::ranges::find(known, space) != known.end() || colors().has_space(space)) return space;
+    for (const std::string& name : colors().spaces()) known.push_back(name);
+    v->fail(fmt::format("one of {}", fmt::join(known, ", ")));
+  }
+
+  std::shared_ptr<const Image> read_texture(const JsonView& j, const ParamInfo& info, json& resolved) {
     Image image;
-    if (j.json().is_string()) {
-      image = read_file(j, [&](const fs::path& f) { return read_image(f, colors()); });
-    } else if (j.has("procedural")) {
+    if (j.json().is_object() && j.has("procedural")) {
       j.at("procedural").choice({"checker"});
       j.only({"procedural", "a", "b", "cells"});
       const auto a = j.at("a").numbers<3>(0, kBright), b = j.at("b").numbers<3>(0, kBright);
       image = checker_texture({a[0], a[1], a[2]}, {b[0], b[1], b[2]}, j.at("cells").integer(1, 256));
     } else {
-      j.only({"image", "colorspace"});
-      std::string space = "auto";
-      if (const auto v = j.find("colorspace")) {
-        space = v->text();
-        std::vector<std::string> known{"auto", "linear", "srgb"};
-        for (const std::string& name : colors().spaces()) known.push_back(name);
-        if (std::find(known.begin(), known.end(), space) == known.end())
-          v->fail(fmt::format("one of {}", fmt::join(known, ", ")));
-      }
-      image = read_file(j.at("image"), [&](const fs::path& f) { return read_image(f, colors(), space); });
+      const bool named = j.json().is_string();
+      if (!named) j.only({"image", "colorspace"});
+      const JsonView file = named ? j : j.at("image");
+      image = read_picture(file, named ? "auto" : read_colorspace(j));
+      limit(image, info, beside(file.text()).string());
     }
     std::string name;
     auto kept = keep(std::move(image), name);
     resolved = {{"texture", {{"image", name}, {"colorspace", "linear"}}}};
     return kept;
+  }
+
+  static std::size_t channels_of(const ParamInfo& info) { return info.kind == ParamKind::Number ? 1 : 3; }
+
+  /// What is beyond the range of the parameter becomes the end of it, as in the shaders.
+  void limit(Image& image, const ParamInfo& info, const std::string& name) {
+    std::size_t count = 0, first = 0;
+    float worst = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+      for (std::size_t c = 0; c < channels_of(info); ++c) {
+        float& x = image.rgb[i + c];
+        const float inside = std::clamp(x, float(info.min), float(info.max));
+        if (x == inside) continue;
+        if (count++ == 0) first = i / 3, worst = x;
+        x = inside;
+      }
+    if (count)
+      note(
+          fmt::format("{}: {} outside of [{:g}, {:g}], the range of \"{}\", the first {:g} at ({}, {}); taken for the "
+                      "end of the range",
+                      name, count == 1 ? "1 value is" : fmt::format("{} values are", count), info.min, info.max,
+                      info.name, worst, first % image.width, first / image.width));
   }
 
   ParamValue read_value(const JsonView& j, const ParamInfo& info) {
@@ -220,9 +258,10 @@ class Loader {
   }
 
   /// Those that a substance sets, in the working space.
-  ParamValues optical_parameters(const JsonView& j, const ModelInfo& info, std::optional<double> thickness) const {
+  ParamValues optical_parameters(const JsonView& j, const ModelInfo& info, std::optional<double> thickness) {
     try {
       const Substance substance = find_substance(j.text(), path_.parent_path());
+      for (const std::string& text : substance.notes) note(text);
       return parameters_of(
           info, substance, [&](const Xyz& xyz) { return colors().from_xyz(xyz); }, thickness);
     } catch (const InputError& e) {
@@ -267,7 +306,7 @@ class Loader {
           } else if (value.json().is_object()) {
             value.only({"texture"});
             if (p->kind == ParamKind::Choice) value.error("a choice can't be textured");
-            const auto image = read_texture(value.at("texture"), resolved["parameters"][name]);
+            const auto image = read_texture(value.at("texture"), *p, resolved["parameters"][name]);
             material.values[name] = texture_mean(value, *p, *image);
             material.textures[name] = image;
           } else {
@@ -289,10 +328,9 @@ class Loader {
 
   /// The mean, after a check that every texel is in the range of the parameter.
   static ParamValue texture_mean(const JsonView& j, const ParamInfo& info, const Image& image) {
-    const int channels = info.kind == ParamKind::Number ? 1 : 3;
     std::array<double, 3> sum{0, 0, 0};
     for (std::size_t i = 0; i < image.rgb.size(); i += 3)
-      for (int c = 0; c < channels; ++c) {
+      for (std::size_t c = 0; c < channels_of(info); ++c) {
         const double x = image.rgb[i + c];
         if (!(x >= info.min && x <= info.max))
           j.error(fmt::format("the texture has the value {:g} at pixel ({}, {}), expected [{:g}, {:g}]", x,
@@ -321,10 +359,13 @@ class Loader {
     if (type != "mesh") {
       mesh = read_shape_of_numbers(j, type);
     } else if (j.has("file")) {
-      j.only({"type", "file", "smooth"});
-      const auto smooth = j.find("smooth");
+      j.only({"type", "file", "smooth", "of_material"});
+      const auto smooth = j.find("smooth"), of_material = j.find("of_material");
       const bool s = smooth ? smooth->boolean() : true;
-      mesh = read_file(j.at("file"), [s](const fs::path& f) { return read_mesh(f, s); });
+      const std::string part = of_material ? of_material->text() : "";
+      std::vector<std::string> notes;
+      mesh = read_file(j.at("file"), [&](const fs::path& f) { return read_mesh(f, s, part, &notes); });
+      for (const std::string& text : notes) note(text);
     } else {
       j.only({"type", "vertices", "normals", "uvs", "triangles"});
       read_array(j.at("vertices"), mesh.vertices);
@@ -374,6 +415,9 @@ class Loader {
       material.fail(fmt::format("one of the materials {}", fmt::join(known, ", ")));
     }
     object.material = int(found - list.begin());
+    if (!found->textures.empty() && object.mesh->uvs.empty())
+      note(fmt::format("{}: the mesh has no UVs: the textures of \"{}\" show the colour of their lower left corner",
+                       j.key(), id));
     resolved["material"] = id;
     if (const auto v = j.find("camera_only")) object.camera_only = v->boolean();
     resolved["camera_only"] = object.camera_only;
@@ -486,6 +530,21 @@ class Loader {
       scene_.lights.push_back(std::move(light));
   }
 
+  /// They stay what they are, as in Cycles.
+  void note_negative(const Image& image, const std::string& name) {
+    std::size_t count = 0, first = 0;
+    float least = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); ++i)
+      if (image.rgb[i] < 0) {
+        if (count++ == 0) first = i / 3;
+        least = std::min(least, image.rgb[i]);
+      }
+    if (count)
+      note(fmt::format("{}: {} negative, the first at ({}, {}), the least {:g}; they take light away, as in Cycles",
+                       name, count == 1 ? "1 value is" : fmt::format("{} values are", count), first % image.width,
+                       first / image.width, least));
+  }
+
   static Vector read_direction(const JsonView& j) {
     const Vector d = vector_of(j.numbers<3>(-kFar, kFar));
     if (!(length(d) > 1e-9)) j.fail("a direction that is not zero");
@@ -500,10 +559,9 @@ class Loader {
     if (j && (j->has("image") || j->has("procedural"))) {
       Image image;
       if (j->has("image")) {
-        j->only({"image", "strength"});
-        image = read_file(j->at("image"), [&](const fs::path& f) { return read_image(f, colors()); });
-        for (const float x : image.rgb)
-          if (x < 0) j->at("image").error("the image has negative values");
+        j->only({"image", "colorspace", "strength"});
+        image = read_picture(j->at("image"), read_colorspace(*j));
+        note_negative(image, beside(j->at("image").text()).string());
       } else {
         j->only({"procedural", "width", "strength"});
         const std::string name = j->at("procedural").choice({"sky", "interior", "checker"});

@@ -119,6 +119,9 @@ struct Scene {
   std::vector<Light> lights;
   Environment environment;
 
+  /// What was assumed or left out of its files, and how many triangles each mesh file has: lines for people.
+  std::vector<std::string> notes;
+
   /// The same scene with every default written out and meshes and images named by their content.
   nlohmann::json resolved;
   std::map<std::string, std::shared_ptr<const Mesh>> mesh_files;    ///< by the stem of their names

@@ -68,6 +68,7 @@ class Substance:
     source: str  #: who measured it; may be empty
     n: Curve
     k: Curve  #: empty where none is given
+    notes: tuple[str, ...] = ()  #: of a file: what was assumed, or left out of it
 
     def _mean(self, formula):
         nm = _optics.WAVELENGTHS
@@ -155,16 +156,86 @@ def _number(text):
     return value if math.isfinite(value) else None
 
 
-def _check_row(letter, micrometres, value, last, where):
-    if last is not None and not micrometres * 1000 > last:
-        got = f"{micrometres:g} after {last / 1000:g}"
-        raise ValueError(f"{where}: expected wavelengths that increase, got {got}")
-    good = value > 0 if letter == "n" else value >= 0
-    if not good or value > _optics.MAX_INDEX:
-        low = "(0" if letter == "n" else "[0"
-        raise ValueError(
-            f"{where}: expected {letter} in {low}, {_optics.MAX_INDEX:g}], got {value:g}"
-        )
+def _counted(count, one, several):
+    return one if count == 1 else several.format(count)
+
+
+class _Cleaner:
+    """What is said of a file on the way from its rows to a curve."""
+
+    def __init__(self, path):
+        self.path, self.notes = path, []
+
+    def note(self, text):
+        self.notes.append(f"{self.path}: {text}")
+
+    def in_nanometres(self, rows):
+        """Whether wavelengths are nanometres."""
+        for wavelength, _, line in rows:
+            if not wavelength > 0:
+                got = f"got {wavelength:g}"
+                raise ValueError(f"{self.path} line {line}: expected a wavelength above 0, {got}")
+            if wavelength < _optics.NANOMETRES:
+                return False
+        self.note("wavelengths of 100 and more are taken for nanometres")
+        return True
+
+    def curve(self, rows, letter, nanometres):
+        rows = [(w * (1 if nanometres else 1000), value, line) for w, value, line in rows]
+        rows = sorted(self._without_bad(rows, letter), key=lambda row: row[0])
+        values: dict[float, list[float]] = {}
+        for wavelength, value, _ in rows:
+            values.setdefault(wavelength, []).append(value)
+        twice = [w for w, several in values.items() if len(several) > 1]
+        if twice:
+            what = _counted(
+                len(twice),
+                f"1 wavelength of {letter} stands",
+                f"{{}} wavelengths of {letter} stand",
+            )
+            self.note(f"{what} twice, the first {twice[0] / 1000:g} µm: the mean is taken")
+        curve = Curve(tuple(values), tuple(sum(v) / len(v) for v in values.values()))
+        return self._spanning(curve, letter)
+
+    def _without_bad(self, rows, letter):
+        kept, dropped, negative = [], 0, []
+        low, high = _optics.SEEN
+        interval = f"{'(' if letter == 'n' else '['}0, {_optics.MAX_INDEX:g}]"
+        for wavelength, value, line in rows:
+            if letter == "k" and -_optics.NOISE_OF_K <= value < 0:
+                negative.append(value)
+                value = 0.0
+            if (value > 0 if letter == "n" else value >= 0) and value <= _optics.MAX_INDEX:
+                kept.append((wavelength, value, line))
+            elif low <= wavelength <= high:
+                raise ValueError(
+                    f"{self.path} line {line}: expected {letter} in {interval}, got {value:g}"
+                )
+            else:
+                dropped += 1
+        if negative:
+            what = _counted(len(negative), "1 value of k is", "{} values of k are")
+            self.note(f"{what} below 0, the least {min(negative):g}: taken for 0")
+        if dropped:
+            what = _counted(dropped, "1 value", "{} values")
+            self.note(f"{what} of {letter} outside of {interval} and of the visible: left out")
+        return kept
+
+    def _spanning(self, curve, letter):
+        if not curve.nm:
+            return curve
+        front, back = curve.nm[0], curve.nm[-1]
+        span = f"{front / 1000:g} to {back / 1000:g}"
+        if letter == "k" and (front > _optics.SEEN[1] or back < _optics.SEEN[0]):
+            self.note(f"k from {span} µm, outside of the visible: left out")
+            return Curve((), ())
+        low, high = _optics.NEEDED
+        if front > low or back < high:
+            needed = f"{low / 1000:g} to {high / 1000:g}"
+            raise ValueError(f"{self.path}: expected {letter} from {needed} µm, got {span}")
+        if front > _optics.EXPECTED[0] or back < _optics.EXPECTED[1]:
+            self.note(f"{letter} from {span} µm: taken for constant beyond")
+        return curve
 
 
 def _header(fields, found, where):
@@ -181,14 +252,16 @@ def _header(fields, found, where):
 def read(path: str | PathLike[str]) -> Substance:
     """Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in
     micrometres and n, then the same of wl,k, which may be missing; or wl,n,k. Lines that start with
-    # are skipped; the first is the label, the second the source.
+    # are skipped; the first is the label, the second the source. Wavelengths of 100 and more are
+    nanometres; rows may come in any order, and of a wavelength that stands twice the mean is taken.
+    What was assumed is said in `notes`.
 
     Raises OSError, and ValueError naming file, line and what was expected.
     """
     path = Path(path)
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     comments, block = [], []
-    found: dict[str, list[tuple[float, float]]] = {"n": [], "k": []}
+    found: dict[str, list[tuple[float, float, int]]] = {"n": [], "k": []}
     for number, line in enumerate(text.split("\n"), 1):
         line, where = line.strip(" \t\r"), f"{path} line {number}"
         if not line:
@@ -210,21 +283,13 @@ def read(path: str | PathLike[str]) -> Substance:
                 f"{' and '.join(block)}, got '{line}'"
             )
         for letter, value in zip(block, row[1:], strict=True):
-            rows = found[letter]
-            _check_row(letter, row[0], value, rows[-1][0] if rows else None, where)
-            rows.append((row[0] * 1000, value))
+            found[letter].append((row[0], value, number))
     if not found["n"]:
         raise ValueError(f"{path}: expected a line wl,n and rows below it, found no n")
-    low, high = _optics.NEEDED
-    for letter, rows in found.items():
-        if rows and (rows[0][0] > low or rows[-1][0] < high):
-            raise ValueError(
-                f"{path}: expected {letter} from {low / 1000:g} to {high / 1000:g} µm, "
-                f"got {rows[0][0] / 1000:g} to {rows[-1][0] / 1000:g}"
-            )
+    cleaner = _Cleaner(path)
+    nanometres = cleaner.in_nanometres(found["n"] + found["k"])
+    curves = [cleaner.curve(rows, letter, nanometres) for letter, rows in found.items()]
+    if not curves[0].nm:
+        raise ValueError(f"{path}: expected n in the visible, found none")
     label, source = [*comments, "", ""][:2]
-    curves = [
-        Curve(*(tuple(c) for c in zip(*rows, strict=True))) if rows else Curve((), ())
-        for rows in found.values()
-    ]
-    return Substance(str(path), label or path.stem, source, *curves)
+    return Substance(str(path), label or path.stem, source, *curves, tuple(cleaner.notes))

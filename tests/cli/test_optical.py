@@ -268,6 +268,46 @@ def test_a_slab_of_the_stated_thickness_has_the_exact_colour(tmp_path):
     np.testing.assert_allclose(pixels.mean((0, 1)), expected, atol=3e-3)
 
 
+#: A file, and what others have that is to be read like it, with what is said of it.
+GOOD = "wl,n,k\n0.38,1.54,0.001\n0.6,1.5,0.0005\n1.2,1.4,0.002\n"
+ODD = {
+    GOOD.replace("0.38", "0.42"): ("n from 0.42 to 1.2 µm: taken for constant", "k from 0.42"),
+    GOOD.replace("0.38", "380").replace("0.6,", "600,").replace("1.2,", "1200,"): (
+        "wavelengths of 100 and more are taken for nanometres",
+    ),
+    GOOD + "1.2,1.42,0.004\n1.4,1.4,0\n": ("1 wavelength of n stands twice", "1 wavelength of k"),
+    "wl,n,k\n" + "\n".join(reversed(GOOD.split("\n")[1:-1])): (),
+    GOOD + "2,1.4,-1.6e-9\n": ("1 value of k is below 0, the least -1.6e-09: taken for 0",),
+    GOOD + "20,1.4,180\n": ("1 value of k outside of [0, 100] and of the visible: left out",),
+    GOOD + "20,-1,0\n": ("1 value of n outside of (0, 100] and of the visible: left out",),
+    GOOD.replace("wl,n,k", "wl,n")
+    .replace(",0.001", "")
+    .replace(",0.0005", "")
+    .replace(",0.002", "")
+    + "wl,k\n2,0.1\n3,0.2\n": ("k from 2 to 3 µm, outside of the visible: left out",),
+}
+
+
+@pytest.mark.parametrize("text", ODD, ids=range(len(ODD)))
+def test_what_files_of_others_have_is_assumed_and_said(tmp_path, optics, text):
+    """The visible is what it is without the oddity; the tool and the package say the same."""
+    file = tmp_path / "odd.csv"
+    file.write_text(GOOD, encoding="utf-8")
+    plain = optical(file)
+    file.write_text(text, encoding="utf-8")
+    done = run("optical", file, "--json")
+    assert done.returncode == 0, done.stderr
+    said, read = done.stderr.splitlines(), optics.read(file)
+    assert said == [f"brdfc: {note}" for note in read.notes] and len(said) == len(ODD[text])
+    for line, words in zip(said, ODD[text], strict=True):
+        assert line.startswith(f"brdfc: {file}: ") and words in line, line
+    told = json.loads(done.stdout)[0] if done.stdout.startswith("[") else json.loads(done.stdout)
+    assert told["n_d"] == pytest.approx(plain["n_d"], abs=2e-3)
+    assert read.index_d == pytest.approx(told["n_d"])
+    np.testing.assert_allclose(told["reflectance"], plain["reflectance"], atol=1e-3)
+    assert (told["absorption"] is not None) is read.absorbs is ("wl,k" not in text)
+
+
 #: What is wrong, and what is said, the file's name left out.
 BAD = {
     "": ": expected a line wl,n and rows below it, found no n",
@@ -283,11 +323,12 @@ BAD = {
     "wl,n\n0.3,1.5,2\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3,1.5,2'",
     "wl,n\n0.3,nan\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3,nan'",
     "wl,n,k\n0.3,1\n": " line 2: expected 3 numbers, a wavelength in µm and n and k, got '0.3,1'",
-    "wl,n\n0.4,1.5\n0.4,1.5\n": " line 3: expected wavelengths that increase, got 0.4 after 0.4",
+    "wl,n\n0,1.5\n0.4,1.5\n": " line 2: expected a wavelength above 0, got 0",
     "wl,n\n0.4,0\n": " line 2: expected n in (0, 100], got 0",
-    "wl,n\n0.4,1\nwl,k\n0.4,-2\n": " line 4: expected k in [0, 100], got -2",
-    "wl,n\n380,1.5\n780,1.5\n": ": expected n from 0.4 to 0.7 µm, got 380 to 780",
-    "wl,n\n0.3,1\n0.8,1\nwl,k\n0.5,1\n": ": expected k from 0.4 to 0.7 µm, got 0.5 to 0.5",
+    "wl,n\n0.3,1\n0.8,1\nwl,k\n0.4,-2\n": " line 5: expected k in [0, 100], got -2",
+    "wl,n\n0.45,1.5\n0.78,1.5\n": ": expected n from 0.43 to 0.65 µm, got 0.45 to 0.78",
+    "wl,n\n1,0\n2,0\n": ": expected n in the visible, found none",
+    "wl,n\n0.3,1\n0.8,1\nwl,k\n0.5,1\n": ": expected k from 0.43 to 0.65 µm, got 0.5 to 0.5",
 }
 
 

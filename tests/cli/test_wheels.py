@@ -140,14 +140,14 @@ def test_what_is_missing_is_said(environment, tmp_path, monkeypatch):
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
         return done.stderr
 
-    wrong = said(lambda b: b.replace(b"libassimp.so.5\0", b"libassimp.so.9\0"))
-    assert wrong.startswith("brdfc: shared libraries are missing: libassimp.so.9; on Debian 12: ")
+    wrong = said(lambda b: b.replace(b"libembree3.so.3\0", b"libembree3.so.9\0"))
+    assert wrong.startswith("brdfc: shared libraries are missing: libembree3.so.9; on Debian 12: ")
     assert wrong.endswith(f"install {' '.join(sorted(set(brdfc_tool.PACKAGES.values())))}\n")
     # One that this system has, but not in the folders where it lies: the wheel knows whose it is.
     program.write_bytes(right)
-    known = call + "t.PACKAGES['libassimp.so.9'] = 'libassimp9'; sys.argv[1:] = []; t.main()"
-    program.write_bytes(right.replace(b"libassimp.so.5\0", b"libassimp.so.9\0"))
-    assert run(environment, "python", "-c", known).stderr.endswith("install libassimp9\n")
+    known = call + "t.PACKAGES['libembree3.so.9'] = 'libembree3-9'; sys.argv[1:] = []; t.main()"
+    program.write_bytes(right.replace(b"libembree3.so.3\0", b"libembree3.so.9\0"))
+    assert run(environment, "python", "-c", known).stderr.endswith("install libembree3-9\n")
     wrong = said(lambda b: b.replace(b"/ld-linux-x86-64.so.2\0", b"/ld-linux-x86-65.so.2\0"))
     assert "expected a system like that on which this wheel was built" in wrong
 

@@ -11,7 +11,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::expect_value_or_input_error([&] { reference::read_npy<float>(path, 3); });
     return 0;
   }
-  const auto path = fuzz::write(data[0] % 3 ? "a.obj" : "a.ply", data + 1, size - 1);
-  fuzz::expect_value_or_input_error([&] { reference::read_mesh(path, data[0] & 8); });
+  static constexpr const char* kNames[] = {"a.obj", "a.ply", "a.stl", "a.gltf", "a.glb"};
+  const auto path = fuzz::write(kNames[data[0] / 3 % 5], data + 1, size - 1);
+  fuzz::expect_value_or_input_error([&] { reference::read_mesh(path, data[0] & 128); });
   return 0;
 }

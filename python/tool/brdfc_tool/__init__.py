@@ -13,7 +13,6 @@ PACKAGES = {
     "libOpenImageIO.so.2.4": "libopenimageio2.4",
     "libOpenImageIO_Util.so.2.4": "libopenimageio2.4",
     "libarchive.so.13": "libarchive13",
-    "libassimp.so.5": "libassimp5",
     "libcrypto.so.3": "libssl3",
     "libembree3.so.3": "libembree3-3",
     "libfmt.so.9": "libfmt9",

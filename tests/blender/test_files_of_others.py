@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Cycles makes of images with values that are not finite or negative, as the tool assumes; and
+the scene loader under OpenColorIO configurations of studios."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from helpers import add_camera, open_image_io, render_passes
+
+DRIVER = Path(__file__).parents[2] / "script" / "render_scene.py"
+
+
+def write(path, pixels):
+    oiio = open_image_io()
+    height, width, channels = pixels.shape
+    buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, channels, oiio.FLOAT))
+    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels, np.float32))
+    assert buffer.write(str(path))
+
+
+def test_what_is_not_finite_is_black_and_what_is_negative_stays(empty, tmp_path):
+    """From 5.2 on the whole pixel is black, which is what the tool makes of it; before, in some
+    places its other channels stay."""
+    pixels = np.full((4, 4, 3), 0.5)
+    pixels[0, 1, 0], pixels[1, 2], pixels[2, 0, 1] = np.nan, np.inf, -np.inf
+    pixels[3, 3], pixels[3, 0, 2] = -2, -6e-8
+    write(tmp_path / "a.exr", pixels)
+    image = bpy.data.images.load(str(tmp_path / "a.exr"))
+    image.colorspace_settings.is_data = True
+    mesh = bpy.data.meshes.new("plane")
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    layer = mesh.uv_layers.new()
+    for corner, uv in zip(layer.data, [(0, 0), (1, 0), (1, 1), (0, 1)], strict=True):
+        corner.uv = uv
+    material = bpy.data.materials.new("m")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    picture = tree.nodes.new("ShaderNodeTexImage")
+    picture.image, picture.interpolation = image, "Closest"
+    emission = tree.nodes.new("ShaderNodeEmission")
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(picture.outputs[0], emission.inputs[0])
+    tree.links.new(emission.outputs[0], output.inputs[0])
+    mesh.materials.append(material)
+    empty.collection.objects.link(bpy.data.objects.new("plane", mesh))
+    add_camera(empty, (0, 0, 5), (0, 0, 0), orthographic=2)
+    empty.render.resolution_x = empty.render.resolution_y = 4
+    empty.cycles.samples, empty.cycles.use_denoising = 1, False
+    empty.cycles.pixel_filter_type = "BOX"
+    seen = render_passes(empty)["Combined"][::-1, :, :3]
+    bad = ~np.isfinite(pixels)
+    of_pixel = np.broadcast_to(bad.any(-1, keepdims=True), bad.shape)
+    assert (seen[of_pixel if bpy.app.version >= (5, 2) else bad] == 0).all()
+    kept = ~of_pixel & (pixels != -6e-8)
+    np.testing.assert_allclose(seen[kept], pixels[kept], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "config",
+    ["cg-config-v1.0.0_aces-v1.3_ocio-v2.1", "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"],
+)
+def test_scenes_load_under_configurations_of_aces(extension_zip, tmp_path, config):
+    """Numbers of the working space pass as they are; a preview has the display's default view."""
+    sky = np.full((4, 8, 3), [0.2, 0.6, 0.1])
+    write(tmp_path / "sky.exr", sky)
+    content = {
+        "name": "sky",
+        "settings": {"width": 4, "height": 4, "spp": 1, "max_bounces": 1},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -4, 0],
+            "look_at": [0, 0, 0],
+            "fov_y_degrees": 25,
+        },
+        "materials": {},
+        "objects": [],
+        "lights": [],
+        "environment": {"image": "sky.exr", "strength": 1},
+    }
+    (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+    for out in ("a.exr", "a.png"):
+        done = subprocess.run(
+            [sys.executable, DRIVER, "--extension", extension_zip, "--scene", tmp_path / "s.json"]
+            + ["--out", tmp_path / out],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"OCIO": f"ocio://{config}"},
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+    found = open_image_io().ImageBuf(str(tmp_path / "a.exr")).get_pixels()[..., :3]
+    np.testing.assert_allclose(found, np.broadcast_to([0.2, 0.6, 0.1], found.shape), rtol=1e-4)
