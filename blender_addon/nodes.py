@@ -203,7 +203,8 @@ def _fill_group(group, model_name, representation, texts, twin_group):
         of_twin = {i: sources.get(name) for name, i in twin_group[TAG]["sockets"].items()}
         instead = stand_in.twin_of(group, twin_group, of_twin)
     elif stand_in.has_node(model_name) and "baked" not in tag:
-        instead = stand_in.node_of(group, model_name, sources)
+        constants = pack.constants(model_name, representation)
+        instead = stand_in.node_of(group, model_name, sources, constants)
     if instead is not None:
         tag["stands_in"] = True
         runs = _add_script(group, stand_in.text(), "what tells where shaders run")
@@ -291,9 +292,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
             "digest": pack.digest(model_name, representation),
             "made_by": pack.manifest()["generator"],
             "choices": json.dumps(pack.form_choices(model_name, representation)),
-            "only": json.dumps(
-                pack.fixed(model_name) | pack.form_values(model_name, representation)
-            ),
+            "only": json.dumps(pack.constants(model_name, representation)),
         }
         if baked:
             # The pack will be gone.

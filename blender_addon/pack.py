@@ -217,6 +217,12 @@ def form_values(model_name, name):
     return canonical(model(model_name)["representations"][name]["only"])
 
 
+def constants(model_name, name):
+    """Values of the parameters for which a form has no socket, since this pack or the form has one
+    value of them alone."""
+    return fixed(model_name) | form_values(model_name, name)
+
+
 def form_choices(model_name, name):
     """Identifiers of every choice as a form has them: one where the form exists for that alone."""
     only = form_values(model_name, name)

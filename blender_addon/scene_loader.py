@@ -374,8 +374,8 @@ def _material(name, view, representation, native):
                     values[key] = pack.check_value(model, key, parameter.value)
                 except ValueError as error:
                     raise ValueError(f"{view.file}: {parameter.path}: {error}") from error
-    defaults = {p["name"]: p["default"] for p in pack.parameters(model).values()}
-    defaults = {k: tuple(v) if isinstance(v, list) else v for k, v in defaults.items()}
+    defaults = pack.canonical({p["name"]: p["default"] for p in pack.parameters(model).values()})
+    defaults |= pack.fixed(model)
     if representation is None:
         representation = view.get("representation").text() if view.has("representation") else "auto"
     if representation in NATIVE:

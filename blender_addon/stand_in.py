@@ -62,21 +62,28 @@ def has_node(model_name):
     return model_name in _NODES
 
 
-def node_of(group, model_name, parameters):
-    """The outputs, by name, of the node that stands in for a model. `parameters`: outputs by
-    name."""
+def node_of(group, model_name, parameters, constants):
+    """The outputs, by name, of the node that stands in for a model. `parameters`: outputs by name.
+    `constants`: values of the parameters that have no socket."""
     kind, given = _NODES[model_name]
     node = group.nodes.new(kind)
     if kind == "ShaderNodeBsdfMetallic":
         node.fresnel_type = "PHYSICAL_CONDUCTOR"
     node.inputs["Roughness"].default_value = 0.0
+
+    def give(socket, name):
+        if name in parameters:
+            group.links.new(parameters[name], socket)
+        else:
+            socket.default_value = constants[name]
+
     for name, source in given.items():
         if isinstance(source, str):
-            group.links.new(parameters[source], node.inputs[name])
+            give(node.inputs[name], source)
             continue
         vector = group.nodes.new("ShaderNodeCombineXYZ")
         for part, socket in zip(source, vector.inputs, strict=True):
-            group.links.new(parameters[part], socket)
+            give(socket, part)
         group.links.new(vector.outputs[0], node.inputs[name])
     return {"BSDF": node.outputs["BSDF"]}
 

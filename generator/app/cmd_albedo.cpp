@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "core/csv.h"
 #include "core/process.h"
 #include "measure/albedo.h"
@@ -35,9 +36,8 @@ void add_albedo_command(CLI::App& app) {
       "        (the albedo includes the mirror and what is refracted)");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  cmd->add_option("--count", o->count, "So many cosines from 0.01 to 1; stdin is not read")
-      ->check(CLI::Range(2, 1 << 20));
-  cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
+  add_number(*cmd, "--count", o->count, {2, 1 << 20}, "So many cosines from 0.01 to 1; stdin is not read");
+  add_number(*cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
   cmd->add_flag("--store", o->store,
                 "Instead makes the table of all parameters anew that packs are built of, and keeps it in\n"
                 "data/albedos, in place of what is kept of the model")

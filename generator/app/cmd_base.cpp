@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc base: how much of a model its base carries, and what noise is left.
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "core/csv.h"
 #include "forms/base.h"
 #include "measure/bound_model.h"
@@ -27,11 +28,9 @@ void add_base_command(CLI::App& app) {
       "        leave the least variance, the variances, and the most that one direction of the rest brings");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  cmd->add_option("--angles", o->angles, "Angles of the view to the normal in degrees")
-      ->delimiter(',')
-      ->check(CLI::Range(0.0, 89.999));
-  cmd->add_option("--phi", o->phi, "Azimuth of the view direction in radians")->check(CLI::Range(-7.0, 7.0));
-  cmd->add_option("--points", o->points, "Directions for each view")->check(CLI::Range(64, 1 << 26));
+  add_numbers(*cmd, "--angles", o->angles, {0, 89.999}, "Angles of the view to the normal in degrees");
+  add_number(*cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
+  add_number(*cmd, "--points", o->points, {64, 1 << 26}, "Directions for each view");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     if (!model.has_base()) input_error("{}: has no base: expected a model that declares one", o->model);

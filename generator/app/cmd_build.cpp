@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "check/check.h"
 #include "core/data_dir.h"
 #include "core/parse.h"
@@ -29,7 +30,7 @@ namespace {
 
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false;
-  std::optional<std::string> error, time;
+  std::optional<double> error, time;  ///< percent of the light; units of Blender's Glossy node
   std::string scene, materials, out, osl, addon;
   std::vector<std::string> models;
 };
@@ -160,27 +161,6 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
 }
 
-/// A finite number, which may end in `unit`.
-std::optional<double> parse_number(std::string_view text, char unit) {
-  const auto value = parse(text.substr(0, text.size() - text.ends_with(unit)));
-  return value && std::isfinite(*value) ? value : std::nullopt;
-}
-
-/// A budget of time in units of Blender's Glossy node.
-double parse_time(const std::string& text) {
-  const auto value = parse_number(text, 'x');
-  if (!value || *value <= 0) input_error("build: --time: expected a positive number, as 1.2 or 1.2x, got '{}'", text);
-  return *value;
-}
-
-/// A part of the light, from percent of it.
-double parse_error(const std::string& text) {
-  const auto value = parse_number(text, '%');
-  if (!value || *value < 0 || *value > 100)
-    input_error("build: --error: expected percent from 0 to 100, as 5 or 5%, got '{}'", text);
-  return *value / 100;
-}
-
 /// The models as OSL that needs no extension. All texts are made before the first is written.
 void write_osl(const Options& options) {
   if (!options.scene.empty() || !options.materials.empty() || !options.out.empty() || !options.addon.empty() ||
@@ -221,9 +201,9 @@ void run(const Options& options) {
   const std::filesystem::path costs = addon / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
   plan::Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, plan::Costs(costs)};
-  if (options.error) budget.error = parse_error(*options.error);
+  if (options.error) budget.error = *options.error / 100;
   if (options.time) {
-    budget.time = parse_time(*options.time);
+    budget.time = options.time;
     if (!std::filesystem::exists(costs))
       input_error("{}: no such file, and --time needs what forms cost", costs.string());
   }
@@ -280,14 +260,16 @@ void add_build_command(CLI::App& app) {
   c->add_option("--materials", options->materials,
                 "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses")
       ->group(what);
-  c->add_option("--error", options->error,
-                "Percent of the light (relative L1 of f cos), as 5%, that a fitted form may be off, where a material\n"
-                "of a scene leaves its form open, or beside the sampled form of a .blend; without, no form is fitted\n"
-                "unasked")
+  add_number(*c, "--error", options->error,
+             {.low = 0, .high = 100, .unit = '%', .in_words = "percent from 0 to 100, as 5 or 5%"},
+             "Percent of the light (relative L1 of f cos), as 5%, that a fitted form may be off, where a material\n"
+             "of a scene leaves its form open, or beside the sampled form of a .blend; without, no form is fitted\n"
+             "unasked")
       ->group(forms);
-  c->add_option("--time", options->time,
-                "What a form may cost, as 1.2x, in CPU time of Blender's Glossy node at equal samples, where a\n"
-                "material leaves its form open; --explain prints what forms cost")
+  add_number(*c, "--time", options->time,
+             {.low = 0, .above_low = true, .unit = 'x', .in_words = "a positive number, as 1.2 or 1.2x"},
+             "What a form may cost, as 1.2x, in CPU time of Blender's Glossy node at equal samples, where a\n"
+             "material leaves its form open; --explain prints what forms cost")
       ->group(forms);
   c->add_flag("--fit", options->fit_bases,
               "Closures are fitted to the materials that can have it, as the base of their aimed forms, which are\n"

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "check/check.h"
 #include "measure/properties.h"
 
@@ -31,9 +32,8 @@ void add_check_command(CLI::App& app) {
   cmd->add_flag("--markdown", o->markdown, "Only the table of properties of all models, for a Markdown page")
       ->excludes(model)
       ->excludes(json);
-  cmd->add_option("--effort", o->check.effort, "Scales the numbers of cases, directions and samples")
-      ->check(CLI::Range(0.01, 1000.));
-  cmd->add_option("--seed", o->check.seed, "Seed of the random parameters and directions");
+  add_number(*cmd, "--effort", o->check.effort, {0.01, 1000}, "Scales the numbers of cases, directions and samples");
+  add_number(*cmd, "--seed", o->check.seed, {}, "Seed of the random parameters and directions");
   cmd->callback([o] {
     if (o->markdown) {
       fmt::print("{}", measure::property_table(true));

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "core/error.h"
 #include "reference/image.h"
 #include "report/statistics.h"
@@ -47,8 +48,8 @@ void add_compare_command(CLI::App& app) {
   command->add_flag("--json", options->json, "Print JSON instead of a table");
   command->add_option("--diff", options->diff,
                       "Write the difference as PNG: red where A is brighter, blue where darker");
-  command->add_option("--diff-scale", options->scale, "Difference shown in full colour, relative to the mean of B")
-      ->check(CLI::Range(1e-9, 1e9))
+  add_number(*command, "--diff-scale", options->scale, {1e-9, 1e9},
+             "Difference shown in full colour, relative to the mean of B")
       ->capture_default_str();
   CLI::Option* test = command->add_flag(
       "--test", options->test,
@@ -56,8 +57,8 @@ void add_compare_command(CLI::App& app) {
       "pixels and all tiles are accepted. Needs two A or more, and a B with a variance layer");
   command->add_option("--keep", options->keep, "Where the test fails: folder for both pictures, difference, p-values")
       ->needs(test);
-  command->add_option("--inject", options->inject, "Brighten A by this fraction first, to see whether the test notices")
-      ->check(CLI::Range(-1.0, 1.0))
+  add_number(*command, "--inject", options->inject, {-1, 1},
+             "Brighten A by this fraction first, to see whether the test notices")
       ->needs(test);
   command->callback([options] {
     const std::string name_a = options->files.front(), name_b = options->files.back();

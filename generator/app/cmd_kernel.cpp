@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "core/csv.h"
 #include "measure/kernel_fit.h"
 
@@ -47,9 +48,8 @@ void add_kernel_command(CLI::App& app) {
   cmd->add_option("file", o->file, "The curve")->required();
   const ParamInfo& n = *find_model("lossless").info().param("n");
   o->n = n.value[0];
-  cmd->add_option("--n", o->n, "Glossiness for which the curve is drawn")->capture_default_str();
-  cmd->callback([o, &n] {
-    if (!(o->n > 0 && o->n <= n.max)) input_error("--n: expected a number in (0, {}], got {}", n.max, o->n);
+  add_number(*cmd, "--n", o->n, {0, n.max, true}, "Glossiness for which the curve is drawn")->capture_default_str();
+  cmd->callback([o] {
     const measure::KernelFit fit = measure::fit_kernel(read_curve(o->file), o->n);
     std::string line;
     for (const char* name : {"n", "kernel", "h0", "h1", "h2", "h3"}) {

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "model/optical.h"
 #include "reference/color.h"
 
@@ -80,9 +81,8 @@ void add_optical_command(CLI::App& app) {
       "k leaves of light after a thickness.\n"
       "The working space is the role scene_linear of the configuration that OCIO names, else Rec.709.");
   cmd->add_option("name", o->name, "One of them, or a file NAME.csv as refractiveindex.info exports it; without: all");
-  cmd->add_option("--thickness", o->thickness,
-                  "Metres after which the absorption of a glass is exact; how far it is off over others is said")
-      ->check(CLI::Range(kThinnest, kThickest))
+  add_number(*cmd, "--thickness", o->thickness, {kThinnest, kThickest},
+             "Metres after which the absorption of a glass is exact; how far it is off over others is said")
       ->capture_default_str();
   cmd->add_flag("--json", o->json, "JSON, also with X, Y, Z over a perfect reflector's under D65");
   cmd->callback([o] {

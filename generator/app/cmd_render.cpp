@@ -8,6 +8,7 @@
 #include <csignal>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "core/process.h"
 #include "reference/color.h"
 #include "reference/image.h"
@@ -83,17 +84,15 @@ void add_render_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "Render the reference picture of a scene");
   command->add_option("SCENE", options->scene, "Scene file (.json)")->required();
   command->add_option("--out", options->out, "EXR to write, with a variance layer")->required();
-  command->add_option("--spp", options->spp, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 10000000));
-  command->add_option("--seed", options->seed, "Seed of the random numbers (default: the scene's)")
-      ->check(CLI::Range(0, 2147483647));
-  command->add_option("--threads", options->threads, "Threads (default: all); the picture does not depend on it")
-      ->check(CLI::Range(1, 1024));
-  command->add_option("--max-seconds", options->max_seconds, "Stop after this time, with at least one sample a pixel")
-      ->check(CLI::Range(0.001, 1e7));
-  CLI::Option* width = command->add_option("--width", options->width, "Pixels")->check(CLI::Range(1, 16384));
-  CLI::Option* height = command->add_option("--height", options->height, "Pixels")->check(CLI::Range(1, 16384));
-  command->add_option("--scale", options->scale, "Factor on the scene's resolution")
-      ->check(CLI::Range(0.001, 64.0))
+  add_number(*command, "--spp", options->spp, {1, 10000000}, "Samples a pixel (default: the scene's)");
+  add_number(*command, "--seed", options->seed, {0, 2147483647}, "Seed of the random numbers (default: the scene's)");
+  add_number(*command, "--threads", options->threads, {1, 1024},
+             "Threads (default: all); the picture does not depend on it");
+  add_number(*command, "--max-seconds", options->max_seconds, {0.001, 1e7},
+             "Stop after this time, with at least one sample a pixel");
+  CLI::Option* width = add_number(*command, "--width", options->width, {1, 16384}, "Pixels");
+  CLI::Option* height = add_number(*command, "--height", options->height, {1, 16384}, "Pixels");
+  add_number(*command, "--scale", options->scale, {0.001, 64}, "Factor on the scene's resolution")
       ->excludes(width)
       ->excludes(height);
   command
@@ -114,7 +113,7 @@ void add_render_command(CLI::App& app) {
       "--view", options->view,
       "View transform of the preview, of the OpenColorIO configuration that the environment variable OCIO\n"
       "names, such as AgX of Blender's own (default: Standard, or the display's own where there is none)");
-  command->add_option("--exposure", options->exposure, "Stops, for the preview")->check(CLI::Range(-64.0, 64.0));
+  add_number(*command, "--exposure", options->exposure, {-64, 64}, "Stops, for the preview");
   command->callback([options] {
     const std::filesystem::path out(options->out);
     if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "core/csv.h"
 #include "measure/bound_model.h"
 #include "reference/patterns.h"
@@ -41,15 +42,15 @@ void add_sample_command(CLI::App& app) {
                          "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  CLI::Option* count = cmd->add_option("--count", o->count, "Draw so many samples from own random numbers")
-                           ->check(CLI::Range(1, std::numeric_limits<int>::max()));
-  cmd->add_option("--seed", o->seed, "Seed of the random numbers")->needs(count);
+  CLI::Option* count =
+      add_number(*cmd, "--count", o->count, {.low = 1}, "Draw so many samples from own random numbers");
+  add_number(*cmd, "--seed", o->seed, {}, "Seed of the random numbers")->needs(count);
   cmd->add_option("--pattern", o->pattern,
                   "How they are placed, as those of a pixel are by the reference renderer: random, regular, jittered,\n"
                   "multi_jittered or hammersley")
       ->check(CLI::IsMember(reference::pattern_names()))
       ->needs(count);
-  cmd->add_option("--wo", o->wo, "View direction x,y,z")->delimiter(',')->expected(3)->needs(count);
+  add_numbers(*cmd, "--wo", o->wo, {}, "View direction x,y,z")->expected(3)->needs(count);
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "app/commands.h"
+#include "app/numbers.h"
 #include "measure/stability.h"
 #include "report/stability_page.h"
 
@@ -23,13 +24,11 @@ void add_stability_command(CLI::App& app) {
       "Rounding of double precision against 113 bits over everything a model accepts, float and recorded program\n"
       "against double, bad values (NaN, infinite, negative). Exit status 1 if one fails.");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
-  cmd->add_option("--points", o->hunt.points, "Places a model at which double is compared with 113 bits")
-      ->check(CLI::Range(1L, std::numeric_limits<long>::max()));
-  cmd->add_option("--calls", o->calls, "Evaluations and samples over all models that look for bad values")
-      ->check(CLI::Range(0L, std::numeric_limits<long>::max()));
-  cmd->add_option("--limit", o->limit, "Units of epsilon that a formula may add to its inputs' rounding");
+  add_number(*cmd, "--points", o->hunt.points, {.low = 1}, "Places a model at which double is compared with 113 bits");
+  add_number(*cmd, "--calls", o->calls, {.low = 0}, "Evaluations and samples over all models that look for bad values");
+  add_number(*cmd, "--limit", o->limit, {.low = 0}, "Units of epsilon that a formula may add to its inputs' rounding");
   cmd->add_option("--page", o->page, "Folder for a page of maps of the errors");
-  cmd->add_option("--seed", o->hunt.seed, "Seed of parameters and directions");
+  add_number(*cmd, "--seed", o->hunt.seed, {}, "Seed of parameters and directions");
   cmd->callback([o] {
     const std::vector<const Model*> chosen = models_named(o->model);
     int failed = 0;

@@ -56,8 +56,9 @@ void Verdict::report(Row& row) const {
   row.skipped = skipped_;
   row.worst = worst_;
   row.limit = cases_ == 0 ? limit_.value : limit_there_;
-  row.where = cases_ == 0 ? "no case could be judged" : where_;
-  row.result = passed_ ? Result::Passed : Result::Failed;
+  row.where = where_;
+  row.result = cases_ == 0 ? Result::Skipped : passed_ ? Result::Passed : Result::Failed;
+  if (cases_ == 0) row.reason = "no case could be judged: quadrature did not converge, or no light is scattered";
 }
 
 std::string without_lobe(const Trial& t) { return t.model().has_scatter() ? "" : "the model has delta terms alone"; }
@@ -95,11 +96,11 @@ Row run(const Check& check, const Trial& trial) {
   try {
     check.judge(trial, verdict);
     verdict.report(row);
-    // Where nothing could be judged nothing is known.
-    if (row.result == Result::Failed && row.cases > 0) row.declare = check.declare;
+    if (row.result == Result::Failed) row.declare = check.declare;
   } catch (const ValueError& e) {
     verdict.report(row);
     row.result = Result::Failed;
+    row.reason.clear();
     row.where = e.what();
   }
   return row;

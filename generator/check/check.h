@@ -13,7 +13,7 @@ namespace brdfc::check {
 enum class Result {
   Passed,
   Failed,
-  Skipped,  ///< the check does not apply to the model: nothing was judged
+  Skipped,  ///< nothing was judged: the check does not apply to the model, or quadrature converged at no case
 };
 
 /// Outcome of one check of one model over all cases.

@@ -55,7 +55,9 @@ enum class Purpose : std::uint64_t {
   Smooth,
   Spread,
   Matte,
-  Mirror
+  Mirror,
+  Length,
+  Horizon
 };
 
 /// A model and what it is tried with. Checks run one after the other, each over the cases side by side.
@@ -108,7 +110,7 @@ class Verdict {
   void add(double value, const std::string& where, double uncertain = 0);
   /// A case that could not be judged: quadrature did not converge well enough.
   void skip();
-  /// Without a case that could be judged a check has failed.
+  /// A check is skipped, with a reason, where no case could be judged: that is no fault of the model.
   void report(Row&) const;
 
  private:

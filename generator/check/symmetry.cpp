@@ -7,7 +7,7 @@
 namespace brdfc::check {
 namespace {
 
-/// In double: swapping only reorders operations.
+/// Swapping only reorders operations.
 constexpr double kReciprocity = 1e-9;
 
 /// Of a lobe, up to the squared index where light goes through.
@@ -16,8 +16,10 @@ double swapped(const Case& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   const double n2i = wi.z > 0 ? 1 : sqr(f.ior()), n2o = wo.z > 0 ? 1 : sqr(f.ior());
   const double d = measure::relative(f.eval(wi, wo) * n2o, f.eval(wo, wi) * n2i);
   if (d <= kReciprocity) return d;
-  // High powers amplify the rounding of a half vector: then the formulas themselves are compared.
-  const Vec3<Wide> a = Vec3<Wide>::from(wi), b = Vec3<Wide>::from(wo);
+  // High powers amplify the rounding of a half vector, and near a critical angle so do Fresnel's equations, for which
+  // the length of a rounded direction is already too far from 1. Then the formulas themselves are compared, for the
+  // unit vectors that the directions stand for.
+  const Vec3<Wide> a = normalize(Vec3<Wide>::from(wi)), b = normalize(Vec3<Wide>::from(wo));
   return measure::relative(c.wide->eval(a, b) * Wide(n2o), c.wide->eval(b, a) * Wide(n2i));
 }
 

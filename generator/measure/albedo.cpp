@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <random>
 
 #include "core/sequence.h"
@@ -101,12 +100,13 @@ class AlbedoIntegrator {
     return out;
   }
 
-  /// Not converged, without value, if the choice of lobe can't be told apart from the direction.
+  /// Whether the choice of lobe can be told apart from the direction: see lobe_borders().
+  bool lobes_are_known() const { return !lobe_borders(guide_, wo_).empty(); }
+
+  /// Of a guide whose lobes are known.
   CubatureResult over_samples(const CubatureOptions& options, int effort) const {
     CubatureResult sum;
-    sum.error.assign(n_, std::numeric_limits<double>::infinity());
     const std::vector<double> borders = lobe_borders(guide_, wo_);
-    if (borders.empty()) return sum;
     sum.value.assign(n_, 0);
     sum.error.assign(n_, 0);
     sum.converged = true;
@@ -206,18 +206,38 @@ struct Estimate {
   double error = 0;
 };
 
+/// Where sample() can't be integrated over its numbers: two meshes over directions that agree, if they meet what
+/// samples meet, or the mean of samples.
+Estimate estimate_over_directions(const AlbedoIntegrator& integrator, const AlbedoOptions& options,
+                                  const CubatureOptions& cubature, double slack) {
+  CubatureResult directions = integrator.over_directions(cubature, 512);
+  for (int effort = 1; effort < 3; ++effort) {
+    const int guides = 512 << effort;
+    const CubatureResult finer = integrator.over_directions(cubature, guides);
+    const double moved = distance(directions, finer), rule = largest(finer.error);
+    directions = finer;
+    if (rule > slack || moved > slack) continue;
+    const double missed = integrator.missed_density(cubature, guides);
+    if (missed <= slack) return {directions.value, std::max({rule, moved, missed})};
+  }
+  const CubatureResult witness = integrator.witness(options.witnesses);
+  const double chance = largest(witness.error), apart = distance(directions, witness);
+  if (apart <= 7 * chance + 1e-12) return {directions.value, std::max({largest(directions.error), chance, apart})};
+  return {witness.value, 3 * chance};
+}
+
 Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& options) {
   const CubatureOptions cubature{options.absolute, 0, options.max_cells};
   // The rule's estimates are far above its true error, unless it missed something. At a kink they may be passed by
   // some hundred times the aim; what differs by more was missed.
   const double slack = 200 * options.absolute;
   CubatureResult directions, samples;
+  if (!integrator.lobes_are_known()) return estimate_over_directions(integrator, options, cubature, slack);
   double directions_moved = 0, samples_moved = 0;  // between the last two meshes
   bool ridge = false;
   for (int effort = 0; effort < 3; ++effort) {
     CubatureResult before = std::move(samples);
     samples = integrator.over_samples(cubature, effort);
-    if (samples.value.empty()) samples.value.assign(samples.error.size(), 0);
     if (effort > 0) samples_moved = distance(before, samples);
     if (!ridge) {
       before = std::move(directions);
@@ -275,6 +295,12 @@ MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<
   const std::size_t n = 6 * models.size();  // scattered, then mirror
   std::vector<std::vector<double>> means(kCopies, std::vector<double>(n, 0.));
   std::vector<double> borders = lobe_borders(guide, direction(cos_theta_o, phi_o.value_or(0.3)));
+  // Over all azimuths only if they have the same intervals.
+  for (int k = 1; k < 8 && !phi_o && !borders.empty(); ++k) {
+    const std::vector<double> there = lobe_borders(guide, direction(cos_theta_o, 0.3 + 2 * kPi * k / 8));
+    const auto close = [](double a, double b) { return std::abs(a - b) < 1e-12; };
+    if (!std::ranges::equal(borders, there, close)) borders.clear();
+  }
   const bool known = !borders.empty();
   if (!known) borders = {0, 1};
   const int each = std::max(1, count / kCopies);
@@ -303,7 +329,7 @@ MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<
       std::mt19937_64 random(seed + std::uint64_t(k));
       for (int i = 0; i < each; ++i) {
         const Vec3<double> p = sequence.next();
-        const double choice = known ? 0.5 : double(random() >> 11) * 0x1p-53;
+        const double choice = known ? 0.5 : phi_o ? p.z : double(random() >> 11) * 0x1p-53;
         if (!phi_o) {
           wo = direction(cos_theta_o, 2 * kPi * p.z);
           mirrors(wo);

@@ -46,31 +46,67 @@ std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo
 
 }  // namespace
 
-std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& wo) {
+namespace {
+
+/// Whether the direction is the same at two values of the first random number.
+class SameLobe {
+ public:
+  SameLobe(const Brdf<double>& brdf, const Vec3<double>& wo, const Point2& others)
+      : brdf_(brdf), wo_(wo), others_(others) {}
+  Vec3<double> at(double u) const { return brdf_.sample(wo_, {u, others_.x, others_.y}).wi; }
+  static bool same(const Vec3<double>& a, const Vec3<double>& b) { return length(a - b) < 1e-12; }
+
+ private:
+  const Brdf<double>& brdf_;
+  const Vec3<double> wo_;
+  const Point2 others_;
+};
+
+constexpr double kLast = 1 - 0x1p-53;
+
+}  // namespace
+
+std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& wo, const Point2& others) {
   constexpr int kProbes = 16;
-  const auto at = [&](double u) { return brdf.sample(wo, {u, 0.37, 0.71}).wi; };
-  const auto same = [](const Vec3<double>& a, const Vec3<double>& b) { return length(a - b) < 1e-12; };
+  const SameLobe lobe(brdf, wo, others);
   std::vector<double> borders{0};
   double from = 0;
-  Vec3<double> before = at(from);
+  Vec3<double> before = lobe.at(from);
   for (int i = 0; i <= kProbes; ++i) {
-    const double to = i < kProbes ? (i + 0.5) / kProbes : 1 - 0x1p-53;
-    const Vec3<double> after = at(to);
+    const double to = i < kProbes ? (i + 0.5) / kProbes : kLast;
+    const Vec3<double> after = lobe.at(to);
     // A lobe that is drawn rarely may lie between two probes: every border up to here, one by one.
-    while (!same(before, after)) {
+    while (!SameLobe::same(before, after)) {
       double lo = from, hi = to;
       while (hi - lo > 1e-15) {
         const double mid = 0.5 * (lo + hi);
-        (same(at(mid), before) ? lo : hi) = mid;
+        (SameLobe::same(lobe.at(mid), before) ? lo : hi) = mid;
       }
       borders.push_back(hi);
       if (borders.size() > kProbes / 2) return {};
       from = hi;
-      before = at(from);
+      before = lobe.at(from);
     }
     from = to;
   }
   borders.push_back(1);
+  return borders;
+}
+
+std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& wo) {
+  const std::vector<double> borders = lobe_borders(brdf, wo, {0.37, 0.71});
+  // Beside a border the first number has this much room: a bisection ends within 1e-15.
+  constexpr double kBeside = 1e-12;
+  constexpr int kOthers = 16;
+  Sequence2 sequence(4);
+  for (int k = 0; k < kOthers; ++k) {
+    const SameLobe lobe(brdf, wo, sequence.next());
+    for (std::size_t i = 0; i + 1 < borders.size(); ++i) {
+      const double low = borders[i] + (i > 0 ? kBeside : 0),
+                   high = i + 2 < borders.size() ? borders[i + 1] - kBeside : kLast;
+      if (low < high && !SameLobe::same(lobe.at(low), lobe.at(high))) return {};
+    }
+  }
   return borders;
 }
 
@@ -81,34 +117,59 @@ Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brd
   if (brdf.scatters_through()) edge_ = kPi - std::asin(std::min(1 / brdf.ior(), 1.));
   cos_phi_ = sin_o_ > 0 ? wo.x / sin_o_ : 1;
   sin_phi_ = sin_o_ > 0 ? wo.y / sin_o_ : 0;
-  std::vector<double> borders = lobe_borders(brdf, wo);
-  if (borders.empty()) borders = {0, 1};
-  lobes_.resize(borders.size() - 1);
+  const std::vector<double> borders = lobe_borders(brdf, wo);
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> octaves(1, 30);
-  for (std::size_t lobe = 0; lobe < lobes_.size(); ++lobe) {
-    std::vector<Point2>& points = lobes_[lobe];
-    Sequence3 sequence(1);
-    // Half of them crowd towards the ends of the random numbers at all scales, which lead to the tails.
-    const auto crowd = [&](double v) {
-      const double near = 0.5 * std::exp2(-octaves(random));
-      return v < 0.5 ? near : 1 - near;
-    };
-    for (int i = 0; i < each; ++i) {
-      Vec3<double> u = sequence.next();
-      u.x = borders[lobe] + (borders[lobe + 1] - borders[lobe]) * u.x;
-      if (i % 8 == 1 || i % 8 == 3) u.y = crowd(u.y);
-      if (i % 8 == 2 || i % 8 == 3) u.z = crowd(u.z);
-      const Sample<double> s = brdf.sample(wo, u);
-      if (s.pdf > 0) points.push_back(angles(s.wi));
-    }
-    // Around every cluster, points at distances of all scales: a narrow lobe's flank, where few samples fall but
-    // which still holds light, then lies in cells that grow with the distance from it.
+  Sequence3 sequence(1);
+  // Half of them crowd towards the ends of the random numbers at all scales, which lead to the tails.
+  const auto crowd = [&](double v) {
+    const double near = 0.5 * std::exp2(-octaves(random));
+    return v < 0.5 ? near : 1 - near;
+  };
+  const auto numbers = [&](int i) {
+    Vec3<double> u = sequence.next();
+    if (i % 8 == 1 || i % 8 == 3) u.y = crowd(u.y);
+    if (i % 8 == 2 || i % 8 == 3) u.z = crowd(u.z);
+    return u;
+  };
+  const auto add = [&](std::vector<Point2>& points, const Vec3<double>& u) {
+    const Sample<double> s = brdf.sample(wo, u);
+    if (s.pdf > 0) points.push_back(angles(s.wi));
+  };
+  // Around every cluster, points at distances of all scales: a narrow lobe's flank, where few samples fall but which
+  // still holds light, then lies in cells that grow with the distance from it.
+  const auto surround = [&](std::vector<Point2>& points) {
     for (std::size_t i = 0, n = points.size(); i + 1 < n; ++i) {
       const double t = std::exp2(octaves(random));
       points.push_back(
           {points[i].x + t * (points[i].x - points[i + 1].x), points[i].y + t * (points[i].y - points[i + 1].y)});
     }
+  };
+  if (borders.empty()) {
+    // Each set of the other numbers has intervals of its own; the n-th of each is taken for one lobe.
+    lobes_.resize(1);
+    for (int i = 0; i < each; ++i) {
+      Vec3<double> u = numbers(i);
+      const std::vector<double> own = lobe_borders(brdf, wo, {u.y, u.z});
+      if (own.empty()) add(lobes_[0], u);
+      for (std::size_t lobe = 0; lobe + 1 < own.size(); ++lobe) {
+        if (lobe == lobes_.size()) lobes_.emplace_back();
+        u.x = 0.5 * (own[lobe] + own[lobe + 1]);
+        add(lobes_[lobe], u);
+      }
+    }
+    for (std::vector<Point2>& points : lobes_) surround(points);
+    return;
+  }
+  lobes_.resize(borders.size() - 1);
+  for (std::size_t lobe = 0; lobe < lobes_.size(); ++lobe) {
+    sequence = Sequence3(1);
+    for (int i = 0; i < each; ++i) {
+      Vec3<double> u = numbers(i);
+      u.x = borders[lobe] + (borders[lobe + 1] - borders[lobe]) * u.x;
+      add(lobes_[lobe], u);
+    }
+    surround(lobes_[lobe]);
   }
   std::vector<Point2> edges;
   for (std::size_t lobe = 0; lobe + 1 < borders.size(); ++lobe)

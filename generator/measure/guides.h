@@ -11,8 +11,11 @@
 
 namespace brdfc::measure {
 
-/// The intervals of the first random number on which sample() uses one lobe: ends, increasing from 0 to 1. Empty if the
-/// direction changes with it everywhere.
+/// The intervals of the first random number on which sample() uses one lobe, with the second and third number given:
+/// ends, increasing from 0 to 1. Empty if the direction changes with the first number everywhere.
+std::vector<double> lobe_borders(const Brdf<double>&, const Vec3<double>& wo, const Point2& others);
+/// Those intervals if they are the same for all values of the other numbers. Empty if they are not, as in a model that
+/// draws a half vector and then reflects or refracts with the probability that Fresnel's equations give for it.
 std::vector<double> lobe_borders(const Brdf<double>&, const Vec3<double>& wo);
 
 /// Where in the hemisphere a model's samples fall: cells for a cubature over (theta, phi - phi_o), coordinates in which

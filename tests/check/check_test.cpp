@@ -11,9 +11,23 @@
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
 #include "measure/tabulate_albedo.h"
+#include "rough_dielectric.h"
 #include "support.h"
 
 namespace brdfc::check {
+
+// Not in the anonymous namespace: the model adapter has members of this type.
+/// Black, and without a direction to draw.
+template <class T> struct Lost {
+  static ModelInfo info() {
+    return {.name = "lost", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor&) {}
+  Rgb<T> eval(const Vec3<T>&, const Vec3<T>&) const { return Rgb<T>(T(0)); }
+  T pdf(const Vec3<T>&, const Vec3<T>&) const { return T(0); }
+  Sample<T> sample(const Vec3<T>&, const Vec3<T>&) const { return {{T(0), T(0), T(1)}, Rgb<T>(T(0)), T(0)}; }
+};
+
 namespace {
 
 using namespace faulty;
@@ -36,6 +50,22 @@ Row row_of(const Model& model, const std::string& check) {
 
 TEST(Checks, PassARightModel) {
   for (const auto& [check, passed] : outcome<kNone>()) EXPECT_TRUE(passed) << check;
+}
+/// Its lobe is chosen by the half vector that is drawn, and light goes through.
+TEST(Checks, PassARoughDielectric) {
+  const detail::ModelOf<testing_models::RoughDielectric> model;
+  for (const Row& r : check_model(model, {.effort = 0.2}))
+    EXPECT_NE(r.result, Result::Failed) << r.check << ": " << r.worst << ", limit " << r.limit << " at " << r.where;
+  require_vital(model);
+  const measure::AlbedoTable table = measure::tabulate_albedo(model);
+  EXPECT_LT(table.error, 0.05);
+}
+TEST(Checks, AreSkippedWhereNoCaseCouldBeJudged) {
+  const detail::ModelOf<Lost> model;
+  const Row row = row_of(model, "exact sampling");
+  EXPECT_EQ(row.result, Result::Skipped);
+  EXPECT_THAT(row.reason, HasSubstr("no case could be judged"));
+  EXPECT_EQ(row.declare, "");
 }
 TEST(Checks, SeeAPdfThatIsNotTheSamplers) {
   const auto r = outcome<kPdf>();

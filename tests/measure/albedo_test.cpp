@@ -17,8 +17,10 @@
 #include "measure/bound_model.h"
 #include "measure/cubature.h"
 #include "measure/guides.h"
+#include "measure/probes.h"
 #include "measure/tabulate_albedo.h"
 #include "model/sampling.h"
+#include "rough_dielectric.h"
 #include "support.h"
 
 namespace brdfc::measure {
@@ -111,6 +113,28 @@ TEST(Cubature, FindsAPeakFarNarrowerThanTheNodesAreApart) {
   EXPECT_NEAR(r.value[0], 1, 1e-7);
 }
 
+// ---- lobes -----------------------------------------------------------------------------------------------
+
+TEST(Lobes, OfAChoiceThatDependsOnTheHalfVectorHaveNoCommonBorders) {
+  const detail::ModelOf<testing_models::RoughDielectric> model;
+  const BoundModel b = bind_model(model, {});
+  const Vec3<double> wo = direction(0.5, 1);
+  EXPECT_TRUE(lobe_borders(*b.brdf, wo).empty());
+  // What Fresnel's equations give for a half vector, which these two numbers draw.
+  const std::vector<double> one = lobe_borders(*b.brdf, wo, {0.2, 0.1}), two = lobe_borders(*b.brdf, wo, {0.9, 0.1});
+  ASSERT_EQ(one.size(), 3u);
+  ASSERT_EQ(two.size(), 3u);
+  EXPECT_GT(std::abs(one[1] - two[1]), 1e-3);
+}
+
+TEST(Lobes, OfEveryModelAreTold) {
+  for (const auto& [name, model] : models()) {
+    const BoundModel b = bind_model(*model, {});
+    for (const double c : {1., 0.6, 0.05})
+      EXPECT_FALSE(lobe_borders(*b.brdf, direction(c, 0.3)).empty()) << name << " cos_theta_o=" << c;
+  }
+}
+
 // ---- albedo ----------------------------------------------------------------------------------------------
 
 TEST(AlbedoValue, CountsMirrorApart) {
@@ -136,6 +160,32 @@ TEST(AlbedoValue, IsGoodToItsErrorForRidgesThatAreThinAndCurved) {
       EXPECT_LT(a.error, 2e-3) << b.label << " cos_theta_o=" << c;
       EXPECT_NEAR(a.scattered.r, mean.scattered[0].r, 2 * a.error + 10 * mean.error) << b.label << " cos_theta_o=" << c;
     }
+}
+
+/// Mean weight of samples drawn with independent numbers, which no cubature has a part in.
+TEST(AlbedoValue, OfALobeThatIsChosenByTheHalfVectorIsTheMeanOfSamples) {
+  const detail::ModelOf<testing_models::RoughDielectric> model;
+  for (const auto& [alpha, c] : {std::pair{0.3, 0.9}, {0.3, 0.2}, {0.6, -0.7}, {0.1, -0.75}}) {
+    const BoundModel b = bind_model(model, {{"alpha", alpha}});
+    const Vec3<double> wo = direction(c, 0.4);
+    std::mt19937_64 random(1);
+    constexpr int kSamples = 1 << 19;
+    double sum = 0, squares = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      const double w = b.brdf->sample(wo, uniform_cube(random)).weight.r;
+      sum += w, squares += w * w;
+    }
+    const double mean = sum / kSamples, sigma = std::sqrt((squares / kSamples - mean * mean) / kSamples);
+    const std::string where = fmt::format("{} cos_theta_o={}", b.label, c);
+    const Albedo a = albedo(*b.brdf, c, 0.4, b.label);
+    EXPECT_LT(a.error, 1e-4) << where;
+    EXPECT_NEAR(a.scattered.r, mean, a.error + 5 * sigma) << where;
+    for (const std::optional<double> phi : {std::optional<double>(0.4), std::optional<double>()}) {
+      const MeanAlbedo m = mean_albedos(*b.brdf, {b.brdf.get()}, c, phi, b.label, 1 << 16);
+      EXPECT_LT(m.error, 1e-2) << where;
+      EXPECT_NEAR(m.scattered[0].r, mean, 8 * m.error + 5 * sigma) << where;
+    }
+  }
 }
 
 TEST(AlbedoValue, FindsAThinPeakThatHoldsLittleOfTheLight) {

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Options that are numbers. Each is finite and within a range, or an error that names the option, what was expected and
+// what was given. All numbers of the command line go through here.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "app/commands.h"
+#include "core/parse.h"
+
+namespace brdfc::app {
+
+template <class N>
+concept OptionNumber = std::integral<N> || std::floating_point<N>;
+
+/// The numbers that an option accepts: all finite ones unless told.
+template <OptionNumber N> struct Accepted {
+  N low = std::numeric_limits<N>::lowest(), high = std::numeric_limits<N>::max();
+  bool above_low = false;     ///< without `low` itself
+  char unit = 0;              ///< which may stand behind the number
+  std::string in_words = {};  ///< in place of the range in messages, as "a positive number"
+
+  std::string text() const {
+    if (!in_words.empty()) return in_words;
+    const std::string kind = std::integral<N> ? "a whole number" : "a number";
+    if (low == std::numeric_limits<N>::lowest() && high == std::numeric_limits<N>::max()) return kind;
+    if (high == std::numeric_limits<N>::max()) return fmt::format("{} {} {}", kind, above_low ? "above" : "from", low);
+    return fmt::format("{} in {}{}, {}]", kind, above_low ? '(' : '[', low, high);
+  }
+};
+
+/// The number that all of the text is. Throws CLI::ValidationError, which names the option.
+template <OptionNumber N>
+N accepted_number(const std::string& option, std::string_view text, const Accepted<N>& range) {
+  const bool has_unit = range.unit != 0 && text.ends_with(range.unit);
+  const std::optional<N> number = parse<N>(text.substr(0, text.size() - has_unit));
+  const bool finite = number && std::isfinite(double(*number));
+  if (!finite || !(*number >= range.low && *number <= range.high) || (range.above_low && *number == range.low))
+    throw CLI::ValidationError(option, fmt::format("expected {}, got '{}'", range.text(), text));
+  return *number;
+}
+
+namespace detail {
+
+template <OptionNumber N> CLI::Option* described(CLI::Option* option) {
+  return option->type_name(std::integral<N> ? "INTEGER" : "NUMBER");
+}
+
+}  // namespace detail
+
+/// Adds an option of one number.
+template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::string& name, N& value,
+                                                  const Accepted<N>& range, const std::string& doc) {
+  CLI::Option* option = command.add_option_function<std::string>(
+      name, [&value, name, range](const std::string& text) { value = accepted_number(name, text, range); }, doc);
+  option->default_function([&value] { return fmt::format("{}", value); });
+  return detail::described<N>(option);
+}
+
+/// The same for one that tells whether it was given.
+template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::string& name, std::optional<N>& value,
+                                                  const Accepted<N>& range, const std::string& doc) {
+  return detail::described<N>(command.add_option_function<std::string>(
+      name, [&value, name, range](const std::string& text) { value = accepted_number(name, text, range); }, doc));
+}
+
+/// Adds an option of several numbers with commas between them.
+template <OptionNumber N> CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<N>& values,
+                                                   const Accepted<N>& range, const std::string& doc) {
+  CLI::Option* option = command.add_option_function<std::vector<std::string>>(
+      name,
+      [&values, name, range](const std::vector<std::string>& texts) {
+        values.clear();
+        for (const std::string& text : texts) values.push_back(accepted_number(name, text, range));
+      },
+      doc);
+  return detail::described<N>(option->delimiter(','));
+}
+
+}  // namespace brdfc::app

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every scene of the repository from an extension of its own, which holds what that scene needs and
+nothing else; and every model with all, some and no parameters that such an extension folds."""
+
+import json
+import re
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from helpers import render
+
+SCENES = Path(__file__).parents[2] / "scenes"
+#: Those whose materials have what differs: mirrors, glass, metal, textures, all models at once.
+QUICK = {"dispersion", "gl-fig11", "sh-fresnel", "sh-glass"}
+REPOSITORY = "user_default"
+
+
+def scenes():
+    names = sorted(p.stem for p in SCENES.glob("*.json") if p.stem != "schema")
+    return [pytest.param(n, marks=[] if n in QUICK else pytest.mark.full) for n in names]
+
+
+@contextmanager
+def installed(extension, path):
+    """The modules of an extension that is installed from its zip in place of the whole one."""
+    name = re.sub(r"-[\d.]+\.zip$", "", path.name)
+    package = f"bl_ext.{REPOSITORY}.{name}"
+    bpy.ops.preferences.addon_disable(module=extension.package)
+    try:
+        bpy.ops.extensions.package_install_files(
+            filepath=str(path), repo=REPOSITORY, enable_on_install=True
+        )
+        assert package in bpy.context.preferences.addons
+        yield lambda module: import_module(f"{package}.{module}")
+    finally:
+        bpy.ops.preferences.addon_disable(module=package)
+        bpy.ops.preferences.addon_enable(module=extension.package)
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool, tmp_path, name):
+    """As the driver does: installed, loaded and rendered, with every material of the scene."""
+    content = json.loads((SCENES / f"{name}.json").read_text(encoding="utf-8"))
+    content["settings"] |= {"width": 16, "height": 16, "spp": 2}
+    source = tmp_path / f"{name}.json"
+    source.write_text(json.dumps(content), encoding="utf-8")
+    built = answers.built(["build", "--scene", str(source), "--explain", "--out", "out"])
+    (path,) = (built / "out").glob("*.zip")
+    tool("scene", source, "--out", tmp_path / "scene")
+    with installed(extension, path) as module:
+        scene = module("scene_loader").load_scene(tmp_path / "scene" / "scene.json")
+        picture = render(scene)[..., :3]
+        made = {m.name: module("nodes").group_nodes(m) for m in bpy.data.materials}
+        models = {module("nodes").identity(n)[0] for ours in made.values() for n in ours}
+    assert models == {m["model"] for m in content["materials"].values()}
+    assert np.isfinite(picture).all() and picture.max() > 1e-3
+
+
+#: How much of a model an extension folds. With all of it constant most twins are searched for anew,
+#: which takes seconds each: these stand for them.
+FOLDED = ("all", "some", "none")
+QUICK_TWINS = {"coupled", "lambert", "lambertian_specular"}
+
+
+def values_of(entry):
+    """Values other than the defaults, where no twin has to be searched for that: colours, and the
+    numbers of models without one."""
+    values = {}
+    for parameter in entry["parameters"]:
+        value = parameter["default"]
+        if parameter["kind"] == "color":
+            value = [0.9 * v + shift for v, shift in zip(value, (0.02, 0.03, 0.04), strict=True)]
+        elif parameter["kind"] == "number" and "twin" not in entry["representations"]:
+            value = 1.05 * value if value else parameter["soft_max"] / 4
+            value = min(max(value, parameter["soft_min"]), parameter["soft_max"])
+        values[parameter["name"]] = value
+    return values
+
+
+def materials_of(models, folded):
+    """A material of each form of each model but those that have to be fitted first, as a file of
+    `build --materials` has it. Of some parameters, the number that a twin is kept over varies, or
+    the first one."""
+    made = {}
+    for name, entry in models.items():
+        values = values_of(entry)
+        axis = (entry["representations"].get("twin", {}).get("axis") or {}).get("name")
+        varies = {"all": set(), "some": {axis or next(iter(values))}, "none": set(values)}[folded]
+        for form, about in entry["representations"].items():
+            if form == "fitted" or (form == "twin" and folded == "all" and name not in QUICK_TWINS):
+                continue
+            given = {key: {"varies": True} if key in varies else v for key, v in values.items()}
+            made[f"{name} {form}"] = {
+                "model": name,
+                "representation": form,
+                "parameters": given | about["only"],
+            }
+    return made
+
+
+def stands_in(node):
+    """What a group's node of Blender's own takes where no shader runs, by socket; linked: None."""
+    found = {}
+    for inner in node.node_tree.nodes:
+        if inner.bl_idname in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfMetallic"):
+            for socket in inner.inputs:
+                if socket.is_linked and socket.links[0].from_node.type == "COMBXYZ":
+                    parts = socket.links[0].from_node.inputs
+                    found[socket.name] = [None if p.is_linked else p.default_value for p in parts]
+                else:
+                    found[socket.name] = None if socket.is_linked else socket.default_value
+    return found
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("part", FOLDED)
+def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pack, part):
+    api, nodes, pack = extension.api, extension.nodes, extension.pack
+    whole = json.loads(json.dumps(pack.manifest()["models"]))
+    materials = materials_of(whole, part)
+    albedos = {
+        name: extension.energy.albedo(name, pack.canonical(values_of(entry)), 0.7)
+        for name, entry in whole.items()
+        if entry.get("albedo")
+    }
+    use_pack(materials)
+    for name, entry in whole.items():
+        values = pack.canonical(values_of(entry))
+        fixed = pack.fixed(name)
+        assert {"all": len(fixed) == len(values), "none": not fixed, "some": True}[part], name
+        for form in pack.model(name)["representations"]:
+            only = pack.form_values(name, form)
+            given = {k: v for k, v in (values | only).items() if k not in fixed}
+            material = api.new_material(name, form, **given)
+            (node,) = nodes.group_nodes(material)
+            assert nodes.script_problem(node.node_tree) is None
+            sockets = set(nodes.sockets(node)) - {"Normal", "Tangent"}
+            assert sockets.isdisjoint(fixed) and sockets <= set(given)
+            complete = nodes.all_values(node)
+            for key, value in (values | only | fixed).items():
+                assert pack.same(complete[key], value), (name, form, key)
+            for socket, found in stands_in(node).items():
+                check_stand_in(socket, found, fixed)
+            if name in albedos and not only:
+                found = api.albedo(name, 0.7, **given)
+                assert found == pytest.approx(albedos[name], abs=2e-3), name
+            bpy.data.materials.remove(material)
+
+
+def check_stand_in(socket, found, fixed):
+    """Folded parameters are constants of the node, the others are linked."""
+    names = {"IOR": ["ior"], "Extinction": ["k_r", "k_g", "k_b"]}
+    if socket == "IOR" and isinstance(found, list):
+        names["IOR"] = ["n_r", "n_g", "n_b"]
+    for name, value in zip(names.get(socket, []), np.atleast_1d(found), strict=True):
+        expected = fixed.get(name)
+        assert value is None if expected is None else value == pytest.approx(expected), name
