@@ -340,7 +340,7 @@ def test_values_round_trip(extension, empty, subtests):
     ("arguments", "message"),
     [
         ((["gloss"], {}), r"unknown model 'gloss'; expected one of .*lambert"),
-        ((["coupled", "fitted"], {}), r"has no form 'fitted'.*auto, aimed"),
+        ((["coupled", "fitted"], {}), r"has no render method 'fitted'.*auto, aimed"),
         ((["coupled"], {"r1": 0.1}), r"'coupled' has no parameter 'r1'; expected one of r0, rm"),
         ((["coupled"], {"r0": 1.5}), r"coupled\.r0: expected a number from 0 to 1, got 1\.5"),
         ((["coupled"], {"r0": -0.1}), r"coupled\.r0: expected a number from 0 to 1"),
@@ -566,7 +566,7 @@ def test_switch_keeps_values_and_links(extension, empty):
         assert sockets["Normal"].links[0].from_node == bump
         assert output.inputs["Surface"].links[0].from_node == node
     assert material.cycles.use_bump_map_correction is False
-    with pytest.raises(ValueError, match="has no form"):
+    with pytest.raises(ValueError, match="has no render method"):
         extension.api.switch_representation(material, "aimed")
     assert extension.nodes.identity(node) == (model, "sampled")
 
