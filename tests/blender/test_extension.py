@@ -1007,6 +1007,19 @@ def test_the_page_of_models_has_their_forms(extension):
         assert rows[name] == ", ".join(form for form in entry["representations"] if form != "twin")
 
 
+def test_the_readme_has_the_errors_that_panel_and_scripts_show(extension):
+    page = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    for form, method in (("fitted", "Fitted"), ("twin", "Blender Nodes")):
+        errors = [
+            100 * entry["representations"][form]["error"]["relative_l1"]
+            for entry in extension.api.models().values()
+            if form in entry["representations"]
+        ]
+        low, high = ("0" if e < 1e-3 else f"{e:.2g}" for e in (min(errors), max(errors)))
+        (row,) = re.findall(rf"^\| {method}\b.*$", page, re.M)
+        assert f"| {low} to {high} % of the light" in row
+
+
 def test_the_page_says_what_scripts_are_given(extension):
     """Every attribute of what is returned, and keys that there are."""
     page = (Path(__file__).parents[2] / "docs" / "blender.md").read_text(encoding="utf-8")
