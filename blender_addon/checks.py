@@ -82,7 +82,7 @@ def _pool_findings(material, scene):
             "ERROR",
             say(
                 "The models of this material take more memory than OptiX has, and its picture is "
-                "wrong: use other forms, fewer models in one material, or the CPU",
+                "wrong: use other render methods, fewer models in one material, or the CPU",
                 more=f"{use.size} bytes of closures, and there is room for {room}",
             ),
         )
@@ -116,7 +116,7 @@ def _by_twin(finding, ours):
         said = say("{reason}: Blender's own nodes stand in", reason=finding.message)
     else:
         said = say(
-            "{reason}: Blender's own nodes stand in, {percent} % off",
+            "{reason}: Blender's own nodes stand in, with an error of {percent} % of the light",
             reason=finding.message,
             percent=f"{100 * max(off):.2g}",
         )
@@ -217,7 +217,9 @@ def node_warnings(node, material, scene):
     label = node.label or node.name
     found = []
     if problem := nodes.script_problem(node.node_tree):
-        said = say("its shader is damaged: choose its form again to make it anew", more=problem)
+        said = say(
+            "its shader is damaged: choose its render method again to make it anew", more=problem
+        )
         found.append(Finding("script_failed", "ERROR", _of(label, said)))
     form, schema = nodes.manifest_entry(node) or ({}, {})
     if not form:
@@ -256,8 +258,8 @@ def node_warnings(node, material, scene):
         slack = 1e-6 * axis["max"]
         if value is not None and not axis["min"] - slack <= value <= axis["max"] + slack:
             said = say(
-                "{parameter} is {value}; this form was fitted from {low} to {high} and shows the "
-                "nearer end of that",
+                "{parameter} is {value}; the render method Fitted knows values from {low} to "
+                "{high} and shows the nearer end of that",
                 parameter=schema[axis["name"]]["label"],
                 value=f"{value:g}",
                 low=f"{axis['min']:g}",
@@ -267,7 +269,7 @@ def node_warnings(node, material, scene):
     # Measured: a sampled form comes out right, no less noisy, and half as slow again.
     sampled = form and nodes.identity(node)[1] == "sampled" and not stood_in
     if sampled and scene.cycles.use_guiding:
-        said = say("Path Guiding is on: it only costs time with a sampled form")
+        said = say("Path Guiding is on: it only costs time with the render method Sampled")
         found.append(Finding("path_guiding", "WARNING", _of(label, said)))
     if form.get("highlight") and (result := clamp_highlight(node, form, scene)):
         found.append(Finding("clamp_low", result[0], _of(label, result[1])))

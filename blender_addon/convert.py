@@ -158,7 +158,7 @@ class Plan:
         if self.refusal or self.error <= limit:
             return self
         why = say(
-            "its nearest model, {model}, is off by {percent} % of the light",
+            "its nearest model, {model}, sends {percent} % of the light in other directions",
             model=pack.model(self.model)["label"],
             percent=self._percent(),
         )
@@ -178,7 +178,7 @@ class Plan:
         if self.error < 1e-6:
             return say("{material}, {node}: {model}, the same", **of)
         return say(
-            "{material}, {node}: {model}, off by {percent} % of the light",
+            "{material}, {node}: {model}, {percent} % of the light in other directions",
             **of,
             percent=self._percent(),
         )

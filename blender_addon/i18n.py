@@ -83,9 +83,13 @@ def rpt(text):
     return _shown("rpt", text)
 
 
+#: Names of forms that people see, where they are not those of scripts.
+_FORM_NAMES = {"twin": say("Blender Nodes")}
+
+
 def form_name(form):
     """The name of a form in sentences; its template is the text of its button."""
-    return Sentence(form.capitalize())
+    return _FORM_NAMES.get(form) or Sentence(form.capitalize())
 
 
 def of_error(error):

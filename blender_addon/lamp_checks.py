@@ -86,8 +86,8 @@ def tiny(material, scene):
         return (
             "WARNING",
             say(
-                "Lamps too small for a sampled form ({lamps}): their highlights are noisy or "
-                "missing; enlarge the lamps or use another form",
+                "Lamps too small for the render method Sampled ({lamps}): their highlights are "
+                "noisy or missing; enlarge the lamps or use another method",
                 lamps=_names(found),
             ),
         )
@@ -103,7 +103,8 @@ def multiple_importance(material, scene):
         return (
             "WARNING",
             say(
-                "Multiple Importance is off for lamps ({lamps}): this form is too dark under them",
+                "Multiple Importance is off for lamps ({lamps}): this material is too dark under "
+                "them",
                 lamps=_names(found),
             ),
         )
@@ -120,7 +121,7 @@ def _in_mirror(scene):
             "small_in_mirror",
             "WARNING",
             say(
-                "Small lamps ({lamps}) are rare, bright dots in this form's ideal mirror: larger "
+                "Small lamps ({lamps}) are rare, bright dots in this material's mirror: larger "
                 "lamps or more samples help; a clamp on indirect light takes dots and light away",
                 lamps=_names(found),
             ),
@@ -137,7 +138,7 @@ def _ray_visibility(scene):
             "WARNING",
             say(
                 "Ray Visibility of lamps ({lamps}) is off for diffuse or glossy rays: how much of "
-                "the model that takes away differs from form to form",
+                "the model that takes away differs with the render method",
                 lamps=_names(found),
             ),
         )

@@ -548,7 +548,11 @@ def add_albedo(node):
         name = node.label or node.name
         if is_baked(node):
             raise ValueError(
-                say("{node} is lean: choose a form of the whole model first", node=name)
+                say(
+                    "{node} is lean: choose a render method first, which brings the whole model "
+                    "back",
+                    node=name,
+                )
             )
         raise ValueError(
             say("{node} is of another version of the extension: update it first", node=name)

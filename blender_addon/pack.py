@@ -168,7 +168,7 @@ def resolve(model_name, representation, values=None):
         known = ", ".join(["auto", *sorted(entry["representations"])])
         raise ValueError(
             say(
-                "{model} has no form {form!r}",
+                "{model} has no render method {form!r}",
                 more=f"expected one of {known}",
                 model=entry["label"],
                 form=representation,

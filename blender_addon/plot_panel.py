@@ -83,10 +83,14 @@ def _form_said(node, legend):
     form = form_name(nodes.identity(node)[1])
     if legend.form is not None:
         percent = _percent(legend.form)
-        return say("Dotted: the form {form}, off by {percent} % here", form=form, percent=percent)
+        return say(
+            "Dotted: render method {form}. {percent} % of its light goes elsewhere",
+            form=form,
+            percent=percent,
+        )
     if nodes.is_fitted(node):
-        return say("What the form {form} reflects can't be drawn", form=form)
-    return say("The form {form} reflects what the model does", form=form)
+        return say("Render method {form}: what it reflects can't be plotted", form=form)
+    return say("Render method {form}: reflects what the model does", form=form)
 
 
 def _legend(node, legend):
@@ -102,7 +106,10 @@ def _legend(node, legend):
         yield say("Grey: the nearest Glossy, roughness {value}", value=f"{legend.glossy:.2f}")
     if near := legend.principled:
         percent = _percent(near.error)
-        yield say("Dashed: the nearest Principled, off by {percent} % here", percent=percent)
+        yield say(
+            "Dashed: the nearest Principled. {percent} % of its light goes elsewhere",
+            percent=percent,
+        )
         yield say(
             "Its roughness {roughness}, metallic {metallic}, IOR {ior}",
             roughness=f"{near.roughness:.2f}",

@@ -360,10 +360,38 @@ def _texture(view):
     return _load_image(view.get("image").file_path(), space)
 
 
+def _lambert(name, view):
+    """A material of Blender's Diffuse node, which is Lambert's model: for packs without that."""
+    material = bpy.data.materials.new(name)
+    tree = nodes.empty_tree(material)
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
+    given = view.get("parameters") if view.has("parameters") else None
+    for key, parameter in given.items() if given else ():
+        if key != "rho":
+            raise parameter.error("no parameter but rho")
+        if isinstance(parameter.value, dict):
+            picture = _image_node(tree, _texture(parameter.get("texture")))
+            tree.links.new(picture.outputs["Color"], node.inputs["Color"])
+        else:
+            color = given.color_or(key, None)
+            if not all(0 <= channel <= 1 for channel in color):
+                raise parameter.error("numbers from 0 to 1")
+            node.inputs["Color"].default_value = (*color, 1.0)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material
+
+
 def _material(name, view, representation, native):
     model = view.get("model").text()
+    if model == "lambert" and model not in pack.model_names() and representation not in NATIVE:
+        return _lambert(name, view)
     if model not in pack.model_names():
-        raise view.get("model").error(f"one of {', '.join(pack.model_names())}")
+        raise view.get("model").error(
+            f"one of {', '.join(pack.model_names())}, which this pack has (brdfc build --scene "
+            "makes a pack for a scene)"
+        )
     values, textures = {}, {}
     if view.has("parameters"):
         for key, parameter in view.get("parameters").items():

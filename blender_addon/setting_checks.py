@@ -41,14 +41,14 @@ def _bump_correction(material, scene):
             "ERROR",
             say(
                 "Bump Map Correction is on in the material's settings: where a normal map or bump "
-                "bends the surface this form sends light the wrong way"
+                "bends the surface this material sends light the wrong way"
             ),
         )
 
 
 def _path_guiding(material, scene):
     if scene.cycles.use_guiding:
-        return "ERROR", say("Path Guiding is on: this form comes out wrong with it")
+        return "ERROR", say("Path Guiding is on: this material comes out wrong with it")
 
 
 def _clamp_indirect(material, scene):
@@ -56,7 +56,7 @@ def _clamp_indirect(material, scene):
     return _warning(
         clamp > 0,
         say(
-            "Indirect Light is clamped to {clamp}: it darkens bright reflections of this form; "
+            "Indirect Light is clamped to {clamp}: it darkens bright reflections of this material; "
             "0 is exact",
             clamp=f"{clamp:g}",
         ),
@@ -80,7 +80,8 @@ def _clamp_direct(material, scene):
     return _warning(
         clamp > 0,
         say(
-            "Direct Light is clamped to {clamp}: it darkens highlights of this form; 0 is exact",
+            "Direct Light is clamped to {clamp}: it darkens highlights of this material; 0 is "
+            "exact",
             clamp=f"{clamp:g}",
         ),
     )
@@ -90,7 +91,7 @@ def _far_camera(material, scene):
     return _warning(
         _far_orthographic(scene),
         say(
-            "The orthographic camera is so far away that the noise of this form shows "
+            "The orthographic camera is so far away that the noise of this material shows "
             "patterns: move it closer"
         ),
     )
@@ -100,7 +101,7 @@ def _caustics(material, scene):
     return _warning(
         not scene.cycles.caustics_reflective,
         say(
-            "Reflective Caustics are off: light that this form reflects onto diffuse surfaces "
+            "Reflective Caustics are off: light that this material reflects onto diffuse surfaces "
             "is lost"
         ),
     )
@@ -110,7 +111,8 @@ def _filter_glossy(material, scene):
     return _warning(
         scene.cycles.blur_glossy > 0,
         say(
-            "Filter Glossy is {value}: it darkens repeated reflections of this form; 0 is exact",
+            "Filter Glossy is {value}: it darkens repeated reflections of this material; 0 is "
+            "exact",
             value=f"{scene.cycles.blur_glossy:g}",
         ),
     )
@@ -125,7 +127,7 @@ def _albedo_passes(material, scene):
         return (
             "WARNING",
             say(
-                "Denoising may blur details of this form; without it the picture is right",
+                "Denoising may blur details of this material; without it the picture is right",
                 more="The colour that the denoiser is given of it is too bright",
             ),
         )
@@ -133,7 +135,7 @@ def _albedo_passes(material, scene):
         return (
             "WARNING",
             say(
-                "Colour and denoising passes show this form too bright: denoising may blur "
+                "Colour and denoising passes show this material too bright: denoising may blur "
                 "details; the picture itself is right"
             ),
         )
@@ -151,7 +153,7 @@ def _normal_pass(material, scene):
         return (
             "WARNING",
             say(
-                "Denoising may blur details of this form; without it the picture is right",
+                "Denoising may blur details of this material; without it the picture is right",
                 more="The normals that the denoiser is given of it are noisy: Albedo alone is "
                 "better",
             ),
@@ -164,8 +166,8 @@ def _leaning_facets(material, scene):
         return (
             "WARNING",
             say(
-                "In Blender 4.5 a twin is up to 7 % too bright where it is seen from the side; "
-                "Blender 5.0 is right"
+                "In Blender 4.5 this material is up to 7 % too bright where it is seen from the "
+                "side; Blender 5.0 is right"
             ),
         )
 

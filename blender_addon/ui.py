@@ -76,6 +76,14 @@ def error_text(entry):
     return say("not measured")
 
 
+def error_line(form):
+    """The same as the panel has it, with what it is a part of."""
+    error = error_text(form)
+    if (form["error"].get("relative_l1") or 0) < ROUNDING:
+        return say("Error: {error}", error=error)
+    return say("Error: {error} of the light", error=error)
+
+
 def percent(part):
     """A part of the light in percent; rounding is not told from 0."""
     if part < ROUNDING:
@@ -93,7 +101,12 @@ def details(node, form):
     out = [
         say("{what}: {error}", what=what, error=percent(error[key]))
         for key, what in (
-            ("relative_l1", say("Light that leaves in other directions than the model's")),
+            (
+                "relative_l1",
+                say(
+                    "Part of the reflected light that goes in other directions than the model says"
+                ),
+            ),
             ("relative_l2", say("The same by squares, to which bright spots count more")),
             ("albedo", say("Largest error of how much is reflected, of a white surface")),
         )
@@ -148,7 +161,10 @@ def energy_text(node):
 def _draw_form(layout, node, form, scene, changes):
     model_name, representation = nodes.identity(node)
     if lean := nodes.is_baked(node):
-        wrapped(layout, say("Lean: only what this file needs. A form brings the whole one back"))
+        wrapped(
+            layout,
+            say("Lean: only what this file needs. A render method brings the whole model back"),
+        )
     entry = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = changes
@@ -173,7 +189,7 @@ def _draw_form(layout, node, form, scene, changes):
     line.alignment = "LEFT"
     line.operator(
         "brdfc.details",
-        text=iface(say("Error: {error}", error=error_text(form))),
+        text=iface(error_line(form)),
         translate=False,
         icon="QUESTION",
         emboss=False,

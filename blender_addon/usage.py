@@ -81,7 +81,7 @@ def _change(before, after):
         return say("it has another model")
     if old["representation"] != new["representation"]:
         return say(
-            "its form was {before} and is {after}",
+            "its render method was {before} and is {after}",
             before=form_name(old["representation"]),
             after=form_name(new["representation"]),
         )

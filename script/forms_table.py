@@ -157,9 +157,14 @@ PAGES = {
         forms,
         "What each form takes",
         """\
-Closures, error and cost with default parameters. Error: the part of the light that goes elsewhere,
-mean over all views; 0 where a form is right, or right on average. Cost: CPU time at equal samples
-in units of Blender's Glossy node, by `script/bench --forms`. `-`: there is none.""",
+Closures, error and cost with default parameters. Error: the part of the reflected light that goes
+in other directions than the model says, mean over all views; 0 where a form is right, or right on
+average. Cost: CPU time at equal samples in units of Blender's Glossy node, by
+`script/bench --forms`. `-`: there is none.
+
+Fitted forms are made for the default parameters here, as `brdfc build --error` makes them for those
+of a scene. The ones that the extension holds serve all values of a number and are further off:
+[errors along a number](fits-over.md).""",
     ),
     "fits": (
         fits,

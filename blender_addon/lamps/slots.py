@@ -23,19 +23,21 @@ def part_names(count):
 
 
 #: Why a lamp is left out that drawn directions meet.
-NO_NEED = say("so large or near that it needs no aiming")
+NO_NEED = say("so large or near that random rays meet it often")
 
 
 def too_many(slots):
     """Why a lamp is left out that others outshine."""
     if not slots:
         return say("no room for it")
-    return say("fainter than the {count} that a material can aim at", count=slots)
+    return say("fainter than the {count} that a material has room for", count=slots)
 
 
 def elsewhere(library):
     """Why a material that is linked from another file aims at no lamp of this one."""
-    return say("the material is linked from {file}, whose lamps it aims at", file=library.filepath)
+    return say(
+        "the material is linked from {file} and knows the lamps of that file", file=library.filepath
+    )
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ def _doc(properties):
 class _ModelOperator:
     model: StringProperty(name="Model", description="Identifier of the model")
     representation: StringProperty(
-        name="Form",
-        description="Form of the model: auto, or one that the model has",
+        name="Render Method",
+        description="How Cycles renders the model: auto, or a method that the model has",
         default="auto",
     )
 

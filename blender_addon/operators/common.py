@@ -21,7 +21,7 @@ def report_osl(operator, ours, scene):
     if not pack.osl_available():
         said = say(
             "This Blender has no Open Shading Language: models are made of Blender's own nodes, "
-            "and the panel shows how far off they are"
+            "and the panel shows their error"
         )
         operator.report({"WARNING"}, rpt(said))
     for finding in checks.of_scene(ours, scene):

@@ -83,8 +83,8 @@ class BRDFC_OT_convert_back(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.convert_back"
     bl_label = "Back to Blender's Nodes"
     bl_description = (
-        "Put Blender's own nodes back into the active material; where they were deleted, "
-        "the model's twin"
+        "Put Blender's own nodes back into the active material; where they were "
+        "deleted, nodes that come close to the model"
     )
     bl_options = {"REGISTER", "UNDO"}
 

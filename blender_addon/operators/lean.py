@@ -42,8 +42,9 @@ class BRDFC_OT_write_materials(Operator):
 class _Budget:
     error: FloatProperty(
         name="Error in Percent",
-        description="Part of the light that a fitted form may misplace, which is then taken in "
-        "place of a sampled one; 0: every material keeps its form",
+        description="Error up to which a material may become Fitted, to have less noise: the part "
+        "of the reflected light that may go in other directions than the model says. 0: every "
+        "material keeps its render method",
         min=0,
         max=100,
         default=0,
@@ -51,8 +52,8 @@ class _Budget:
 
     fit: BoolProperty(
         name="Fit Closures",
-        description="Less noise of aimed and sampled forms under skies and images, for seconds to "
-        "minutes of work a material",
+        description="Less noise of the render methods Aimed and Sampled under skies and images, "
+        "for seconds to minutes of work a material",
         default=False,
     )
 

@@ -8,28 +8,56 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
 from .. import api, color, editable, kernel, nodes, optical
-from ..i18n import iface, of_error, rpt, say, tip
+from ..i18n import Sentence, iface, of_error, rpt, say, tip
 from ..labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
+
+#: What each form means to who chooses one; "form" is the word of scripts for a render method.
+METHODS = {
+    "exact": say(
+        "Exact: Cycles' own shaders add up to the model. No error, and the noise of Blender's own "
+        "nodes"
+    ),
+    "aimed": say(
+        "Aimed: Cycles samples the lamps, and random rays find all other light. No error on "
+        "average, and little noise"
+    ),
+    "sampled": say(
+        "Sampled: random rays alone, which rarely meet small lamps. No error on average, and much "
+        "noise"
+    ),
+    "fitted": say(
+        "Fitted: eight of Cycles' own shaders that come close to the model. A small error, and the "
+        "noise of Blender's own nodes"
+    ),
+    "twin": say(
+        "Blender Nodes: Glossy and Diffuse nodes that come close to the model. They run in EEVEE "
+        "and on GPUs too, with a larger error"
+    ),
+}
 
 
 class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.switch"
-    bl_label = "Switch Form"
-    bl_description = "Use another form of the same model; values and links stay"
+    bl_label = "Switch Render Method"
+    bl_description = "Change how Cycles renders this model; values and links stay"
     bl_options = {"REGISTER", "UNDO"}
 
     node: StringProperty(name="Node", description="Name of the group node")
     representation: StringProperty(
-        name="Form",
-        description="Form of the model: auto, or one that the model has",
+        name="Render Method",
+        description="How Cycles renders the model: auto, or a method that the model has",
         default="auto",
     )
     all_users: BoolProperty(
         name="All Materials",
-        description="Also in every other material that has this model and form",
+        description="Also in every other material that has this model and render method",
         default=False,
     )
+
+    @classmethod
+    def description(cls, context, properties):
+        return tip(METHODS.get(properties.representation) or Sentence(cls.bl_description))
 
     def execute(self, context):
         material = context.object.active_material
@@ -57,9 +85,9 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
     bl_idname = "brdfc.details"
     bl_label = "What This Means"
     bl_description = (
-        "The part of the reflected light that this form sends in other directions than its "
-        "model, on average over views: of an error of 1.2 % that is 1.2 of 100 parts, and 1 % is "
-        "hard to see. Click for more figures"
+        "Of the light that this material reflects, the part that goes in other "
+        "directions than the model says, on average over views: at an error of 1.2 %, 1.2 of 100 "
+        "parts, and 1 % is hard to see. Click for more figures"
     )
     bl_options = {"INTERNAL"}
 

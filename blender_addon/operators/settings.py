@@ -42,7 +42,9 @@ class BRDFC_OT_fix_material(ChangesActiveMaterial, Operator):
 class BRDFC_OT_no_guiding(Operator):
     bl_idname = "brdfc.no_guiding"
     bl_label = "Turn Off Path Guiding"
-    bl_description = "Turn path guiding off, which the forms of this extension can't follow"
+    bl_description = (
+        "Turn path guiding off, which makes materials of this extension wrong or only slower"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
@@ -53,14 +55,20 @@ class BRDFC_OT_no_guiding(Operator):
 class BRDFC_OT_find_lamps(Operator):
     bl_idname = "brdfc.find_lamps"
     bl_label = "Find Lamps"
-    bl_description = "Look again for the lamps that materials aim at, the brightest first"
+    bl_description = (
+        "Look again for the lamps that materials know of and show without noise, the "
+        "brightest first"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         found = api.see_lamps(context.scene)
         taken = sum(lamp.slot is not None for lamp in found)
         self.report(
-            {"INFO"}, rpt(say("Lamps aimed at: {taken} of {all}", taken=taken, all=len(found)))
+            {"INFO"},
+            rpt(
+                say("Lamps that leave little noise: {taken} of {all}", taken=taken, all=len(found))
+            ),
         )
         return {"FINISHED"}
 
@@ -88,8 +96,8 @@ class BRDFC_OT_make_local(OfActiveMaterial, Operator):
     bl_idname = "brdfc.make_local"
     bl_label = "Make Local"
     bl_description = (
-        "Make the active material this file's own, with object and data where they are linked, "
-        "so that it can be changed and aims at the lamps of this file"
+        "Make the active material this file's own, with object and data where they "
+        "are linked, so that it can be changed and knows the lamps of this file"
     )
     bl_options = {"REGISTER", "UNDO"}
 

@@ -28,6 +28,8 @@ ModelInfo schema(const std::string& kind) {
                  parameter("exponent", 0, 1e8, {1, 0, 0}, ParamKind::Number),
                  parameter("alpha_x", 1e-4, 1, {0.5, 0, 0}, ParamKind::Number),
                  parameter("alpha_y", 1e-4, 1, {0.5, 0, 0}, ParamKind::Number),
+                 parameter("roughness", 0, 1, {0, 0, 0}, ParamKind::Number),
+                 parameter("albedo", 0, 1, {0, 0, 0}, ParamKind::Color),
                  parameter("size", 1e-5, 1, {0.5, 0, 0}, ParamKind::Number),
                  parameter("smooth", 0, 1, {0, 0, 0}, ParamKind::Number)};
   for (int i = 0; i < kRampSize; ++i)
@@ -56,6 +58,8 @@ Lobe lobe(LobeKind kind, const ParamValues& v) {
   c.exponent = number("exponent");
   c.alpha_x = number("alpha_x");
   c.alpha_y = number("alpha_y");
+  c.roughness = number("roughness");
+  c.albedo = color("albedo");
   c.size = number("size");
   c.smooth = number("smooth");
   for (int i = 0; i < kRampSize; ++i) c.ramp[std::size_t(i)] = color(fmt::format("ramp_{}", i));
@@ -73,9 +77,9 @@ void add_closure_command(CLI::App& app) {
   CLI::App* cmd = app.add_subcommand(
       "closure",
       "f cos(theta_i) of a Cycles closure as the forms rely on it, for direction pairs.\n"
-      "Kinds: diffuse, burley, diffuse_ramp, phong_ramp, reflection, ggx, beckmann, ashikhmin_shirley,\n"
-      "diffuse_toon, glossy_toon. Values: weight, normal, tangent, exponent, alpha_x, alpha_y, size, smooth,\n"
-      "ramp_0 ... ramp_7.\n"
+      "Kinds: diffuse, burley, oren_nayar, velvet, diffuse_ramp, phong_ramp, reflection, ggx, beckmann,\n"
+      "ashikhmin_shirley, diffuse_toon, glossy_toon. Values: weight, normal, tangent, exponent, alpha_x, alpha_y,\n"
+      "roughness, albedo, size, smooth, ramp_0 ... ramp_7.\n"
       "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
       "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
   cmd->add_option("kind", o->kind, "Which closure")->required();

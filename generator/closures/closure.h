@@ -13,8 +13,13 @@
 namespace brdfc::inline closures {
 
 enum class ClosureKind {
-  Diffuse,      ///< diffuse(N):             cos / pi
-  Burley,       ///< burley_diffuse_bsdf(N, 1, 0): (c/pi)(1 - s_i/2)(1 - s_o/2), s = (1 - c)^5
+  Diffuse,    ///< diffuse(N):             cos / pi
+  Burley,     ///< burley_diffuse_bsdf(N, 1, roughness): (c/pi)(1 - k s_i)(1 - k s_o), s = (1 - c)^5,
+              ///< k = 1/2 - 2 roughness (wi.h)^2
+  OrenNayar,  ///< oren_nayar_diffuse_bsdf(N, albedo, roughness): Fujii's form of Oren and Nayar's model with facets of
+              ///< `albedo`, and the light that they reflect again
+  Velvet,     ///< ashikhmin_velvet(N, roughness): fibres that stand up, bright at grazing angles
+  DiffuseToon,  ///< diffuse_toon(N, size, smooth): as GlossyToon, about the normal
   DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, no cosine
   PhongRamp,    ///< phong_ramp(N, e, colours): ramp8(cos^e a) (N.wi) (e+2)/(2 pi) cos^e a
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
@@ -37,8 +42,16 @@ inline constexpr int kRampSize = 8;
 /// Does it take the colours of a ramp?
 inline bool has_ramp(ClosureKind kind) { return kind == ClosureKind::DiffuseRamp || kind == ClosureKind::PhongRamp; }
 
-/// Does it take a roughness?
+/// Does it take a roughness of facets, or two?
 inline bool has_facets(ClosureKind kind) { return kind == ClosureKind::Ggx || kind == ClosureKind::Beckmann; }
+
+/// Does it take the roughness of a matte surface?
+inline bool has_matte_roughness(ClosureKind kind) {
+  return kind == ClosureKind::Burley || kind == ClosureKind::OrenNayar || kind == ClosureKind::Velvet;
+}
+
+/// Does it take an angle and the width of its edge?
+inline bool has_cone(ClosureKind kind) { return kind == ClosureKind::GlossyToon || kind == ClosureKind::DiffuseToon; }
 
 /// A closure with its settings; those that its kind does not take have no meaning.
 template <class T> struct Closure {
@@ -50,7 +63,9 @@ template <class T> struct Closure {
   T alpha;                             ///< Ggx, Beckmann: roughness in (0, 1], of stretched facets along `tangent`
   T alpha_across;                      ///< of stretched facets: across it
   Vec3<T> tangent;                     ///< of stretched facets: unit, perpendicular to the normal
-  T size, smooth;                      ///< GlossyToon: in units of 90 degrees, from 0 to 1
+  T roughness;                         ///< Burley, OrenNayar, Velvet: from 0 to 1
+  Rgb<T> albedo;                       ///< OrenNayar: of the facets, from 0 to 1
+  T size, smooth;                      ///< toons: in units of 90 degrees, from 0 to 1
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
   bool turned = false;                 ///< `normal` is not the surface's; it is not below it
   Tangent stretched = Tangent::None;   ///< what `tangent` is
@@ -63,6 +78,8 @@ template <class T> struct Closure {
         alpha(1),
         alpha_across(1),
         tangent{T(1), T(0), T(0)},
+        roughness(0),
+        albedo(T(0)),
         size(0),
         smooth(1),
         ior(1) {}
@@ -118,6 +135,53 @@ template <class T> T microfacet(ClosureKind kind, const T& alpha_x, const T& alp
   return microfacet(kind, alpha_x, alpha_y, in_frame(wi), in_frame(wo));
 }
 
+/// What a rough matte surface lacks of reflecting all light that comes from or goes to a direction of this cosine: see
+/// rough_matte(). Fujii's G, with (1 - sin^3) / cos rearranged so that it keeps its digits near the surface.
+template <class T> T matte_loss(const T& c) {
+  const T s = sqrt(maximum(T(1) - sqr(c), T(0)));
+  const T theta = T(2) * atan(s / (T(1) + c));
+  const T grooves = s * (theta - T(2.0 / 3) - s * c) + T(2.0 / 3) * s * c * (T(1) + s + s * s) / (T(1) + s);
+  return T(kPi / 2 - 2.0 / 3) - grooves;
+}
+
+/// f of the closure OrenNayar without its weight. M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model,
+/// SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model, with light that facets
+/// reflect again as J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough Diffuse BRDF, JCGT 2025.
+template <class T> Rgb<T> rough_matte(const T& roughness, const Rgb<T>& albedo, const T& cosTheta_i,
+                                      const T& cosTheta_o, const T& cosine) {
+  const T a = T(1) / (T(kPi) + roughness * T(kPi / 2 - 2.0 / 3)), b = roughness * a;
+  const T s = cosine - cosTheta_i * cosTheta_o;
+  const T t = select(s > T(0), s / maximum(maximum(cosTheta_i, cosTheta_o), tiny<T>()), s);
+  // 1 - E(c) = b matte_loss(c) and its mean b matte_loss_mean, so that smooth surfaces lose no digits.
+  constexpr double kMeanLoss = kPi / 2 - 2.0 / 3 - (2 * kPi - 5.6) / 3;
+  const T again = b * matte_loss(cosTheta_i) * matte_loss(cosTheta_o) * T(kInvPi / kMeanLoss);
+  const T mean_loss = b * T(kMeanLoss);
+  const Rgb<T> twice = albedo * albedo * ((T(1) - mean_loss) * again) / (Rgb<T>(T(1)) - albedo * mean_loss);
+  return albedo * (Rgb<T>(a + b * t) + twice);
+}
+
+/// f cos(theta_i) of the closure Velvet without its weight: M. Ashikhmin, S. Premoze: Distribution-based BRDFs, 2007.
+/// `sin2` is the square of the half vector's sine.
+template <class T>
+T velvet(const T& roughness, const T& sin2, const T& cosTheta_i, const T& cosTheta_o, const T& cosine) {
+  const T sigma2 = sqr(maximum(roughness, T(0.01)));
+  // Below, Cycles has 0, and the exponential is 0 as well.
+  const T s2 = maximum(sin2, T(2e-5)), z2 = maximum(T(1) - sin2, T(0));
+  const T D = exp(-z2 / (s2 * sigma2)) / (sigma2 * sqr(s2)) * T(kInvPi);
+  // (n.h) / (wi.h), whose square is (1 + wi.wo) / 2.
+  const T ratio = sqrt(z2 / maximum((T(1) + cosine) / T(2), tiny<T>()));
+  const T G = minimum(T(1), T(2) * ratio * minimum(cosTheta_i, cosTheta_o));
+  return D * G / (T(4) * maximum(cosTheta_o, tiny<T>()));
+}
+
+/// A cone about a direction at an angle of which wi has this cosine, without weight.
+template <class T> T toon(const T& size, const T& smooth, const T& cosAngle) {
+  const T c = clamp01(cosAngle);
+  const T angle = atan(sqrt((T(1) - c) / (T(1) + c))) * T(4 * kInvPi);
+  const T outer = size + smooth, half = sin(minimum(outer, T(1)) * T(kPi / 4));
+  return clamp01((outer - angle) / maximum(smooth, tiny<T>())) * T(kInvPi / 4) / sqr(half);
+}
+
 /// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface. `ramp` is a
 /// function that gives the ramp's colour at a position, which may lie above 1.
 template <class T, class Ramp>
@@ -129,9 +193,20 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     case ClosureKind::Diffuse:
       return select(lit, c.weight * (cosTheta_i * T(kInvPi)), none);
     case ClosureKind::Burley: {
-      const T pair = (T(1) - pow5(T(1) - cosTheta_i) / T(2)) * (T(1) - pow5(T(1) - cosTheta_o) / T(2));
+      const T k = T(0.5) - c.roughness * (T(1) + dot(wi, wo));
+      const T pair = (T(1) - pow5(T(1) - cosTheta_i) * k) * (T(1) - pow5(T(1) - cosTheta_o) * k);
       return select(lit, c.weight * (cosTheta_i * T(kInvPi) * pair), none);
     }
+    case ClosureKind::OrenNayar:
+      return select(
+          lit, c.weight * rough_matte(c.roughness, c.albedo, cosTheta_i, cosTheta_o, dot(wi, wo)) * cosTheta_i, none);
+    case ClosureKind::Velvet: {
+      const Vec3<T> across = cross(c.normal, normalize(wi + wo));
+      return select(both, c.weight * velvet(c.roughness, dot(across, across), cosTheta_i, cosTheta_o, dot(wi, wo)),
+                    none);
+    }
+    case ClosureKind::DiffuseToon:
+      return select(lit, c.weight * toon(c.size, c.smooth, cosTheta_i), none);
     case ClosureKind::DiffuseRamp:
       return select(lit, c.weight * ramp(cosTheta_i) * T(kInvPi), none);
     case ClosureKind::PhongRamp: {
@@ -152,11 +227,8 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
       return select(both, c.weight * of_facets(), none);
     }
     case ClosureKind::GlossyToon: {
-      const T cosAlpha = clamp01(T(2) * cosTheta_o * cosTheta_i - dot(wo, wi));
-      const T angle = atan(sqrt((T(1) - cosAlpha) / (T(1) + cosAlpha))) * T(4 * kInvPi);
-      const T outer = c.size + c.smooth, half = sin(minimum(outer, T(1)) * T(kPi / 4));
-      const T height = clamp01((outer - angle) / maximum(c.smooth, tiny<T>())) * T(kInvPi / 4) / sqr(half);
-      return select(both, c.weight * height, none);
+      const T cosAlpha = T(2) * cosTheta_o * cosTheta_i - dot(wo, wi);
+      return select(both, c.weight * toon(c.size, c.smooth, cosAlpha), none);
     }
     case ClosureKind::Reflection:
     case ClosureKind::Refraction:

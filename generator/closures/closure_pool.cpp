@@ -13,6 +13,7 @@ int pool_bytes(ClosureKind kind) {
     case ClosureKind::Reflection:
       return with(kVector);
     case ClosureKind::Burley:
+    case ClosureKind::OrenNayar:
       return with(2 * kVector + kNumber);
     case ClosureKind::DiffuseRamp:
       return with((1 + kRampSize) * kVector);
@@ -22,8 +23,10 @@ int pool_bytes(ClosureKind kind) {
     case ClosureKind::Beckmann:
       return with(kPointer + 2 * kVector + 4 * kNumber);
     case ClosureKind::GlossyToon:
+    case ClosureKind::DiffuseToon:
       return with(kVector + 2 * kNumber);
     case ClosureKind::Refraction:
+    case ClosureKind::Velvet:
       return with(kVector + kNumber);
   }
   throw std::logic_error("closure of unknown kind");

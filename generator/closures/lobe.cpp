@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::pair<LobeKind, const char*> kNames[] = {
     {LobeKind::Diffuse, "diffuse"},          {LobeKind::Burley, "burley"},
+    {LobeKind::OrenNayar, "oren_nayar"},     {LobeKind::Velvet, "velvet"},
     {LobeKind::DiffuseRamp, "diffuse_ramp"}, {LobeKind::PhongRamp, "phong_ramp"},
     {LobeKind::Reflection, "reflection"},    {LobeKind::Ggx, "ggx"},
     {LobeKind::Beckmann, "beckmann"},        {LobeKind::AshikhminShirley, "ashikhmin_shirley"},
@@ -36,15 +37,6 @@ double facets(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   return microfacet(c.kind == LobeKind::Ggx ? ClosureKind::Ggx : ClosureKind::Beckmann, c.alpha_x, c.alpha_y, wi, wo);
 }
 
-/// Uniform in a cone that the linear flank widens, normalised without the flank's loss.
-double toon(const Lobe& c, double cosAngle) {
-  const double inner = c.size * kPi / 2, outer = std::min(inner + c.smooth * kPi / 2, kPi / 2);
-  const double angle = std::acos(std::min(std::max(cosAngle, 0.0), 1.0));
-  if (angle >= outer) return 0;
-  const double height = angle < inner ? 1 : 1 - (angle - inner) / (c.smooth * kPi / 2);
-  return height * kInvPi / (4 * sqr(std::sin(outer / 2)));
-}
-
 /// A closure that forms use, by its definition in closure.h.
 Rgb<double> used_by_forms(ClosureKind kind, const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   Closure<double> closure(kind, c.weight);
@@ -52,6 +44,8 @@ Rgb<double> used_by_forms(ClosureKind kind, const Lobe& c, const Vec3<double>& w
   closure.turned = true;
   closure.ramp = c.ramp;
   closure.exponent = c.exponent;
+  closure.roughness = c.roughness;
+  closure.albedo = c.albedo;
   closure.size = c.size;
   closure.smooth = c.smooth;
   return evaluate(closure, wi, wo);
@@ -79,6 +73,10 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
       return used_by_forms(ClosureKind::Diffuse, c, wi, wo);
     case LobeKind::Burley:
       return used_by_forms(ClosureKind::Burley, c, wi, wo);
+    case LobeKind::OrenNayar:
+      return used_by_forms(ClosureKind::OrenNayar, c, wi, wo);
+    case LobeKind::Velvet:
+      return used_by_forms(ClosureKind::Velvet, c, wi, wo);
     case LobeKind::DiffuseRamp:
       return used_by_forms(ClosureKind::DiffuseRamp, c, wi, wo);
     case LobeKind::PhongRamp:
@@ -91,7 +89,7 @@ Rgb<double> evaluate(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& 
       if (cosTheta_i <= 0 || cosTheta_o <= 0) return Rgb<double>(0.0);
       return c.weight * facets(c, in_frame(c, wi), in_frame(c, wo));
     case LobeKind::DiffuseToon:
-      return cosTheta_i > 0 ? c.weight * toon(c, cosTheta_i) : Rgb<double>(0.0);
+      return used_by_forms(ClosureKind::DiffuseToon, c, wi, wo);
     case LobeKind::GlossyToon:
       return used_by_forms(ClosureKind::GlossyToon, c, wi, wo);
   }

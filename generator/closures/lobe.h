@@ -12,6 +12,8 @@ namespace brdfc::inline closures {
 enum class LobeKind {
   Diffuse,
   Burley,
+  OrenNayar,
+  Velvet,
   DiffuseRamp,
   PhongRamp,
   Reflection,
@@ -19,7 +21,7 @@ enum class LobeKind {
   Ggx,               ///< Smith's height-correlated masking
   Beckmann,          ///< the same with Walter's rational masking, as Cycles has it
   AshikhminShirley,  ///< eq. 16 of their paper, n = 2 / alpha^2 - 2. Cycles samples it wrongly: no form may use it
-  DiffuseToon,       ///< diffuse_toon(N, size, smooth): as GlossyToon, about N
+  DiffuseToon,
   GlossyToon,
 };
 
@@ -37,6 +39,8 @@ struct Lobe {
   double exponent = 1;                      ///< PhongRamp
   Vec3<double> tangent{1, 0, 0};            ///< microfacets; need not be perpendicular to the normal
   double alpha_x = 0.5, alpha_y = 0.5;      ///< microfacets: roughness along the tangent and across it, in (0, 1]
+  double roughness = 0;                     ///< Burley, OrenNayar, Velvet: from 0 to 1
+  Rgb<double> albedo{0, 0, 0};              ///< OrenNayar: of the facets, from 0 to 1
   double size = 0.5, smooth = 0;            ///< toons: in units of 90 degrees, from 0 to 1
 };
 

@@ -93,9 +93,8 @@ FormError error_of_closures(const Model& model, const ParamValues& confined, con
   const auto record = [&](const Brdf<Expr>& brdf, Program& program) {
     kinds = output_closures(closures_of(brdf), program);
     for (const RecordedClosure& c : kinds)
-      if (has_facets(c.kind) || c.kind == ClosureKind::GlossyToon || c.turned)
-        throw std::logic_error(model.info().name +
-                               ": the error of facets, cones or closures with normals is not executed");
+      if (has_facets(c.kind) || c.turned)
+        throw std::logic_error(model.info().name + ": the error of facets or closures with normals is not executed");
   };
   const double albedo = largest_difference(model, confined, record, [&](Case& at, Sequence3& points) {
     const auto out = at.run();
@@ -106,6 +105,13 @@ FormError error_of_closures(const Model& model, const ParamValues& confined, con
         for (std::size_t i = 0; i < kRampSize; ++i) closure.ramp[i] = at.checked(out, ramp_entry(c, i), true);
       if (kinds[c].kind == ClosureKind::PhongRamp)
         closure.exponent = at.checked(out, fmt::format("exponent_{}", c), false).r;
+      if (has_matte_roughness(kinds[c].kind))
+        closure.roughness = at.checked(out, fmt::format("roughness_{}", c), false).r;
+      if (kinds[c].kind == ClosureKind::OrenNayar) closure.albedo = at.checked(out, fmt::format("albedo_{}", c), false);
+      if (has_cone(kinds[c].kind)) {
+        closure.size = at.checked(out, fmt::format("size_{}", c), false).r;
+        closure.smooth = at.checked(out, fmt::format("smooth_{}", c), false).r;
+      }
       closures.push_back(closure);
     }
     Rgb<double> difference(0.0);

@@ -62,7 +62,11 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
     case ClosureKind::Diffuse:
       return fmt::format("weight_{} * brdfc_diffuse({})", i, n);
     case ClosureKind::Burley:
-      return fmt::format("weight_{} * burley_diffuse_bsdf({}, color(1), 0.0)", i, n);
+      return fmt::format("weight_{0} * burley_diffuse_bsdf({1}, color(1), roughness_{0})", i, n);
+    case ClosureKind::OrenNayar:
+      return fmt::format("weight_{0} * oren_nayar_diffuse_bsdf({1}, albedo_{0}, roughness_{0})", i, n);
+    case ClosureKind::Velvet:
+      return fmt::format("weight_{0} * ashikhmin_velvet({1}, roughness_{0})", i, n);
     case ClosureKind::DiffuseRamp:
       return fmt::format("weight_{} * diffuse_ramp({}, ramp_{})", i, n, i);
     case ClosureKind::Reflection:
@@ -71,6 +75,8 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
       return fmt::format("weight_{} * refraction({}, ior_{})", i, n, i);
     case ClosureKind::GlossyToon:
       return fmt::format("weight_{0} * glossy_toon({1}, size_{0}, smooth_{0})", i, n);
+    case ClosureKind::DiffuseToon:
+      return fmt::format("weight_{0} * diffuse_toon({1}, size_{0}, smooth_{0})", i, n);
     case ClosureKind::PhongRamp:
       return fmt::format("weight_{} * phong_ramp({}, exponent_{}, ramp_{})", i, n, i, i);
     case ClosureKind::Ggx:
@@ -111,7 +117,9 @@ void ShaderText::declare(const std::vector<RecordedClosure>& closures) {
     statements += fmt::format("    color weight_{} = 0.0;\n", c);
     if (has_ramp(kind)) statements += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
     if (kind == ClosureKind::PhongRamp) statements += fmt::format("    float exponent_{};\n", c);
-    if (kind == ClosureKind::GlossyToon) statements += fmt::format("    float size_{0}, smooth_{0};\n", c);
+    if (has_matte_roughness(kind)) statements += fmt::format("    float roughness_{};\n", c);
+    if (kind == ClosureKind::OrenNayar) statements += fmt::format("    color albedo_{};\n", c);
+    if (has_cone(kind)) statements += fmt::format("    float size_{0}, smooth_{0};\n", c);
     if (has_facets(kind)) statements += fmt::format("    float alpha_{};\n", c);
     if (closures[c].stretched != Tangent::None) statements += fmt::format("    float alpha_across_{};\n", c);
     if (closures[c].stretched == Tangent::Surface)

@@ -72,7 +72,9 @@ std::vector<RecordedClosure> output_closures(const ClosureSum<Expr>& sum, Progra
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) program.output(ramp_entry(c, i), sum[c].ramp[i]);
     if (sum[c].kind == ClosureKind::PhongRamp) program.output(fmt::format("exponent_{}", c), sum[c].exponent);
-    if (sum[c].kind == ClosureKind::GlossyToon) {
+    if (has_matte_roughness(sum[c].kind)) program.output(fmt::format("roughness_{}", c), sum[c].roughness);
+    if (sum[c].kind == ClosureKind::OrenNayar) program.output(fmt::format("albedo_{}", c), sum[c].albedo);
+    if (has_cone(sum[c].kind)) {
       program.output(fmt::format("size_{}", c), sum[c].size);
       program.output(fmt::format("smooth_{}", c), sum[c].smooth);
     }
@@ -91,7 +93,9 @@ ClosureSum<Expr> input_closures(ClosureSum<Expr> sum) {
     if (has_ramp(sum[c].kind))
       for (std::size_t i = 0; i < kRampSize; ++i) sum[c].ramp[i] = Rgb<Expr>::input(ramp_entry(c, i));
     if (sum[c].kind == ClosureKind::PhongRamp) sum[c].exponent = Expr::input(fmt::format("exponent_{}", c));
-    if (sum[c].kind == ClosureKind::GlossyToon) {
+    if (has_matte_roughness(sum[c].kind)) sum[c].roughness = Expr::input(fmt::format("roughness_{}", c));
+    if (sum[c].kind == ClosureKind::OrenNayar) sum[c].albedo = Rgb<Expr>::input(fmt::format("albedo_{}", c));
+    if (has_cone(sum[c].kind)) {
       sum[c].size = Expr::input(fmt::format("size_{}", c));
       sum[c].smooth = Expr::input(fmt::format("smooth_{}", c));
     }

@@ -54,8 +54,8 @@ template <class T> Rgb<T> medium(const Brdf<T>& brdf, const T& side, const T& di
   return select(side < T(0), brdf.transmittance(distance), Rgb<T>(T(1)));
 }
 
-/// Assigns what closure i takes of weight_i, ramp_i[8], exponent_i, alpha_i, alpha_across_i, ior_i, and of its normal
-/// and tangent, if they are its own, normal_i_x and so on.
+/// Assigns what closure i takes of weight_i, ramp_i[8], exponent_i, alpha_i, alpha_across_i, roughness_i, albedo_i,
+/// size_i, smooth_i, ior_i, and of its normal and tangent, if they are its own, normal_i_x and so on.
 std::vector<RecordedClosure> output_closures(const ClosureSum<Expr>&, Program&, Division = Division::Done);
 /// The same closures with these variables for their numbers.
 ClosureSum<Expr> input_closures(ClosureSum<Expr>);

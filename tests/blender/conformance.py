@@ -104,6 +104,27 @@ def _phong(exponent, tilted_=False):
     )
 
 
+def _rough_matte(albedo, roughness, normal="n"):
+    return Case(
+        f"oren_nayar_diffuse_bsdf {albedo[0]} {roughness}" + ("" if normal == "n" else " tilted"),
+        f"oren_nayar_diffuse_bsdf({normal}, color{albedo}, {roughness})",
+        (
+            "oren_nayar",
+            f"albedo={_vector(albedo)}",
+            f"roughness={roughness}",
+            *([] if normal == "n" else [TILTED]),
+        ),
+    )
+
+
+def _velvet(sigma, normal="n"):
+    return Case(
+        f"ashikhmin_velvet {sigma}" + ("" if normal == "n" else " tilted"),
+        f"ashikhmin_velvet({normal}, {sigma})",
+        ("velvet", f"roughness={sigma}", *([] if normal == "n" else [TILTED])),
+    )
+
+
 def _toon(kind, size, smooth):
     return Case(
         f"{kind} {size} {smooth}",
@@ -116,6 +137,18 @@ CASES = [
     Case("diffuse", "diffuse(n)", ("diffuse",)),
     Case("diffuse tilted", "diffuse(m)", ("diffuse", TILTED)),
     Case("burley", "burley_diffuse_bsdf(n, color(1), 0.0)", ("burley",)),
+    Case("burley 0.7", "burley_diffuse_bsdf(n, color(1), 0.7)", ("burley", "roughness=0.7")),
+    Case(
+        "burley 0.7 tilted",
+        "burley_diffuse_bsdf(m, color(1), 0.7)",
+        ("burley", "roughness=0.7", TILTED),
+    ),
+    _rough_matte((0.8, 0.5, 0.2), 0.0),
+    _rough_matte((0.8, 0.5, 0.2), 0.7),
+    _rough_matte((1.0, 0.9, 0.1), 1.0),
+    _rough_matte((0.8, 0.5, 0.2), 0.7, normal="m"),
+    *(_velvet(sigma) for sigma in (0.2, 0.6, 1.0)),
+    _velvet(0.6, normal="m"),
     Case("diffuse_ramp", "diffuse_ramp(n, ramp)", ("diffuse_ramp", *RAMP_VALUES)),
     Case("diffuse_ramp tilted", "diffuse_ramp(m, ramp)", ("diffuse_ramp", *RAMP_VALUES, TILTED)),
     *(_phong(e) for e in (1.0, 20.0, 300.0)),
@@ -125,8 +158,6 @@ CASES = [
     *(_toon("glossy_toon", *p) for p in ((0.3, 0.0), (0.1, 0.3), (0.001, 0.05), (0.6, 0.4))),
     # Nothing defines these yet: only their sampling is held against their evaluation.
     Case("oren_nayar 0.5", "oren_nayar(n, 0.5)"),
-    Case("oren_nayar_diffuse_bsdf 0.7", "oren_nayar_diffuse_bsdf(n, color(0.8, 0.5, 0.2), 0.7)"),
-    Case("ashikhmin_velvet 0.6", "ashikhmin_velvet(n, 0.6)"),
     Case("sheen 0.4", "sheen(n, 0.4)"),
     Case(
         "generalized_schlick_bsdf 0.3",

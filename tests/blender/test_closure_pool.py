@@ -82,7 +82,7 @@ def test_lamps_are_as_many_as_the_largest_material_has_room_for(extension, optix
     assert filled() == 5
     found = extension.api.see_lamps(optix)
     assert [lamp.slot for lamp in found] == [1, 2, 3, 4, 5, None, None]
-    assert found[5].why == "fainter than the 5 that a material can aim at"
+    assert found[5].why == "fainter than the 5 that a material has room for"
     text = panel(extension, first.active_material, optix)
     assert "OptiX has memory for 5 lamps" in text and "Mix Shader" in text
     # By themselves: another material, which needs more; its end; another device.

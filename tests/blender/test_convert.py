@@ -136,7 +136,7 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
     print(plan.line(), plan.values)
     assert plan.model in models
     assert plan.error < worst
-    said = f"off by {100 * plan.error:.2g} % of the light" if plan.error > 1e-6 else "the same"
+    said = f"{100 * plan.error:.2g} % of the light in other" if plan.error > 1e-6 else "the same"
     assert said in plan.line()
     # No other width would be nearer.
     (native,) = convert.natives(plan.node)
@@ -353,15 +353,15 @@ def test_a_limit_is_a_reason(extension, convert):
     assert not plan.refusal and 0.05 < plan.error < 0.35
     (plan,) = extension.api.plan_conversion([material], limit=0.05)
     assert plan.line() == (
-        f"{material.name}, Glossy BSDF: stays, its nearest model, Ward, is off by "
-        f"{100 * plan.error:.2g} % of the light"
+        f"{material.name}, Glossy BSDF: stays, its nearest model, Ward, sends "
+        f"{100 * plan.error:.2g} % of the light in other directions"
     )
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
     with pytest.raises(ValueError, match="Expected a number, got 'much'"):
         extension.api.plan_conversion([material], limit="much")
     # What no model reflects: a colour far above 1.
     (plan,) = extension.api.plan_conversion([material_of("diffuse", Color=(9.0, 0.0, 0.0))[0]])
-    assert "is off by 89 % of the light" in plan.refusal
+    assert "sends 89 % of the light" in plan.refusal
 
 
 def test_a_linked_roughness_is_followed(extension, convert):

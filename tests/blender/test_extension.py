@@ -340,7 +340,7 @@ def test_values_round_trip(extension, empty, subtests):
     ("arguments", "message"),
     [
         ((["gloss"], {}), r"unknown model 'gloss'; expected one of .*lambert"),
-        ((["coupled", "fitted"], {}), r"has no form 'fitted'.*auto, aimed"),
+        ((["coupled", "fitted"], {}), r"has no render method 'fitted'.*auto, aimed"),
         ((["coupled"], {"r1": 0.1}), r"'coupled' has no parameter 'r1'; expected one of r0, rm"),
         ((["coupled"], {"r0": 1.5}), r"coupled\.r0: expected a number from 0 to 1, got 1\.5"),
         ((["coupled"], {"r0": -0.1}), r"coupled\.r0: expected a number from 0 to 1"),
@@ -566,7 +566,7 @@ def test_switch_keeps_values_and_links(extension, empty):
         assert sockets["Normal"].links[0].from_node == bump
         assert output.inputs["Surface"].links[0].from_node == node
     assert material.cycles.use_bump_map_correction is False
-    with pytest.raises(ValueError, match="has no form"):
+    with pytest.raises(ValueError, match="has no render method"):
         extension.api.switch_representation(material, "aimed")
     assert extension.nodes.identity(node) == (model, "sampled")
 
@@ -1005,6 +1005,19 @@ def test_the_page_of_models_has_their_forms(extension):
     rows = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*) \|$", page, re.M))
     for name, entry in extension.api.models().items():
         assert rows[name] == ", ".join(form for form in entry["representations"] if form != "twin")
+
+
+def test_the_readme_has_the_errors_that_panel_and_scripts_show(extension):
+    page = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    for form, method in (("fitted", "Fitted"), ("twin", "Blender Nodes")):
+        errors = [
+            100 * entry["representations"][form]["error"]["relative_l1"]
+            for entry in extension.api.models().values()
+            if form in entry["representations"]
+        ]
+        low, high = ("0" if e < 1e-3 else f"{e:.2g}" for e in (min(errors), max(errors)))
+        (row,) = re.findall(rf"^\| {method}\b.*$", page, re.M)
+        assert f"| {low} to {high} % of the light" in row
 
 
 def test_the_page_says_what_scripts_are_given(extension):

@@ -186,7 +186,7 @@ CHANGES = {
     "animation": (lambda used: key(socket(used.extension, used.first)), "linked or animated"),
     "a form": (
         lambda used: used.api.switch_representation(used.first, "sampled"),
-        "its form was .* and is Sampled",
+        "its render method was .* and is Sampled",
     ),
     "no material": (
         lambda used: bpy.data.materials.remove(used.first),

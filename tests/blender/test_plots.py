@@ -515,7 +515,7 @@ def test_a_form_made_for_other_values_has_its_own_curve(
     off = area(np.abs(closures - f * wi[:, 2:]), plots._angles()[1:-1], axis=0).sum()
     off /= area(f * wi[:, 2:], plots._angles()[1:-1], axis=0).sum()
     assert legend.form == pytest.approx(off, rel=0.01) and 0.001 < off < 0.05
-    assert f"Dotted: the form Fitted, off by {100 * off:.2g} % here" in log
+    assert f"Dotted: render method Fitted. {100 * off:.2g} % of its light goes elsewhere" in log
 
 
 def test_the_curve_of_a_form_is_dotted(panel, plots, form_light, extension, empty):
@@ -557,7 +557,7 @@ def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
     material = extension.api.new_material("phong", "fitted")
     (node,) = extension.nodes.group_nodes(material)
     script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
-    said = "What the form Fitted reflects can't be drawn"
+    said = "Render method Fitted: what it reflects can't be plotted"
     good = script.script.as_string()
     for text in ("", "shader x(\n)\n{\n  BSDF = diffuse(N);\n}\n", good.replace("exp(", "eval(")):
         extension.api.set_parameters(material, e=10.0 + len(text) % 97)  # drawn anew
@@ -569,7 +569,7 @@ def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
     (end,) = (n for n in group.node_tree.nodes if n.bl_idname == "NodeGroupOutput")
     glass = group.node_tree.nodes.new("ShaderNodeBsdfGlass")
     group.node_tree.links.new(glass.outputs[0], end.inputs["BSDF"])
-    assert said.replace("Fitted", "Twin") in legend_of(panel, extension, twin)[0]
+    assert said.replace("Fitted", "Blender Nodes") in legend_of(panel, extension, twin)[0]
 
 
 @pytest.mark.parametrize(
@@ -791,7 +791,7 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
     panel.draw_plots(layout, material)
     assert "picture 14.4" in layout.log
     assert any("Glossy, roughness" in line for line in layout.log)
-    assert any("Principled, off by 1" in line for line in layout.log)
+    assert any("Principled. 1" in line for line in layout.log)
     assert any("Its roughness 0.58, metallic 1.00, IOR 1.50" in line for line in layout.log)
     assert not any("default" in line for line in layout.log)
     value = node.id_data.nodes.new("ShaderNodeValue")

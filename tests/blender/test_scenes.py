@@ -364,6 +364,30 @@ def test_representation_can_be_overridden(extension, empty, scene_file):
     assert any(n.bl_idname == "ShaderNodeBsdfAnisotropic" for n in nodes)
 
 
+def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch):
+    """A pack of one model, as of an own one, loads a scene with a floor: Blender's Diffuse node is
+    Lambert's model."""
+    sun = [{"type": "sun", "direction": [0.3, 0, -1], "irradiance": math.pi}]
+    materials = {"white": {"model": "lambert", "parameters": {"rho": [0.2, 0.5, 0.8]}}}
+    path = scene_file(lights=sun, materials=materials)
+    before = render(extension.scene_loader.load_scene(path))
+    monkeypatch.setattr(extension.scene_loader.pack, "model_names", lambda: ["minnaert"])
+    scene = extension.scene_loader.load_scene(path)
+    (material,) = {s.material for o in scene.objects for s in o.material_slots}
+    assert not extension.nodes.group_nodes(material)
+    assert render(scene) == pytest.approx(before, rel=1e-4)
+    for wrong, message in (
+        ({"rho": 2}, r"materials\.white\.parameters\.rho: expected numbers from 0 to 1, got 2"),
+        ({"rd": 0.5}, r"materials\.white\.parameters\.rd: expected no parameter but rho"),
+    ):
+        path = scene_file(materials={"white": {"model": "lambert", "parameters": wrong}})
+        with pytest.raises(ValueError, match=message):
+            extension.scene_loader.load_scene(path)
+    path = scene_file(materials={"white": {"model": "phong"}})
+    with pytest.raises(ValueError, match="expected one of minnaert.*brdfc build --scene makes"):
+        extension.scene_loader.load_scene(path)
+
+
 def test_glossy_comparison_has_the_same_axes(extension, empty, scene_file):
     """The stretched highlight of Blender's node lies where the model's does."""
     values = {"nu": 20.0, "nv": 2000.0, "rs": 1.0, "part": "specular"}

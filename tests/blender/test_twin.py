@@ -328,13 +328,16 @@ def test_every_model_renders_without_osl(extension):
 def test_how_far_off_a_twin_is_is_said_where_that_is_known(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
     empty.cycles.shading_system = False
-    for values, off in (({}, " 1.2 % off"), ({"ax": 0.0625, "ay": 0.3}, None)):
+    for values, off in (
+        ({}, " with an error of 1.2 % of the light"),
+        ({"ax": 0.0625, "ay": 0.3}, None),
+    ):
         material = extension.api.new_material("ward", **values)
         (found,) = [f for f in extension.api.warnings(material, empty) if f.code == "osl_off"]
         said = "Open Shading Language is off: Blender's own nodes stand in"
         assert found.message == said + ("" if off is None else f",{off}")
         assert found.severity == "WARNING"
-    with pytest.raises(ValueError, match="Twin is only for .* = 0.15, not for 0.0625"):
+    with pytest.raises(ValueError, match="Blender Nodes is only for .* = 0.15, not for 0.0625"):
         extension.api.new_material("ward", "twin", ax=0.0625, ay=0.3)
 
 

@@ -30,14 +30,32 @@ def run(*command, text=None):
     return done.stdout
 
 
-def example_of(page):
-    """Path and text of the source that a page shows."""
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-    found = re.findall(
-        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", text, re.S
+def page_of(page):
+    return (ROOT / "docs" / page).read_text(encoding="utf-8")
+
+
+def examples_of(page):
+    """[(path, text)] of the sources that a page shows."""
+    return re.findall(
+        r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", page_of(page), re.S
     )
-    assert len(found) == 1
-    return found[0]
+
+
+def example_of(page):
+    """The first one."""
+    return examples_of(page)[0]
+
+
+def with_base(text):
+    """The example with the base() that its page adds to the class."""
+    (base,) = re.findall(
+        r"<!-- base of generator/models/minnaert.cpp -->\n```cpp\n(.*?)```",
+        page_of("add-a-model.md"),
+        re.S,
+    )
+    end = "\n};\n\nBRDFC_MODEL"
+    assert text.count(end) == 1
+    return text.replace(end, f"\n\n{base}{end[1:]}")
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +65,10 @@ def tool(tmp_path_factory):
     source = tmp_path_factory.mktemp("example") / "source"
     skip = shutil.ignore_patterns("build", ".env", ".git", "__pycache__", ".*_cache")
     shutil.copytree(ROOT, source, ignore=skip)
-    for path, text in (example_of("add-a-model.md"), example_of("add-a-form.md")):
+    sources = dict(examples_of("add-a-model.md") + examples_of("add-a-form.md"))
+    minnaert = "generator/models/minnaert.cpp"
+    sources[minnaert] = with_base(sources[minnaert])
+    for path, text in sources.items():
         assert not (source / path).exists()
         (source / path).write_text(text, encoding="utf-8")
     # The form's page says to declare it and to list it.
@@ -141,8 +162,46 @@ def test_values_equal_the_formula(tool):
         assert float(row["pdf"]) == pytest.approx(pdf, rel=1e-12)
 
 
-def test_checks_find_no_fault(tool):
-    run(tool, "check", "minnaert")
+@pytest.mark.parametrize("model", ["minnaert", "paper"])
+def test_checks_find_no_fault(tool, model):
+    run(tool, "check", model)
+
+
+def test_the_base_carries_the_model(tool):
+    """As the page says: all but what lies between the colours of a ramp."""
+    rows = list(csv.DictReader(run(tool, "base", "minnaert").splitlines()))
+    assert rows
+    for row in rows:
+        assert float(row["relative_l1"]) < 0.02
+        assert float(row["share"]) == pytest.approx(1, abs=0.02)
+
+
+def test_four_lines_make_a_picture(tool, tmp_path):
+    """The page's own, but for the compiler, with the folders of this test."""
+    page = page_of("add-a-model.md")
+    ((name, content),) = re.findall(
+        r"<!-- scene: (\S+) -->\n```json\n(.*?)```\n<!-- end of scene", page, re.S
+    )
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    (lines,) = re.findall(r"<!-- commands -->\n((?:    .*\n)+)", page)
+    lines = [line.strip() for line in lines.splitlines()]
+    assert len(lines) == 4 and lines[0] == "ninja -C build brdfc && build/brdfc check minnaert"
+    for line in lines[1:]:
+        words = [
+            {"build/brdfc": tool, "script/render_scene.py": ROOT / "script/render_scene.py"}.get(
+                word, word
+            )
+            for word in shlex.split(line)
+        ]
+        if words[0] == ".env/blender-4.5/bin/python":
+            words[0] = BLENDER_PYTHON
+            (words[words.index("--extension") + 1],) = (tmp_path / "build").glob("*.zip")
+            words += ["--spp", 4]
+        done = subprocess.run(
+            [str(word) for word in words], cwd=tmp_path, capture_output=True, text=True
+        )
+        assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    assert (tmp_path / "minnaert.png").stat().st_size > 10_000
 
 
 def test_uniform_light_gives_the_albedo(renderers):

@@ -3,6 +3,7 @@
 one that can be translated."""
 
 import json
+import re
 import subprocess
 
 import pytest
@@ -63,6 +64,15 @@ def test_nothing_is_shown_that_is_not_looked_up():
 def test_no_text_has_the_terms_of_the_code(english):
     for text, place in english.items():
         assert "representation" not in text.lower() and "L1" not in text, place
+
+
+def test_no_text_has_words_of_this_project_alone(english):
+    """Who has not read the pages does not know them; names of render methods are explained in their
+    tooltips."""
+    known = re.compile(r"\{\w+(!r)?\}|\b(Aimed|Sampled|Fitted|Exact)\b")
+    unknown = re.compile(r"\b(forms?|twins?|aim(s|ed|ing)?|drawn|misplac\w*)\b|% off|off by", re.I)
+    found = {text: place for text, place in english.items() if unknown.search(known.sub("", text))}
+    assert not found
 
 
 @pytest.mark.parametrize(

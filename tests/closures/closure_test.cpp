@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Closures of Cycles by their definitions: tests/blender/conformance.py holds the definitions against Cycles.
+#include "closures/closure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/sequence.h"
+#include "model/sampling.h"
+
+namespace brdfc {
+namespace {
+
+Vec3<double> at(double degrees, double phi) { return direction(std::cos(degrees * kPi / 180), phi); }
+
+/// The integral of f cos over the hemisphere.
+Rgb<double> albedo(const Closure<double>& c, const Vec3<double>& wo) {
+  Rgb<double> sum(0.0);
+  constexpr int kPoints = 1 << 15;
+  Sequence3 points(1);
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3<double> u = points.next(), wi = sample_cosine(u.x, u.y);
+    if (wi.z > 0) sum += evaluate(c, wi, wo) * (kPi / wi.z / kPoints);
+  }
+  return sum;
+}
+
+Closure<double> rough_matte(double roughness, const Rgb<double>& albedo) {
+  Closure<double> c(ClosureKind::OrenNayar, Rgb<double>(1.0));
+  c.roughness = roughness;
+  c.albedo = albedo;
+  return c;
+}
+
+TEST(Closure, ASmoothMatteSurfaceIsLamberts) {
+  const Vec3<double> wi = at(30, 1), wo = at(70, 4);
+  for (const double albedo : {0., 0.5, 1.}) {
+    const Rgb<double> f = evaluate(rough_matte(0, Rgb<double>(albedo)), wi, wo);
+    EXPECT_NEAR(f.r, albedo * wi.z / kPi, 1e-15);
+  }
+}
+
+/// Light that facets of albedo 1 reflect again is all of what is lost at the first reflection.
+TEST(Closure, ARoughMatteSurfaceOfWhiteFacetsLosesNoLight) {
+  for (const double roughness : {0.1, 0.5, 1.})
+    for (const double degrees : {0., 40., 60., 75.}) {
+      EXPECT_NEAR(albedo(rough_matte(roughness, Rgb<double>(1.0)), at(degrees, 0.3)).g, 1, 2e-3)
+          << roughness << " " << degrees;
+      EXPECT_LT(albedo(rough_matte(roughness, Rgb<double>(0.5)), at(degrees, 0.3)).g, 0.5);
+    }
+}
+
+/// Values of the formula that agrees with Cycles 4.5 and 5.2 to 1e-7, worked out in another language.
+TEST(Closure, ARoughMatteSurfaceHasTheValuesOfCycles) {
+  const Closure<double> c = rough_matte(0.7, Rgb<double>(0.8, 0.5, 0.2));
+  const Rgb<double> beside = evaluate(c, at(30, 1), at(70, 1.5)), opposite = evaluate(c, at(50, 0.4), at(75, 3));
+  EXPECT_NEAR(beside.r, 0.2567231652999792, 1e-12);
+  EXPECT_NEAR(beside.b, 0.06135512621035594, 1e-12);
+  EXPECT_NEAR(opposite.r, 0.08112444531293897, 1e-12);
+  EXPECT_NEAR(opposite.g, 0.04861150379774029, 1e-12);
+}
+
+TEST(Closure, ARoughMatteSurfaceIsReciprocal) {
+  const Closure<double> c = rough_matte(0.7, Rgb<double>(0.9, 0.5, 0.1));
+  const Vec3<double> a = at(20, 0.2), b = at(80, 2.5);
+  const Rgb<double> there = evaluate(c, a, b) / a.z, back = evaluate(c, b, a) / b.z;
+  EXPECT_NEAR(there.r, back.r, 1e-14);
+  EXPECT_NEAR(there.b, back.b, 1e-14);
+}
+
+/// Its loss in the form that Cycles' source has, which divides by the cosine.
+TEST(Closure, TheLossOfARoughMatteSurfaceKeepsItsDigitsNearTheHorizon) {
+  for (const double c : {1., 0.7, 0.2, 1e-2}) {
+    const double s = std::sqrt(1 - c * c), theta = std::acos(c);
+    const double G = s * (theta - 2. / 3 - s * c) + 2. / 3 * (s / c) * (1 - s * s * s);
+    EXPECT_NEAR(matte_loss(c), kPi / 2 - 2. / 3 - G, 1e-12) << c;
+  }
+  EXPECT_NEAR(matte_loss(1e-12), 1e-12, 1e-15);
+  EXPECT_NEAR(matte_loss(1e-4f), 1e-4f, 3e-7f);
+}
+
+TEST(Closure, BurleysIsTheFormulaOfTheHalfVector) {
+  Closure<double> c(ClosureKind::Burley, Rgb<double>(1.0));
+  c.roughness = 0.7;
+  const Vec3<double> wi = at(50, 0.4), wo = at(75, 3), h = normalize(wi + wo);
+  const double F90 = 0.5 + 2 * c.roughness * dot(wi, h) * dot(wi, h);
+  const auto mix = [&](double cosine) { return 1 + (F90 - 1) * std::pow(1 - cosine, 5); };
+  EXPECT_NEAR(evaluate(c, wi, wo).g, wi.z / kPi * mix(wi.z) * mix(wo.z), 1e-15);
+}
+
+TEST(Closure, VelvetIsTheFormulaOfTheHalfVector) {
+  Closure<double> c(ClosureKind::Velvet, Rgb<double>(1.0));
+  c.roughness = 0.6;
+  const Vec3<double> wi = at(50, 0.4), wo = at(75, 3), h = normalize(wi + wo);
+  const double s2 = 1 - h.z * h.z;
+  const double D = std::exp(-h.z * h.z / s2 / 0.36) / (kPi * 0.36 * s2 * s2);
+  const double G = std::min(1., 2 * h.z * std::min(wi.z, wo.z) / dot(wi, h));
+  EXPECT_NEAR(evaluate(c, wi, wo).g, D * G / (4 * wo.z), 1e-14);
+  EXPECT_EQ(evaluate(c, wo, wo).g, evaluate(c, wo, wo).g) << "no NaN where the half vector is the view";
+  const Vec3<double> normal = at(0, 0);
+  EXPECT_EQ(evaluate(c, normal, normal).g, 0);
+}
+
+}  // namespace
+}  // namespace brdfc
