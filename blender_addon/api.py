@@ -20,6 +20,7 @@ from pathlib import Path
 import bpy
 
 from . import (
+    bump_correction,
     checks,
     convert,
     editable,
@@ -107,14 +108,7 @@ def prepare_material(material):
     Raises ValueError for a linked material, as do all that change one.
     """
     editable.check(expected.material(material))
-    declared = set()
-    for node in nodes.group_nodes(material):
-        if entry := nodes.manifest_entry(node):
-            declared |= set(entry[0].get("warnings", []))
-    if "bump_correction" in declared and material.cycles.use_bump_map_correction:
-        material.cycles.use_bump_map_correction = False
-        return [say("Bump Map Correction turned off for this material")]
-    return []
+    return bump_correction.prepare(material)
 
 
 def new_material(model, representation="auto", **parameters):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import closure_pool, i18n, lamp_checks, nodes, pack, stand_in, update
+from . import closure_pool, i18n, lamp_checks, lamps, nodes, pack, stand_in, update
 from .i18n import Sentence, say
 from .setting_checks import DECLARED, black_aovs, clamp_highlight
 
@@ -54,9 +54,9 @@ def runs_on_optix(scene):
 
 
 def lamps_that_fit(scene):
-    """How many lamps the open file's materials can aim at on a scene's device; None where the
-    device sets no limit."""
-    return closure_pool.lamps_that_fit() if runs_on_optix(scene) else None
+    """How many lamps the open file's materials can aim at on a scene's device, and the material
+    that leaves room for no more; None where none aims at lamps."""
+    return closure_pool.lamps_that_fit(runs_on_optix(scene))
 
 
 def device_refusal(model_name, form, scene):
@@ -71,11 +71,40 @@ def device_refusal(model_name, form, scene):
     return None
 
 
+def _slot_findings(use, scene):
+    """Whether Cycles has room for a material's closures, and for those of lamps beside them."""
+    most = closure_pool.most_slots()
+    if use.slots > most:
+        yield Finding(
+            "closures",
+            "ERROR",
+            say(
+                "The shaders of this material are more than Cycles keeps, and light is lost: use "
+                "fewer models in one material",
+                more=f"{use.slots} slots of closures, and Cycles has {most}",
+            ),
+        )
+        return
+    room = use.lamps(on_optix=False)
+    if room is not None and any(lamp.why == lamps.too_many(room) for lamp in lamps.seen(scene)):
+        yield Finding(
+            "closures",
+            "WARNING",
+            say(
+                "Cycles has room for {count} lamps beside the shaders of this material, so no "
+                "material of the file aims at more: use fewer models in it",
+                more=f"{use.slots} of {most} slots of closures, and {use.slots_per_lamp} a lamp",
+                count=room,
+            ),
+        )
+
+
 def _pool_findings(material, scene):
-    """Whether a material's closures fit the pool of a scene's device."""
+    """Whether a material's closures fit what a scene's device has for them."""
+    use, room = closure_pool.of_material(material), closure_pool.capacity()
+    yield from _slot_findings(use, scene)
     if not runs_on_optix(scene):
         return
-    use, room = closure_pool.of_material(material), closure_pool.capacity()
     if use.size > room:
         yield Finding(
             "closure_pool",

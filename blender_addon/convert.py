@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import bpy
 
-from . import animation, editable, nodes, pack
+from . import animation, bump_correction, editable, nodes, pack
 from .i18n import Sentence, say
 from .native_bsdf import Native
 from .nearest_model import Target, candidates, nearest_factor, with_width
@@ -24,6 +24,9 @@ LIMIT = 0.35
 
 #: Custom property of a group node: the name of the node that it stands in for.
 BEFORE = "brdfc_before"
+#: And whether Bump Map Correction was on then; without it an earlier version converted the node,
+#: which turned it off.
+CORRECTED = "brdfc_before_bump_map_correction"
 #: Of nodes that were added for it: the name of the group node.
 HELPS = "brdfc_helps"
 
@@ -300,6 +303,7 @@ def _source(socket):
 def _replace(p, group, values):
     tree, node = p.material.node_tree, p.node
     group.location, group[BEFORE] = node.location, node.name
+    group[CORRECTED] = bump_correction.recorded(p.material)
     for name, value in values.items():
         nodes.set_value(group, name, value)
     present = nodes.sockets(group)
@@ -351,8 +355,9 @@ def _before(group):
 
 
 def restore(material):
-    """Puts the nodes of before back; where they are gone, the twin, which Blender's own nodes are
-    as well. Returns how many nodes were put back. Raises ValueError where there is neither."""
+    """Puts the nodes of before back, and the settings; where they are gone, the twin, which
+    Blender's own nodes are as well. Returns how many nodes were put back. Raises ValueError where
+    there is neither."""
     editable.check(material)
     if material.node_tree is None:
         return 0
@@ -361,10 +366,12 @@ def restore(material):
     for group, before in pairs:
         if before is None:  # refused before anything is changed
             pack.resolve(nodes.identity(group)[0], "twin", nodes.all_values(group))
+    corrected = [bool(group.get(CORRECTED, True)) for group, _ in pairs]
     for group, before in pairs:
         if before is None:
             nodes.switch(group, "twin")
-            del group[BEFORE]
+            for key in (BEFORE, CORRECTED):
+                group.pop(key, None)
             continue
         for link in list(group.outputs["BSDF"].links):
             target = link.to_socket
@@ -374,5 +381,7 @@ def restore(material):
         for helper in [n for n in tree.nodes if n.get(HELPS) == group.name]:
             tree.nodes.remove(helper)
         tree.nodes.remove(group)
+    if pairs:
+        bump_correction.restore(material, all(corrected))
     nodes.remove_unused_groups()
     return len(pairs)

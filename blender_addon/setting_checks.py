@@ -40,8 +40,8 @@ def _bump_correction(material, scene):
         return (
             "ERROR",
             say(
-                "Bump Map Correction is on in the material's settings: where a normal map or bump "
-                "bends the surface this material sends light the wrong way"
+                "Bump Map Correction is on in the material's settings: this material sends light the "
+                "wrong way where it is seen from the side"
             ),
         )
 

@@ -246,17 +246,22 @@ def draw_lamps(layout, material, scene):
     else:
         said = say("Free of noise under no lamp yet")
     wrapped(box.column(align=True), said, "LIGHT")
-    room = checks.lamps_that_fit(scene)
-    if room is not None and room < slots:
-        wrapped(
-            box.column(align=True),
-            say(
+    limit = checks.lamps_that_fit(scene)
+    if limit is not None and limit[0] < slots:
+        room, largest = limit
+        if checks.runs_on_optix(scene):
+            said = say(
                 "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
                 "Shader mixes shares it",
                 count=room,
-            ),
-            "ERROR",
-        )
+            )
+        else:
+            said = say(
+                "Cycles has room for {count} lamps beside the shaders of {material}",
+                count=room,
+                material=largest.name,
+            )
+        wrapped(box.column(align=True), said, "ERROR")
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
 
 

@@ -23,8 +23,9 @@ nodes are there to compare with. `tests/blender/test_every_fit.py` holds fitted 
 every model to the same.
 
 Of the tilted normals (by the mesh's own, by the Normal input, by that with Bump Map Correction on)
-the worst of three views is shown, against the model's own rays without those that end below the
-surface. Passes: mean difference from the model's albedo, median angle from the true normal, largest
+the worst of three views is shown: what is lost of all that the model reflects, of Blender's own
+nodes of their colour. It is bold where it is not what the model's own rays lose below the surface.
+Passes: mean difference from the model's albedo, median angle from the true normal, largest
 difference of the picture and the sum of its light groups. "lamp without shadows" is a sun overhead,
 "lamp without multiple importance" one 1 rad wide, each compared with the same sun as it should be;
 "lamp linked elsewhere" adds a sun that shines on something else, "nine lamps for one" puts nine

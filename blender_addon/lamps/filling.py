@@ -41,8 +41,8 @@ def _checks():
 
 def limit_of(scene):
     """How many lamps materials can aim at on a scene's device."""
-    room = _checks().lamps_that_fit(scene)
-    return slots.SLOTS if room is None else min(room, slots.SLOTS)
+    found = _checks().lamps_that_fit(scene)
+    return slots.SLOTS if found is None else min(found[0], slots.SLOTS)
 
 
 def device_changed(scene):

@@ -15,6 +15,7 @@
 #include "forms/made_of_fit.h"
 #include "forms/osl_form.h"
 #include "measure/probes.h"
+#include "model/horizon.h"
 #include "print/osl_text.h"
 
 namespace brdfc::forms {
@@ -133,6 +134,13 @@ class AimedText {
     for (const char* what : {"centre", "across", "along", "disk"})
       out += fmt::format("                lamp_{0}[lobes] = lit_{0};\n", what);
     out += "            }\n";
+    // Bump Map Correction bends the normals of lobes towards what is lower, and from Blender 5.0 on Cycles evaluates no
+    // lobe towards what is below the interpolated normal.
+    out += fmt::format(
+        "            vector to_centre = normalize(lamp_centre[lobes]);\n"
+        "            to_centre = frame_t * to_centre[0] + frame_b * to_centre[1] + frame_n * to_centre[2];\n"
+        "            if (dot(N, to_centre) <= 0.0 || brdfc_is_below(to_centre, {}))\n                continue;\n",
+        number(kMirrorRise));
     if (!through_)
       out += "            float lamp_above;\n" + indented(steps.above.statements, 3) +
              "            if (lamp_above <= 0.0)\n                continue;\n";
@@ -232,8 +240,8 @@ class Aimed final : public OslForm {
     const bool mirror = model.has_mirror();
     // Path Guiding and the passes know nothing of closures that take light away: pictures get 2 % too bright, the
     // albedo too high by what base and rest cancel. Normals are those of the drawn lobes where no base outweighs them.
-    std::vector<std::string> codes = {"bump_correction", "multiple_importance", "path_guiding", "orthographic_far",
-                                      "albedo_passes"};
+    std::vector<std::string> codes = {"multiple_importance", "path_guiding", "orthographic_far", "albedo_passes"};
+    if (shader.leaning) codes.push_back("bump_correction");
     if (mirror) codes.push_back("clamp_mirror");
     if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
     if (mirror) codes.push_back("filter_glossy");
@@ -251,6 +259,28 @@ class Aimed final : public OslForm {
  protected:
   void write_closures(ShaderText&) const override;
 };
+
+/// Closures that Cycles would evaluate as others than the rest takes off are left out of the base.
+void leave_out_of_base(ShaderText& text, const std::vector<RecordedClosure>& base) {
+  for (std::size_t c = 0; c < base.size(); ++c) {
+    // About a bent normal: by Bump Map Correction Cycles darkens matte ones, and from Blender 5.0 on it evaluates none
+    // towards what is below the interpolated normal.
+    std::string out = "frame_n != shading_n";
+    if (base[c].turned) {
+      // Bump Map Correction would bend it.
+      out += fmt::format(
+          " || brdfc_is_below(reflect(-I, frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * normal_{0}_z), "
+          "{1})",
+          c, number(kMirrorRise));
+    }
+    if (text.model.info().look == Look::Matte && !base[c].turned) continue;
+    text.statements += fmt::format("    if ({})\n        weight_{} = 0.0;\n", out, c);
+  }
+  // But for matte ones about normals of their own, which it darkens anywhere.
+  text.shader.leaning = std::any_of(base.begin(), base.end(), [](const RecordedClosure& c) {
+    return c.turned && c.kind == ClosureKind::DiffuseRamp;
+  });
+}
 
 std::string Aimed::under_sizeless_lamps(int lamps, int slots) const {
   if (lamps <= slots) return "as on Blender's own nodes";
@@ -281,17 +311,22 @@ void Aimed::write_closures(ShaderText& text) const {
   for (std::size_t c = 0; c < base.size(); ++c)
     if (has_facets(base[c].kind))
       text.statements += fmt::format("    if (raytype(\"camera\") == 0)\n        weight_{} = 0.0;\n", c);
+  leave_out_of_base(text, base);
   text.statements += lamps.print();
   shader.lamps = setting.max_lamps;
   shader.operations += lamps.operations();
   shader.slots += (setting.max_lamps + 1) * slots(ClosureKind::PhongRamp);
   shader.closure_bytes += ray_bytes(model);
   const bool aimed = setting.max_lamps > 0;
+  const char* wi = aimed ? "ray_{0}" : "drawn_{0}";
+  const auto part = [&](const char* axis) { return fmt::format(fmt::runtime(wi), axis); };
+  const std::string ray =
+      fmt::format("    vector ray = frame_t * {} + frame_b * {} + frame_n * {};\n", part("x"), part("y"), part("z"));
   shader.lamp_bytes = aimed ? pool_bytes(ClosureKind::PhongRamp) + kPoolNode : 0;
   if (aimed) text.terms.push_back("aimed");
   // As a colour: see kPoolNode.
   if (!model.has_through()) {
-    text.statements += "    color rest_followed = rest_weight;\n";
+    text.statements += "    color rest_followed = rest_weight;\n" + ray + lost_below(model, "ray", "rest_followed");
     std::string of_base;
     for (std::size_t c = 0; c < base.size(); ++c)
       of_base += fmt::format("{}weight_{} != color(0.0)", c > 0 ? " || " : "", c);
@@ -300,11 +335,9 @@ void Aimed::write_closures(ShaderText& text) const {
           fmt::format("    if ({}) {{\n        rest_followed *= {};\n        rest_colour /= {};\n    }}\n", of_base,
                       number(kRestFollowed), number(kRestFollowed));
   }
-  const char* ray = model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, {}, I, frame_n)"
-                                        : "rest_followed * brdfc_ray_coloured({}, I, rest_colour)";
-  text.terms.push_back(
-      fmt::format(fmt::runtime(ray), aimed ? "frame_t * ray_x + frame_b * ray_y + frame_n * ray_z"
-                                           : "frame_t * drawn_x + frame_b * drawn_y + frame_n * drawn_z"));
+  if (model.has_through()) text.statements += ray + lost_below(model, "ray", "rest_weight");
+  text.terms.push_back(model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, ray, I, frame_n)"
+                                           : "rest_followed * brdfc_ray_coloured(ray, I, rest_colour)");
   text.turn(base);
 }
 

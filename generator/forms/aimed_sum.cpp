@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "forms/aimed.h"
+#include "model/horizon.h"
 
 namespace brdfc::forms {
 
@@ -14,6 +15,7 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
     LitPart<double> lit{patches[i], patches[i]};
     if (!beams.empty() && beams[i].edge > 0) lit = lit_part(patches[i], beams[i]);
     if (!brdf.scatters_through() && highest(lit.lamp) <= 0) continue;
+    if (lit.lamp.centre.z <= kMirrorRise * length(lit.lamp.centre)) continue;
     double room = 1;
     for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(lit.lamp.centre, earlier));
     const AimedLamp<double> lamp = aim_at(lit.lamp, lit.mean, room, v[i][0], v[i][1], wo);

@@ -11,6 +11,7 @@
 #include "closures/closure_pool.h"
 #include "core/error.h"
 #include "forms/albedo_text.h"
+#include "model/horizon.h"
 #include "print/osl_library.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
@@ -47,7 +48,31 @@ std::string within_ranges(const ModelInfo& info, const ParamValues& fixed, const
   return bounds.empty() ? statements : bounds + "    {\n" + print::indented(names + statements, 1) + "    }\n";
 }
 
-std::string closure_text(const RecordedClosure& closure, std::size_t i) {
+/// Statements that declare the frame. Normals of matte models are not bent: they have no mirror direction, and
+/// Blender's Diffuse node leaves its normal as it is, too.
+std::string frame_text(const Model& model, double lowest_view) {
+  std::string text = "    vector shading_n = normalize(Normal), frame_n = shading_n;\n";
+  if (model.info().look != Look::Matte) {
+    Recorder recorder;
+    const auto input_vector = [](const std::string& name) {
+      return Vec3<Expr>{Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
+    };
+    const Vec3<Expr> geometric = input_vector("Ng"), wo = input_vector("I"), n = input_vector("shading_n");
+    Program rise, bend;
+    rise.output("mirror_rise", mirror_rise(geometric, wo, n));
+    const Vec3<Expr> bent = bent_normal(geometric, wo, n);
+    bend.output("frame_n[0]", bent.x);
+    bend.output("frame_n[1]", bent.y);
+    bend.output("frame_n[2]", bent.z);
+    text += "    float mirror_rise;\n" + block(recording_of(model, rise, 0).statements, 1) +
+            "    if (mirror_rise < 0.0 && brdfc_has_true_normal()) {\n" +
+            print::indented(recording_of(model, bend, 0).statements, 2) + "    }\n";
+  }
+  if (lowest_view > 0) text += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", lowest_view);
+  return text;
+}
+
+std::string closure_text(const RecordedClosure& closure, std::size_t i, const std::string& diffuse_n) {
   const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
   const auto microfacet = [&](const char* distribution) {
     // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
@@ -60,7 +85,7 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
   };
   switch (closure.kind) {
     case ClosureKind::Diffuse:
-      return fmt::format("weight_{} * brdfc_diffuse({})", i, n);
+      return fmt::format("weight_{} * brdfc_diffuse({})", i, closure.turned ? n : diffuse_n);
     case ClosureKind::Burley:
       return fmt::format("weight_{0} * burley_diffuse_bsdf({1}, color(1), roughness_{0})", i, n);
     case ClosureKind::OrenNayar:
@@ -91,6 +116,12 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i) {
 
 int ray_bytes(const Model& model) { return pool_bytes(ClosureKind::PhongRamp) + (model.has_through() ? kPoolNode : 0); }
 
+std::string lost_below(const Model& model, const std::string& wi, const std::string& weight) {
+  const char* reflects = model.has_through() ? "dot({0}, frame_n) > 0.0 && " : "";
+  return fmt::format(
+      fmt::runtime(std::string("    if (") + reflects + "brdfc_is_below({0}, 0.0))\n        {1} = 0.0;\n"), wi, weight);
+}
+
 std::vector<RecordedClosure> ShaderText::record(
     ChoiceSwitch& by_choice, const std::function<Recording(const Choices&, const ParamValues&)>& recording) {
   const ModelInfo& info = model.info();
@@ -110,7 +141,7 @@ std::vector<RecordedClosure> ShaderText::record(
   return closures;
 }
 
-void ShaderText::declare(const std::vector<RecordedClosure>& closures) {
+void ShaderText::declare(const std::vector<RecordedClosure>& closures, const std::string& diffuse_n) {
   for (std::size_t c = 0; c < closures.size(); ++c) {
     const ClosureKind kind = closures[c].kind;
     // 0 for choices without closures.
@@ -127,7 +158,8 @@ void ShaderText::declare(const std::vector<RecordedClosure>& closures) {
     if (kind == ClosureKind::Refraction) statements += fmt::format("    float ior_{};\n", c);
     if (closures[c].turned) statements += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
     shader.facets = shader.facets || has_facets(kind);
-    terms.push_back(closure_text(closures[c], c));
+    shader.leaning = shader.leaning || closures[c].turned;
+    terms.push_back(closure_text(closures[c], c, diffuse_n));
     shader.slots += slots(kind);
     shader.closure_bytes += pool_bytes(kind);
   }
@@ -167,7 +199,8 @@ void OslForm::write_closures(ShaderText& text) const {
   const auto closures = text.record(by_choice, [&](const Choices&, const ParamValues& values) {
     return recordings(text.model, values, text.setting).at(0);
   });
-  text.declare(closures);
+  // As Blender's nodes do, where closures are not parts of a sum that holds for one frame alone.
+  text.declare(closures, made_of_fit() ? "frame_n" : "shading_n");
   text.statements += by_choice.print(4);
   // Closures of a fit are made without them.
   text.scale(closures, made_of_fit() ? fit::roles_of(text.model, text.setting.fixed).with(fit::Role::Factor)
@@ -192,8 +225,7 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   if (with_mirror)
     made.record(mirror, [&](const Choices&, const ParamValues& v) { return record_mirror(model, v, 0); });
 
-  std::string normal = "    vector frame_n = normalize(Normal);\n";
-  if (lowest_view() > 0) normal += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", lowest_view());
+  const std::string normal = frame_text(model, lowest_view());
   std::string body = normal;
   body +=
       "    vector frame_t, frame_b;\n"
@@ -270,7 +302,8 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
 
 std::vector<std::string> warnings_of_closures(const Model& model, const Shader& shader) {
   const bool mirror = model.has_mirror();
-  std::vector<std::string> codes = {"bump_correction"};
+  std::vector<std::string> codes;
+  if (shader.leaning) codes.push_back("bump_correction");
   if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
   if (shader.facets) codes.push_back("caustics");
   if (mirror || shader.facets) codes.push_back("filter_glossy");

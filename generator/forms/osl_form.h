@@ -26,8 +26,9 @@ struct ShaderText {
   /// closures, which are the same for all that have any, and counts the operations of the longest.
   std::vector<RecordedClosure> record(ChoiceSwitch&,
                                       const std::function<Recording(const Choices&, const ParamValues&)>& recording);
-  /// Declares what recorded statements assign of the closures, makes them terms and counts what they take.
-  void declare(const std::vector<RecordedClosure>&);
+  /// Declares what recorded statements assign of the closures, makes them terms and counts what they take. `diffuse_n`:
+  /// the variable that Diffuse closures have for their normal.
+  void declare(const std::vector<RecordedClosure>&, const std::string& diffuse_n = "frame_n");
   /// Divides colours of ramps as they ask for; then weights are multiplied by the `factors`, that of a mirror is not.
   void scale(const std::vector<RecordedClosure>&, const std::set<std::string>& factors);
   /// Brings normals and tangents of their own from the model's frame into the shader's.
@@ -56,6 +57,10 @@ std::vector<std::string> warnings_of_closures(const Model&, const Shader&);
 /// Three numbers in [0, 1) that draw a direction.
 inline constexpr const char* kDraws =
     "    vector u_all = brdfc_random(0, path_length);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";
+
+/// Sets a weight to 0 where the vector `wi` of this name leaves on the viewer's side of the shading normal but goes
+/// below the true surface. Cycles ends such a path; with Bump Map Correction it would send it along the surface.
+std::string lost_below(const Model&, const std::string& wi, const std::string& weight);
 
 /// What a drawn direction, which is a lobe, takes of a GPU's pool. Where it may be another closure, OSL makes a product
 /// of that and its weight.

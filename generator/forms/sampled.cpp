@@ -20,8 +20,8 @@ class Sampled final : public OslForm {
   std::vector<std::string> warnings(const Model& model, const Shader&) const override {
     // A clamp or a lamp of no size meets the lobe differently from Blender's own closures, and its normal is not the
     // surface's.
-    std::vector<std::string> codes = {"bump_correction",  "multiple_importance", "clamp_indirect", "clamp_direct",
-                                      "zero_size_lights", "orthographic_far",    "normal_pass"};
+    std::vector<std::string> codes = {"multiple_importance", "clamp_indirect",   "clamp_direct",
+                                      "zero_size_lights",    "orthographic_far", "normal_pass"};
     if (model.has_mirror()) codes.insert(codes.end(), {"filter_glossy", "albedo_passes_mirror"});
     return codes;
   }
@@ -40,7 +40,8 @@ class Sampled final : public OslForm {
     text.record(by_choice,
                 [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
     text.statements += std::string(kDraws) + "    float wi_x, wi_y, wi_z;\n    color weight;\n" + by_choice.print(4) +
-                       "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n";
+                       "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n" +
+                       lost_below(text.model, "wi", "weight");
     text.terms.push_back(text.model.has_through() ? "brdfc_ray_anywhere(weight, wi, I, frame_n)"
                                                   : "weight * brdfc_ray(wi, I)");
     text.shader.slots = slots(ClosureKind::PhongRamp);

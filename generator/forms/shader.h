@@ -16,6 +16,7 @@ struct Shader {
   int operations = 0;     ///< most that one combination of choices executes, a loop's body counted once
   int statements = 0;     ///< of the shader for all combinations of choices, without the library it calls
   bool facets = false;    ///< has closures of facets
+  bool leaning = false;   ///< has closures about normals of their own that Bump Map Correction changes
   int lamps = 0;          ///< slots of lamps that it aims at
   int closure_bytes = 0;  ///< most that they take of a GPU's kPoolBytes where no lamp is aimed at
   int lamp_bytes = 0;     ///< that each lamp adds

@@ -100,8 +100,8 @@ class Twin final : public Form {
   Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const override;
   std::vector<std::string> warnings(const Model& model, const Shader&) const override {
     // A matte node, glossy ones whose facets lean, and a mirror.
-    if (!model.has_mirror()) return {"bump_correction", "leaning_facets", "caustics", "filter_glossy"};
-    return {"bump_correction", "multiple_importance", "leaning_facets", "caustics", "filter_glossy", "clamp_mirror"};
+    if (!model.has_mirror()) return {"leaning_facets", "caustics", "filter_glossy"};
+    return {"multiple_importance", "leaning_facets", "caustics", "filter_glossy", "clamp_mirror"};
   }
   bool highlights(const Model& model, const Shader&) const override { return !model.has_mirror(); }
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one convention for views below the shading normal's horizon, shared by the shaders and the reference.
+// The conventions for shading normals that differ from the surface's own, shared by the shaders and the reference.
 #pragma once
 
 #include "core/vec.h"
@@ -17,6 +17,35 @@ template <class T> Vec3<T> raise_to_horizon(const Vec3<T>& wo) {
   const auto below = wo.z < low;
   return {named("x_o", select(below, wo.x * shrink, wo.x)), named("y_o", select(below, wo.y * shrink, wo.y)),
           named("cosTheta_o", select(below, low, wo.z))};
+}
+
+/// How high above the true surface bent_normal() brings the mirror direction at most, as a cosine.
+inline constexpr double kMirrorRise = 0.01;
+
+/// How high it brings that for a view of this cosine.
+template <class T> T least_mirror_rise(const T& cos_o) { return minimum(T(0.9) * cos_o, T(kMirrorRise)); }
+
+/// How far the mirror direction about a shading normal is above the true surface, as a cosine, less the height that
+/// bent_normal() gives it. Negative: the normal has to be bent. All directions are unit; wo is on the side of
+/// `geometric`, the true normal.
+template <class T> T mirror_rise(const Vec3<T>& geometric, const Vec3<T>& wo, const Vec3<T>& normal) {
+  return T(2) * dot(normal, wo) * dot(normal, geometric) - dot(wo, geometric) - least_mirror_rise(dot(wo, geometric));
+}
+
+/// The shading normal, turned towards the true one until the mirror direction about it is just above the surface. Else
+/// a mirror, and with it much of a narrow lobe, would send its rays below the surface, where they are lost: meshes of
+/// few faces that are shaded smooth would be black there. Only for a negative mirror_rise(). This is Cycles' Bump Map
+/// Correction (kernel/closure/bsdf_util.h, ensure_valid_specular_reflection), which has the derivation.
+template <class T> Vec3<T> bent_normal(const Vec3<T>& geometric, const Vec3<T>& wo, const Vec3<T>& normal) {
+  // In the plane of both normals: z along the true one, x to the side of the other.
+  const Vec3<T> across = normal - geometric * dot(normal, geometric);
+  const Vec3<T> x_axis = across / maximum(length(across), tiny<T>());
+  const T x = dot(wo, x_axis), z = maximum(dot(wo, geometric), T(0)), least = least_mirror_rise(z);
+  // The square of the bent normal's z, a root of 4 a z^4 - 2 b z^2 + c = 0. Both are written so that nothing cancels.
+  const T a = maximum(sqr(x) + sqr(z), tiny<T>()), b = T(2) * (a + z * least), c = sqr(least + z);
+  const T both = b + sqrt(maximum(sqr(b) - T(4) * a * c, T(0)));
+  const T z2 = minimum(select(x < T(0), both / (T(4) * a), c / maximum(both, tiny<T>())), T(1));
+  return x_axis * sqrt(T(1) - z2) + geometric * sqrt(z2);
 }
 
 }  // namespace brdfc::inline model

@@ -222,6 +222,7 @@ Result build_pack(const Options& options) {
                    {"generator", std::string(kGenerator) + BRDFC_VERSION},
                    {"hash", ""},
                    {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
+                   {"closure_slots", {{"most", kMaxClosures}, {"lamp", slots(ClosureKind::PhongRamp)}}},
                    {"looks", looks_json()},
                    {"models", Json::object()}};
   for (std::size_t i = 0; i < chosen.size(); ++i) {

@@ -20,11 +20,11 @@ constexpr const char* kWords = R"(
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
   abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
-  microfacet min normalize phong_ramp pow raytype reflection refraction sin sqrt
+  microfacet min normalize phong_ramp pow raytype reflect reflection refraction sin sqrt
 
   Albedo BSDF Normal Shown Tangent
 
-  entry first frame_b frame_n frame_t last mirror_weight path_length show side
+  entry first frame_b frame_n frame_t last mirror_rise mirror_weight path_length ray shading_n show side
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
   across_here aimed along_here beam beam_blend beam_edge beam_here centre_here chosen covered covered_before
@@ -33,7 +33,7 @@ constexpr const char* kWords = R"(
   lamps lit_across lit_along lit_centre lit_disk lobe_colour lobe_colours lobe_end lobe_exponent lobe_extent
   lobe_followed lobe_half lobe_height lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight lobes ray_x
   ray_y ray_z rest_colour rest_followed rest_weight shining_across shining_along shining_centre shining_disk to_half_x
-  to_half_y to_half_z to_lamp_x to_lamp_y to_lamp_z tossed v_all
+  to_centre to_half_y to_half_z to_lamp_x to_lamp_y to_lamp_z tossed v_all
 )";
 
 /// What a shader numbers.

@@ -10,6 +10,8 @@
 //
 // Interpolated normals: light arrives on the triangle and reflects about the normal, which multiplies what arrives by
 // the ratio of both cosines (E. Veach, Robust Monte Carlo Methods for Light Transport Simulation, 1997, section 5.3).
+// They are not bent as the path tracer bends them, which depends on the viewer: of meshes of few faces that are shaded
+// smooth its pictures of polished models are others.
 #pragma once
 
 #include "reference/render.h"

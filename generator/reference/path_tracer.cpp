@@ -177,7 +177,7 @@ void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const 
   Surface::Scratch& scratch = wave.scratch.of(material);
   Block& b = *wave.block;
   const std::uint64_t dimension = dimension_of(bounce);
-  make_frames(surface.has_transmit() || surface.scatters_through(), b);
+  make_frames(surface, b);
   for (int far = 0; far < 2; ++far)
     if (surface.has_scatter() && !lights_.empty() && (!far || surface.scatters_through()))
       aim(far, bounce, wave);
@@ -214,10 +214,16 @@ void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const 
   }
 }
 
-BRDFC_VECTORISED void PathTracer::make_frames(bool two_sided, Block& b) {
+BRDFC_VECTORISED void PathTracer::make_frames(const Surface& surface, Block& b) {
+  const bool two_sided = surface.has_transmit() || surface.scatters_through(), bends = surface.bends_normals();
   for_lanes(b.count, [&](std::size_t k) {
-    const Vector normal = b.hits.normal[k], tangent = b.hits.tangent[k], bitangent = cross(normal, tangent),
-                 direction = b.rays.direction[k];
+    const Vector direction = b.rays.direction[k], geometric = b.hits.geometric[k], shading = b.hits.normal[k];
+    const bool bent = bends & (mirror_rise(geometric, -direction, shading) < 0);
+    const Vector normal = select(bent, bent_normal(geometric, -direction, shading), shading);
+    const Vector tangent = unit(b.hits.tangent[k] - normal * dot(normal, b.hits.tangent[k]));
+    const Vector bitangent = cross(normal, tangent);
+    b.hits.normal.set(k, normal);
+    b.hits.tangent.set(k, tangent);
     Vector wo = raise_to_horizon(Vector{-dot(direction, tangent), -dot(direction, bitangent), -dot(direction, normal)});
     b.side[k] = two_sided ? b.hits.side[k] : 1;
     wo.z *= b.side[k];

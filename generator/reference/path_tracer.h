@@ -63,7 +63,7 @@ class PathTracer {
   /// directions to lights into the frames; directions where paths go out of them.
   void begin(const Numbers& x, const Numbers& y, Block& b) const;
   static void random(const Block& b, std::uint64_t index, Numbers& out);
-  static void make_frames(bool two_sided, Block& b);
+  static void make_frames(const Surface& surface, Block& b);
   static void turn_to_lights(bool far, Block& b);
   static void turn_to_world(Block& b);
 

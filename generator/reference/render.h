@@ -3,9 +3,10 @@
 //
 // Conventions. A path scatters at most max_bounces + 1 times; after the last one it still collects what shines
 // directly, as in Cycles. Surfaces have two equal sides: normals are turned towards the viewer. Shading uses the
-// interpolated normal; a viewer below its horizon is raised to it (model/horizon.h). Light from below the geometric
-// surface contributes nothing. The tangent is the object's z axis made orthogonal to the normal, or its x axis
-// where those are parallel, and the bitangent is normal x tangent. A pixel is the mean over its own square.
+// interpolated normal, bent where the mirror direction about it would be below the surface; a viewer below its horizon
+// is raised to it (model/horizon.h). Light from below the geometric surface contributes nothing. The tangent is the
+// object's z axis made orthogonal to the normal, or its x axis where those are parallel, and the bitangent is normal x
+// tangent. A pixel is the mean over its own square.
 #pragma once
 
 #include <atomic>

@@ -62,6 +62,9 @@ class Surface {
   bool has_transmit() const { return has_transmit_; }
   bool has_medium() const { return has_medium_; }
   bool scatters_through() const { return through_; }
+  /// Whether shading normals are bent (model/horizon.h): those of matte models, which have no mirror direction, are
+  /// not.
+  bool bends_normals() const { return material_.model->info().look != Look::Matte; }
 
   /// Chance to follow one of the delta terms, whose weights add up to `delta`, rather than to sample the rest. Any
   /// number strictly between 0 and 1 is unbiased where both exist; the estimate of the rest's albedo only keeps the

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the extension does where closures have a pool of limited size: OptiX, which is pretended.
-Sums are by hand, of what tests/pack/pack_test.cpp counts; 1016 bytes is what the pool holds."""
+"""What the extension does where closures have little room: the slots that Cycles has, and the pool
+of limited size on OptiX, which is pretended. Sums are by hand, of what tests/pack/pack_test.cpp
+counts; 1016 bytes is what the pool holds."""
+
+from importlib import import_module
 
 import bpy
 import helpers
+import numpy as np
 import pytest
 
 
@@ -143,3 +147,84 @@ def test_a_form_that_does_not_fit_is_refused(extension, optix):
     optix.cycles.device = "CPU"
     assert "closure_pool" not in codes(extension, material, optix)
     assert "operator brdfc.switch Fitted" in panel(extension, material, optix)
+
+
+# ---- slots of closures, of which Cycles has 64 on every device ----------------------------------
+
+
+def mix_of(extension, scene, model, count, extra=()):
+    """A material of `count` nodes of a model and other shaders, by Mix Shader in equal parts."""
+    material = extension.api.new_material(model)
+    tree = material.node_tree
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    (first,) = extension.nodes.group_nodes(material)
+    more = [extension.nodes.add_group_node(tree, model).outputs["BSDF"] for _ in range(count - 1)]
+    more += [tree.nodes.new(kind).outputs[0] for kind in extra]
+    shader = first.outputs["BSDF"]
+    for i, other in enumerate(more):
+        mix = tree.nodes.new("ShaderNodeMixShader")
+        mix.inputs[0].default_value = 1 / (i + 2)
+        tree.links.new(shader, mix.inputs[1])
+        tree.links.new(other, mix.inputs[2])
+        shader = mix.outputs[0]
+    tree.links.new(shader, output.inputs["Surface"])
+    return material
+
+
+@pytest.fixture
+def cpu(extension, empty):
+    extension.scene_loader.apply_clean_settings(empty, samples=1)
+    return empty
+
+
+def test_several_models_in_one_material_aim_at_fewer_lamps(extension, cpu):
+    """By hand: phong has 8 slots beside its lamps, each of which takes 3."""
+    put(cpu, extension.api.new_material("phong"))
+    add_lamps(cpu, 8)
+    assert filled() == 8
+    two = put(cpu, mix_of(extension, cpu, "phong", 2)).active_material
+    assert filled() == 8  # (64 - 2 * 8) / 6
+    assert "closures" not in codes(extension, two, cpu)
+    four = put(cpu, mix_of(extension, cpu, "phong", 4)).active_material
+    assert filled() == 2  # (64 - 4 * 8) / 12 = 2.7
+    finding = codes(extension, four, cpu)["closures"]
+    assert finding.severity == "WARNING" and "room for 2 lamps" in finding.message
+    assert "closures" not in codes(extension, two, cpu), "it is not the one"
+    assert "room for 2 lamps beside the shaders of" in panel(extension, two, cpu)
+    nine = mix_of(extension, cpu, "phong", 9)
+    assert codes(extension, nine, cpu)["closures"].severity == "ERROR"
+
+
+def test_blenders_own_shaders_in_a_material_count(extension, cpu):
+    pool = import_module(f"{extension.package}.closure_pool")
+    alone = pool.of_material(mix_of(extension, cpu, "phong", 1)).slots
+    kinds = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfDiffuse")
+    material = mix_of(extension, cpu, "phong", 1, kinds)
+    assert pool.of_material(material).slots == alone + 2 + 3 + 1
+    principled = next(n for n in material.node_tree.nodes if n.bl_idname == kinds[1])
+    principled.inputs["Coat Weight"].default_value = 0.5
+    assert pool.of_material(material).slots == alone + 2 + 5 + 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [4, 6])
+def test_a_mix_of_equal_nodes_is_as_bright_as_one(extension, cpu, count):
+    """Under eight point lamps six nodes of phong were 37.6 % too dark."""
+
+    def mean(material):
+        ball = put(cpu, material)
+        cpu.view_layers[0].update()
+        value = helpers.render(cpu)[..., :3].mean()
+        bpy.data.objects.remove(ball)
+        bpy.data.materials.remove(material)
+        return value
+
+    helpers.add_camera(cpu)
+    for i in range(8):
+        angle = i * 0.8
+        place = (4 * np.cos(angle), -4, 4 * np.sin(angle))
+        helpers.add_lamp(cpu, "POINT", location=place, energy=200, shadow_soft_size=0.3)
+    cpu.cycles.samples = 512
+    cpu.render.resolution_x = cpu.render.resolution_y = 32
+    alone = mean(mix_of(extension, cpu, "phong", 1))
+    assert mean(mix_of(extension, cpu, "phong", count)) == pytest.approx(alone, rel=0.02)

@@ -193,12 +193,13 @@ def test_linked_materials_become_the_files_own_with_their_twins(extension, empty
 
 def test_what_is_said_is_of_the_twin_where_that_stands_in(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
+    empty.cycles.use_guiding = True  # of which only the shader is warned
+    empty.cycles.caustics_reflective = False  # and the twin of this
     material = extension.api.new_material("phong", "aimed")
-    material.cycles.use_bump_map_correction = True
-    assert "bump_correction" in {f.code for f in extension.api.warnings(material, empty)}
+    before = {f.code for f in extension.api.warnings(material, empty)}
+    assert "path_guiding" in before and "caustics" not in before
     empty.cycles.shading_system = False
     as_twin = extension.api.new_material("phong", "twin")
-    as_twin.cycles.use_bump_map_correction = True
     said = [{f.code for f in extension.api.warnings(m, empty)} for m in (material, as_twin)]
     assert said[0] == said[1] | {"osl_off"}
 

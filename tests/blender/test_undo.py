@@ -128,7 +128,7 @@ def test_guiding(extension, start):
 
 
 def test_fix_material(extension, start):
-    start("ward", representation="sampled")
+    start("phong", representation="fitted")
     bpy.context.object.active_material.cycles.use_bump_map_correction = True
     bpy.ops.ed.undo_push(message="Spoil")
     is_one_step(bpy.ops.brdfc.fix_material)
