@@ -258,6 +258,12 @@ def _give_way(group):
             return
 
 
+def _let_go(group):
+    """Has the texts of a group, which older versions kept for good, go with their last user."""
+    for text in (n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script):
+        text.use_fake_user = False
+
+
 def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     """Node group of a model, made if the file has none. Raises ValueError, CompileError.
 
@@ -267,6 +273,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     """
     representation = pack.resolve(model_name, representation)
     if group := find_group(model_name, representation, albedo):
+        _let_go(group)
         return group
     stem, source = pack.source(model_name, representation)
     sources = {stem: source}
@@ -277,7 +284,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     stands_in = not native and not baked and "twin" in pack.model(model_name)["representations"]
     known = set(bpy.data.node_groups)
     twin_group = ensure_group(model_name, "twin") if stands_in else None
-    texts = [] if native else [bpy.data.texts.new(f"{stem}.osl") for stem in sources]
+    texts = [] if native else [stand_in.new_text(f"{stem}.osl") for stem in sources]
     names = [text.name for text in texts]
     form = ", ".join([representation, *([ALBEDO] if len(texts) > 1 else [])])
     group = bpy.data.node_groups.new(

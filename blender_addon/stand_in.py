@@ -20,6 +20,14 @@ shader brdfc_runs(output float Runs = 1)
 """
 
 
+def new_text(name):
+    """An empty text that goes with its last user, as all else that a group is made of: Blender
+    gives a new text a fake user, and would keep it in the file for good."""
+    made = bpy.data.texts.new(name)
+    made.use_fake_user = False
+    return made
+
+
 def texts():
     """The file's own texts that are the script."""
     return [t for t in bpy.data.texts if t.library is None and t.as_string() == _SOURCE]
@@ -29,7 +37,7 @@ def text():
     """The script's text, of which a file has one."""
     for found in texts():
         return found
-    made = bpy.data.texts.new(_FILE)
+    made = new_text(_FILE)
     made.write(_SOURCE)
     made.cursor_set(0)
     return made

@@ -754,6 +754,40 @@ def test_warning_clamp_direct(extension, empty):
     assert codes(extension, aimed, empty) == []
 
 
+@pytest.mark.parametrize("reopened", [False, True])
+def test_what_a_material_is_made_of_goes_with_it(extension, empty, tmp_path, reopened):
+    """Blender gives every new text a fake user, and would keep each shader's for good."""
+    before = helpers.counts()
+    made = [("lambert", "auto"), ("glass", "auto"), ("phong", "aimed"), ("phong", "twin")]
+    materials = [extension.api.new_material(model, form) for model, form in made]
+    materials.append(extension.api.new_material("ashikhmin_shirley"))
+    extension.api.add_albedo(materials[-1])
+    extension.api.switch_representation(materials[0], "sampled")
+    names = [material.name for material in materials]
+    if reopened:
+        for material in materials:
+            material.use_fake_user = True
+        path = str(tmp_path / "file.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+    for name in names:
+        bpy.data.materials.remove(bpy.data.materials[name])
+    bpy.data.orphans_purge(do_recursive=True)
+    assert helpers.counts() == before
+
+
+def test_a_text_that_an_older_version_kept_goes_too(extension, empty):
+    before = helpers.counts()
+    first = extension.api.new_material("phong")
+    for text in bpy.data.texts:
+        text.use_fake_user = True
+    second = extension.api.new_material("phong")
+    for material in (first, second):
+        bpy.data.materials.remove(material)
+    bpy.data.orphans_purge(do_recursive=True)
+    assert helpers.counts() == before
+
+
 def test_warning_multiple_importance(extension, empty):
     """Lamps that directions of a material's own do not meet."""
     made = {
