@@ -44,7 +44,9 @@ TEST(Horizon, NothingIsBentWhereNormalsAgree) {
   std::mt19937 random(8);
   for (int i = 0; i < 1000; ++i) {
     const Vector n = any_above(random), wo = any_above(random);
-    if (dot(n, wo) > 1e-6) EXPECT_GE(mirror_rise(n, wo, n), 0);
+    if (dot(n, wo) > 1e-6) {
+      EXPECT_GE(mirror_rise(n, wo, n), 0);
+    }
   }
 }
 
