@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An option of all tests."""
+"""An option of all tests, and their environment."""
+
+import os
 
 import pytest
+
+# What the tool makes is made in each run, whatever earlier ones have left in the user's cache.
+os.environ["BRDFC_CACHE"] = ""
 
 
 def pytest_addoption(parser):

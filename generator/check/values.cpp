@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Nothing is NaN, infinite or negative.
+// Nothing is NaN, infinite or negative, drawn directions are unit vectors, and nothing is scattered below the surface.
 #include "check/claim.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
@@ -54,12 +54,56 @@ void values(const Trial& t, Verdict& verdict) {
   });
 }
 
+void unit(const Trial& t, Verdict& verdict) {
+  t.for_each([&](const Case& c) {
+    measure::Random random = t.random(c, Purpose::Length);
+    for (int k = 0; k < t.scaled(64); ++k) {
+      Vec3<double> wo = measure::uniform_direction(random);
+      const Vec3<double> u = measure::uniform_cube(random);
+      if (measure::two_sided(t.model(), *c.bound.brdf) && k % 2 == 1) wo.z = -wo.z;
+      const Sample<double> s = c.bound.brdf->sample(wo, u);
+      if (!(s.pdf > 0)) continue;
+      verdict.add(std::abs(length(s.wi) - 1), fmt::format("{} wo={} u={}: sample() gives wi={}", c.bound.label,
+                                                          measure::text(wo), measure::text(u), measure::text(s.wi)));
+    }
+  });
+}
+
+/// The largest of f, the density, and the density of a drawn direction, where one direction is below the surface.
+void horizon(const Trial& t, Verdict& verdict) {
+  t.for_each([&](const Case& c) {
+    const Brdf<double>& f = *c.bound.brdf;
+    if (measure::two_sided(t.model(), f)) return;
+    measure::Random random = t.random(c, Purpose::Horizon);
+    const auto judge = [&](double value, const char* what, const Vec3<double>& wi, const Vec3<double>& wo) {
+      verdict.add(value, fmt::format("{} {}(wi={}, wo={})", c.bound.label, what, measure::text(wi), measure::text(wo)));
+    };
+    const auto below = [](const Vec3<double>& w) { return Vec3<double>{w.x, w.y, -w.z}; };
+    for (const auto& [i, o] : measure::direction_pairs(f, t.scaled(64), random)) {
+      for (const auto& [wi, wo] : {std::pair{below(i), o}, std::pair{i, below(o)}, std::pair{below(i), below(o)}}) {
+        judge(max_component(magnitude(f.eval(wi, wo))), "f", wi, wo);
+        judge(std::abs(f.pdf(wi, wo)), "pdf", wi, wo);
+      }
+      for (const Vec3<double>& wo : {o, below(o)}) {
+        const Sample<double> s = f.sample(wo, measure::uniform_cube(random));
+        if (!(s.wi.z > 0 && wo.z > 0)) judge(s.pdf, "sample()'s pdf", s.wi, wo);
+      }
+    }
+  });
+}
+
+/// Rounding of a formula in double precision, which may draw a direction through several others.
+constexpr double kUnit = 1e-9;
+
 }  // namespace
 
 std::vector<Check> value_checks() {
-  Check check{"values", "no bad one: f, pdf, weights finite and >= 0, in float and double", at_most(0), values};
-  check.vital = true;
-  return {check};
+  std::vector<Check> checks = {
+      {"values", "no bad one: f, pdf, weights finite and >= 0, in float and double", at_most(0), values},
+      {"unit directions", "sample() gives unit vectors", at_most(kUnit), unit, without_lobe},
+      {"horizon", "f = pdf = 0 unless wi and wo are above the surface", at_most(0), horizon, without_upper_lobe}};
+  for (Check& check : checks) check.vital = true;
+  return checks;
 }
 
 }  // namespace brdfc::check

@@ -38,4 +38,12 @@ fs::path data_dir() {
       kSign, installed.string(), program.string());
 }
 
+std::optional<fs::path> cache_dir() {
+  if (const char* given = std::getenv("BRDFC_CACHE")) return *given ? std::optional<fs::path>(given) : std::nullopt;
+  if (const char* base = std::getenv("XDG_CACHE_HOME"); base && fs::path(base).is_absolute())
+    return fs::path(base) / "brdfc";
+  if (const char* home = std::getenv("HOME"); home && *home) return fs::path(home) / ".cache" / "brdfc";
+  return std::nullopt;
+}
+
 }  // namespace brdfc::inline core

@@ -20,17 +20,24 @@ Fit::Fit(const Model& model, const ParamValues& given, From from) {
   }
   // The same fit whether factors and mixed parameters are known or sockets.
   const auto [values, factor] = along_axis(model, roles.fitted());
-  std::optional<std::filesystem::path> file;
-  const StoreKey key = stored_fit(model, values);
-  if (from == From::Store)
-    file = find_stored(key,
-                       fmt::format("stored fit of {} {} over {}", model.info().name,
-                                   format_values(model.info(), values), number->name),
-                       "about a minute");
-  if (file)
-    tables_ = read_fit(fit_axis(*number), roles_of(model, values).terms(), key.hash(), *file);
-  else
-    tables_ = make_fit(model, values);
+  const auto make = [&, &v = values] { return make_fit(model, v); };
+  if (from == From::Scratch) {
+    tables_ = make();
+  } else {
+    const StoreKey key = stored_fit(model, values);
+    tables_ = kept_or_made(
+        key,
+        fmt::format("stored fit of {} {} over {}", model.info().name, format_values(model.info(), values),
+                    number->name),
+        "about a minute",
+        [&, &v = values](const std::filesystem::path& path) {
+          return read_fit(fit_axis(*number), roles_of(model, v).terms(), key.hash(), path);
+        },
+        make,
+        [&, &v = values](const FitTables& made, const std::filesystem::path& path) {
+          write_fit(made, model, v, key.hash(), path);
+        });
+  }
   tables_.multiply(factor);
 }
 

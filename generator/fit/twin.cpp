@@ -55,21 +55,29 @@ Twin::Twin(const Model& model, const ParamValues& given, From from) {
   terms_ = roles.terms();
   // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
   const auto [values, factor] = without_factors(model, roles.fitted());
-  const StoreKey key = stored_twin(model, values);
-  std::optional<std::filesystem::path> file;
-  if (from == From::Store) {
-    if (axis_)
-      file = find_stored(key, fmt::format("stored twin of {} over {}", model.info().name, axis_->parameter),
-                         "a minute or two");
-    else if (std::filesystem::exists(key.path()))  // in seconds it is made, too
-      file = key.path();
-  }
   const Along along(model, values, axis_, terms_);
   if (model.has_mirror()) make_mirror(model, along);
-  if (file)
-    read(key.hash(), *file);
-  else
+  if (from == From::Scratch) {
     make(model, along);
+  } else {
+    const StoreKey key = stored_twin(model, values);
+    // One without an axis is made in seconds, of which nothing is said.
+    const std::string what =
+        axis_ ? fmt::format("stored twin of {} over {}", model.info().name, axis_->parameter) : std::string();
+    *this = kept_or_made(
+        key, what, "a minute or two",
+        [&](const std::filesystem::path& path) {
+          Twin twin = *this;
+          twin.read(key.hash(), path);
+          return twin;
+        },
+        [&] {
+          Twin twin = *this;
+          twin.make(model, along);
+          return twin;
+        },
+        [&, &v = values](const Twin& made, const std::filesystem::path& path) { made.write(model, v, path); });
+  }
   multiply(factor);
 }
 

@@ -74,6 +74,8 @@ class Twin {
   void make(const Model&, const Along&);
   void make_mirror(const Model&, const Along&);
   void read(const std::string& hash, const std::filesystem::path&);
+  /// What read() takes.
+  void write(const Model&, const ParamValues& values, const std::filesystem::path&) const;
   /// All tables, in the order in which files have them.
   std::vector<TablePtr*> all();
   std::vector<TableAxis> axes() const;

@@ -50,6 +50,10 @@ std::vector<TablePtr*> Twin::all() {
 }
 
 void Twin::store(const Model& model, const ParamValues& given) const {
+  replace_stored(stored_twin(model, given), [&](const std::filesystem::path& path) { write(model, given, path); });
+}
+
+void Twin::write(const Model& model, const ParamValues& given, const std::filesystem::path& path) const {
   const StoreKey key = stored_twin(model, given);
   Twin copy = *this;
   std::vector<const Table*> rows;
@@ -78,7 +82,7 @@ void Twin::store(const Model& model, const ParamValues& given) const {
                      {"tables", names}};
   TableImage image = image_of(rows);
   image.meta = meta.dump();
-  replace_stored(key, [&](const std::filesystem::path& path) { write_table_image(image, path); });
+  write_table_image(image, path);
 }
 
 void Twin::read(const std::string& hash, const std::filesystem::path& path) {

@@ -270,9 +270,6 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   for (const ParamInfo& p : info.params) {
     if (fixed.count(p.name)) continue;
     if (p.kind == ParamKind::Choice && p.choices.size() == 1) continue;  // nothing to choose
-    if (print::is_osl_word(p.name))
-      input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
-                  p.name);
     parameters += parameter(p);
   }
   const auto text = [&](const std::string& name, const std::string& what, const std::string& sockets,

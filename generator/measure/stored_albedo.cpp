@@ -32,12 +32,15 @@ StoreKey stored_albedo(const Model& model) {
 }
 
 AlbedoTable albedo_table_of(const Model& model) {
-  const auto path = find_stored(stored_albedo(model), "stored albedo of " + model.info().name, "up to a minute");
-  if (!path) return tabulate_albedo(model);
-  AlbedoTable table = read_albedo_exr(*path);
-  if (table.model != model.info().name)
-    input_error("{}: model: expected {}, got {}", path->string(), model.info().name, table.model);
-  return table;
+  const auto read = [&](const std::filesystem::path& path) {
+    AlbedoTable table = read_albedo_exr(path);
+    if (table.model != model.info().name)
+      input_error("{}: model: expected {}, got {}", path.string(), model.info().name, table.model);
+    return table;
+  };
+  return kept_or_made(
+      stored_albedo(model), "stored albedo of " + model.info().name, "up to a minute", read,
+      [&] { return tabulate_albedo(model); }, write_albedo_exr);
 }
 
 }  // namespace brdfc::measure

@@ -12,21 +12,15 @@
 #include "print/osl_library.h"
 #include "print/osl_program.h"
 #include "print/osl_text.h"
-#include "print/osl_words.h"
+#include "print/reserved.h"
 #include "trace/program.h"
 
 namespace brdfc::pack {
 namespace {
 
-/// Names of the functions' other arguments and of what they return.
-constexpr const char* kOwnNames[] = {"wi", "wo", "numbers", "distance", "value", "pdf"};
-
 std::string arguments(const ModelInfo& info) {
   std::string out;
   for (const ParamInfo& p : info.params) {
-    if (print::is_osl_word(p.name) || std::count(std::begin(kOwnNames), std::end(kOwnNames), p.name))
-      input_error("{}: a parameter may not be called '{}', which is a word of OSL or of the generator", info.name,
-                  p.name);
     const char* type = p.kind == ParamKind::Number ? "float" : p.kind == ParamKind::Color ? "color" : "int";
     out += fmt::format("{}{} {}", out.empty() ? "" : ", ", type, p.name);
   }
@@ -38,7 +32,8 @@ using Outputs = std::function<void(const Brdf<Expr>&, Program&)>;
 
 /// Statements that assign the outputs, for every combination of choices.
 std::string statements(const Model& model, const Outputs& outputs) {
-  std::vector<std::string> taken(std::begin(kOwnNames), std::end(kOwnNames));
+  const std::set<std::string>& own = print::osl_function_words();
+  std::vector<std::string> taken(own.begin(), own.end());
   for (const ParamInfo& p : model.info().params) taken.push_back(p.name);
   const ParamValues none;
   forms::ChoiceSwitch by_choice(model.info(), none);

@@ -10,8 +10,6 @@
 #include "print/program_printer.h"
 
 namespace brdfc::print {
-namespace {
-
 bool is_python_word(const std::string& name) {
   static const std::set<std::string_view> words = {
       "False",    "None",   "True", "and",    "as",    "assert", "async", "await",    "break",  "class",
@@ -20,6 +18,8 @@ bool is_python_word(const std::string& name) {
       "try",      "while",  "with", "yield",  "match", "case",   "np",    "rgb",      "lookup", "range"};
   return words.count(name) > 0 || name.starts_with("table_");
 }
+
+namespace {
 
 class NumpyPrinter : public ProgramPrinter {
  public:

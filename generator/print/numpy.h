@@ -17,6 +17,9 @@ namespace brdfc::print {
 /// Tables by name, which the functions of a module read.
 using NumpyTables = std::map<std::string, std::shared_ptr<const Table>>;
 
+/// Whether a function of Python uses that name itself: a keyword, a module or a function that formulas call, a table.
+bool is_python_word(const std::string& name);
+
 /// Text of a function of these arguments that returns the outputs in their order, a single one by itself. It calls np,
 /// rgb(r, g, b) and lookup(table, coordinates...), and names its tables table_NAME, which are added to `tables`.
 /// Throws ExprError for an argument that Python can't have, and if two tables have one name.

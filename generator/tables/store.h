@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The store of results that take long to make and are kept beside the tool: fits and tables of albedos.
+// The store of results that take long to make: fits and tables of albedos.
 //
-// A result is kept as data/KIND/MODEL_HASH.exr in the tool's data (core/data_dir.h), by a hash of all that it depends
-// on. Where the hash of today has no file, it is made, and a line on stderr says so.
+// A result is kept by a hash of all that it depends on: those that belong to the repository as data/KIND/MODEL_HASH.exr
+// in the tool's data, those of other models and parameters as KIND/MODEL_HASH.exr in the user's cache
+// (core/data_dir.h). Where the hash of today has no file, the result is made, a line on stderr says so, and it goes
+// into the cache.
 #pragma once
 
 #include <array>
@@ -14,6 +16,8 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+
+#include "core/error.h"
 
 namespace brdfc::inline tables {
 
@@ -45,13 +49,45 @@ class StoreKey {
   /// data/KIND/MODEL_HASH.exr, of the first 16 digits, whether or not it is there. Throws InputError where the tool's
   /// data are not found.
   std::filesystem::path path() const;
+  /// KIND/MODEL_HASH.exr in the user's cache; none where there is no cache.
+  std::optional<std::filesystem::path> cached_path() const;
 
  private:
   std::string kind_, model_, text_;
 };
 
-/// The file of a key; nothing, and a line on stderr that `what` is made, which takes `how_long`, if there is none.
-std::optional<std::filesystem::path> find_stored(const StoreKey&, const std::string& what, const std::string& how_long);
+/// The file of a key in the tool's data, if there is one.
+std::optional<std::filesystem::path> find_stored(const StoreKey&);
+/// The same in the user's cache. It counts as used, so that it is among the last to go.
+std::optional<std::filesystem::path> find_cached(const StoreKey&);
+/// Writes a file of a key into the user's cache, in one step, and removes the ones of this model and kind that were
+/// used longest ago, all but 16. Nothing, and a line on stderr, if it can't be written: then the next run makes it
+/// again.
+std::optional<std::filesystem::path> cache(const StoreKey&,
+                                           const std::function<void(const std::filesystem::path&)>& write);
+/// Says on stderr that `what` is not stored and is made, which takes `how_long`.
+void announce_making(const StoreKey&, const std::string& what, const std::string& how_long);
+
+/// What is kept by a key, by read(path); else what make() gives, which is kept in the cache by write(result, path) and
+/// read from there, so that every run has the same numbers. `what` and `how_long` as in announce_making(); nothing is
+/// said if `what` is empty. What can't be read is an error in the tool's data, and made anew in the cache.
+template <class Read, class Make, class Write> auto kept_or_made(const StoreKey& key, const std::string& what,
+                                                                 const std::string& how_long, const Read& read,
+                                                                 const Make& make, const Write& write) {
+  if (const auto path = find_stored(key)) return read(*path);
+  if (const auto path = find_cached(key)) {
+    try {
+      return read(*path);
+    } catch (const InputError&) {
+      std::error_code ignored;
+      std::filesystem::remove(*path, ignored);
+    }
+  }
+  if (!what.empty()) announce_making(key, what, how_long);
+  auto made = make();
+  const auto path = cache(key, [&](const std::filesystem::path& to) { write(made, to); });
+  return path ? read(*path) : made;
+}
 
 /// Writes the file of a key, and removes what is kept of the model and kind by other hashes. Throws InputError naming
 /// the folder if it can't be created.

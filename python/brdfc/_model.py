@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -55,6 +56,23 @@ class Choice:
 
 
 Parameter = Number | Color | Choice
+
+
+def real(what: str, value: ArrayLike, expected: str) -> Array:
+    """Real numbers as an array. TypeError, naming `what` and `expected`, for what NumPy would turn
+    into some: masked arrays without their mask, complex numbers without their imaginary part, text,
+    truth values, dates."""
+    masked = isinstance(value, np.ma.MaskedArray)
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different lengths
+        array = None
+    if masked or array is None or array.dtype.kind not in "iuf":
+        shown = "a masked array" if masked else repr(value)
+        if array is not None and array.ndim and not masked:
+            shown = f"an array of {array.dtype.name}"
+        raise TypeError(f"{what}: expected {expected}, got {shown}")
+    return array.astype(np.float64)
 
 
 class Sample(NamedTuple):
@@ -154,7 +172,14 @@ class Model:
         cos_theta_o: cosine (...) between view and normal in (0, 1], negative inside of a model of
         two sides; phi_o: azimuth (...) of the view in radians. Returns (..., 3).
         """
-        cosine, phi = np.asarray(cos_theta_o, np.float64), np.asarray(phi_o, np.float64)
+        if not isinstance(samples, Integral) or isinstance(samples, bool):
+            raise TypeError(f"{self.name}: samples: expected a whole number, got {samples!r}")
+        if samples < 1:
+            raise ValueError(f"{self.name}: samples: expected a number from 1, got {samples}")
+        cosine = real(f"{self.name}: cos_theta_o", cos_theta_o, "numbers")
+        phi = real(f"{self.name}: phi_o", phi_o, "numbers")
+        if not np.all(np.isfinite(phi)):
+            raise ValueError(f"{self.name}: phi_o: expected finite numbers")
         if not np.all((np.abs(cosine) <= 1) & (cosine != 0) & ((cosine > 0) | self.two_sided)):
             least = "[-1, 1], not 0" if self.two_sided else "(0, 1]"
             raise ValueError(f"{self.name}: cos_theta_o: expected numbers in {least}")
@@ -167,7 +192,7 @@ class Model:
             if isinstance(self.parameters.get(name), Choice):
                 inner[name] = value
                 continue
-            value = np.asarray(value, np.float64)
+            value = np.asarray(value, np.float64)  # which mirror() has checked
             colour = isinstance(self.parameters.get(name), Color)
             lead = value.ndim - (1 if colour and value.ndim else 0)
             inner[name] = np.expand_dims(value, lead) if lead else value
@@ -178,7 +203,7 @@ class Model:
     # ---- what the methods above share ----------------------------------------------------------
 
     def _vectors(self, name: str, value: ArrayLike) -> Array:
-        array = np.asarray(value, np.float64)
+        array = real(f"{self.name}: {name}", value, "numbers in an array (..., 3)")
         if array.ndim == 0 or array.shape[-1] != 3:
             raise ValueError(f"{self.name}: {name}: expected shape (..., 3), got {array.shape}")
         return array
@@ -214,10 +239,7 @@ class Model:
                 choices.append(value)
                 continue
             what = "three numbers or one" if isinstance(p, Color) else "a number"
-            try:
-                array = np.asarray(value, np.float64)
-            except (TypeError, ValueError):
-                raise TypeError(f"{self.name}: {name}: expected {what}, got {value!r}") from None
+            array = real(f"{self.name}: {name}", value, what)
             if isinstance(p, Color):
                 if array.ndim == 0:
                     array = np.repeat(array, 3)

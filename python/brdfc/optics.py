@@ -26,12 +26,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _optics
+from ._model import real
 
 #: Metres after which absorption is exact where none are stated, and their range.
 THICKNESS, THICKNESSES = _optics.THICKNESS, _optics.THICKNESSES
 
 Array = NDArray[np.float64]
 ToRgb = Callable[[Array], Array]
+
+
+def _one(what, value, expected):
+    """One real number."""
+    array = real(what, value, expected)
+    if array.ndim:
+        raise TypeError(f"{what}: expected {expected}, got an array")
+    return float(array)
 
 
 @dataclass(frozen=True)
@@ -82,6 +91,8 @@ class Substance:
 
     def xyz(self, cosine: float = 1.0) -> Array:
         """X, Y and Z of what is reflected, unpolarised, at an angle of that cosine in (0, 1]."""
+        if not 0 < _one(f"{self.name}: cosine", cosine, "a number in (0, 1]") <= 1:
+            raise ValueError(f"{self.name}: cosine: expected a number in (0, 1], got {cosine}")
         return self._mean(lambda n, k: _optics.reflectance(cosine, n, k))
 
     @property
@@ -91,6 +102,8 @@ class Substance:
 
     def transmittance(self, metres: float) -> Array:
         """X, Y and Z of what is left of light after that many metres inside, by Beer's law."""
+        if not 0 <= _one(f"{self.name}: metres", metres, "a number from 0") < math.inf:
+            raise ValueError(f"{self.name}: metres: expected a number from 0, got {metres}")
         nm = _optics.WAVELENGTHS
         left = _optics.transmittance(nm, self.k.at(nm), float(metres))
         return np.broadcast_to(left, nm.shape) @ _optics.WEIGHTS

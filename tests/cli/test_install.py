@@ -86,6 +86,24 @@ def test_a_table_that_is_not_stored_is_made_and_said(installed, own, tmp_path):
     assert f"no stored albedo of lambert in {own / 'data' / 'albedos'}: making it" in done.stderr
 
 
+def test_what_was_made_once_is_kept_in_the_users_cache(installed, own, tmp_path):
+    """As for a model of one's own, of which no data are stored."""
+    (table,) = (own / "data" / "albedos").glob("lambert_*.exr")
+    table.unlink()
+    program, cache, hashes = installed / "bin" / "brdfc", tmp_path / "cache", set()
+    said = []
+    for out in (tmp_path / "one", tmp_path / "two"):
+        command = (program, "build", "--model", "lambert", "--out", str(out))
+        done = run(*command, BRDFC_DATA=str(own), BRDFC_CACHE=str(cache))
+        assert done.returncode == 0, done.stderr
+        said.append("making it" in done.stderr)
+        hashes.add(next(out.glob("*.zip")).read_bytes())
+    assert said == [True, False]
+    assert len(hashes) == 1
+    assert [p.name for p in (cache / "albedos").iterdir()] == [table.name]
+    assert not table.exists(), "the data are those of the installation"
+
+
 def test_a_fit_that_is_not_stored_is_announced_before_it_is_made(installed, own):
     shutil.rmtree(own / "data" / "fits")
     command = [installed / "bin" / "brdfc", "fit", "phong", "--over", "e"]

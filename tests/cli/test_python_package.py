@@ -286,6 +286,53 @@ UP = [0.0, 0.0, 1.0]
             ValueError,
             r"ward: shapes do not broadcast: .*ax \(3,\)",
         ),
+        (
+            lambda b: b.model("ward").albedo(0.5, samples=0),
+            ValueError,
+            "ward: samples: .*from 1.*0",
+        ),
+        (lambda b: b.model("ward").albedo(0.5, samples=-3), ValueError, "ward: samples: .*-3"),
+        (lambda b: b.model("ward").albedo(0.5, samples=0.5), TypeError, "ward: samples: .*whole"),
+        (lambda b: b.model("ward").albedo(0.5, samples=True), TypeError, "ward: samples: .*True"),
+        (lambda b: b.model("ward").albedo(0.5, np.inf), ValueError, "ward: phi_o: .*finite"),
+        (lambda b: b.model("ward").albedo(0.5 + 1j), TypeError, "ward: cos_theta_o: .*0.5.1j"),
+        (lambda b: b.model("ward").albedo(0.5, ax=0.1j), TypeError, "ward: ax: .*a number.*0.1j"),
+        (
+            lambda b: b.model("ward").eval(np.array(UP, complex), UP),
+            TypeError,
+            "ward: wi: expected numbers.*an array of complex128",
+        ),
+        (
+            lambda b: b.model("ward").eval(UP, np.ma.masked_array(UP, [0, 1, 0])),
+            TypeError,
+            "ward: wo: .*a masked array",
+        ),
+        (
+            lambda b: b.model("ward").pdf(UP, UP, ks=np.ma.masked_array([1, 1, 1], [0, 1, 0])),
+            TypeError,
+            "ward: ks: .*a masked array",
+        ),
+        (lambda b: b.model("ward").eval(UP, UP, ax="0.1"), TypeError, "ward: ax: .*'0.1'"),
+        (lambda b: b.model("ward").eval(UP, UP, ks=True), TypeError, "ward: ks: .*True"),
+        (lambda b: b.model("ward").eval(UP, UP, ks=None), TypeError, "ward: ks: .*None"),
+        (lambda b: b.model("ward").eval([UP, [0, 1]], UP), TypeError, "ward: wi: expected numbers"),
+        (
+            lambda b: b.model("ward").sample(UP, np.array(["0", "0", "0"])),
+            TypeError,
+            "ward: u: .*an array of str",
+        ),
+        (
+            lambda b: b.model("ward").eval(np.array([0, 0, 1], "timedelta64[s]"), UP),
+            TypeError,
+            "ward: wi: .*timedelta64",
+        ),
+        (lambda b: b.optics.substance("gold").xyz(0), ValueError, r"gold: cosine: .*\(0, 1\].*0"),
+        (lambda b: b.optics.substance("gold").xyz([1, 1]), TypeError, "gold: cosine: .*an array"),
+        (
+            lambda b: b.optics.substance("water").transmittance(-1),
+            ValueError,
+            "water: metres: .*-1",
+        ),
     ],
 )
 def test_errors_name_model_and_parameter(brdfc, call, error, words):

@@ -2,6 +2,7 @@
 // Models that are declared wrongly.
 #include "model/registry.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -76,6 +77,52 @@ TEST(Registry, NamesFileModelAndWhatWasExpected) {
   info.params[0].min = -1;
   info.params[0].by_factors = true;
   EXPECT_THAT(complaint(info), HasSubstr("draft: k: a number that goes by factors"));
+}
+
+ModelInfo of_parameter(const std::string& name) {
+  ModelInfo info = draft();
+  info.params[0].name = name;
+  return info;
+}
+
+TEST(Registry, RefusesNamesThatOslTheGeneratorOrPythonUse) {
+  for (const char* name : {"cos", "float", "wi", "time", "u", "color", "normal", "class", "pdf", "lamp", "weight_0"})
+    EXPECT_EQ(
+        complaint(of_parameter(name)),
+        fmt::format("draft.cpp: draft: parameter name '{}': expected another name: OSL or the generator uses this "
+                    "one",
+                    name));
+  for (const char* name : {"lambda", "np", "yield", "table_a"})
+    EXPECT_EQ(complaint(of_parameter(name)),
+              fmt::format("draft.cpp: draft: parameter name '{}': expected another name: Python uses this one", name));
+  for (const char* name : {"representation", "cos_theta_o", "samples"})
+    EXPECT_THAT(complaint(of_parameter(name)),
+                AllOf(HasSubstr("draft.cpp: draft: parameter name"), HasSubstr("functions in Python")))
+        << name;
+  for (const char* name : {"alpha", "exponent", "ior", "n_r", "rho", "size", "timely"})
+    EXPECT_EQ(complaint(of_parameter(name)), "") << name;
+  for (const char* name : {"class", "lambda", "none", "true"}) {
+    ModelInfo info = draft();
+    info.name = name;
+    EXPECT_EQ(complaint(info),
+              fmt::format("draft.cpp: model name '{}': expected another name: Python uses this one", name));
+  }
+  for (const char* name : {"_draft", "__init__", "2nd"}) {
+    ModelInfo info = draft();
+    info.name = name;
+    EXPECT_THAT(complaint(info), HasSubstr("a letter first")) << name;
+  }
+}
+
+TEST(Registry, RefusesLabelsThatOtherSocketsHave) {
+  ModelInfo info = draft();
+  info.params[0].label = "Normal";
+  EXPECT_THAT(complaint(info), HasSubstr("draft: k: expected another label than 'Normal'"));
+  ParamInfo other = draft().params[0];
+  info.params[0].label = other.label = "Glossiness";
+  other.name = "m";
+  info.params.push_back(other);
+  EXPECT_THAT(complaint(info), HasSubstr("draft: m: expected another label than 'Glossiness'"));
 }
 
 TEST(Registry, TellsAllThatIsWrongAtOnce) {

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <set>
 
 #include "core/data_dir.h"
@@ -74,21 +76,120 @@ TEST(Store, SaysWhatItHasNotAndReplacesWhatIsOld) {
   const OwnData data;
   const StoreKey key = StoreKey("fits", "phong").add("a", "1"), old = StoreKey("fits", "phong").add("a", "0"),
                  other = StoreKey("fits", "phong_material").add("a", "0");
+  EXPECT_EQ(find_stored(key), std::nullopt);
   testing::internal::CaptureStderr();
-  EXPECT_EQ(find_stored(key, "fit of phong", "a minute"), std::nullopt);
+  announce_making(key, "fit of phong", "a minute");
   EXPECT_THAT(
       testing::internal::GetCapturedStderr(),
       HasSubstr(fmt::format("no fit of phong in {}/data/fits: making it, which takes a minute", data.path().string())));
   const auto write = [](const std::filesystem::path& path) { std::ofstream(path) << "kept"; };
   replace_stored(old, write);
   replace_stored(other, write);
-  EXPECT_TRUE(find_stored(old, "", ""));
+  EXPECT_TRUE(find_stored(old));
   replace_stored(key, write);
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(find_stored(key, "", ""), key.path());
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(find_stored(key), key.path());
   EXPECT_FALSE(std::filesystem::exists(old.path()));
   EXPECT_TRUE(std::filesystem::exists(other.path())) << "a model whose name begins alike";
+}
+
+/// Sets an environment variable until the test ends.
+class Environment {
+ public:
+  Environment(const char* name, const std::string& value) : name_(name) {
+    if (const char* before = getenv(name)) before_ = before;
+    setenv(name, value.c_str(), 1);
+  }
+  ~Environment() { before_ ? setenv(name_, before_->c_str(), 1) : unsetenv(name_); }
+
+ private:
+  const char* name_;
+  std::optional<std::string> before_;
+};
+
+/// A result that is a word, and how often it was made.
+struct Word {
+  int made = 0;
+
+  std::string operator()(const StoreKey& key) {
+    return kept_or_made(
+        key, "word", "a moment",
+        [](const std::filesystem::path& path) {
+          std::string word;
+          if (!(std::ifstream(path) >> word)) input_error("{}: expected a word", path.string());
+          return word;
+        },
+        [&] {
+          ++made;
+          return std::string("new");
+        },
+        [](const std::string& word, const std::filesystem::path& path) { std::ofstream(path) << word; });
+  }
+};
+
+TEST(Store, KeepsInTheCacheWhatTheDataLack) {
+  const OwnData data;
+  const TempFolder folder;
+  const Environment environment("BRDFC_CACHE", (folder.path() / "cache").string());
+  const StoreKey key = StoreKey("fits", "own").add("a", "1");
+  Word word;
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(word(key), "new");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("making it, which takes a moment"));
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(word(key), "new");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "nothing is made, and nothing is said";
+  EXPECT_EQ(word.made, 1);
+  // Damaged: made anew.
+  std::ofstream(*key.cached_path(), std::ios::trunc).close();
+  EXPECT_EQ(word(key), "new");
+  EXPECT_EQ(word.made, 2);
+  EXPECT_EQ(word(key), "new");
+  EXPECT_EQ(word.made, 2);
+  // The data come first, and a damaged file of theirs is an error.
+  replace_stored(key, [](const std::filesystem::path& path) { std::ofstream(path) << "kept"; });
+  EXPECT_EQ(word(key), "kept");
+  std::ofstream(key.path(), std::ios::trunc).close();
+  EXPECT_THROW(word(key), InputError);
+}
+TEST(Store, TheCacheKeepsThoseThatWereUsedLast) {
+  const OwnData data;
+  const TempFolder folder;
+  const Environment environment("BRDFC_CACHE", folder.path().string());
+  const auto key = [](int i) { return StoreKey("fits", "own").add("a", std::to_string(i)); };
+  Word word;
+  testing::internal::CaptureStderr();
+  for (int i = 0; i < 16; ++i) {
+    word(key(i));
+    std::filesystem::last_write_time(*key(i).cached_path(),
+                                     std::filesystem::file_time_type::clock::now() - std::chrono::hours(100 - i));
+  }
+  word(key(0));  // is used again
+  word(key(16));
+  testing::internal::GetCapturedStderr();
+  EXPECT_EQ(word.made, 17);
+  EXPECT_TRUE(find_cached(key(0)));
+  EXPECT_FALSE(find_cached(key(1)));
+  EXPECT_TRUE(find_cached(key(2)));
+  EXPECT_TRUE(find_cached(key(16)));
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path() / "fits"))
+    EXPECT_TRUE(entry.path().filename().string().starts_with("own_")) << entry.path();
+}
+TEST(Store, WithoutACacheEverythingIsMade) {
+  const OwnData data;
+  const TempFolder folder;
+  const StoreKey key = StoreKey("fits", "own").add("a", "1");
+  Word word;
+  testing::internal::CaptureStderr();
+  {
+    const Environment environment("BRDFC_CACHE", "");
+    word(key);
+    word(key);
+  }
+  std::ofstream(folder.path() / "file").close();
+  const Environment environment("BRDFC_CACHE", (folder.path() / "file").string());
+  EXPECT_EQ(word(key), "new") << "a place that takes no files is no error";
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("it is not kept for the next time"));
+  EXPECT_EQ(word.made, 3);
 }
 
 }  // namespace

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "print/reserved.h"
+
+#include "print/numpy.h"
+#include "print/osl_words.h"
+
+namespace brdfc::print {
+
+const std::set<std::string>& osl_function_words() {
+  static const std::set<std::string> words = {"wi", "wo", "numbers", "distance", "value", "pdf"};
+  return words;
+}
+
+const std::set<std::string>& python_arguments() {
+  static const std::set<std::string> words = {"cos_theta_o", "material", "model", "phi_o", "representation",
+                                              "samples",     "self",     "u",     "wi",    "wo"};
+  return words;
+}
+
+std::optional<std::string> reserved_for_parameters(const std::string& name) {
+  if (is_osl_word(name) || osl_function_words().count(name)) return "OSL or the generator";
+  if (is_python_word(name)) return "Python";
+  if (python_arguments().count(name)) return "the functions in Python that take parameters by name";
+  return std::nullopt;
+}
+
+std::optional<std::string> reserved_for_models(const std::string& name) {
+  // The class of a model is called as the model, with capitals: None, True and False are words of Python.
+  if (is_python_word(name) || name == "none" || name == "true" || name == "false") return "Python";
+  return std::nullopt;
+}
+
+}  // namespace brdfc::print

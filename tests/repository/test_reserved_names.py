@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names that a model's parameters may not have, since functions in Python that take parameters by
+name have arguments of these names: generator/print/reserved.cpp lists them all."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = (ROOT / "python/brdfc/_model.py", ROOT / "blender_addon/api.py")
+
+
+def test_arguments_beside_parameters_are_reserved():
+    listed = re.search(
+        r"python_arguments\(\) \{.*?\{(.*?)\}",
+        (ROOT / "generator/print/reserved.cpp").read_text(encoding="utf-8"),
+        re.S,
+    )
+    found = set()
+    for source in SOURCES:
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.args.kwarg is not None:
+                arguments = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
+                found |= {a.arg for a in arguments}
+    assert found == set(re.findall(r'"(\w+)"', listed[1]))
