@@ -162,6 +162,7 @@ def _not_aimed(node, count, scene):
     found = lamps.seen(scene, group)
     left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > count]
     lost = [lamp for lamp in left_out if lamp.sizeless]
+    unmet = [lamp for lamp in left_out if not lamp.met and not lamp.sizeless]
     total = sum(lamp.irradiance for lamp in found)
 
     def share(some):
@@ -178,10 +179,20 @@ def _not_aimed(node, count, scene):
                 why=why,
             ),
         )
+    if share(unmet) > UNSEEN:
+        yield (
+            "multiple_importance",
+            "ERROR",
+            say(
+                "Light of lamps without Multiple Importance ({lamps}) is lost: {why}",
+                lamps=_names(unmet),
+                why=unmet[0].why or lamps.too_many(count),
+            ),
+        )
     kinds = {}
     for lamp in left_out:
         why = lamp.why or lamps.too_many(count)
-        if lamp not in lost and why != lamps.NO_NEED:
+        if lamp not in lost and lamp not in unmet and why != lamps.NO_NEED:
             kinds.setdefault(why, []).append(lamp)
     for why, noisy in kinds.items():
         if share(noisy) > DIM:

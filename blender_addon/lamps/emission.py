@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from .. import color, shader_trees
+from . import ies
 
 
 def animated(owner):
@@ -19,12 +20,31 @@ def _luminance(rgb):
     return float(color.luminance(np.array(rgb[:3])))
 
 
+def _level(socket):
+    """Luminance of a colour, or a number, that a socket has: about, where a link controls it, and 1
+    where nothing is known of that."""
+    if not socket.is_linked:
+        value = socket.default_value
+        return _luminance(value) if hasattr(value, "__len__") else value
+    source = socket.links[0].from_socket
+    node = source.node
+    if node.bl_idname == "NodeReroute":
+        return _level(node.inputs[0])
+    if node.bl_idname in {"ShaderNodeValue", "ShaderNodeRGB"}:
+        value = source.default_value
+        return _luminance(value) if hasattr(value, "__len__") else value
+    if node.bl_idname == "ShaderNodeLightFalloff":  # others than quadratic falloff as at 1 m
+        return _level(node.inputs["Strength"])
+    if node.bl_idname == "ShaderNodeTexIES":
+        return _level(node.inputs["Strength"]) * ies.level(node)
+    if node.bl_idname == "ShaderNodeMath" and node.operation == "MULTIPLY":
+        return _level(node.inputs[0]) * _level(node.inputs[1])
+    return 1.0  # so has a Blackbody
+
+
 def _strength(node, *names):
-    """Luminance that a node emits, by its sockets of colour and strength; what a link controls
-    counts as 1."""
-    parts = [node.inputs[name] for name in names]
-    shade = 1.0 if parts[0].is_linked else _luminance(parts[0].default_value)
-    return shade * (1.0 if parts[1].is_linked else parts[1].default_value)
+    """Luminance that a node emits, by its sockets of colour and strength."""
+    return math.prod(_level(node.inputs[name]) for name in names)
 
 
 _EMITTERS = {

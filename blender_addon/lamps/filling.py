@@ -60,8 +60,8 @@ def _listed(survey, chosen, why=None):
     taken = {id(c) for c in chosen}
     why = why or slots.too_many(len(chosen))
     placed = sorted(enumerate(chosen, 1), key=lambda item: -item[1].rank)
-    return [slots.Lamp(c.name, slot, c.rank, "", c.sizeless) for slot, c in placed] + [
-        slots.Lamp(c.name, None, c.rank, c.why or why, c.sizeless)
+    return [slots.Lamp(c.name, slot, c.rank, "", c.sizeless, c.met) for slot, c in placed] + [
+        slots.Lamp(c.name, None, c.rank, c.why or why, c.sizeless, c.met)
         for c in survey.candidates
         if id(c) not in taken
     ]

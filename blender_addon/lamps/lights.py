@@ -3,7 +3,6 @@
 
 import math
 
-import bpy
 import numpy as np
 
 from . import emission, slots
@@ -33,19 +32,29 @@ def is_sizeless(light):
     return light.type in {"POINT", "SPOT"} and light.shadow_soft_size == 0
 
 
+def has_importance(light):
+    """Whether Multiple Importance is on: only then does Cycles show a light to drawn directions."""
+    return light.cycles.use_multiple_importance_sampling
+
+
 def _values(light, item, matrix):
     place, turn, scale = slots.placed(item, matrix)
+    # The lobe carries all of what drawn directions do not meet, or not behind other objects; the
+    # shaders know it by the sign.
+    sign = 1.0 if has_importance(light) and light.use_shadow else -1.0
     if light.type == "SUN":
-        return slots.numbers(slots.SUN, place, turn, scale, (slots.Driven(light, "angle"), 0.0))
+        angle = slots.Driven(light, "angle", sign)
+        return slots.numbers(slots.SUN, place, turn, scale, (angle, 0.0))
     if light.type in {"POINT", "SPOT"}:
         kind, cone = slots.BALL, 0.0
         if light.type == "SPOT":
             kind = slots.Driven(light, "spot_blend", 0.45, slots.BALL)
             cone = slots.Driven(light, "spot_size")
-        radius = slots.Driven(light, "shadow_soft_size")
+        radius = slots.Driven(light, "shadow_soft_size", sign)
         return slots.numbers(kind, place, turn, scale, (radius, cone))
     round_ = light.shape in {"DISK", "ELLIPSE"}
-    sizes = tuple(slots.Driven(light, side) for side in emission.sides(light))
+    first, second = emission.sides(light)
+    sizes = slots.Driven(light, first, sign), slots.Driven(light, second)
     kind = slots.ELLIPSE if round_ else slots.RECTANGLE
     spread = slots.Driven(light, "spread", -0.5 / math.pi, kind + 0.5)
     return slots.numbers(spread, place, turn, scale, sizes)
@@ -94,40 +103,10 @@ def candidate_of(item, name, light, matrix):
         _irradiance(light, matrix),
         _looks(light, matrix),
         sizeless=is_sizeless(light),
+        met=has_importance(light) and not is_sizeless(light),
         # A scaled spot has a cone that is none, which the shaders don't know.
         uneven=not emission.is_even(light) or (light.type == "SPOT" and slots.is_stretched(matrix)),
     )
-
-
-def _inputs_of(modifier):
-    """Values of the inputs of geometry nodes."""
-    if hasattr(modifier, "properties"):  # since 5.2
-        inputs = modifier.properties.inputs
-        return [getattr(getattr(inputs, key), "value", None) for key in inputs.keys()]
-    return [modifier[key] for key in modifier.keys()]
-
-
-def places_lamps(item, depth=0):
-    """Whether an object places copies of lamps."""
-
-    def has_lights(collection):
-        return collection is not None and any(
-            o.type == "LIGHT" or (depth < 4 and places_lamps(o, depth + 1))
-            for o in collection.all_objects
-        )
-
-    if item.instance_type == "COLLECTION":
-        return has_lights(item.instance_collection)
-    if item.instance_type in {"VERTS", "FACES"}:
-        return any(child.type == "LIGHT" for child in item.children)
-    for modifier in item.modifiers:
-        if modifier.type == "NODES" and modifier.node_group is not None:
-            for value in _inputs_of(modifier):
-                if isinstance(value, bpy.types.Collection) and has_lights(value):
-                    return True
-                if isinstance(value, bpy.types.Object) and value.type == "LIGHT":
-                    return True
-    return False
 
 
 def instances(depsgraph):

@@ -3,6 +3,7 @@
 them, where they look like one."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from mathutils import Matrix, Vector, geometry
@@ -27,6 +28,15 @@ def _evaluated(item, depsgraph):
     return item.evaluated_get(depsgraph) if depsgraph is not None and item.mode != "EDIT" else item
 
 
+def _own_materials(item):
+    """Materials of the faces of an evaluated object, or of what geometry nodes make an instance of,
+    in the order of their indices."""
+    found = [s.material for s in item.material_slots]
+    if item.type == "MESH" and len(item.data.materials) > len(found):
+        found = list(item.data.materials)
+    return [m.original if m is not None else None for m in found]
+
+
 def materials_of(item, depsgraph):
     """Materials of an object's faces, in the order of their indices, with those that geometry nodes
     give it."""
@@ -36,13 +46,41 @@ def materials_of(item, depsgraph):
     return [s.material for s in item.material_slots]
 
 
-def _lit(item, materials, depsgraph):
-    """Points of an object's faces of some materials, in its own space, (n, 3), and triangles of
-    these points, (m, 3); no triangles of what is no mesh or too large a one to look at."""
-    own = _evaluated(item, depsgraph)
+@dataclass(frozen=True)
+class _Shape:
+    """What of an object shines."""
+
+    points: np.ndarray  # (n, 3), in its own space
+    triangles: np.ndarray  # (m, 3), of these points; none of what is no mesh or too large a one
+    radiance: float
+    uneven: bool
+
+    def ball(self):
+        """Middle and radius of a ball that holds it."""
+        low, high = self.points.min(0), self.points.max(0)
+        middle = (low + high) / 2
+        return middle, float(np.sqrt(((self.points - middle) ** 2).sum(-1).max()))
+
+
+def _shape(own, materials, emitting):
+    """The _Shape of an evaluated object by the materials of its faces; None of what does not shine
+    or has no points. `emitting`: radiance by material."""
+    glowing = set(materials) & set(emitting)
+    if not glowing:
+        return None
+    points, triangles = _lit(own, materials, emitting)
+    if len(points) == 0:
+        return None
+    radiance = sum(emitting[m] for m in glowing)
+    uneven = len(glowing) > 1 or not all(emission.is_even(m) for m in glowing)
+    return _Shape(points, triangles, radiance, uneven)
+
+
+def _lit(own, materials, emitting):
+    """Points and triangles of an object's faces that shine; see _Shape."""
     mesh = own.data
     none = np.empty((0, 3), np.int32)
-    if item.type != "MESH" or len(mesh.vertices) == 0 or len(mesh.vertices) > 200000:
+    if own.type != "MESH" or len(mesh.vertices) == 0 or len(mesh.vertices) > 200000:
         return np.array(own.bound_box), none
     points = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", points)
@@ -51,7 +89,7 @@ def _lit(item, materials, depsgraph):
     triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     triangles = triangles.reshape(-1, 3)
-    lit_slots = np.array([m in materials for m in materials_of(item, depsgraph)])
+    lit_slots = np.array([m in emitting for m in materials])
     if lit_slots.all():
         return points, triangles
     index = np.empty(len(triangles), np.int32)
@@ -123,18 +161,68 @@ def _main_axis(places):
     return math.atan2(2 * covariance[0, 1], covariance[0, 0] - covariance[1, 1]) / 2
 
 
-def candidate_of(item, materials, matrix, depsgraph):
-    """An object that emits, as a ball; None where none of its faces does."""
-    points, triangles = _lit(item, materials, depsgraph)
-    if len(points) == 0:
-        return None
-    glowing = set(materials_of(item, depsgraph)) & set(materials)
-    radiance = sum(materials[m] for m in glowing)
-    uneven = len(glowing) > 1 or not all(emission.is_even(m) for m in glowing)
+def candidate_of(item, emitting, matrix, depsgraph):
+    """An object that emits, as a ball or a flat lamp; None where none of its faces does."""
+    own, materials = _evaluated(item, depsgraph), materials_of(item, depsgraph)
+    shape = _shape(own, materials, emitting)
+    return _candidate(item, item.name, shape, matrix) if shape is not None else None
+
+
+#: Copies that are looked at one by one, those that give most light.
+_COPIES = 4 * slots.SLOTS
+
+
+def instances(depsgraph, emitting, subject, sources):
+    """A candidate for each copy that an object places of one that shines, where they are many of
+    those that give most light, and one for all others. `subject`: points of it, (n, 3). Adds the
+    names of what is copied to `sources`."""
+    shapes, found = {}, []
+    for instance in depsgraph.object_instances:
+        item = instance.object
+        if not instance.is_instance or item.type not in TYPES:
+            continue
+        parent = instance.parent
+        if parent is None or parent.original.hide_render or item.hide_render:
+            continue
+        key = item.data.as_pointer() if item.data is not None else 0
+        if key not in shapes:
+            shapes[key] = _shape(item, _own_materials(item), emitting)
+        if shapes[key] is None:
+            continue
+        sources.add(item.original.name_full)
+        matrix = instance.matrix_world.copy()
+        middle, radius = shapes[key].ball()
+        away = np.array(matrix @ Vector(middle)) - subject
+        size = radius * max(abs(s) for s in matrix.to_scale())
+        squared = np.maximum((away**2).sum(-1), max(size**2, 1e-12))
+        light = float(np.mean(shapes[key].radiance * math.pi * size**2 / squared))
+        found.append((light, f"{parent.name}/{item.name}", shapes[key], matrix))
+    found.sort(key=lambda copy: -copy[0])
+    for _, name, shape, matrix in found[:_COPIES]:
+        yield _candidate(None, name, shape, matrix)
+    if others := found[_COPIES:]:
+        name = others[0][1]
+        if others[1:]:
+            name = say("{lamps} and {count} more", lamps=name, count=len(others) - 1)
+        all_light = sum(copy[0] for copy in others)
+        nothing = slots.looks_alike(0.0)
+        yield slots.Candidate(
+            name,
+            None,
+            lambda points: np.full(len(points), all_light),
+            nothing,
+            why=slots.too_many(slots.SLOTS),
+        )
+
+
+def _candidate(item, name, shape, matrix):
+    """What shines, where `matrix` says: followed by drivers where `item` is its object, None where
+    it is a copy."""
+    points, radiance, uneven = shape.points, shape.radiance, shape.uneven
     world = points @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
-    areas = _areas(world, triangles)
+    areas = _areas(world, shape.triangles)
     if flat := _flat(world, areas):
-        candidate = _sheet(item, radiance, *flat)
+        candidate = _sheet(name, radiance, *flat)
         candidate.uneven = uneven
         return candidate
     low, high = points.min(0), points.max(0)
@@ -144,7 +232,7 @@ def candidate_of(item, materials, matrix, depsgraph):
     scales = [abs(s) for s in matrix.to_scale()]
     largest = max(range(3), key=lambda i: scales[i])
     place, size = matrix @ centre, radius * scales[largest]
-    if centre.length > 1e-4 * radius or slots.is_sheared(matrix):
+    if item is None or centre.length > 1e-4 * radius or slots.is_sheared(matrix):
         values = slots.numbers(slots.BALL, tuple(place), sizes=(size, 0.0))
     else:
         where = tuple(slots.Driven(item, f"LOC_{axis}") for axis in "XYZ")
@@ -158,7 +246,7 @@ def candidate_of(item, materials, matrix, depsgraph):
         return radiance * math.pi * size**2 / np.maximum(squared, max(size**2, 1e-12))
 
     looks = slots.looks_like(middle, size)
-    candidate = slots.Candidate(item.name, values, irradiance, looks, uneven=uneven)
+    candidate = slots.Candidate(name, values, irradiance, looks, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
     if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
         extent = 0.0  # it is open: part of a ball
@@ -175,7 +263,7 @@ def candidate_of(item, materials, matrix, depsgraph):
     return candidate
 
 
-def _sheet(item, radiance, kind, middle, frame, sizes):
+def _sheet(name, radiance, kind, middle, frame, sizes):
     """A flat mesh, which shines on both sides, as a lamp that shines on the side of the subject."""
     area = sizes[0] * sizes[1] * (1 if kind == slots.RECTANGLE else math.pi / 4)
 
@@ -185,7 +273,7 @@ def _sheet(item, radiance, kind, middle, frame, sizes):
         return radiance * area * np.abs(to @ frame[2]) / squared**1.5
 
     looks = slots.looks_like(middle, math.hypot(*sizes) / 2)
-    candidate = slots.Candidate(item.name, (), irradiance, looks)
+    candidate = slots.Candidate(name, (), irradiance, looks)
 
     def judge(points):
         # Lamps shine along their own -z.

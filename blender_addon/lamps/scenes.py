@@ -9,11 +9,14 @@ import numpy as np
 from mathutils import Vector
 
 from ..i18n import say
-from . import emission, lights, meshes, slots, world
+from . import emission, instancers, lights, meshes, slots, world
 
 #: Angular radius from which it counts that a lamp's light differs over it: what a lobe carries is
 #: the mean of the model over the lamp.
 _LOOKS_UNEVEN = 0.05
+#: Radius over distance from which shaders leave a lamp to drawn directions (kNearest of
+#: generator/forms/aimed.h).
+_LOOKS_TOO_WIDE = 0.85
 
 
 @dataclass
@@ -24,7 +27,7 @@ class Survey:
     emission: dict = field(default_factory=dict)  # of materials, by name
     uneven: set = field(default_factory=set)  # names of those that emit unlike from place to place
     glowing: set = field(default_factory=set)  # names of objects that emit
-    instancers: set = field(default_factory=set)  # names of objects that place lamps
+    instancers: set = field(default_factory=set)  # names of objects that place what shines
     kinds: dict = field(
         default_factory=dict
     )  # slots.transform_kind() of the lamps' transforms, by name
@@ -115,9 +118,11 @@ def look(scene, depsgraph, subject=None):
     survey.emission = {m.name_full: emission.of_material(m) for m in bpy.data.materials}
     emitting = {m: e for m in bpy.data.materials if (e := survey.emission[m.name_full]) > 0}
     survey.uneven = {m.name_full for m in emitting if not emission.is_even(m)}
-    shown = []
+    shown, placing = [], instancers.Instancers(emitting)
     for item in _rendered(scene):
         kind = item.type
+        if item.parent is not None and item.parent.instance_type in {"VERTS", "FACES"}:
+            continue  # its copies alone are shown
         if kind == "LIGHT":
             if lights.shines(item):
                 matrix = matrices(item).copy()
@@ -134,13 +139,17 @@ def look(scene, depsgraph, subject=None):
                 survey.candidates.append(made)
             elif subject is None:
                 shown.append(item)
-        if (kind == "EMPTY" or kind == "MESH") and lights.places_lamps(item):
+        if placing.places(item):
             survey.instancers.add(item.name_full)
-    if survey.instancers and depsgraph:
-        survey.candidates += lights.instances(depsgraph)
-    survey.candidates += world.candidates(scene.world)
     if survey.subject is None:
         survey.subject = _subject(scene, shown, matrices)
+    if survey.instancers and depsgraph:
+        survey.candidates += lights.instances(depsgraph)
+        if emitting:
+            survey.candidates += meshes.instances(
+                depsgraph, emitting, survey.subject, survey.glowing
+            )
+    survey.candidates += world.candidates(scene.world)
     for candidate in survey.candidates:
         if candidate.judge is not None:
             candidate.judge(survey.subject)
@@ -149,7 +158,9 @@ def look(scene, depsgraph, subject=None):
         if not math.isfinite(candidate.rank + angle):  # of a mesh with broken points
             candidate.rank = angle = 0.0
         candidate.width = round(math.log2(max(angle, 1e-4)))
-        if candidate.uneven and angle > _LOOKS_UNEVEN and not candidate.why:
+        if candidate.uneven and angle > _LOOKS_UNEVEN and candidate.met and not candidate.why:
             candidate.why = say("its light is not the same all over it")
+        elif not candidate.met and angle > _LOOKS_TOO_WIDE:
+            candidate.why = say("it looks too large for a closure")
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
     return survey

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a slot of the shared group holds of a lamp: twelve numbers, some of them driven."""
 
+import math
 from dataclasses import dataclass
 
 import bpy
@@ -43,13 +44,15 @@ def elsewhere(library):
 @dataclass(frozen=True)
 class Lamp:
     """A lamp of a scene: its slot from 1, or None and why; its irradiance at the subject, which is
-    an estimate to rank lamps by; whether it has no size, so that only slots show it."""
+    an estimate to rank lamps by; whether it has no size; whether drawn directions meet it, so that
+    more than slots show it."""
 
     name: str
     slot: int | None
     irradiance: float
     why: str = ""
     sizeless: bool = False
+    met: bool = True
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Driven:
 @dataclass
 class Candidate:
     """A lamp, the twelve numbers of its slot, irradiance(points), (n, 3) to (n,), and likewise
-    looks(points), its angular radius."""
+    looks(points), the tangent of its angular radius."""
 
     name: str
     values: tuple
@@ -80,6 +83,7 @@ class Candidate:
     rank: float = 0.0
     width: int = 0  # doublings of its angular radius
     sizeless: bool = False
+    met: bool = True  # drawn directions meet it
     uneven: bool = False  # its light is not the same all over it
     #: Of a mesh: judge(points) sets values and `why` for a subject at these points, (n, 3).
     judge: object = None
@@ -97,7 +101,7 @@ def looks_like(place, radius):
 
 def looks_alike(angle):
     """looks() of what lies in a direction and has this full angle."""
-    return lambda points: np.full(len(points), angle / 2)
+    return lambda points: np.full(len(points), math.tan(angle / 2))
 
 
 def numbers(kind, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):

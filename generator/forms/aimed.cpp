@@ -84,9 +84,9 @@ class AimedText {
     const AimedSteps& steps = aimed_steps(0);
     if (lamps_ == 0) return operations_ + steps.alone.operations;
     int all = operations_ + steps.rest.operations;
-    // Without the beam's: few lamps shine within a cone.
-    for (const Recording* r :
-         {&steps.above, &steps.room, &steps.aim, &steps.less, &steps.send, &steps.toss, &steps.under, &steps.meet})
+    // Without those of cones and of horizons, which few lamps are cut off by.
+    for (const Recording* r : {&steps.above, &steps.room, &steps.aim, &steps.low, &steps.less, &steps.send, &steps.toss,
+                               &steps.under, &steps.meet})
       all += r->operations;
     return all;
   }
@@ -110,6 +110,7 @@ class AimedText {
         "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
         lamps_);
     out +=
+        "    vector horizon = brdfc_local(N, frame_t, frame_b, frame_n);\n"
         "    // The lamps, and at last the direction that was drawn.\n"
         "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
         "        float wi_x, wi_y, wi_z, lobe_height, lamp_emphasis;\n"
@@ -155,6 +156,14 @@ class AimedText {
         "            if (lamp_emphasis == 0.0)\n                continue;\n"
         "            lobe_towards[lobes] = vector(to_lamp_x, to_lamp_y, to_lamp_z);\n"
         "            lobe_half[lobes] = vector(to_half_x, to_half_y, to_half_z);\n"
+        "            float lamp_low;\n            {\n";
+    out += indented(steps.low.statements, 4) +
+           "            }\n            if (lamp_low < 0.0 && brdfc_cuts_off() != 0) {\n" +
+           indented(steps.cut.statements, 4) +
+           "                if (lamp_emphasis == 0.0)\n                    continue;\n            }\n";
+    out +=
+        "            // Drawn directions do not meet it, or are not to: see brdfc_lamp().\n"
+        "            if (lamp_shape[lamp][1] < 0.0)\n                lamp_solid_angle[lobes] = 1e-20;\n"
         "        } else {\n"
         "            float tossed;\n";
     out += indented(steps.toss.statements, 3);
@@ -240,9 +249,10 @@ class Aimed final : public OslForm {
     const bool mirror = model.has_mirror();
     // Path Guiding and the passes know nothing of closures that take light away: pictures get 2 % too bright, the
     // albedo too high by what base and rest cancel. Normals are those of the drawn lobes where no base outweighs them.
-    std::vector<std::string> codes = {"multiple_importance", "path_guiding", "orthographic_far", "albedo_passes"};
+    std::vector<std::string> codes = {"path_guiding", "orthographic_far", "albedo_passes"};
     if (shader.leaning) codes.push_back("bump_correction");
-    if (mirror) codes.push_back("clamp_mirror");
+    // Of lamps without it aimed closures carry all; the panel says which have none.
+    if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
     if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
     if (mirror) codes.push_back("filter_glossy");
     return codes;
@@ -253,7 +263,7 @@ class Aimed final : public OslForm {
                                     const Setting& setting) const override {
     const AimedRecording r = record_aimed(model, values, 4, setting.base, setting.views);
     const AimedSteps& s = aimed_steps(4);
-    return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.less, s.send, s.rest};
+    return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.cut, s.less, s.send, s.rest};
   }
 
  protected:

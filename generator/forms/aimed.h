@@ -18,6 +18,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "closures/closure.h"
@@ -45,6 +46,58 @@ template <class T> struct LampPatch {
 template <class T> T highest(const LampPatch<T>& patch) {
   return patch.centre.z + abs(patch.across.z) + abs(patch.along.z);
 }
+
+/// The same of the part that reaches lowest, over a plane with this normal.
+template <class T> T lowest(const LampPatch<T>& patch, const Vec3<T>& normal) {
+  const T across = dot(normal, patch.across), along = dot(normal, patch.along);
+  const auto disk = patch.disk > T(0.5);
+  return dot(normal, patch.centre) - select(disk, sqrt(sqr(across) + sqr(along)), abs(across) + abs(along));
+}
+
+/// The part of a lamp that lies above a plane through the shading point, by two numbers in [0, 1].
+template <class T> class PartAbove {
+ public:
+  struct Point {
+    Vec3<T> at;  ///< of the lamp
+    T area;      ///< what it stands for: in units of the half axes, the mean of all is the area of the part
+  };
+
+  PartAbove(const LampPatch<T>& patch, const Vec3<T>& normal) : patch_(patch), disk_(patch.disk > T(0.5)) {
+    // Height over the plane: height_ + flat_ p + steep_ q, where q is the half axis that rises faster. Of a disk p runs
+    // level.
+    const T a = dot(normal, patch.across), b = dot(normal, patch.along);
+    const T slope = sqrt(sqr(a) + sqr(b)), unit = maximum(slope, tiny<T>());
+    const auto swapped = abs(a) > abs(b);
+    const Vec3<T> across = select(swapped, patch.along, patch.across),
+                  along = select(swapped, patch.across, patch.along);
+    p_ = select(disk_, (patch.across * b - patch.along * a) / unit, across * sign_of(dot(normal, across)));
+    q_ = select(disk_, (patch.across * a + patch.along * b) / unit, along * sign_of(dot(normal, along)));
+    height_ = dot(normal, patch.centre);
+    flat_ = select(disk_, T(0), minimum(abs(a), abs(b)));
+    steep_ = maximum(select(disk_, slope, maximum(abs(a), abs(b))), tiny<T>());
+    const T start = minimum(maximum(-height_ / steep_, T(-1)), T(1));
+    half_chord_ = sqrt(T(1) - sqr(maximum(start, T(0))));
+    first_ = minimum(maximum(-(height_ + steep_) / maximum(flat_, tiny<T>()), T(-1)), T(1));
+  }
+
+  Point at(const T& u, const T& v) const {
+    // Across a disk by the sine, so that its round ends are smooth.
+    const T angle = pi<T>() * (u - T(0.5));
+    const T p = select(disk_, half_chord_ * sin(angle), first_ + u * (T(1) - first_));
+    const T step = select(disk_, half_chord_ * pi<T>() * cos(angle), T(1) - first_);
+    const T end = select(disk_, sqrt(maximum(T(1) - sqr(p), T(0))), T(1));
+    const T start = minimum(maximum(-(height_ + flat_ * p) / steep_, -end), end);
+    return {patch_.centre + p_ * p + q_ * (start + v * (end - start)), step * (end - start)};
+  }
+
+ private:
+  static T sign_of(const T& x) { return select(x < T(0), T(-1), T(1)); }
+
+  LampPatch<T> patch_;
+  decltype(T(0) > T(0)) disk_;
+  Vec3<T> p_, q_;
+  T height_, flat_, steep_, half_chord_, first_;
+};
 
 /// A lamp that shines within a cone alone, as bright as the angle to its axis says.
 template <class T> struct LampBeam {
@@ -296,6 +349,40 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   return lamp;
 }
 
+/// A lamp whose light from below a plane the closure does not meet: what it carries is the mean over the part above.
+/// From 5.0 on Cycles takes closures with a normal of their own for black below the smooth normal (docs/cycles.md). v1,
+/// v2: as of aim_at().
+template <class T>
+AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<T>& normal, const T& v1, const T& v2) {
+  constexpr int kSteps = 6;
+  const PartAbove<T> part(shining, normal);
+  const Vec3<T> axis = cross(shining.across, shining.along);
+  // Solid angle of what a point stands for, up to the length of the axis.
+  const auto density = [&](const typename PartAbove<T>::Point& p) {
+    const T d2 = dot(p.at, p.at);
+    return p.area * abs(dot(axis, p.at)) / (d2 * sqrt(d2));
+  };
+  // Light times the lobe's slope, over the part: the midpoint rule along u, Gauss' of two points along v.
+  const std::array<T, 2> sums =
+      iterate(kSteps, std::array<T, 2>{T(0.5 / kSteps), T(0)}, [&](const std::array<T, 2>& s) {
+        T sum = s[1];
+        for (const double v : {0.5 - std::sqrt(1.0 / 12), 0.5 + std::sqrt(1.0 / 12)}) {
+          const auto p = part.at(s[0], T(v));
+          sum = sum + density(p) * (dot(lamp.lobe.half, p.at) / sqrt(dot(p.at, p.at)));
+        }
+        return std::array<T, 2>{s[0] + T(1.0 / kSteps), sum};
+      });
+  const T mean_rise = sums[1] / T(2 * kSteps);
+  const auto point = part.at(v1, v2);
+  lamp.wi = normalize(point.at);
+  const T rise = dot(lamp.lobe.half, lamp.lobe.towards);
+  const T profile = profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi));
+  // A lobe whose normal is below the plane is black above it.
+  const auto shows = lamp.emphasis > T(0) && mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
+  lamp.emphasis = select(shows, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
+  return lamp;
+}
+
 /// What the drawn direction carries of a lamp of this solid angle, which it meets with this density: the power
 /// heuristic, to the fourth so that it has next to nothing where the lamp is the smaller one: light sampling finds
 /// that, too, and rarely.
@@ -446,9 +533,9 @@ struct AimedSum {
 
 /// As the shader goes about it (aimed.cpp), with the base for wo. u: three numbers that draw the direction; v:
 /// two a lamp that choose a point of it, independent of one another. `beams`: none, or one a lamp, whose edge is 0
-/// where it shines everywhere.
+/// where it shines everywhere. `horizon`: the normal below which lobes are cut_off(), if they are.
 AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
                    const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 2>>& v,
-                   const std::vector<LampBeam<double>>& beams = {});
+                   const std::vector<LampBeam<double>>& beams = {}, const std::optional<Vec3<double>>& horizon = {});
 
 }  // namespace brdfc::forms

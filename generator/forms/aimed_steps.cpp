@@ -84,6 +84,16 @@ const AimedSteps& aimed_steps(int indent) {
     p.output("lamp_emphasis", lamp.emphasis);
     p.output("lamp_solid_angle[lobes]", lamp.solid_angle);
   });
+  const Vec3<Expr> horizon = input_vector("horizon");
+  steps.low = record_step([&](Program& p) { p.output("lamp_low", lowest(patch, horizon)); });
+  steps.cut = record_step([&](Program& p) {
+    AimedLamp<Expr> lamp;
+    lamp.lobe = kept_lobe("lobes");
+    lamp.emphasis = Expr::input("lamp_emphasis");
+    const AimedLamp<Expr> cut = cut_off(lamp, shining, horizon, Expr::input("v_1"), Expr::input("v_2"));
+    p.output("wi", cut.wi);
+    p.output("lamp_emphasis", cut.emphasis);
+  });
   const Rgb<Expr> value = Rgb<Expr>::input("excess");
   const Expr density = Expr::input("drawn_density");
   steps.less = record_step([&](Program& p) {

@@ -14,6 +14,8 @@ struct AimedSteps {
   Recording room;   ///< of `earlier` and the lamp's centre: assigns lobe_room
   Recording aim;    ///< reads the lamp, shining_*, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_emphasis,
                   ///< lamp_solid_angle, lobe_height and of the lobe to_lamp_*, to_half_*, exponent, radius, end, extent
+  Recording low;  ///< reads the lamp and horizon; assigns lamp_low, how high over that its lowest point is
+  Recording cut;  ///< reads what aim reads and assigned, the lobe `lobes` and horizon; assigns wi_*, lamp_emphasis anew
   Recording less;   ///< reads the lobe `earlier` and wi_*; takes it off excess
   Recording send;   ///< reads excess, drawn_density and what aim assigned; assigns the lobe's value, weight and colour
   Recording toss;   ///< assigns tossed, the number of a lobe or less than 0, and u_0

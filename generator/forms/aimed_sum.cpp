@@ -6,7 +6,8 @@ namespace brdfc::forms {
 
 AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
                    const std::vector<LampPatch<double>>& patches, const Vec3<double>& wo, const Vec3<double>& u,
-                   const std::vector<std::array<double, 2>>& v, const std::vector<LampBeam<double>>& beams) {
+                   const std::vector<std::array<double, 2>>& v, const std::vector<LampBeam<double>>& beams,
+                   const std::optional<Vec3<double>>& horizon) {
   const auto excess_at = [&](const Vec3<double>& wi) { return excess(brdf, base, wi, wo); };
   AimedSum out;
   std::vector<LampPatch<double>> of;
@@ -18,7 +19,8 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
     if (lit.lamp.centre.z <= kMirrorRise * length(lit.lamp.centre)) continue;
     double room = 1;
     for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(lit.lamp.centre, earlier));
-    const AimedLamp<double> lamp = aim_at(lit.lamp, lit.mean, room, v[i][0], v[i][1], wo);
+    AimedLamp<double> lamp = aim_at(lit.lamp, lit.mean, room, v[i][0], v[i][1], wo);
+    if (horizon && lowest(lit.lamp, *horizon) < 0) lamp = cut_off(lamp, lit.mean, *horizon, v[i][0], v[i][1]);
     if (lamp.emphasis == 0) continue;
     Excess<double> there = excess_at(lamp.wi);
     for (std::size_t k = 0; k < out.lobes.size(); ++k)

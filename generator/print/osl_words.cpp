@@ -28,8 +28,8 @@ constexpr const char* kWords = R"(
   shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
   across_here aimed along_here beam beam_blend beam_edge beam_here centre_here chosen covered covered_before
-  density_under disk_here drawn_density drawn_x drawn_y drawn_z earlier excess half_way lamp lamp_above lamp_across
-  lamp_along lamp_centre lamp_disk lamp_emphasis lamp_met lamp_place lamp_scale lamp_shape lamp_solid_angle lamp_turn
+  density_under disk_here drawn_density drawn_x drawn_y drawn_z earlier excess half_way horizon lamp lamp_above lamp_across
+  lamp_along lamp_centre lamp_disk lamp_emphasis lamp_low lamp_met lamp_place lamp_scale lamp_shape lamp_solid_angle lamp_turn
   lamps lit_across lit_along lit_centre lit_disk lobe_colour lobe_colours lobe_end lobe_exponent lobe_extent
   lobe_followed lobe_half lobe_height lobe_level lobe_radius lobe_room lobe_towards lobe_value lobe_weight lobes ray_x
   ray_y ray_z rest_colour rest_followed rest_weight shining_across shining_along shining_centre shining_disk to_half_x

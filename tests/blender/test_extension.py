@@ -806,8 +806,8 @@ def test_warning_multiple_importance(extension, empty):
     assert not any(codes(extension, m, empty) for m in made.values())
     data.cycles.use_multiple_importance_sampling = False
     warned = {key for key, m in made.items() if codes(extension, m, empty)}
-    assert warned == made.keys() - {("blinn", "fitted")}
-    (found,) = extension.api.warnings(made["blinn", "aimed"], empty)
+    assert warned == made.keys() - {("blinn", "fitted"), ("blinn", "aimed")}
+    (found,) = extension.api.warnings(made["blinn", "sampled"], empty)
     assert found.code == "multiple_importance" and "Key" in found.message
     lamp.hide_render = True
     assert not any(codes(extension, m, empty) for m in made.values())

@@ -179,6 +179,75 @@ def bright_spot(scene):
     return [send]
 
 
+def without_importance(scene):
+    """A wide lamp that no drawn direction meets."""
+    item = lit(scene, "AREA", shape="SQUARE", size=1.5)
+    item.data.cycles.use_multiple_importance_sampling = False
+    return [item]
+
+
+def without_shadows(scene):
+    """A lamp that shines through what stands before it, as light sampling alone shows."""
+    (item,) = without_importance(scene)
+    item.data.use_shadow = False
+    mesh = bpy.data.meshes.new("Wall")
+    mesh.from_pydata([(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(node_material("ShaderNodeBsdfDiffuse"))
+    wall = bpy.data.objects.new("Wall", mesh)
+    wall.matrix_world = Matrix.LocRotScale(2.5 * Vector(TOWARDS), turned(TOWARDS), None)
+    wall.visible_camera = False
+    scene.collection.objects.link(wall)
+    return [item]
+
+
+def copied_sheet(scene):
+    """A sheet that an object places a copy of."""
+    sends = sheet(scene)
+    (item,) = (o for o in scene.collection.objects if o.name.startswith("Sheet"))
+    collection = bpy.data.collections.new("Sheets")
+    scene.collection.objects.unlink(item)
+    collection.objects.link(item)
+    shown = bpy.data.objects.new("Copy", None)
+    shown.instance_type, shown.instance_collection = "COLLECTION", collection
+    scene.collection.objects.link(shown)
+    return sends
+
+
+#: Vertical angles in degrees and candelas of an IES file: a beam that is even in the middle and
+#: fades over twenty degrees.
+IES_ANGLES = np.arange(0, 182.5, 2.5)
+IES_LIGHT = 1000 * np.clip((40 - IES_ANGLES) / 20, 0, 1)
+
+
+def with_ies(scene):
+    """A lamp whose light an IES file shapes. Some of its beam's edge is in the picture."""
+    item = lit(scene, "POINT", shadow_soft_size=0.3, energy=20.0)
+    item.data.use_nodes = True
+    tree = item.data.node_tree
+    (emission,) = (n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
+    node = tree.nodes.new("ShaderNodeTexIES")
+    lines = [
+        "IESNA:LM-63-1995",
+        "TILT=NONE",
+        f"1 1000 1 {len(IES_ANGLES)} 1 1 2 0 0 0",
+        "1 1 100",
+    ]
+    for numbers in (IES_ANGLES, [0.0], IES_LIGHT):
+        lines.append(" ".join(f"{n:.6g}" for n in numbers))
+    node.mode, node.ies = "INTERNAL", bpy.data.texts.new("Lamp.ies")
+    node.ies.write("\n".join(lines) + "\n")
+    tree.links.new(node.outputs["Fac"], emission.inputs["Strength"])
+    bpy.context.view_layer.update()
+    axis = unit(np.array(item.matrix_world.col[2].to_3d()))
+
+    def beam(wi):
+        angle = np.degrees(np.arccos(np.clip(wi @ axis, -1, 1)))
+        return 0.0706650768394 * np.interp(angle, IES_ANGLES, IES_LIGHT)
+
+    place = np.array(item.matrix_world.translation)
+    return [highlights.facing_disk(place, 0.3, item.data.energy / (4 * math.pi), beam)]
+
+
 KINDS = {
     "point": one("POINT", shadow_soft_size=0.4),
     "square": one("AREA", shape="SQUARE", size=1.0),
@@ -195,6 +264,10 @@ SLOW_KINDS = {
         ("POINT", {"shadow_soft_size": 0.03}), ("AREA", {"shape": "SQUARE", "size": 1.5})
     ),
     "instance": instance,
+    "without multiple importance": without_importance,
+    "without shadows": without_shadows,
+    "copy of a sheet": copied_sheet,
+    "IES file": with_ies,
 }
 EVIDENCE_KINDS = {
     "point without soft falloff": one("POINT", shadow_soft_size=0.5, use_soft_falloff=False),
@@ -216,8 +289,7 @@ EVIDENCE_KINDS = {
 WIDE_CASES = [("cook_torrance", {"m": 0.3}), ("radziszewski_alda", {"n": 1.0}), ("phong", {})]
 #: Of lamps without a size pictures have next to no noise.
 SHARP = {"point without a size", "instance", "hidden"}
-#: Where light is bounded within the lamp. Of one half below the horizon this is so in 4.5 alone
-#: (docs/aimed.md).
+#: Where light is bounded within the lamp.
 BOUNDED = {"edge of a spot": 0.08, "half below the horizon": 0.04}
 WITH_MARKS = [
     *KINDS,

@@ -862,6 +862,152 @@ def test_lamps_that_geometry_nodes_place(extension, ball, empty):
     assert slots(empty)[0][:3] == pytest.approx([0, 0, 4])
 
 
+def square(scene, material, side=0.5):
+    corners = [(-side, -side), (side, -side), (side, side), (-side, side)]
+    return emissive_plane(scene, material, corners)
+
+
+def in_collection(scene, item):
+    """The item moved to a collection that no picture shows by itself."""
+    collection = bpy.data.collections.new("Copied")
+    scene.collection.objects.unlink(item)
+    collection.objects.link(item)
+    return collection
+
+
+def placing(scene, *nodes):
+    """An object of geometry nodes: a point for each corner of a square of 2 m, and `nodes(tree,
+    points)` makes the output of them."""
+    tree = bpy.data.node_groups.new("Place", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    end, grid = tree.nodes.new("NodeGroupOutput"), tree.nodes.new("GeometryNodeMeshGrid")
+    for name in ("Size X", "Size Y", "Vertices X", "Vertices Y"):
+        grid.inputs[name].default_value = 2
+    put = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(grid.outputs["Mesh"], put.inputs["Points"])
+    tree.links.new(nodes[0](tree), put.inputs["Instance"])
+    tree.links.new(put.outputs[0], end.inputs[0])
+    item = bpy.data.objects.new("Placing", bpy.data.meshes.new("Placing"))
+    item.location.z = 5
+    scene.collection.objects.link(item)
+    item.modifiers.new("Place", "NODES").node_group = tree
+    return item
+
+
+def copies_by_collection(scene, material):
+    shown = bpy.data.objects.new("Copy", None)
+    shown.instance_type, shown.location = "COLLECTION", (1, 0, 5)
+    shown.instance_collection = in_collection(scene, square(scene, material))
+    scene.collection.objects.link(shown)
+    return [(1, 0, 5)]
+
+
+def copies_by_nested_collections(scene, material):
+    copies_by_collection(scene, material)
+    (inner,) = (o for o in scene.collection.objects if o.name == "Copy")
+    shown = bpy.data.objects.new("Outer", None)
+    shown.instance_type, shown.location = "COLLECTION", (0, 1, 0)
+    shown.instance_collection = in_collection(scene, inner)
+    scene.collection.objects.link(shown)
+    return [(1, 1, 5)]
+
+
+def copies_by_faces(scene, material):
+    parent = emissive_plane(scene, None, [(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    parent.location.z, parent.instance_type = 5, "FACES"
+    square(scene, material).parent = parent
+    return [(0, 0, 5)]
+
+
+def copies_by_particles(scene, material):
+    item = square(scene, material, 0.1)
+    collection = in_collection(scene, item)
+    scene.collection.children.link(collection)
+    item.hide_viewport = False
+    item.location.z = -100
+    parent = emissive_plane(scene, None, [(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    parent.location.z = 5
+    parent.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = parent.particle_systems[0].settings
+    settings.type, settings.count, settings.use_advanced_hair = "HAIR", 3, True
+    settings.render_type, settings.instance_object = "OBJECT", item
+    return None
+
+
+def copies_by_nodes_of_an_object(scene, material):
+    item = square(scene, material, 0.1)
+    in_collection(scene, item)
+
+    def info(tree):
+        node = tree.nodes.new("GeometryNodeObjectInfo")
+        node.inputs["Object"].default_value = item
+        return node.outputs["Geometry"]
+
+    placing(scene, info)
+    return [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
+
+
+def copies_by_nodes_of_what_they_make(scene, material):
+    def lamp(tree):
+        grid, paint = (
+            tree.nodes.new(f"GeometryNode{name}") for name in ("MeshGrid", "SetMaterial")
+        )
+        for name, value in (("Size X", 0.2), ("Size Y", 0.2), ("Vertices X", 2), ("Vertices Y", 2)):
+            grid.inputs[name].default_value = value
+        paint.inputs["Material"].default_value = material
+        tree.links.new(grid.outputs["Mesh"], paint.inputs[0])
+        return paint.outputs[0]
+
+    placing(scene, lamp)
+    return [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        copies_by_collection,
+        copies_by_nested_collections,
+        copies_by_faces,
+        copies_by_particles,
+        copies_by_nodes_of_an_object,
+        copies_by_nodes_of_what_they_make,
+    ],
+)
+def test_copies_of_what_shines(extension, ball, empty, place):
+    places = place(empty, emissive()[0])
+    bpy.context.view_layer.update()
+    found = extension.api.see_lamps(empty)
+    numbers = slots(empty)
+    if places is None:
+        assert len(numbers) == 4, [lamp.name for lamp in found]
+        assert sum(s[2] == pytest.approx(5, abs=0.1) for s in numbers) == 3
+        return
+    assert sorted(tuple(s[:3].round(4)) for s in numbers) == sorted(places)
+    assert {s[9] for s in numbers} == {3}
+
+
+def test_many_copies_of_what_shines(extension, ball, empty):
+    """The nearest ones, and a line for all others."""
+    item = square(empty, emissive()[0], 0.02)
+    collection = in_collection(empty, item)
+    for i in range(100):
+        shown = bpy.data.objects.new(f"Copy{i:02}", None)
+        shown.instance_type, shown.instance_collection = "COLLECTION", collection
+        shown.location = (0.1 * i, 0, 5 + 0.1 * i)
+        empty.collection.objects.link(shown)
+    bpy.context.view_layer.update()
+    found = extension.api.see_lamps(empty)
+    assert [lamp.name for lamp in found[:8]] == [f"Copy0{i}/Panel" for i in range(8)]
+    assert [lamp.slot for lamp in found[:9]] == [*range(1, 9), None]
+    assert 9 < len(found) < 50 and any("and 67 more" in lamp.name for lamp in found)
+    # A copy that moves, and the one that all are copies of.
+    bpy.data.objects["Copy50"].location = (0, 0, 3)
+    assert any(s[:3] == pytest.approx([0, 0, 3]) for s in slots(empty))
+    item.data.transform(Matrix.Translation((0, 0, 0.5)))
+    item.data.update()
+    assert any(s[:3] == pytest.approx([0, 0, 3.5]) for s in slots(empty))
+
+
 def test_broken_and_empty_meshes(extension, ball, empty):
     """Raise nothing and take no slot."""
     material, _ = emissive()
@@ -1045,3 +1191,101 @@ def test_lean_files_name_the_number_of_lamps(extension, ball, empty):
     add_lamp(empty, "SUN", "Sun")
     bpy.context.view_layer.update()
     assert lean.needs(extension.api.used_materials())["lamps"] == 2
+
+
+def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
+    """The sign of their size tells shaders so; and the panel, where a closure misses them, too."""
+    extension.scene_loader.apply_clean_settings(empty)
+    extension.api.enable_osl(empty)
+    material = ball.active_material
+    kinds = [("POINT", "shadow_soft_size"), ("SPOT", "shadow_soft_size"), ("SUN", "angle")]
+    for kind, size in [*kinds, ("AREA", "size")]:
+        item = add_lamp(empty, kind, energy=10.0)
+        setattr(item.data, size, 0.5)
+        assert slots(empty)[0][10] == pytest.approx(0.5)
+        item.data.cycles.use_multiple_importance_sampling = False
+        item.data.update_tag()  # as the panel does
+        assert slots(empty)[0][10] == pytest.approx(-0.5), kind
+        assert extension.api.warnings(material, empty) == []
+        item.data.cycles.use_multiple_importance_sampling = True
+        item.data.update_tag()
+        item.data.use_shadow = False
+        assert slots(empty)[0][10] == pytest.approx(-0.5), kind
+        bpy.data.objects.remove(item)
+    near = add_lamp(empty, "POINT", "Near", location=(0, 0, 2), shadow_soft_size=1.9)
+    near.data.cycles.use_multiple_importance_sampling = False
+    (lamp,) = extension.api.see_lamps(empty)
+    assert lamp.slot is None and not lamp.met and "too large" in lamp.why
+    (found,) = extension.api.warnings(material, empty)
+    assert (found.code, found.severity) == ("multiple_importance", "ERROR")
+    assert "Near" in found.message and lamp.why in found.message
+    near.data.shadow_soft_size, near.data.energy = 0.1, 240.0  # the faintest, and no trifle
+    for i in range(8):
+        add_lamp(empty, "POINT", f"Lamp{i}", location=(0, i, 3), energy=5000.0)
+    assert len(slots(empty)) == 8
+    (found,) = extension.api.warnings(material, empty)
+    assert found.code == "multiple_importance" and "fainter" in found.message
+
+
+IES = """IESNA:LM-63-1995
+[TEST] none
+TILT=INCLUDE
+1
+2
+0, 90
+1.0 1.0
+1 1000 2.0 3 2 1 2 0 0 0
+0.5 1.0 100
+0 45 90
+0 90
+10 20 30
+40 50 60
+"""
+
+
+def test_light_that_nodes_give(extension, ball, empty, tmp_path):
+    """How bright a lamp is counts by what is linked to its strength: by that it gets its slot."""
+    item = add_lamp(empty, "POINT", energy=10.0)
+    (plain,) = extension.api.see_lamps(empty)
+    item.data.use_nodes = True
+    tree = item.data.node_tree
+    (node,) = (n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
+
+    def power(kind, output=0, **values):
+        source = tree.nodes.new(f"ShaderNode{kind}")
+        for name, value in values.items():
+            source.inputs[name].default_value = value
+        tree.links.new(source.outputs[output], node.inputs["Strength"])
+        return source, lambda: extension.api.see_lamps(empty)[0].irradiance / plain.irradiance
+
+    source, found = power("Value")
+    source.outputs[0].default_value = 7.0
+    assert found() == pytest.approx(7, rel=1e-4)
+    assert power("LightFalloff", "Quadratic", Strength=3.0)[1]() == pytest.approx(3, rel=1e-4)
+    source, found = power("TexIES", Strength=2.0)
+    assert found() == pytest.approx(2, rel=1e-4), "there is no file"
+    file = tmp_path / "lamp.ies"
+    file.write_text(IES)
+    wanted = 2 * 0.0706650768394 * 60 * 2.0 * 0.5
+    source.mode, source.filepath = "EXTERNAL", str(file)
+    assert found() == pytest.approx(wanted, rel=1e-4)
+    source.mode, source.ies = "INTERNAL", bpy.data.texts.new("lamp.ies")
+    source.ies.write(IES)
+    assert found() == pytest.approx(wanted, rel=1e-4)
+    for broken in (
+        "",
+        "TILT=NONE\n1 2 3",
+        IES.replace("60", "much"),
+        IES.replace("90\n10", "90\n"),
+    ):
+        source.ies.clear()
+        source.ies.write(broken)
+        assert found() > 0
+    tree.links.remove(node.inputs["Strength"].links[0])
+    node.inputs["Strength"].default_value = 4.0
+    black = tree.nodes.new("ShaderNodeBlackbody")
+    tree.links.new(black.outputs[0], node.inputs["Color"])
+    assert extension.api.see_lamps(empty)[0].irradiance / plain.irradiance == pytest.approx(
+        4, rel=1e-4
+    )
+    assert len(slots(empty)) == 1

@@ -286,6 +286,68 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
   std::printf("worst %.4f, with the whole lamp %.4f\n", worst, worst_whole);
 }
 
+/// Lamps that reach below the horizon, whose light from there no lobe meets: f is averaged over the part above.
+TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
+  constexpr int kSteps = 32;
+  int tested = 0;
+  double worst = 0, worst_whole = 0;
+  for (const auto& [model, values] :
+       {std::pair{"phong", "e=20"}, {"radziszewski_alda", "n=1"}, {"cook_torrance", "m=0.3"}}) {
+    const Model& m = find_model(model);
+    const auto brdf = m.make_double(values_of(m, {values}));
+    for (const double cosTheta_o : {0.4, 0.8})
+      for (const double height : {0.14, 0.02, 0.0, -0.1})
+        for (const double turn : {kPi, 2.0})
+          // The last one rolled about its centre, so that its sides are oblique to the horizon.
+          for (const double roll : {-1.0, 0.0, 0.6}) {
+            const Vec3<double> wo = direction(cosTheta_o, 0.3);
+            LampPatch<double> lamp = disk(direction(height, 0.3 + turn) * 2.0, 0.4, 0.7);
+            lamp.disk = roll < 0;
+            if (roll > 0) {
+              const Vec3<double> across = lamp.across;
+              lamp.across = across * std::cos(roll) + lamp.along * std::sin(roll);
+              lamp.along = lamp.along * std::cos(roll) - across * std::sin(roll);
+              lamp.along = lamp.along - lamp.across * (dot(lamp.along, lamp.across) / dot(lamp.across, lamp.across));
+            }
+            for (const Vec3<double>& horizon : {Vec3<double>{0, 0, 1}, normalize(Vec3<double>{0.06, -0.04, 1})}) {
+              if (lowest(lamp, horizon) >= 0) continue;
+              const auto above = [&](const Vec3<double>& w, double x) { return dot(w, horizon) > 0 ? x : 0.0; };
+              const auto f_cos = [&](const Vec3<double>& w) {
+                return above(w, brdf->eval(w, wo).g * std::max(w.z, 0.0));
+              };
+              const double truth = over_patch(lamp, 1, f_cos);
+              if (truth < 1e-4) continue;
+              const auto off = [&](bool cut) {
+                double mean = 0;
+                AimedLamp<double> aimed;
+                for (int i = 0; i < kSteps * kSteps; ++i) {
+                  const double v1 = (i / kSteps + 0.5) / kSteps, v2 = (i % kSteps + 0.5) / kSteps;
+                  aimed = aim_at(lamp, lamp, 1.0, v1, v2, wo);
+                  if (cut) {
+                    aimed = cut_off(aimed, lamp, horizon, v1, v2);
+                    EXPECT_GT(dot(aimed.wi, horizon), -1e-9);
+                    EXPECT_TRUE(meets(lamp, aimed.wi));
+                  }
+                  mean += brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * aimed.emphasis / (kSteps * kSteps);
+                }
+                const double lit =
+                    over_patch(lamp, 1, [&](const auto& w) { return above(w, evaluate(aimed.lobe, w)); });
+                return mean == 0 ? 0 : std::abs(mean * lit / truth - 1);  // or it is left to drawn directions
+              };
+              const double found = off(true);
+              tested += found > 0;
+              EXPECT_LT(found, 0.01) << model << " " << cosTheta_o << " " << height << " " << turn << " " << roll << " "
+                                     << horizon.x;
+              worst = std::max(worst, found);
+              worst_whole = std::max(worst_whole, off(false));
+            }
+          }
+  }
+  EXPECT_GT(worst_whole, 0.3) << "nothing would be wrong without";
+  EXPECT_GT(tested, 100);
+  std::printf("%d, worst %.4f, with the whole lamp %.4f\n", tested, worst, worst_whole);
+}
+
 /// What the drawn direction carries of a lamp is a lobe 1e-3 wide: it must lie on the lamp as a whole, and beside it
 /// not at all.
 TEST(Aimed, NothingOfTheRestReachesOverTheEdgeOfALamp) {
