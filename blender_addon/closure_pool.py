@@ -10,9 +10,6 @@ import bpy
 
 from . import nodes, pack, shader_trees
 
-#: Nodes that only pass on what others make.
-_PASSING = {"NodeReroute", "NodeGroupInput", "NodeGroupOutput", "ShaderNodeGroup"}
-
 
 @dataclass(frozen=True)
 class Use:
@@ -36,17 +33,14 @@ def capacity():
 
 def of_material(material):
     """Use of a material, of what its output for Cycles hangs on."""
-    tree = shader_trees.shading(material)
-    output = tree and shader_trees.output(tree, "ShaderNodeOutputMaterial")
-    found = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []
     pool = pack.manifest()["closure_pool"]
     joining = {"ShaderNodeMixShader": pool["mix"], "ShaderNodeAddShader": pool["add"]}
     size, per_lamp, shared = 0, 0, False
-    for node in found:
+    for node in (shown.node for shown in shader_trees.shown(material)):
         if nodes.is_ours(node) and (made := nodes.manifest_entry(node)):
             size += made[0]["closure_bytes"]
             per_lamp += made[0]["lamp_bytes"]
-        elif nodes.is_ours(node) or node.bl_idname not in _PASSING | joining.keys():
+        elif nodes.is_ours(node) or node.bl_idname not in joining:
             shared = True
         else:
             size += joining.get(node.bl_idname, 0)

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from . import lamp_checks, nodes
+from . import lamp_checks, nodes, shader_trees
 from .i18n import say
 
 #: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
@@ -180,8 +180,9 @@ def black_aovs(scene):
     written = {
         node.aov_name
         for owner in owners
+        if shader_trees.shading(owner) is not None
         for node in nodes.all_nodes(owner)
-        if node.bl_idname == "ShaderNodeOutputAOV"
+        if node.bl_idname == "ShaderNodeOutputAOV" and not node.mute
     }
     return sorted(wanted & written)
 
