@@ -61,7 +61,7 @@ def value_of(socket):
 
 def moved(node):
     """{(pointer of the node or a socket, name of a property)} of what is animated or driven."""
-    own = {item.as_pointer() for item in (node, *node.inputs)}
+    own = {item.as_pointer() for item in (node, *node.inputs, *node.outputs)}
     found = {(item.as_pointer(), name) for c, _, item, name in _moves(node) if not c.mute}
     return {(pointer, name) for pointer, name in found if pointer in own}
 

@@ -32,6 +32,7 @@ from . import (
     library,
     nodes,
     pack,
+    shader_trees,
     update,
     usage,
 )
@@ -170,7 +171,7 @@ def _set(node, what, parameters):
                 f"{name!r} of {what} is {nodes.get_value(node, name)!r}, the only value of a lean "
                 f"material; switch_representation() brings the others back; got {value!r}"
             )
-        if name in present and present[name].is_linked:
+        if name in present and shader_trees.is_driven(present[name]):
             raise ValueError(
                 say("{parameter!r} of {what} is controlled by a link", parameter=name, what=what)
             )

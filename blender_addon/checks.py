@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import closure_pool, i18n, lamp_checks, lamps, nodes, pack, stand_in, update
+from . import closure_pool, i18n, lamp_checks, lamps, nodes, pack, shader_trees, stand_in, update
 from .i18n import Sentence, say
 from .setting_checks import DECLARED, black_aovs, clamp_highlight
 
@@ -333,13 +333,15 @@ def is_stood_in(node, scene):
 def why_not_run(material, scene):
     """The findings that say why a material's shaders do not run in a scene: errors where they are
     black, warnings where twins stand in."""
-    ours = nodes.group_nodes(material)
+    ours = nodes.shown_nodes(material)
     return [f for f in of_scene(ours, scene) if f.code in UNABLE]
 
 
 def warnings(material, scene):
     """See api.warnings()."""
-    ours = nodes.group_nodes(material)
+    if nodes.group_nodes(material) and shader_trees.shading(material) is None:
+        return [Finding("nodes_off", "ERROR", shader_trees.nodes_off())]
+    ours = nodes.shown_nodes(material)
     if not ours:
         return []
     found = of_scene(ours, scene)

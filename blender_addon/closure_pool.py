@@ -12,9 +12,6 @@ import bpy
 
 from . import nodes, pack, shader_trees
 
-#: Nodes that only pass on what others make.
-_PASSING = {"NodeReroute", "NodeGroupInput", "NodeGroupOutput", "ShaderNodeGroup"}
-
 #: Slots that Blender's own nodes take. (Cycles 4.5 to 5.2, kernel/osl/closures_setup.h and
 #: kernel/svm/closure.h: a closure takes one, and another for its Fresnel term.)
 _NATIVE_SLOTS = {
@@ -77,32 +74,39 @@ def _native_slots(node):
     if node.bl_idname == "ShaderNodeBsdfPrincipled":
         for name, (off, more) in _PRINCIPLED_SLOTS.items():
             socket = node.inputs.get(name)
-            if socket is not None and (socket.is_linked or socket.default_value != off):
+            if socket is not None and (
+                shader_trees.is_driven(socket) or socket.default_value != off
+            ):
                 taken += more
     return taken
 
 
 def _times(node):
     """How often a node is added to the sum: once for each place that it is linked to."""
-    return max(sum(len(s.links) for s in node.outputs if s.type == "SHADER"), 1)
+    return max(
+        sum(
+            map(
+                shader_trees.counts,
+                (k for s in node.outputs if s.type == "SHADER" for k in s.links),
+            )
+        ),
+        1,
+    )
 
 
 def of_material(material):
     """Use of a material, of what its output for Cycles hangs on."""
-    tree = shader_trees.shading(material)
-    output = tree and shader_trees.output(tree, "ShaderNodeOutputMaterial")
-    found = shader_trees.upstream(output.inputs["Surface"], "SHADER") if output else []
     pool, a_lamp = pack.manifest()["closure_pool"], pack.manifest()["closure_slots"]["lamp"]
     joining = {"ShaderNodeMixShader": pool["mix"], "ShaderNodeAddShader": pool["add"]}
     slots, slots_per_lamp, size, per_lamp, shared = 0, 0, 0, 0, False
-    for node in found:
+    for node in (shown.node for shown in shader_trees.shown(material)):
         if nodes.is_ours(node) and (made := nodes.manifest_entry(node)):
             aimed_at = made[0].get("lamps") or 0
             slots += _times(node) * (made[0].get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
             size += made[0]["closure_bytes"]
             per_lamp += made[0]["lamp_bytes"]
-        elif nodes.is_ours(node) or node.bl_idname not in _PASSING | joining.keys():
+        elif nodes.is_ours(node) or node.bl_idname not in joining:
             slots += _times(node) * _native_slots(node)
             shared = True
         else:

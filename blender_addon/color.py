@@ -113,6 +113,11 @@ def from_srgb(colors):
     return np.interp(colors, _ENCODED, _decoded())
 
 
+def from_rec709(rgb):
+    """Linear colours (..., 3) of the working space, of linear ones with the primaries of sRGB."""
+    return _converted(rgb, "from_rec709_linear_to_scene_linear")
+
+
 def to_screen(rgb):
     """Linear colours (..., 3) of the working space as sRGB has them, in [0, 1]."""
     return np.interp(_converted(rgb, "from_scene_linear_to_rec709_linear"), _decoded(), _ENCODED)

@@ -7,6 +7,7 @@ as in most pictures. The formulas of the models come as NumPy with the extension
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,14 @@ VIEWS = (0.95, 0.75, 0.5, 0.25)
 DIRECTIONS = 256
 #: Standard deviation of the light of such a lamp, in radians, and how many there are about.
 LAMP, LAMPS = 0.1, 512
+#: Candidates are looked at closely whose error at a rough width is at most this times that of the
+#: nearest.
+_AS_NEAR = 1.1
+#: One of how many directions is enough to tell widths apart that are far from each other.
+_FEW = 8
+#: Looks by parabolas at most, and how near to one before another tells nothing new of a width, as
+#: a logarithm.
+_PARABOLAS, _NO_NEWS = 4, 0.02
 #: Of the narrowest lobe that directions are drawn for, as Cycles' alpha.
 _NARROWEST = 5e-4
 
@@ -184,6 +193,8 @@ class Directions:
             which.append(np.full(len(both), k))
         self.wi, self.wo = np.concatenate(wi), np.concatenate(wo)
         self.weight, self.which = np.concatenate(weight), np.concatenate(which)
+        #: Where the rows of each view begin, and where those of the last end.
+        self.starts = np.searchsorted(self.which, range(len(self.each) + 1))
 
     def light(self, f_cos):
         """Integral over the directions of light by view, (k, 3)."""
@@ -201,24 +212,35 @@ class Directions:
         mirrored = self.each * (-1, -1, 1)
         parts = []
         for directions in (self.wi, mirrored):
-            near = np.exp((directions @ lamps.T - 1) / LAMP**2)
-            parts.append(near / near.sum(1, keepdims=True))
+            near = directions.astype(np.float32) @ lamps.T.astype(np.float32)
+            near -= 1
+            near /= np.float32(LAMP**2)
+            # Less is next to nothing, and much slower.
+            np.exp(np.maximum(near, np.float32(-30), out=near), out=near)
+            near /= near.sum(1, keepdims=True)
+            parts.append(near)
         return parts
 
     def light_of_lamps(self, f_cos, mirror):
         """The same with a mirror's part (k, 3), by view and lamp, (k, LAMPS, 3)."""
         of_lobe, of_mirror = self._from_lamps
-        weighed = f_cos * self.weight[:, None]
-        views = [self.which == k for k in range(len(self.each))]
+        weighed = (f_cos * self.weight[:, None]).astype(np.float32)
+        views = [slice(*ends) for ends in itertools.pairwise(self.starts)]
         lobes = np.stack([of_lobe[here].T @ weighed[here] for here in views])
         return lobes + of_mirror[:, :, None] * mirror[:, None]
 
 
+@functools.lru_cache(maxsize=8)
+def _directions(roughness, stretch):
+    """What several nodes may share, of some four megabytes."""
+    return Directions(native_bsdf.Native("glossy", (1.0, 1.0, 1.0), roughness, stretch))
+
+
 class Target:
-    """A node's light at these directions."""
+    """A node's light at its Directions."""
 
     def __init__(self, native):
-        self.native, self.at = native, Directions(native)
+        self.native, self.at = native, _directions(native.roughness, native.stretch)
         self.f_cos = native_bsdf.f_cos(
             native, self.at.wi, self.at.wo, (self.at.each, self.at.which)
         )
@@ -242,6 +264,15 @@ class Target:
         f_cos, mirror = self._differences(model, values)
         return self._mean(self.at.light(np.abs(f_cos)) + np.abs(mirror))
 
+    def roughly_misplaced(self, model, values):
+        """The same of few of the directions, in arbitrary units: enough to tell widths apart that
+        are far from each other."""
+        from .brdfc import model as formulas
+
+        at, few = self.at, slice(None, None, _FEW)
+        f = formulas(model).eval(at.wi[few], at.wo[few], **values) * at.wi[few, 2:]
+        return float((np.abs(f - self.f_cos[few]).sum(1) * at.weight[few]).sum())
+
     def error(self, model, values):
         """The same of lamps as wide as windows, all around: what a picture of these shows."""
         return self._mean(np.abs(self.at.light_of_lamps(*self._differences(model, values))).sum(1))
@@ -262,31 +293,126 @@ def with_width(candidate, native, factor):
     return values
 
 
-def nearest_factor(candidate, targets):
-    """The factor of the width that misplaces the least, mean over the targets, and the mean error
-    with it."""
+@dataclass(frozen=True)
+class Fit:
+    """The candidate that is nearest to nodes, and the factor of its width."""
 
-    def mean(measure, factor):
-        values = [with_width(candidate, t.native, factor) for t in targets]
-        found = [measure(t, candidate.model, v) for t, v in zip(targets, values, strict=True)]
-        return sum(found) / len(found)
+    candidate: Candidate
+    factor: float
+    #: (light, error) of the nodes at each colour that was asked for.
+    found: tuple
+    #: Whether a link to the node's colour would be lost.
+    lost: bool
 
-    if candidate.width is None:
-        return 1.0, mean(Target.error, 1.0)
 
-    def off(factor):
-        return mean(Target.misplaced, factor)
+@functools.lru_cache(maxsize=256)
+def nearest(natives, colors, colored, models):
+    """The Fit to nodes that differ in roughness alone, a tuple, among these models; with its error
+    at nodes of other colours. `colored`: whether something is linked to the colour, which a model
+    without a parameter for it would lose. None where no model is near."""
+    native, targets, found = natives[0], [Target(n) for n in natives], []
+    # With another base the width of a model is about the same: it is sought once.
+    roughly, closely = {}, {}
+    for candidate in candidates(native):
+        if candidate.model not in models:
+            continue  # a pack that is cut to a scene
+        if native.stretch != 1 and not (candidate.width and candidate.width.across):
+            continue
+        lost = colored and "Color" not in candidate.links.values()
+        key = candidate.model, candidate.width
+        if key not in roughly:
+            roughly[key] = _rough_width(candidate, targets)
+        between = roughly[key]
+        error = _mean(Target.error, candidate, targets, math.exp(between[1]))
+        found.append((lost, error, between, candidate))
+    if not found:
+        return None
+    best, fits = min(f[:2] for f in found), []
+    for lost, error, between, candidate in found:
+        if lost == best[0] and error <= _AS_NEAR * best[1]:
+            key = candidate.model, candidate.width
+            if key not in closely:
+                closely[key] = _factor(candidate, targets, between)
+            error = _mean(Target.error, candidate, targets, closely[key])
+            fits.append((error, closely[key], candidate))
+    _, factor, candidate = min(fits, key=lambda f: f[0])
+    errors = tuple(_light_and_error(candidate, targets, factor, c) for c in colors)
+    return Fit(candidate, factor, errors, best[0])
 
-    width, r = candidate.width, np.array([max(t.native.roughness, 1e-3) for t in targets])
+
+def _light_and_error(candidate, targets, factor, color):
+    """The light of nodes of another colour than these, and a candidate's error with the factor of
+    its width, mean over the nodes."""
+    found = []
+    for t in targets:
+        if t.native.color != color:
+            t = Target(replace(t.native, color=color))
+        values = with_width(candidate, t.native, factor)
+        found.append((float(t.total.mean()), t.error(candidate.model, values)))
+    return tuple(np.mean(found, 0).tolist())
+
+
+def _mean(measure, candidate, targets, factor):
+    """Of a Target's method, over nodes that differ in roughness."""
+    values = [with_width(candidate, t.native, factor) for t in targets]
+    found = [measure(t, candidate.model, v) for t, v in zip(targets, values, strict=True)]
+    return sum(found) / len(found)
+
+
+def _rough_width(candidate, targets):
+    """Three logarithms of the factor of a candidate's width: about where it misplaces least, and
+    one on each side; of one without a width thrice 0."""
+    width = candidate.width
+    if width is None:
+        return 0.0, 0.0, 0.0
+
+    def off(x):
+        return _mean(Target.roughly_misplaced, candidate, targets, math.exp(x))
+
+    r = np.array([max(t.native.roughness, 1e-3) for t in targets])
     ends = np.log([width.low, width.high])[:, None] - width.power * np.log(r)[None]
-    low, high = ends.min(), ends.max()
-    grid = np.linspace(low, high, 16)
-    best = int(np.argmin([off(math.exp(x)) for x in grid]))
-    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    golden = (math.sqrt(5) - 1) / 2
-    for _ in range(10):
-        a, b = high - golden * (high - low), low + golden * (high - low)
-        low, high = (low, b) if off(math.exp(a)) < off(math.exp(b)) else (a, high)
-    factor = math.exp((low + high) / 2)
-    factor = min((factor, math.exp(grid[best])), key=off)
-    return factor, mean(Target.error, factor)
+    grid = np.linspace(ends.min(), ends.max(), 16)
+    best = min(grid, key=off)
+    step = grid[1] - grid[0]
+    low, high = max(best - step, grid[0]), min(best + step, grid[-1])
+    best = _lowest(off, low, best, high)
+    return max(best - step / 3, grid[0]), best, min(best + step / 3, grid[-1])
+
+
+def _factor(candidate, targets, between):
+    """The factor of the width that misplaces the least."""
+    if candidate.width is None:
+        return 1.0
+    return math.exp(
+        _lowest(lambda x: _mean(Target.misplaced, candidate, targets, math.exp(x)), *between)
+    )
+
+
+def _lowest(off, low, best, high):
+    """Where a function is least between two ends, by parabolas through three points."""
+    points = {x: off(x) for x in {low, best, high}}
+    for _ in range(_PARABOLAS):
+        middle = min(points, key=points.get)
+        below, above = ([x for x in points if x < middle], [x for x in points if x > middle])
+        if not below or not above:
+            # At an end: the function may be least beside it.
+            other = min(above) if above else max(below)
+            x = (middle + other) / 2
+        else:
+            x = _vertex(points, max(below), middle, min(above))
+        if min(abs(x - y) for y in points) < _NO_NEWS:
+            break
+        points[x] = off(x)
+    return min(points, key=points.get)
+
+
+def _vertex(points, a, b, c):
+    """Of the parabola through three points, of which the middle one, b, is the lowest; held away
+    from them, so that each look tells something."""
+    left, right = (b - a) * (points[b] - points[c]), (b - c) * (points[b] - points[a])
+    x = b - 0.5 * ((b - a) * left - (b - c) * right) / min(left - right, -1e-30)
+    wide, far = ((a, b), (b, c)), 0.1
+    low, high = max(wide, key=lambda ends: ends[1] - ends[0])
+    if abs(x - b) < far * min(b - a, c - b):
+        return low + 0.25 * (high - low) if low == b else high - 0.25 * (high - low)
+    return min(max(x, a + far * (b - a)), c - far * (c - b))

@@ -9,7 +9,7 @@ import json
 
 import bpy
 
-from . import animation, compiler, editable, lamps, pack, stand_in, twin
+from . import animation, compiler, editable, lamps, pack, shader_trees, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, add_parameter, vector_socket
 from .i18n import say
@@ -407,29 +407,35 @@ def set_value(node, name, value):
 
 
 def get_value(node, name):
-    """Value of an unlinked socket in the same form; None for a linked one or a vector."""
+    """Value of a socket in the same form; None where a node's output reaches it, and of a vector.
+    Links that Cycles ignores do not count."""
     socket = sockets(node).get(name)
     if socket is None:
         only = _only(node)
         return only[name] if name in only else _choices(node, name)[0]
-    if socket.is_linked or socket.type == "VECTOR":
+    reached = shader_trees.reach(socket)
+    if reached.output is not None or socket.type == "VECTOR":
         return None
     if socket.type == "RGBA":
-        return tuple(socket.default_value)[:3]
+        return tuple(socket.default_value)[:3] if reached.holder else (0.0, 0.0, 0.0)
     if socket.type == "MENU":
         labels = {choice_label(c): c for c in _choices(node, name)}
         return labels.get(socket.default_value)
     if socket.type == "INT":
-        choices = _choices(node, name)
-        return choices[min(max(socket.default_value, 0), len(choices) - 1)]
-    return socket.default_value
+        choices, index = _choices(node, name), socket.default_value if reached.holder else 0
+        return choices[min(max(index, 0), len(choices) - 1)]
+    return socket.default_value if reached.holder else 0.0
 
 
 def varying(node):
     """Parameters of a group node that are not constant: what a link controls, a curve animates or a
-    driver sets."""
+    driver sets. Links that Cycles ignores do not count."""
     moved = animation.inputs(node)
-    return {name for name, s in sockets(node).items() if s.is_linked or s.identifier in moved}
+    return {
+        name
+        for name, s in sockets(node).items()
+        if s.identifier in moved or shader_trees.is_driven(s)
+    }
 
 
 def _trees(tree, seen):
@@ -460,6 +466,13 @@ def all_nodes(owner):
 def group_nodes(material):
     """Every group node of this extension in a material, nested groups included."""
     return [node for node in all_nodes(material) if is_ours(node)]
+
+
+def shown_nodes(material):
+    """The same of those that Cycles shows: what is muted, lies behind links that are, or reaches no
+    active output is not among them."""
+    found = (shown.node for shown in shader_trees.shown(material))
+    return list(dict.fromkeys(node for node in found if is_ours(node)))
 
 
 def make_local(tree):
@@ -576,8 +589,12 @@ def replace_group(node, group):
     names = {s.identifier: name for name, s in sockets(node).items()}
     animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.hold(node)]
     values = all_values(node)
-    incoming = [(name, s.links[0].from_socket) for name, s in sockets(node).items() if s.is_linked]
-    outgoing = [(s.name, link.to_socket) for s in node.outputs for link in s.links]
+    incoming = [
+        (link.from_socket, name, link.is_muted)
+        for name, s in sockets(node).items()
+        for link in s.links
+    ]
+    outgoing = [(s.name, link.to_socket, link.is_muted) for s in node.outputs for link in s.links]
     for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:
         tree.links.remove(link)
     node.node_tree = group
@@ -585,11 +602,11 @@ def replace_group(node, group):
     for name, value in values.items():
         if name in present and value is not None:
             set_value(node, name, value)
-    for name, source in incoming:
+    for source, name, muted in incoming:
         if name in present:
-            tree.links.new(source, present[name])
-    for name, target in outgoing:
-        tree.links.new(node.outputs[name], target)
+            tree.links.new(source, present[name]).is_muted = muted
+    for name, target, muted in outgoing:
+        tree.links.new(node.outputs[name], target).is_muted = muted
     for curve, owner, name in animated:  # which knows sockets by their number
         if name in present:
             animation.follow(curve, owner, present[name])

@@ -3,23 +3,20 @@
 
 import bpy
 
-from . import animation, usage
+from . import animation, shader_trees, shader_values, usage
 from .i18n import Sentence, say
 
 
 def _settings(node):
     """{(identifier, label): value} of all that decides what a node looks like."""
-    moved = animation.moved(node)
+    moved, values = animation.moved(node), shader_values.Constants()
     settings = {("distribution", "Distribution"): getattr(node, "distribution", None)}
     for socket in node.inputs:
-        if socket.is_linked:
-            value = "linked"
-        elif animation.value_of(socket) in moved:
-            value = "animated"
-        else:
-            value = getattr(socket, "default_value", None)
-            value = tuple(value) if hasattr(value, "__len__") else value
-        settings[socket.identifier, socket.name] = value
+        value = values.told(socket)
+        if value is None:
+            animated = animation.value_of(socket) in moved
+            value = "animated" if animated else "linked"
+        settings[socket.identifier, socket.name] = (shader_trees.is_driven(socket), value)
     return settings
 
 
@@ -36,7 +33,7 @@ class SeenNode:
         node = tree.nodes.get(self._name) if tree is not None else None
         if node is None or node.bl_idname != self._kind:
             raise usage.stale(self._of, say("there is no such node any more"))
-        if not any(socket.is_linked for socket in node.outputs):
+        if node not in [shown.node for shown in shader_trees.shown(material)]:
             raise usage.stale(self._of, say("nothing shows the node any more"))
         for key, value in _settings(node).items():
             if value != self._settings.get(key):

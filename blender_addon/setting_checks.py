@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from . import lamp_checks, lamps, nodes
+from . import lamp_checks, lamps, nodes, shader_trees
 from .i18n import say
 
 #: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
@@ -40,8 +40,8 @@ def _bump_correction(material, scene):
         return (
             "ERROR",
             say(
-                "Bump Map Correction is on in the material's settings: this material sends light the "
-                "wrong way where it is seen from the side"
+                "Bump Map Correction is on in the material's settings: this material sends light "
+                "the wrong way where it is seen from the side"
             ),
         )
 
@@ -101,7 +101,9 @@ def _shines(material):
         if node.bl_idname == "ShaderNodeEmission":
             return True
         strength = node.inputs.get("Emission Strength")
-        if strength is not None and (strength.is_linked or strength.default_value > 0):
+        if strength is not None and (
+            shader_trees.is_driven(strength) or strength.default_value > 0
+        ):
             return True
     return False
 
@@ -218,8 +220,9 @@ def black_aovs(scene):
     written = {
         node.aov_name
         for owner in owners
+        if shader_trees.shading(owner) is not None
         for node in nodes.all_nodes(owner)
-        if node.bl_idname == "ShaderNodeOutputAOV"
+        if node.bl_idname == "ShaderNodeOutputAOV" and not node.mute
     }
     return sorted(wanted & written)
 

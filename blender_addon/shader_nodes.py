@@ -6,7 +6,7 @@ It knows the nodes that twin.py wires; a file may hold others.
 
 import numpy as np
 
-from . import shader_text
+from . import shader_text, shader_trees
 from .shader_text import Lobes, Unreadable
 
 _MATH = {
@@ -60,7 +60,11 @@ class _Execution:
         self._given, self._wo = given, wo
         self._pictures = {}
         # A socket's own list of links is a search through those of the tree.
-        self._sources = {link.to_socket.as_pointer(): link.from_socket for link in group.links}
+        self._sources = {
+            link.to_socket.as_pointer(): link.from_socket
+            for link in group.links
+            if shader_trees.counts(link)
+        }
         self._known = {}
 
     def value(self, socket):
@@ -76,8 +80,8 @@ class _Execution:
     def _output(self, node, socket):
         kind = node.bl_idname.removeprefix("ShaderNode")
         compute = getattr(self, f"_{kind.lower()}", None)
-        if compute is None:
-            raise Unreadable(f"unexpected node {kind}")
+        if compute is None or node.mute:
+            raise Unreadable(f"unexpected {'muted ' if node.mute else ''}node {kind}")
         return compute(node, socket)
 
     def _nodegroupinput(self, node, socket):

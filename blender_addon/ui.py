@@ -7,7 +7,19 @@ import bpy
 import numpy as np
 from bpy.types import Menu, Panel
 
-from . import checks, color, convert, editable, energy, kernel, lamps, nodes, optical, pack
+from . import (
+    checks,
+    color,
+    convert,
+    editable,
+    energy,
+    kernel,
+    lamps,
+    nodes,
+    optical,
+    pack,
+    shader_trees,
+)
 from .i18n import button, form_name, iface, of_error, say
 from .labels import wrapped
 
@@ -205,7 +217,7 @@ def _draw_values(layout, node):
     for socket in nodes.sockets(node).values():
         if socket.type != "VECTOR":
             row = column.row()
-            row.enabled = not socket.is_linked
+            row.enabled = not shader_trees.is_driven(socket)
             row.prop(socket, "default_value", text=socket.name, translate=False)
 
 

@@ -3,10 +3,9 @@
 
 import math
 
-import bpy
 import numpy as np
 
-from .. import color, shader_trees
+from .. import color, shader_trees, shader_values
 from . import ies
 
 
@@ -20,31 +19,27 @@ def _luminance(rgb):
     return float(color.luminance(np.array(rgb[:3])))
 
 
-def _level(socket):
-    """Luminance of a colour, or a number, that a socket has: about, where a link controls it, and 1
-    where nothing is known of that."""
-    if not socket.is_linked:
-        value = socket.default_value
-        return _luminance(value) if hasattr(value, "__len__") else value
-    source = socket.links[0].from_socket
-    node = source.node
-    if node.bl_idname == "NodeReroute":
-        return _level(node.inputs[0])
-    if node.bl_idname in {"ShaderNodeValue", "ShaderNodeRGB"}:
-        value = source.default_value
-        return _luminance(value) if hasattr(value, "__len__") else value
-    if node.bl_idname == "ShaderNodeLightFalloff":  # others than quadratic falloff as at 1 m
-        return _level(node.inputs["Strength"])
-    if node.bl_idname == "ShaderNodeTexIES":
-        return _level(node.inputs["Strength"]) * ies.level(node)
-    if node.bl_idname == "ShaderNodeMath" and node.operation == "MULTIPLY":
-        return _level(node.inputs[0]) * _level(node.inputs[1])
-    return 1.0  # so has a Blackbody
+class _Level(shader_values.Current):
+    """What an input has at the current frame, about: what is not known, or differs from place to
+    place, counts as 1."""
+
+    def _output(self, reached):
+        try:
+            return super()._output(reached)
+        except shader_values.Unknown:
+            return 1.0
+
+    def _lightfalloff(self, node, output, of):  # others than quadratic falloff as at 1 m
+        return of(node.inputs["Strength"])
+
+    def _texies(self, node, output, of):
+        return of(node.inputs["Strength"]) * ies.level(node)
 
 
-def _strength(node, *names):
+def _strength(shown, names):
     """Luminance that a node emits, by its sockets of colour and strength."""
-    return math.prod(_level(node.inputs[name]) for name in names)
+    shade, strength = (_Level().told(shown.node.inputs[n], shown.within) for n in names)
+    return (1.0 if shade is None else _luminance(shade)) * (1.0 if strength is None else strength)
 
 
 _EMITTERS = {
@@ -53,80 +48,60 @@ _EMITTERS = {
 }
 
 
-#: Nodes by which light differs from place to place, beside textures.
-_PLACES = {
+#: Nodes whose outputs are the same at every place of an object where their inputs are. Of others,
+#: such as textures and what later versions of Blender add, nothing is taken for granted.
+_SAME_EVERYWHERE = {
     f"ShaderNode{name}"
     for name in (
-        *("NewGeometry", "UVMap", "Attribute", "VertexColor", "Tangent", "Bevel", "Wireframe"),
-        *("AmbientOcclusion", "LayerWeight", "Fresnel", "CameraData", "Script"),
+        *("AddShader", "Background", "Blackbody", "BrightContrast", "Clamp", "CombineColor"),
+        *("CombineHSV", "CombineRGB", "CombineXYZ", "Emission", "FloatCurve", "Gamma"),
+        *("HueSaturation", "Invert", "LightFalloff", "LightPath", "MapRange", "Mapping", "Math"),
+        *("Mix", "MixRGB", "MixShader", "ObjectInfo", "ParticleInfo", "RGB", "RGBCurve"),
+        *("RGBToBW", "SeparateColor", "SeparateHSV", "SeparateRGB", "SeparateXYZ", "Squeeze"),
+        *("ValToRGB", "Value", "VectorCurve", "VectorMath", "VectorRotate", "Wavelength"),
     )
 }
-#: What goes through a node that joins shaders.
+#: Inputs by which nodes that join shaders do so.
 _JOINTS = {"ShaderNodeMixShader": (0,), "ShaderNodeAddShader": ()}
 
 
-def _differs(socket, seen):
+def _differs(socket, within, seen):
     """Whether a value differs from place to place."""
-    for link in socket.links:
-        node = link.from_node
-        if node.bl_idname == "ShaderNodeNewGeometry" and link.from_socket.name == "Backfacing":
-            continue  # the other side
-        if node.bl_idname.startswith("ShaderNodeTex") or node.bl_idname in _PLACES:
-            return True
-        if node not in seen:
-            seen.append(node)
-            ends = shader_trees.ends(node)
-            if any(_differs(own, seen) for end in ends for own in end.inputs):
-                return True
-    return False
+    reached = shader_trees.reach(socket, within)
+    if reached.output is None or reached.shown in seen or _is_other_side(reached.output):
+        return False
+    seen.add(reached.shown)
+    if reached.node.bl_idname not in _SAME_EVERYWHERE:
+        return True
+    return any(_differs(own, reached.within, seen) for own in reached.node.inputs)
 
 
-def _shines_unevenly(socket, seen):
-    """The same of the light of a shader. What does not emit does not count."""
-    for link in socket.links:
-        node = link.from_node
-        if node in seen:
-            continue
-        seen.append(node)
-        values = _JOINTS.get(node.bl_idname, ())
-        if node.bl_idname in _EMITTERS:
-            values = (*_EMITTERS[node.bl_idname], *(("Alpha",) if "Alpha" in node.inputs else ()))
-        if any(_differs(node.inputs[name], []) for name in values):
-            return True
-        ends = shader_trees.ends(node)
-        for own in (own for end in ends for own in end.inputs):
-            if own.type == "SHADER":
-                if _shines_unevenly(own, seen):
-                    return True
-            # What a group makes of its inputs is not looked into.
-            elif len(ends) > 1 and _differs(own, []):
-                return True
-    return False
-
-
-def _surface(owner):
-    """The socket by which nodes shade a light or a material, or None."""
-    kind = "Material" if isinstance(owner, bpy.types.Material) else "Light"
-    tree = shader_trees.shading(owner)
-    output = shader_trees.output(tree, f"ShaderNodeOutput{kind}") if tree is not None else None
-    return output.inputs["Surface"] if output is not None else None
+def _is_other_side(output):
+    return output.node.bl_idname == "ShaderNodeNewGeometry" and output.name == "Backfacing"
 
 
 def is_even(owner):
     """Whether a light or a material emits the same at every place of it."""
-    surface = _surface(owner)
-    return surface is None or not _shines_unevenly(surface, [])
+    for shown in shader_trees.shown(owner):
+        node = shown.node
+        names = _JOINTS.get(node.bl_idname, ())
+        if node.bl_idname in _EMITTERS:
+            if _strength(shown, _EMITTERS[node.bl_idname]) == 0:
+                continue
+            names = (*_EMITTERS[node.bl_idname], *(("Alpha",) if "Alpha" in node.inputs else ()))
+        if any(_differs(node.inputs[name], shown.within, set()) for name in names):
+            return False
+    return True
 
 
 def of_material(material):
     """Radiance of a material that light sampling looks for, 0 of most."""
-    surface = _surface(material)
-    if surface is None or material.cycles.emission_sampling == "NONE":
+    if material.cycles.emission_sampling == "NONE":
         return 0.0
     return sum(
-        _strength(node, *_EMITTERS[node.bl_idname])
-        for node in shader_trees.upstream(surface, "SHADER")
-        if node.bl_idname in _EMITTERS
+        _strength(shown, _EMITTERS[shown.node.bl_idname])
+        for shown in shader_trees.shown(material)
+        if shown.node.bl_idname in _EMITTERS
     )
 
 
@@ -153,10 +128,10 @@ def of_light(light):
     if not light.normalize:
         power *= _size(light) or 1.0
     if shader_trees.shading(light):
-        surface = _surface(light)
-        nodes = shader_trees.upstream(surface, "SHADER") if surface else []
         power *= sum(
-            _strength(n, "Color", "Strength") for n in nodes if n.bl_idname == "ShaderNodeEmission"
+            _strength(shown, _EMITTERS["ShaderNodeEmission"])
+            for shown in shader_trees.shown(light)
+            if shown.node.bl_idname == "ShaderNodeEmission"
         )
     if power == 0 and (animated(light) or (light.node_tree and animated(light.node_tree))):
         return 1e-9

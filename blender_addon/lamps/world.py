@@ -4,7 +4,7 @@
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from .. import color, shader_trees
+from .. import color, shader_trees, shader_values
 from ..i18n import say
 from . import bright_spots, emission, slots
 
@@ -15,29 +15,22 @@ _SKIES_WITH_SUN = {"NISHITA", "SINGLE_SCATTERING", "MULTIPLE_SCATTERING"}
 _SKY_SUN_IRRADIANCE = 100.0
 
 
-def _reroute(socket):
-    """The node at the other end of a socket's link, and the socket there."""
-    while socket.is_linked:
-        link = socket.links[0]
-        if link.from_node.bl_idname != "NodeReroute":
-            return link.from_node, link.from_socket
-        socket = link.from_node.inputs[0]
-    return None, None
-
-
-def _turn_of(node):
+def _turn_of(shown):
     """How the direction of a ray becomes that of a texture, or None where that is not known."""
     matrix = Matrix.Identity(3)
-    source, socket = _reroute(node.inputs["Vector"])
-    while source is not None and source.bl_idname == "ShaderNodeMapping":
-        inputs = source.inputs
-        if inputs["Rotation"].is_linked or inputs["Scale"].is_linked:
+    reached = shown.reach(shown.node.inputs["Vector"])
+    while reached.output is not None and reached.node.bl_idname == "ShaderNodeMapping":
+        source, inputs = reached.node, reached.node.inputs
+        place, angles, sizes = (
+            shader_values.current(inputs[name], reached.within)
+            for name in ("Location", "Rotation", "Scale")
+        )
+        if angles is None or sizes is None:
             return None
-        moves = inputs["Location"].is_linked or any(inputs["Location"].default_value)
+        moves = place is None or any(place)
         if moves and source.vector_type in {"POINT", "TEXTURE"}:
             return None
-        turn = Euler(inputs["Rotation"].default_value).to_matrix()
-        scale = Matrix.Diagonal(inputs["Scale"].default_value)
+        turn, scale = Euler(angles).to_matrix(), Matrix.Diagonal(sizes)
         try:
             step = {
                 "POINT": lambda t, s: t @ s,
@@ -48,8 +41,8 @@ def _turn_of(node):
         except ValueError:
             return None
         matrix = matrix @ step
-        source, socket = _reroute(inputs["Vector"])
-    if source is None or (source.bl_idname, socket.name) in {
+        reached = shader_trees.reach(inputs["Vector"], reached.within)
+    if reached.output is None or (reached.node.bl_idname, reached.output.name) in {
         ("ShaderNodeTexCoord", "Generated"),
         ("ShaderNodeNewGeometry", "Position"),
     }:
@@ -98,12 +91,13 @@ def _sky(node, strength):
     return slots.Candidate(name, values, lambda p: np.full(len(p), power), looks)
 
 
-def _environment(node, strength):
+def _environment(shown, strength):
     """The bright spots of an Environment Texture."""
+    node = shown.node
     if node.image is None:
         return
     name = node.image.name
-    turn = _turn_of(node) if node.projection == "EQUIRECTANGULAR" else None
+    turn = _turn_of(shown) if node.projection == "EQUIRECTANGULAR" else None
     for index, (direction, angle, irradiance) in enumerate(_image_spots(node.image)):
         which = say("{image}, bright spot {number}", image=name, number=index + 1)
         power = irradiance * strength
@@ -128,23 +122,22 @@ def candidates(world):
     tree = shader_trees.shading(world) if world is not None else None
     if tree is None or world.cycles.sampling_method == "NONE":
         return
-    output = shader_trees.output(tree, "ShaderNodeOutputWorld")
-    if output is None:
-        return
     seen = []
-    for background in shader_trees.upstream(output.inputs["Surface"], "SHADER"):
-        if background.bl_idname not in {"ShaderNodeBackground", "ShaderNodeEmission"}:
+    for background in shader_trees.shown(world):
+        if background.node.bl_idname not in {"ShaderNodeBackground", "ShaderNodeEmission"}:
             continue
-        socket = background.inputs["Strength"]
-        strength = 1.0 if socket.is_linked else socket.default_value
+        inputs, within = background.node.inputs, background.within
+        strength = shader_values.current(inputs["Strength"], within)
+        strength = 1.0 if strength is None else strength
         if strength <= 0 and not emission.animated(tree):
             continue
-        for node in shader_trees.upstream(background.inputs["Color"]):
+        for shown in shader_trees.upstream(inputs["Color"], within=within):
+            node = shown.node
             if node in seen:
                 continue
             seen.append(node)
             if node.bl_idname == "ShaderNodeTexEnvironment":
-                yield from _environment(node, strength)
+                yield from _environment(shown, strength)
             elif node.bl_idname == "ShaderNodeTexSky":
                 if node.sky_type in _SKIES_WITH_SUN and node.sun_disc:
                     yield _sky(node, strength)

@@ -322,10 +322,11 @@ def test_a_refused_conversion_is_no_good_one(api, native):
     material, node = native
     other = material.node_tree.nodes.new("ShaderNodeBsdfGlass")
     other.inputs["Roughness"].default_value = 0.5
-    material.node_tree.links.new(other.outputs[0], material.node_tree.nodes[-1].inputs[0])
     shader = material.node_tree.nodes.new("ShaderNodeMixShader")
     material.node_tree.links.new(node.outputs[0], shader.inputs[1])
     material.node_tree.links.new(other.outputs[0], shader.inputs[2])
+    output = material.node_tree.nodes["Material Output"]
+    material.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
     plans = sorted(api.plan_conversion([material]), key=lambda plan: plan.error)
     assert [bool(plan.refusal) for plan in plans] == [False, True]
     assert plans[-1].error == math.inf
