@@ -22,7 +22,10 @@ enum Defect {
   kDark,
   kEdge,
   kShadow,
-  kModest
+  kModest,
+  kLong,
+  kBelow,
+  kPdfBelow
 };
 
 template <Defect D> struct Faulty {
@@ -64,13 +67,16 @@ template <Defect D> struct Faulty {
       if (D == kEdge) f = f * (T(1) - T(0.05) * abs(wi.x + wo.x));
       // Fades so quickly that it underflows, and smoothly.
       if (D == kShadow) f = f * exp(-level * level * (sqr(wi.x) + sqr(wo.x)));
+      if (D == kBelow) return f;
       return select(above(wi, wo), f, Rgb<T>(T(0)));
     }
     T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+      if (D == kPdfBelow) return cosine_pdf(wi);
       return select(above(wi, wo), D == kPdf ? T(1) / (T(2) * pi<T>()) : cosine_pdf(wi), T(0));
     }
     Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-      const Vec3<T> wi = sample_cosine(D == kSampler ? T(0.98) * u.y : u.y, u.z);
+      Vec3<T> wi = sample_cosine(D == kSampler ? T(0.98) * u.y : u.y, u.z);
+      if (D == kLong) wi = wi * T(1.001);
       const T p = pdf(wi, wo);
       return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
     }

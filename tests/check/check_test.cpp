@@ -79,6 +79,22 @@ TEST(Checks, SeeASamplerThatLeavesTwoPercentOut) {
   EXPECT_FALSE(r.at("chi-square"));
   EXPECT_TRUE(r.at("sampled albedo"));
 }
+TEST(Checks, NameDirectionsThatAreNoUnitVectors) {
+  const detail::ModelOf<Faulty<kLong>::Type> model;
+  const Row row = row_of(model, "unit directions");
+  EXPECT_EQ(row.result, Result::Failed);
+  EXPECT_THAT(row.where, testing::AllOf(HasSubstr("faulty rho="), HasSubstr("sample() gives wi=(")));
+  EXPECT_THAT(message([&] { require_vital(model); }), HasSubstr("faulty: fails unit directions"));
+}
+TEST(Checks, NameWhatIsNotZeroBelowTheSurface) {
+  const Row f = row_of(detail::ModelOf<Faulty<kBelow>::Type>(), "horizon");
+  EXPECT_EQ(f.result, Result::Failed);
+  EXPECT_THAT(f.where, testing::AllOf(HasSubstr("faulty rho="), HasSubstr(" f(wi=("), HasSubstr("wo=(")));
+  // Of a view from below.
+  const Row pdf = row_of(detail::ModelOf<Faulty<kPdfBelow>::Type>(), "horizon");
+  EXPECT_EQ(pdf.result, Result::Failed);
+  EXPECT_THAT(pdf.where, HasSubstr("pdf(wi=("));
+}
 TEST(Checks, SeeMissingReciprocity) { EXPECT_FALSE(outcome<kReciprocity>().at("reciprocal")); }
 TEST(Checks, SeeMissingIsotropy) { EXPECT_FALSE(outcome<kTurn>().at("isotropic")); }
 TEST(Checks, SeeEnergyFromNowhere) {

@@ -256,7 +256,7 @@ def test_every_option_that_is_a_number_is_checked_as_one():
 def test_a_number_that_is_none_is_named(command):
     for option, kind in numbers_of(command).items():
         many = int(kind.split(" x ")[1]) if " x " in kind else 1
-        wrong = ["nan", "-nan", "inf", "-inf", "1e999", "two", "0x10", "1 ", ""]
+        wrong = ["nan", "-inf", "1e999", "0x10", ""]
         wrong += ["1.5", "1" + "0" * 30] if kind.startswith("INTEGER") else []
         for value in wrong:
             done = run(command, f"{option}={','.join([value] * many)}")
