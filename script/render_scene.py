@@ -311,7 +311,7 @@ def main():
     )
     parser.add_argument(
         "--view",
-        help="Blender's view transform; default: Standard, or the display's own where there is none",
+        help="Blender's view transform (default: Standard, else the display's own)",
     )
     parser.add_argument("--denoise", action="store_true", help="by Blender's denoiser")
     parser.add_argument("--jobs", help="JSON file with a list of jobs")

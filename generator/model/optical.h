@@ -68,10 +68,10 @@ struct Curve {
 
 /// A metal, a glass, a liquid.
 struct Substance {
-  std::string name;                ///< "gold", or the path of a file
-  std::string label;               ///< "Gold"; of a file without one its name
-  std::string source;              ///< who measured it; may be empty
-  Curve n, k;                      ///< k is empty where none is given
+  std::string name;                     ///< "gold", or the path of a file
+  std::string label;                    ///< "Gold"; of a file without one its name
+  std::string source;                   ///< who measured it; may be empty
+  Curve n, k;                           ///< k is empty where none is given
   std::vector<std::string> notes = {};  ///< of a file: what was assumed, or left out of it
 
   /// Whether its mean k, as the eye weighs it, is that of a conductor.
