@@ -91,8 +91,8 @@ def _slot_findings(use, scene):
             "closures",
             "WARNING",
             say(
-                "Cycles has room for {count} lamps beside the shaders of this material, so no "
-                "material of the file aims at more: use fewer models in it",
+                "Cycles has room for {count} lamps beside the shaders of this material, so the "
+                "light of more lamps is noisy in every material: use fewer models in it",
                 more=f"{use.slots} of {most} slots of closures, and {use.slots_per_lamp} a lamp",
                 count=room,
             ),
