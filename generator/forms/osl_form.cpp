@@ -48,26 +48,13 @@ std::string within_ranges(const ModelInfo& info, const ParamValues& fixed, const
   return bounds.empty() ? statements : bounds + "    {\n" + print::indented(names + statements, 1) + "    }\n";
 }
 
-/// Statements that declare the frame. Normals of matte models are not bent: they have no mirror direction, and
-/// Blender's Diffuse node leaves its normal as it is, too.
+/// Statements that declare the frame.
 std::string frame_text(const Model& model, double lowest_view) {
   std::string text = "    vector shading_n = normalize(Normal), frame_n = shading_n;\n";
-  if (model.info().look != Look::Matte) {
-    Recorder recorder;
-    const auto input_vector = [](const std::string& name) {
-      return Vec3<Expr>{Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
-    };
-    const Vec3<Expr> geometric = input_vector("Ng"), wo = input_vector("I"), n = input_vector("shading_n");
-    Program rise, bend;
-    rise.output("mirror_rise", mirror_rise(geometric, wo, n));
-    const Vec3<Expr> bent = bent_normal(geometric, wo, n);
-    bend.output("frame_n[0]", bent.x);
-    bend.output("frame_n[1]", bent.y);
-    bend.output("frame_n[2]", bent.z);
-    text += "    float mirror_rise;\n" + block(recording_of(model, rise, 0).statements, 1) +
-            "    if (mirror_rise < 0.0 && brdfc_has_true_normal()) {\n" +
-            print::indented(recording_of(model, bend, 0).statements, 2) + "    }\n";
-  }
+  if (const std::vector<Recording> bend = record_bending(model); !bend.empty())
+    text += "    float mirror_rise;\n" + block(bend[0].statements, 1) +
+            "    if (mirror_rise < 0.0 && brdfc_has_true_normal()) {\n" + print::indented(bend[1].statements, 2) +
+            "    }\n";
   if (lowest_view > 0) text += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", lowest_view);
   return text;
 }
@@ -113,6 +100,22 @@ std::string closure_text(const RecordedClosure& closure, std::size_t i, const st
 }
 
 }  // namespace
+
+std::vector<Recording> record_bending(const Model& model) {
+  if (model.info().look == Look::Matte) return {};
+  Recorder recorder;
+  const auto input_vector = [](const std::string& name) {
+    return Vec3<Expr>{Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
+  };
+  const Vec3<Expr> geometric = input_vector("Ng"), wo = input_vector("I"), n = input_vector("shading_n");
+  Program rise, bend;
+  rise.output("mirror_rise", mirror_rise(geometric, wo, n));
+  const Vec3<Expr> bent = bent_normal(geometric, wo, n);
+  bend.output("frame_n[0]", bent.x);
+  bend.output("frame_n[1]", bent.y);
+  bend.output("frame_n[2]", bent.z);
+  return {recording_of(model, rise, 0), recording_of(model, bend, 0)};
+}
 
 int ray_bytes(const Model& model) { return pool_bytes(ClosureKind::PhongRamp) + (model.has_through() ? kPoolNode : 0); }
 

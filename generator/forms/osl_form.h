@@ -62,6 +62,10 @@ inline constexpr const char* kDraws =
 /// below the true surface. Cycles ends such a path; with Bump Map Correction it would send it along the surface.
 std::string lost_below(const Model&, const std::string& wi, const std::string& weight);
 
+/// How the shading normal is bent (model/horizon.h): whether it has to be, and to what. None for a matte model, which
+/// has no mirror direction; Blender's Diffuse node leaves its normal as it is, too.
+std::vector<Recording> record_bending(const Model&);
+
 /// What a drawn direction, which is a lobe, takes of a GPU's pool. Where it may be another closure, OSL makes a product
 /// of that and its weight.
 int ray_bytes(const Model&);

@@ -38,8 +38,8 @@ constexpr const char* kWords = R"(
 
 /// What a shader numbers.
 constexpr const char* kNumbered =
-    "alpha alpha_across exponent ior knots normal position ramp size smooth table table_b table_g table_r tangent u v "
-    "weight";
+    "albedo alpha alpha_across exponent ior knots normal position ramp roughness size smooth table table_b table_g "
+    "table_r tangent u v weight";
 
 std::set<std::string> split(const char* text) {
   std::istringstream in(text);

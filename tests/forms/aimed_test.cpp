@@ -296,7 +296,8 @@ TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
     const Model& m = find_model(model);
     const auto brdf = m.make_double(values_of(m, {values}));
     for (const double cosTheta_o : {0.4, 0.8})
-      for (const double height : {0.14, 0.02, 0.0, -0.1})
+      // Shaders aim at no lamp whose centre is below.
+      for (const double height : {0.14, 0.02, 0.0})
         for (const double turn : {kPi, 2.0})
           // The last one rolled about its centre, so that its sides are oblique to the horizon.
           for (const double roll : {-1.0, 0.0, 0.6}) {
@@ -344,7 +345,7 @@ TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
           }
   }
   EXPECT_GT(worst_whole, 0.3) << "nothing would be wrong without";
-  EXPECT_GT(tested, 100);
+  EXPECT_GT(tested, 50);
   std::printf("%d, worst %.4f, with the whole lamp %.4f\n", tested, worst, worst_whole);
 }
 

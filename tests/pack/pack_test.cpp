@@ -129,10 +129,10 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       if (kind->native()) continue;
       const forms::Shader s = kind->write(*model, empty_table(*model));
       EXPECT_LE(s.slots, kMaxClosures) << s.name;
-      // Aimed forms hold what is done with lamps, a base and the model's value beside its sampling; lossless' value is
-      // a long sum, and its base has eight.
+      // Aimed forms hold what is done with lamps (also with those cut off by the horizon), a base and the model's value
+      // beside its sampling; lossless' value is a long sum, and its base has eight.
       const bool aimed = kind == forms::form("aimed");
-      EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2900 : 1320) << s.name;
+      EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2900 : 1400) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
 }
@@ -238,7 +238,7 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
       const std::string text = kind->write(*model, measure::albedo_table_of(*model)).source;
       // What two aimed forms hold for each of their many choices is more than it should be.
       const bool longer = kind == forms::form("aimed") && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
-      EXPECT_LE(text.size(), longer ? 192000u : 108000u) << name << " " << kind->name();
+      EXPECT_LE(text.size(), longer ? 200000u : 116000u) << name << " " << kind->name();
     }
 }
 

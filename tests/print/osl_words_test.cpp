@@ -9,6 +9,7 @@
 
 #include "fit/terms.h"
 #include "forms/form.h"
+#include "forms/osl_form.h"
 #include "measure/albedo_table.h"
 #include "measure/fold.h"
 #include "model/choices.h"
@@ -123,6 +124,7 @@ std::set<std::string> declared_by(const Model& model, const forms::Form* kind, c
     for (const forms::Recording& r : kind->recordings(model, values)) add(r);
     if (model.has_mirror()) add(forms::record_mirror(model, values, 4));
   }
+  for (const forms::Recording& r : forms::record_bending(model)) add(r);
   return names;
 }
 
