@@ -188,8 +188,8 @@ def statements(source):
 def test_shaders_are_short(extension_zip, subtests):
     """Every shader of the extension has fewer than 600 statements, counted by the generator as
     operations and here in its text. Aimed forms hold what is done with lamps beside a model's value
-    and its sampling, and a base: up to 1,300, which compile in some 0.4 s; `lossless`, whose value
-    is a long sum, 2,300."""
+    and its sampling, and a base: up to 1,400, which compile in some 0.4 s; `lossless`, whose value
+    is a long sum, 2,900."""
     import zipfile
 
     text = "shader x(float a = 0 [[ int b = 1; ]],\n    output color Albedo = 0)\n{\n"
@@ -208,7 +208,7 @@ def test_shaders_are_short(extension_zip, subtests):
             with subtests.test(name):
                 found = statements(archive.read(name).decode())
                 print(f"{name}: {operations} operations, {found} statements")
-                most = 2900 if "lossless_aimed" in name else 1320 if "_aimed" in name else 600
+                most = 2900 if "lossless_aimed" in name else 1400 if "_aimed" in name else 600
                 assert operations < most
                 assert 0 < found < most
 
@@ -433,12 +433,12 @@ def scripts_of(node):
 def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, made_forms, subtests):
     """A file holds source and bytecode of each. Fits hold tables of their own; what two aimed forms
     hold for each of their many choices is more than it should be."""
-    longer = {("ashikhmin_shirley", "aimed"): 152_000, ("radziszewski_alda", "aimed"): 192_000}
+    longer = {("ashikhmin_shirley", "aimed"): 160_000, ("radziszewski_alda", "aimed"): 200_000}
     for model, form, material in made_forms:
         with subtests.test(model=model, form=form):
             source = extension.pack.source(model, form)[1]
             if form != "fitted":
-                assert len(source) <= longer.get((model, form), 108_000)
+                assert len(source) <= longer.get((model, form), 116_000)
             apart = extension.pack.albedo_source(model, form)
             assert extension.nodes.has_albedo_script(model, form) == (apart is not None)
             node = extension.nodes.group_nodes(material)[0]
@@ -995,11 +995,17 @@ def test_warning_out_of_range(extension, empty):
 
 def test_warnings_reach_nested_groups(extension, empty):
     inner = bpy.data.node_groups.new("mine", "ShaderNodeTree")
-    extension.nodes.add_group_node(inner, "coupled")
+    inner.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    node = extension.nodes.add_group_node(inner, "coupled")
+    inner.links.new(node.outputs[0], inner.nodes.new("NodeGroupOutput").inputs[0])
     material = bpy.data.materials.new("outer")
     if material.node_tree is None:
         material.use_nodes = True
-    material.node_tree.nodes.new("ShaderNodeGroup").node_tree = inner
+    tree = material.node_tree
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = inner
+    assert codes(extension, material, bpy.data.scenes.new("other")) == [], "it is not shown"
+    tree.links.new(group.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
     assert "engine" in codes(extension, material, bpy.data.scenes.new("other"))
 
 
@@ -1165,7 +1171,8 @@ def test_panel_shows_model_form_values_and_warnings(extension, made_forms, subte
                 assert part in text
             assert ("Albedo: 0\u00b0" in text) == bool(entry.get("albedo"))
             for form in entry["representations"]:
-                assert f"operator brdfc.switch {form.capitalize()}" in text
+                label = "Blender Nodes" if form == "twin" else form.capitalize()
+                assert f"operator brdfc.switch {label}" in text
             shown = extension.nodes.identity(extension.nodes.group_nodes(material)[0])
             for parameter in extension.pack.socket_parameters(*shown).values():
                 assert f"value {parameter['label']}:" in text
