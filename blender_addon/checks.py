@@ -145,7 +145,7 @@ def _by_twin(finding, ours):
         said = say("{reason}: Blender's own nodes stand in", reason=finding.message)
     else:
         said = say(
-            "{reason}: Blender's own nodes stand in, with an error of {percent} % of the light",
+            "{reason}: Blender's own nodes stand in, error {percent} %",
             reason=finding.message,
             percent=f"{100 * max(off):.2g}",
         )

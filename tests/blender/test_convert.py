@@ -778,7 +778,7 @@ def test_back_where_the_node_of_a_mix_is_gone_is_a_twin_of_each(extension, conve
     groups = extension.nodes.group_nodes(material)
     assert len(groups) == 2
     before = [extension.nodes.identity(g) for g in groups]
-    with pytest.raises(ValueError, match="Twin is only for"):
+    with pytest.raises(ValueError, match="Blender Nodes is only for"):
         convert.restore(material)
     assert [extension.nodes.identity(g) for g in groups] == before
     for group in groups:

@@ -433,7 +433,7 @@ def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch
     empty.cycles.shading_system = False
     light_of(empty, 1)
     said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("brdfc: ")]
-    stands_in = "Blender's own nodes stand in, with an error of 15 % of the light: Phong"
+    stands_in = "Blender's own nodes stand in, error 15 %: Phong"
     assert said == [f"brdfc: Open Shading Language is off: {stands_in}"]
     empty.cycles.shading_system = True
     console = import_module(f"{extension.package}.console")

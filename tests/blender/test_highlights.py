@@ -213,41 +213,6 @@ def copied_sheet(scene):
     return sends
 
 
-#: Vertical angles in degrees and candelas of an IES file: a beam that is even in the middle and
-#: fades over twenty degrees.
-IES_ANGLES = np.arange(0, 182.5, 2.5)
-IES_LIGHT = 1000 * np.clip((40 - IES_ANGLES) / 20, 0, 1)
-
-
-def with_ies(scene):
-    """A lamp whose light an IES file shapes. Some of its beam's edge is in the picture."""
-    item = lit(scene, "POINT", shadow_soft_size=0.3, energy=20.0)
-    item.data.use_nodes = True
-    tree = item.data.node_tree
-    (emission,) = (n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
-    node = tree.nodes.new("ShaderNodeTexIES")
-    lines = [
-        "IESNA:LM-63-1995",
-        "TILT=NONE",
-        f"1 1000 1 {len(IES_ANGLES)} 1 1 2 0 0 0",
-        "1 1 100",
-    ]
-    for numbers in (IES_ANGLES, [0.0], IES_LIGHT):
-        lines.append(" ".join(f"{n:.6g}" for n in numbers))
-    node.mode, node.ies = "INTERNAL", bpy.data.texts.new("Lamp.ies")
-    node.ies.write("\n".join(lines) + "\n")
-    tree.links.new(node.outputs["Fac"], emission.inputs["Strength"])
-    bpy.context.view_layer.update()
-    axis = unit(np.array(item.matrix_world.col[2].to_3d()))
-
-    def beam(wi):
-        angle = np.degrees(np.arccos(np.clip(wi @ axis, -1, 1)))
-        return 0.0706650768394 * np.interp(angle, IES_ANGLES, IES_LIGHT)
-
-    place = np.array(item.matrix_world.translation)
-    return [highlights.facing_disk(place, 0.3, item.data.energy / (4 * math.pi), beam)]
-
-
 KINDS = {
     "point": one("POINT", shadow_soft_size=0.4),
     "square": one("AREA", shape="SQUARE", size=1.0),
@@ -267,7 +232,6 @@ SLOW_KINDS = {
     "without multiple importance": without_importance,
     "without shadows": without_shadows,
     "copy of a sheet": copied_sheet,
-    "IES file": with_ies,
 }
 EVIDENCE_KINDS = {
     "point without soft falloff": one("POINT", shadow_soft_size=0.5, use_soft_falloff=False),

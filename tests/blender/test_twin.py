@@ -330,7 +330,7 @@ def test_how_far_off_a_twin_is_is_said_where_that_is_known(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
     empty.cycles.shading_system = False
     for values, off in (
-        ({}, " with an error of 1.2 % of the light"),
+        ({}, " error 1.2 %"),
         ({"ax": 0.0625, "ay": 0.3}, None),
     ):
         material = extension.api.new_material("ward", **values)
