@@ -177,6 +177,8 @@ def _program(text):
     body, assigned, sum_of_closures = body.partition("BSDF = ")
     if not assigned:
         raise Unreadable("expected a shader that assigns BSDF")
+    # How the normal is bent has no effect on a plot, whose shading normal is the surface's own.
+    body = re.sub(r"vector shading_n = .*?(?=vector frame_t\b)", "", body, flags=re.S)
     body = re.sub(r"//[^\n]*", "", body + assigned + sum_of_closures.partition(";")[0] + ";")
     arrays = {name: np.fromstring(numbers, sep=",") for name, numbers in _TABLE.findall(body)}
     body = _TABLE.sub("", body)

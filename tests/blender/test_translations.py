@@ -136,7 +136,7 @@ def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
     group.nodes.remove(script)
     (finding,) = [f for f in extension.api.warnings(phong, empty) if f.code == "script_failed"]
     assert finding.message.endswith(": has no script node")
-    assert i18n.iface(finding.message).endswith("choose its form again to make it anew")
+    assert i18n.iface(finding.message).endswith("choose its render method again to make it anew")
     layout = helpers.Layout()
     extension.ui.draw_findings(layout, extension.checks.warnings(phong, empty))
     assert "operator brdfc.more " in layout.log
