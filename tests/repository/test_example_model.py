@@ -269,7 +269,7 @@ def test_a_new_form_is_listed_built_and_measured(tool, tmp_path):
     assert forms["phong"]["error"]["relative_l1"] > 0.1
     assert forms["phong"]["warnings"] == []
     shader = (pack / forms["phong"]["shader"]).read_text(encoding="utf-8")
-    assert "weight_0 * brdfc_diffuse(frame_n)" in shader
+    assert "weight_0 * brdfc_diffuse(shading_n)" in shader
 
 
 @pytest.fixture
