@@ -22,6 +22,7 @@ from test_physics import KINDS, axes, expected_radiance, hemisphere, light_of_la
 from worlds import gradient, half, spot, white
 
 FULL = pytest.mark.full
+EVIDENCE = pytest.mark.evidence
 ALL = os.environ.get("BRDFC_EVERY_FIT") == "all"
 #: Facets that lean, a narrow lobe, a matte model, closures beside a mirror.
 SOME = {"ward", "glossy_reflector", "oren_nayar", "coupled"}
@@ -195,7 +196,7 @@ def compare(form, model, name, seen, truth):
 
 # Versions differ in how facets that lean are sampled.
 @pytest.mark.slow
-@pytest.mark.parametrize("form", [pytest.param("fitted", marks=FULL), "twin"])
+@pytest.mark.parametrize("form", [pytest.param("fitted", marks=[FULL, EVIDENCE]), "twin"])
 def test_closures_of_every_model(extension, fits, tool, subtests, form):
     """Cycles evaluates what the tool says under suns, and samples it: the mean in every world
     within 5.5 standard errors, 60 comparisons a model, so one false alarm in some ten thousand
@@ -223,6 +224,7 @@ def test_closures_of_every_model(extension, fits, tool, subtests, form):
 
 
 @FULL
+@EVIDENCE
 def test_aimed_forms_whose_base_is_a_fit(extension, fits, tool, subtests):
     """They reflect what the model does: in every world within 5.5 standard errors, 60 comparisons a
     model, so one false alarm in some ten thousand runs."""
@@ -242,6 +244,7 @@ LIT = tilted(np.cos([LAMP_ZENITH / 2 + 0.08, LAMP_ZENITH / 2 - 0.15, 0.0, 1.0]),
 
 
 @FULL
+@EVIDENCE
 @pytest.mark.parametrize("settings", ["clean", "default"])
 def test_noise_of_aimed_forms_whose_base_is_a_fit(extension, fits, tool, subtests, settings):
     """relMSE under a small lamp, at equal samples: a third of the sampled form's at most."""
@@ -280,6 +283,7 @@ class Default(conditions.Form):
 
 
 @FULL
+@EVIDENCE
 def test_the_panel_warns_where_a_form_of_any_model_is_biased(extension, fits, tool):
     """As test_conditions.py does for some forms of the extension."""
     mirrors = {m["name"]: m["mirror"] for m in json.loads(tool("list", "--json"))}

@@ -118,7 +118,10 @@ def judge(tmp_path):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("name", ["small-lamp", "ra-back", "lamps"])
+@pytest.mark.parametrize(
+    "name",
+    ["small-lamp", *(pytest.param(n, marks=pytest.mark.evidence) for n in ("ra-back", "lamps"))],
+)
 def test_small_lamps_against_the_reference(extension_zip, tool, tmp_path, judge, name):
     """Scenes that drawn directions alone can't be told right in: nearly all they see is dots."""
     content = json.loads((SCENES / f"{name}.json").read_text())
@@ -130,6 +133,7 @@ def test_small_lamps_against_the_reference(extension_zip, tool, tmp_path, judge,
     assert found["test"]["passed"], f"see {tmp_path}"
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_path, judge):
     # Those that equal their model; what the others are off by test_fitted.py and test_twin.py tell.

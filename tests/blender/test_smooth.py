@@ -140,6 +140,7 @@ def test_no_part_of_a_smooth_cylinder_is_dark(
         assert dark(found, seen) < darkness_of_glossy + 0.02
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 @pytest.mark.parametrize("model", ["cook_torrance", "ashikhmin_shirley"])
 def test_aimed_forms_are_as_drawn_directions_alone(extension, model):
