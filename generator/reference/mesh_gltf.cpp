@@ -408,7 +408,7 @@ class GltfReader {
       input_error("{}: more than 2147483647 vertices", name_);
     // Normals turn by the inverse transpose, of which the cofactors are a multiple.
     const bool mirrored = determinant(matrix) < 0;
-    const auto column = [&](std::size_t k) { return Vec3<double>(matrix[0][k], matrix[1][k], matrix[2][k]); };
+    const auto column = [&](std::size_t k) { return Vec3<double>{matrix[0][k], matrix[1][k], matrix[2][k]}; };
     const Vec3<double> cofactors[3] = {cross(column(1), column(2)), cross(column(2), column(0)),
                                        cross(column(0), column(1))};
     for (std::size_t i = 0; i < n; ++i) {
