@@ -43,7 +43,7 @@ struct LightTree::Builder {
     if (set.size() == 1) return lamps[set[0]];
     LampBounds out;
     Box box;
-    Vector axis(0);
+    Vector axis{0, 0, 0};
     double least_cos = 1;
     for (const std::size_t i : set) {
       const LampBounds& lamp = lamps[i];
