@@ -22,6 +22,8 @@ constexpr const char* kWords = R"(
   abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
   microfacet min normalize phong_ramp pow raytype reflect reflection refraction sin sqrt
 
+  area ceil cross distance floor hypot length mix mod noise rotate round sign smoothstep step transform
+
   Albedo BSDF Normal Shown Tangent
 
   entry first frame_b frame_n frame_t last mirror_rise mirror_weight path_length ray shading_n show side
