@@ -83,15 +83,8 @@ def _native_slots(node):
 
 def _times(node):
     """How often a node is added to the sum: once for each place that it is linked to."""
-    return max(
-        sum(
-            map(
-                shader_trees.counts,
-                (k for s in node.outputs if s.type == "SHADER" for k in s.links),
-            )
-        ),
-        1,
-    )
+    links = (link for s in node.outputs if s.type == "SHADER" for link in s.links)
+    return max(sum(map(shader_trees.counts, links)), 1)
 
 
 def of_material(material):
