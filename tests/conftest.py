@@ -7,6 +7,8 @@ import pytest
 
 # What the tool makes is made in each run, whatever earlier ones have left in the user's cache.
 os.environ["BRDFC_CACHE"] = ""
+#: script/evidence runs every case of the tests that are marked `sample`.
+EVERY_CASE = os.environ.get("BRDFC_EVIDENCE") == "all"
 
 
 def pytest_addoption(parser):
@@ -22,16 +24,17 @@ def pytest_addoption(parser):
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config, items):
     few = config.getoption("few")
-    if few is None:
-        return
-    if few < 2:
+    if few is not None and few < 2:
         raise pytest.UsageError(f"--few: expected 2 or more, got {few}")
     tests = {}
     for item in items:
         tests.setdefault(item.nodeid.split("[")[0], []).append(item)
     kept = set()
     for cases in tests.values():
-        count = min(few, len(cases))
+        limits = [len(cases), *([few] if few is not None else [])]
+        if not EVERY_CASE:
+            limits += [mark.args[0] for mark in cases[0].iter_markers("sample")]
+        count = min(limits)
         kept |= {cases[i * (len(cases) - 1) // max(count - 1, 1)] for i in range(count)}
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]
