@@ -62,6 +62,7 @@ def cases_of(extension, rng):
     return found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
     """No drawn direction meets it: what is seen is base and lobes, f cos to 1e-3 (relative L1)."""
@@ -201,6 +202,7 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
     assert error < 0.02 * alone
 
 
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["phong", "max_phong", "glossy_reflector"])
 def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):

@@ -188,6 +188,7 @@ SEEN = [
 ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("kind", "inputs"), SEEN)
 def test_a_picture_under_a_wide_lamp_is_off_as_is_said(extension, convert, empty, kind, inputs):
     """Of a ball, with fewer grazing views than are taken for what is said."""

@@ -254,6 +254,7 @@ WORLDS = [
 ]
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), SAMPLED)
 def test_sampled_form_in_a_world(extension, empty, tool, batch, request, model, values, world):
@@ -308,12 +309,14 @@ AIMED = with_every_model(
 )
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), AIMED)
 def test_aimed_form_in_a_world(extension, empty, tool, batch, request, model, values, world):
     check_in_a_world(extension, "aimed", tool, batch, request, model, values, world)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.full
 @pytest.mark.parametrize(("model", "values"), SAMPLED)
 def test_furnace_of_sampled_form_by_angle(extension, empty, tool, batch, request, model, values):
@@ -455,6 +458,7 @@ TABLES = with_every_model(
 )
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize(("model", "values"), TABLES)
 def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, values):
     cosines = np.linspace(0.02, 1, 50)

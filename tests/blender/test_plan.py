@@ -18,7 +18,7 @@ SEEDS = 4
 #: Scenes with isotropic material of one model, and with four models.
 SCENES = [
     pytest.param("room-radziszewski_alda", marks=pytest.mark.slow),
-    pytest.param("small-lamp", marks=pytest.mark.full),
+    pytest.param("small-lamp", marks=[pytest.mark.full, pytest.mark.evidence]),
 ]
 
 

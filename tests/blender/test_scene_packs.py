@@ -16,12 +16,20 @@ from helpers import render
 SCENES = Path(__file__).parents[2] / "scenes"
 #: Those whose materials have what differs: mirrors, glass, metal, textures, all models at once.
 QUICK = {"dispersion", "gl-fig11", "sh-fresnel", "sh-glass"}
+#: The head picture, and meshes.
+SLOWER = {"as-fig8", "small-lamp"}
 REPOSITORY = "user_default"
 
 
 def scenes():
     names = sorted(p.stem for p in SCENES.glob("*.json") if p.stem != "schema")
-    return [pytest.param(n, marks=[] if n in QUICK else pytest.mark.full) for n in names]
+
+    def marks(name):
+        if name in QUICK:
+            return []
+        return [pytest.mark.full] if name in SLOWER else [pytest.mark.full, pytest.mark.evidence]
+
+    return [pytest.param(name, marks=marks(name)) for name in names]
 
 
 @contextmanager

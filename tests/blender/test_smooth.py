@@ -125,6 +125,7 @@ def darkness_of_glossy(extension):
     return dark(*picture(extension, "cylinder", native("ShaderNodeBsdfAnisotropic", Roughness=0.3)))
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("correction", [None, True, False])
 @pytest.mark.parametrize(("model", "form"), EVEN + OTHERS)
 def test_no_part_of_a_smooth_cylinder_is_dark(
