@@ -118,8 +118,7 @@ class AimedText {
         "            vector centre_here, across_here, along_here, beam_here;\n"
         "            float disk_here, beam_edge, beam_blend, lobe_room = 1.0;\n"
         "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], "
-        "centre_here, across_here,\n"
-        "                           along_here, disk_here, beam_here, beam_edge, beam_blend) == 0)\n"
+        "centre_here, across_here, along_here, disk_here, beam_here, beam_edge, beam_blend) == 0)\n"
         "                continue;\n"
         "            lamp_centre[lobes] = brdfc_local(centre_here, frame_t, frame_b, frame_n);\n"
         "            lamp_across[lobes] = brdfc_local(across_here, frame_t, frame_b, frame_n);\n"
@@ -215,9 +214,9 @@ class AimedText {
 
   /// Done with every lobe so far, in the loop over the lamps.
   static std::string earlier_lobes(const char* condition, const std::string& statements) {
-    return fmt::format("            for (int earlier = 0; earlier < lobes; earlier++)\n                {}{{\n",
-                       condition) +
-           indented(statements, 5) + "                }\n";
+    const std::string loop = "            for (int earlier = 0; earlier < lobes; earlier++)";
+    if (!*condition) return loop + " {\n" + indented(statements, 4) + "            }\n";
+    return fmt::format("{}\n                {}{{\n", loop, condition) + indented(statements, 5) + "                }\n";
   }
 
   ChoiceSwitch draw_, value_;

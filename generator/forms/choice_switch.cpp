@@ -36,13 +36,11 @@ std::string ChoiceSwitch::print(int indent) const {
   std::string out;
   for (std::size_t i = 0; i < cases_.size(); ++i) {
     const bool last = i + 1 == cases_.size();
-    out += fmt::format("{:{}}{}{{\n", "", indent,
-                       i == 0 ? "if (" + condition(cases_[i].second) + ") "
-                       : last ? std::string("else ")
-                              : "else if (" + condition(cases_[i].second) + ") ");
+    out += fmt::format("{:{}}{}{}{{\n", "", indent, i == 0 ? "" : "} else ",
+                       i > 0 && last ? "" : "if (" + condition(cases_[i].second) + ") ");
     out += print::indented(cases_[i].first);
-    out += fmt::format("{:{}}}}\n", "", indent);
   }
+  if (!out.empty()) out += fmt::format("{:{}}}}\n", "", indent);
   return out;
 }
 

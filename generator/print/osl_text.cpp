@@ -57,7 +57,8 @@ std::string indented(const std::string& text, std::size_t levels) {
   std::size_t start = 0;
   while (start < text.size()) {
     const std::size_t end = text.find('\n', start);
-    out += std::string(4 * levels, ' ') + text.substr(start, end + 1 - start);
+    if (end > start) out += std::string(4 * levels, ' ');
+    out += text.substr(start, end + 1 - start);
     start = end + 1;
   }
   return out;

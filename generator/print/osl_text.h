@@ -18,7 +18,7 @@ std::string quoted(const std::string&);
 /// Lines of comment, broken between words.
 std::string comment(const std::string&);
 
-/// Every line of the text, `levels` steps further in.
+/// Every line of the text but empty ones, `levels` steps further in.
 std::string indented(const std::string& text, std::size_t levels = 1);
 
 /// Every line with half its indent: a .blend keeps the text of each shader, and deep blocks are many.
