@@ -22,7 +22,7 @@ class OslPrinter : public ProgramPrinter {
   std::vector<std::string> arrays(int indent) {
     std::vector<std::string> all;
     for (std::size_t i = 0; i < reachable_.size(); ++i) {
-      const ExprNode& n = r_.node(int(i));
+      const ExprNode& n = program_.node(int(i));
       if (!reachable_[i] || n.op != Op::Lookup || array_names_.count(n.name)) continue;
       const std::string name = fresh(n.name);
       array_names_[n.name] = name;
@@ -50,7 +50,7 @@ class OslPrinter : public ProgramPrinter {
   std::string loop_end() const override { return "}"; }
 
   Text text(int id) const override {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = program_.node(id);
     switch (n.op) {
       case Op::Const:
         if (n.type == ExprType::Bool) return {n.value[0] != 0 ? "1" : "0", 6};
@@ -95,7 +95,7 @@ class OslPrinter : public ProgramPrinter {
       case Op::Select: {
         // Both arms of an OSL conditional must have one type.
         const auto arm = [&](std::size_t i) {
-          const bool promote = n.type == ExprType::Color && r_.node(n.args[i]).type != ExprType::Color;
+          const bool promote = n.type == ExprType::Color && program_.node(n.args[i]).type != ExprType::Color;
           return promote ? "color(" + use(n.args[i], 0) + ")" : use(n.args[i], 1);
         };
         return {use(n.args[0], 1) + " ? " + arm(1) + " : " + arm(2), 0};

@@ -9,8 +9,7 @@
 
 namespace brdfc::print {
 
-/// Statements that assign every output (to variables declared by the caller), indented. The current recorder must be
-/// the one the outputs were recorded with. The text declares no name of `taken`, as it declares no osl_words(), inputs
+/// Statements that assign every output (to variables declared by the caller), indented. The text declares no name of `taken`, as it declares no osl_words(), inputs
 /// and outputs. The arrays that look-ups read come first or, one text each, in `arrays`. Throws ExprError for what OSL
 /// has no words for.
 std::string osl_program(const Program&, int indent, const std::vector<std::string>& taken,

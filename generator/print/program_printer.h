@@ -11,11 +11,10 @@
 
 namespace brdfc::print {
 
-/// A language derives from this and spells what is virtual. The current recorder must be the one that the program was
-/// recorded with.
+/// A language derives from this and spells what is virtual.
 class ProgramPrinter {
  public:
-  /// No statement declares a name of `taken`, of an input or of an output.
+  /// No statement declares a name of `taken`, of an input or of an output. The program must outlive it.
   ProgramPrinter(const Program&, const std::vector<std::string>& taken);
   virtual ~ProgramPrinter() = default;
 
@@ -46,7 +45,7 @@ class ProgramPrinter {
   Text infix(const char* op, const ExprNode&, int precedence) const;
   const std::string& loop_out(const ExprNode&) const;
 
-  const Recorder& r_;
+  const Program& program_;
   const std::vector<bool>& reachable_;
 
  private:
