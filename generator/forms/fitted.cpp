@@ -56,7 +56,7 @@ class Fitted final : public OslForm {
       if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf.mirror(wo));
       return sum;
     };
-    return {record_closures(model, values, 4, closures, division_of(fit))};
+    return {record_closures(model, values, closures, division_of(fit))};
   }
 
  protected:

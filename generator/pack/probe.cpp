@@ -98,7 +98,9 @@ std::string probe_source(const Model& model, const ParamValues& choices) {
       "    for (int i = 0; i < 3; i++)\n"
       "        if (!isfinite(first[i]))\n            first[i] = -31337.0;\n"
       "    BSDF = first * emission();\n";
-  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + print::library_for(body) + "\nshader brdfc_probe(\n" +
+  std::set<std::string> called = print::library_calls(r.eval);
+  called.merge(print::library_calls(r.sample));
+  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + print::library_for(called) + "\nshader brdfc_probe(\n" +
          parameters + "    output closure color BSDF = 0)\n{\n" + body + "}\n";
 }
 

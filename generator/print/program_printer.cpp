@@ -70,6 +70,7 @@ void ProgramPrinter::declare(int id, int indent, std::string& out) {
   const std::string value = text(id).s;
   const std::string name = fresh(n.hint.empty() ? "t" : n.hint);
   out += fmt::format("{:{}}{}\n", "", indent, declaration(n.type, name, value));
+  ++count_;
   names_[id] = name;
 }
 
@@ -95,6 +96,7 @@ void ProgramPrinter::loop(int id, int indent, std::string& out) {
     line(indent + 4, declaration(ExprType::Real, next[k], use(n.args[size + k], 0)));
   }
   for (std::size_t k = 0; k < size; ++k) line(indent + 4, assignment(vars[k], next[k]));
+  count_ += int(3 * size);
   if (const std::string end = loop_end(); !end.empty()) line(indent, end);
   loop_vars_[id] = std::move(vars);
 }

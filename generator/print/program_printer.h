@@ -20,6 +20,8 @@ class ProgramPrinter {
 
   /// The statements that the outputs need.
   std::string statements(int indent);
+  /// How many those are, without the heads of loops.
+  int count() const { return count_; }
   /// A value as an operand of something that binds as tightly as that.
   std::string use(int id, int precedence) const;
 
@@ -54,6 +56,7 @@ class ProgramPrinter {
   void declare(int id, int indent, std::string& out);
   void loop(int id, int indent, std::string& out);
 
+  int count_ = 0;
   std::set<std::string> taken_;
   std::vector<int> uses_;
   std::map<int, std::string> names_;
