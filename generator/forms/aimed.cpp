@@ -306,9 +306,13 @@ class Aimed final : public OslForm {
  public:
   Aimed() : OslForm("aimed") {}
 
-  /// An exact form for all choices leaves nothing to aim.
+  /// One that is preferred to it and exists for all values leaves nothing to aim.
   bool in_whole_pack(const Model& model) const override {
-    return model.has_scatter() && (!model.has_exact() || !form("exact")->values(model, {}).empty());
+    if (!model.has_scatter()) return false;
+    const auto own = std::ranges::find(forms(), static_cast<const Form*>(this));
+    return std::none_of(forms().begin(), own, [&](const Form* f) {
+      return f->when() == When::Always && f->in_whole_pack(model) && f->values(model, {}).empty();
+    });
   }
   bool draws() const override { return true; }
   bool aims() const override { return true; }
