@@ -45,11 +45,7 @@ print::Statements statements(const Model& model, const Outputs& outputs) {
     const std::unique_ptr<Brdf<Expr>> brdf = model.record(with_choices(model.info(), choices));
     Program program;
     outputs(*brdf, program);
-    print::Statements all;
-    for (const print::ProgramArray& array : print::osl_arrays(program, taken))
-      all.push_back(print::Array{array.name, array.table->values});
-    all.push_back(print::Run{std::make_shared<const Program>(std::move(program)), taken});
-    by_choice.add(choices, std::move(all));
+    by_choice.add(choices, print::run_with_arrays(std::make_shared<const Program>(std::move(program)), taken));
   }
   return by_choice.statements();
 }

@@ -31,7 +31,7 @@ int precedence_of(const Value& v) {
       return precedence_of_sign(v.word);
     case Value::Kind::Choice:
       return kChoice;
-    case Value::Kind::Negative:
+    case Value::Kind::Unary:
       return kUnary;
     case Value::Kind::Number:
     case Value::Kind::Integer:
@@ -171,8 +171,8 @@ std::string osl_value(const Value& v) {
       return v.word + "(" + list(v.args) + ")";
     case Value::Kind::Element:
       return operand(v.args.at(0), kAtom) + "[" + osl_value(v.args.at(1)) + "]";
-    case Value::Kind::Negative:
-      return "-" + operand(v.args.at(0), kAtom);
+    case Value::Kind::Unary:
+      return v.word + operand(v.args.at(0), kAtom);
     case Value::Kind::Operation: {
       // Left-associative, as OSL reads it: the grouping of floating-point operations must survive.
       const int own = precedence_of_sign(v.word);

@@ -107,6 +107,13 @@ Statements scope(Statements body) {
   return {Block{std::move(body)}};
 }
 
+Statements run_with_arrays(const std::shared_ptr<const Program>& program, const std::vector<std::string>& taken) {
+  Statements out;
+  for (const ProgramArray& array : osl_arrays(*program, taken)) out.push_back(Array{array.name, array.table->values});
+  out.push_back(Run{program, taken});
+  return out;
+}
+
 void append(Statements& to, Statements more) {
   to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }

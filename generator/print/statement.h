@@ -25,7 +25,7 @@ struct Value {
     Text,       ///< a string literal
     Call,       ///< of the function `word`
     Element,    ///< of the first argument, an array or a vector, by the second
-    Negative,   ///< of its argument
+    Unary,      ///< `word` is the operator before its argument
     Operation,  ///< `word` is the operator between its arguments
     Choice,     ///< condition, and the values where it is true and false
     Group       ///< its argument in brackets that it does not need
@@ -57,7 +57,8 @@ Value any_of(const std::vector<Value>& conditions);
 Value balanced_sum(const std::vector<Value>& terms);
 inline Value operator+(Value a, Value b) { return operation(std::move(a), "+", std::move(b)); }
 inline Value operator*(Value a, Value b) { return operation(std::move(a), "*", std::move(b)); }
-inline Value operator-(Value a) { return {Value::Kind::Negative, "", {std::move(a)}}; }
+inline Value operator-(Value a) { return {Value::Kind::Unary, "-", {std::move(a)}}; }
+inline Value operator!(Value a) { return {Value::Kind::Unary, "!", {std::move(a)}}; }
 
 /// One of the kinds below. Copies share what they hold, which does not change.
 class Statement {
@@ -166,6 +167,8 @@ Statement declare_all(std::string type, const std::vector<std::string>& names);
 Statement assign(Value target, Value value);
 /// Block of statements; nothing where there is nothing to do.
 Statements scope(Statements);
+/// The arrays that a program looks up, and its run.
+Statements run_with_arrays(const std::shared_ptr<const Program>&, const std::vector<std::string>& taken);
 void append(Statements& to, Statements more);
 
 /// The names of variables and parameters in values, recorded programs' inputs among them.

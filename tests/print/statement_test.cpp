@@ -68,6 +68,8 @@ TEST(Statements, KeepTheGroupingOfTheirValues) {
   EXPECT_EQ(osl_value(a + (b + c)), "a + (b + c)");
   EXPECT_EQ(osl_value((a + b) * c), "(a + b) * c");
   EXPECT_EQ(osl_value(a * -(b + c)), "a * -(b + c)");
+  EXPECT_EQ(osl_value(!operation(a, "<", b)), "!(a < b)");
+  EXPECT_EQ(osl_value(!call("is_so")), "!is_so()");
   EXPECT_EQ(osl_value(operation(a, "-", operation(b, "-", c))), "a - (b - c)");
   EXPECT_EQ(osl_value(operation(a * b, "/", c * c)), "a * b / (c * c)");
   EXPECT_EQ(osl_value(all_of({any_of({a, b}), c})), "(a || b) && c");
