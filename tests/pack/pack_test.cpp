@@ -98,6 +98,15 @@ template <class T> struct MirrorOnly {
   Rgb<T> mirror(const Vec3<T>& wo) const { return ks * (T(1) - wo.z / T(2)); }
 };
 
+/// A number that no formula reads, whose name is a word of a comment in the shader's text.
+template <class T> struct Unread : MirrorOnly<T> {
+  T viewer;
+  template <class Visitor> void parameters(const Visitor& v) {
+    MirrorOnly<T>::parameters(v);
+    v(viewer, NumberSpec{"viewer", "Viewer", 0.5, 0, 1, 0, 1, ""});
+  }
+};
+
 }  // namespace pack_test
 
 namespace {
@@ -186,6 +195,18 @@ TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
   EXPECT_LT(forms::form("exact")->error(model, {}).albedo, 1e-6);
   const measure::AlbedoTable table = measure::tabulate_albedo(model);
   EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
+}
+
+TEST(Shader, KeepsThoseNumbersWithinTheirRangesThatItReads) {
+  const detail::ModelOf<pack_test::Unread> model;
+  const forms::Shader unread = forms::form("exact")->write(model, empty_table(model));
+  EXPECT_THAT(unread.source, HasSubstr("float viewer = 0.5"));
+  EXPECT_THAT(unread.source, HasSubstr("// Towards the viewer"));
+  EXPECT_THAT(unread.source, Not(HasSubstr("bounded_viewer")));
+  const Model& ward = find_model("ward");
+  const forms::Shader read = forms::form("sampled")->write(ward, empty_table(ward));
+  EXPECT_THAT(read.source, HasSubstr("float bounded_ax = clamp(ax, "));
+  EXPECT_THAT(read.source, HasSubstr("float ax = bounded_ax;"));
 }
 
 TEST(Shader, AFixedParameterLeavesTheText) {
