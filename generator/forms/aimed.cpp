@@ -92,7 +92,8 @@ Value of_earlier(const char* array) { return element(array, "earlier"); }
 /// Into the shader's frame.
 Value in_frame(Value direction) { return call("brdfc_local", {std::move(direction), "frame_t", "frame_b", "frame_n"}); }
 
-/// The steps that a loop over the lamps takes; several of them read and assign the element `lobes` of arrays.
+/// The lamps and the rest of an aimed form: a loop over the lamps, whose last turn is the drawn direction's, so that
+/// the model is evaluated in one place.
 class AimedLamps {
  public:
   /// `through`: whether the model may scatter through the surface.

@@ -40,8 +40,8 @@ std::string parameter(const ParamInfo& p) {
   }
 }
 
-/// Statements of a shader, in which numbers that are sockets are kept within their ranges, which sliders keep but links
-/// do not: a texture may be black. Without what that takes they are counted.
+/// Prints a shader's statements, with numbers that are sockets kept within their ranges: sliders keep those, but links
+/// do not, and a texture may be black. The count leaves out the statements that do this.
 print::OslText within_ranges(const ModelInfo& info, const ParamValues& fixed, const Statements& statements) {
   const std::set<std::string> read = print::names_in(statements);
   Statements bounds, bounded;

@@ -13,7 +13,7 @@
 namespace brdfc::print {
 namespace {
 
-/// Of what OSL itself does not have.
+/// Operations that OSL has no function for, but the library has.
 bool is_of_library(Op op) { return op == Op::Log1p || op == Op::Expm1 || op == Op::MaxComponent; }
 std::string library_name(Op op) { return std::string("brdfc_") + name_of(op); }
 

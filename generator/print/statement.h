@@ -5,7 +5,6 @@
 
 #include <concepts>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -165,15 +164,15 @@ Statement declare(std::string type, std::string name);
 Statement declare(std::string type, std::string name, Value value);
 Statement declare_all(std::string type, const std::vector<std::string>& names);
 Statement assign(Value target, Value value);
-/// Block of statements; nothing where there is nothing to do.
+/// A block of the statements, or nothing if there are none.
 Statements scope(Statements);
 /// The arrays that a program looks up, and its run.
 Statements run_with_arrays(const std::shared_ptr<const Program>&, const std::vector<std::string>& taken);
 void append(Statements& to, Statements more);
 
-/// The names of variables and parameters in values, recorded programs' inputs among them.
+/// All variables and parameters that values name or recorded programs take as inputs.
 std::set<std::string> names_in(const Statements&);
-/// The functions that are called, those of the library by recorded programs among them.
+/// All functions that values call, and those of the library that recorded programs call.
 std::set<std::string> functions_in(const Statements&);
 
 }  // namespace brdfc::print
