@@ -16,7 +16,6 @@
 #include "check/check.h"
 #include "core/data_dir.h"
 #include "core/parse.h"
-#include "forms/aimed.h"
 #include "forms/form.h"
 #include "pack/pack.h"
 #include "pack/standalone.h"

@@ -16,14 +16,30 @@
 #include "forms/osl_form.h"
 #include "measure/probes.h"
 #include "model/horizon.h"
-#include "print/osl_text.h"
+#include "print/statement.h"
 
 namespace brdfc::forms {
 namespace {
 
-using print::block;
-using print::indented;
-using print::number;
+using print::append;
+using print::assign;
+using print::Assign;
+using print::Block;
+using print::call;
+using print::Comment;
+using print::Continue;
+using print::declare;
+using print::Declare;
+using print::declare_all;
+using print::element;
+using print::If;
+using print::Loop;
+using print::operation;
+using print::Run;
+using print::Statement;
+using print::Statements;
+using print::Value;
+using print::Variable;
 
 /// The statements of the form that depend on the model, for one combination of choices.
 struct AimedRecording {
@@ -32,8 +48,7 @@ struct AimedRecording {
   Recording value;  ///< reads wi_x, wi_y, wi_z and the base's closures; assigns excess and drawn_density
 };
 
-AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int indent, AimedBase from,
-                            const Cosines& views) {
+AimedRecording record_aimed(const Model& model, const ParamValues& fixed, AimedBase from, const Cosines& views) {
   Recorder recorder;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   const Vec3<Expr> wo = recorded_wo(model, *brdf);
@@ -48,13 +63,13 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
   {
     Program program;
     const auto closures = output_closures(base, program, fit ? division_of(*fit) : Division::Done);
-    out.base = recording_of(model, program, indent, closures);
+    out.base = recording_of(model, std::move(program), closures);
   }
   const ClosureSum<Expr> given = input_closures(base);
   {
     Program program;
     program.output("drawn", turned(draw(*brdf, given, wo, recorded_u())));
-    out.draw = recording_of(model, program, indent);
+    out.draw = recording_of(model, std::move(program));
   }
   {
     Program program;
@@ -62,164 +77,227 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, int in
     const Excess<Expr> e = excess(*brdf, given, turned(wi), wo);
     program.output("excess", e.value);
     program.output("drawn_density", e.density);
-    out.value = recording_of(model, program, indent);
+    out.value = recording_of(model, std::move(program));
   }
   return out;
 }
 
-/// Lamps and rest of an aimed form: one evaluation of the model, in a loop over the lamps and the drawn direction.
-class AimedText {
+/// name_x, name_y and name_z.
+std::vector<std::string> components(const std::string& name) { return {name + "_x", name + "_y", name + "_z"}; }
+Value vector_of(const std::string& name) { return call("vector", {name + "_x", name + "_y", name + "_z"}); }
+/// Of arrays of lamps or lobes: the lamp that the loop has come to, the lobe that is being aimed, an earlier one.
+Value of_lamp(const char* array) { return element(array, "lamp"); }
+Value of_new(const char* array) { return element(array, "lobes"); }
+Value of_earlier(const char* array) { return element(array, "earlier"); }
+/// Into the shader's frame.
+Value in_frame(Value direction) { return call("brdfc_local", {std::move(direction), "frame_t", "frame_b", "frame_n"}); }
+
+/// The lamps and the rest of an aimed form: a loop over the lamps, whose last turn is the drawn direction's, so that
+/// the model is evaluated in one place.
+class AimedLamps {
  public:
   /// `through`: whether the model may scatter through the surface.
-  AimedText(const ModelInfo& info, const ParamValues& fixed, int lamps, bool through)
+  AimedLamps(const ModelInfo& info, const ParamValues& fixed, int lamps, bool through)
       : draw_(info, fixed), value_(info, fixed), lamps_(lamps), through_(through) {}
 
   void add(const Choices& choices, const AimedRecording& r, SharedArrays& arrays) {
-    draw_.add(choices, arrays.without_shared(r.draw));
-    value_.add(choices, arrays.without_shared(r.value));
-    operations_ = std::max(operations_, r.draw.operations + r.value.operations);
+    draw_.add(choices, arrays.run(r.draw));
+    value_.add(choices, arrays.run(r.value));
+    operations_ = std::max(operations_, r.draw.operations() + r.value.operations());
   }
 
   int operations() const {
-    const AimedSteps& steps = aimed_steps(0);
-    if (lamps_ == 0) return operations_ + steps.alone.operations;
-    int all = operations_ + steps.rest.operations;
+    if (lamps_ == 0) return operations_ + steps_.alone.operations();
+    int all = operations_ + steps_.rest.operations();
     // Without those of cones and of horizons, which few lamps are cut off by.
-    for (const Recording* r : {&steps.above, &steps.room, &steps.aim, &steps.low, &steps.less, &steps.send, &steps.toss,
-                               &steps.under, &steps.meet})
-      all += r->operations;
+    for (const Recording* r : {&steps_.above, &steps_.room, &steps_.aim, &steps_.low, &steps_.less, &steps_.send,
+                               &steps_.toss, &steps_.under, &steps_.meet})
+      all += r->operations();
     return all;
   }
 
-  std::string print() const {
-    const AimedSteps& steps = aimed_steps(0);
-    std::string out =
-        std::string(kDraws) + "    float drawn_x, drawn_y, drawn_z;\n    color rest_colour;\n    float rest_weight;\n";
-    if (lamps_ == 0)
-      return out + block(draw_.print(0), 1) +
-             "    color excess;\n    float drawn_density, wi_x = drawn_x, wi_y = drawn_y, wi_z = drawn_z;\n" +
-             block(value_.print(0), 1) + block(steps.alone.statements, 1);
-    for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out += slots_array(what);
-    out += fmt::format(
-        "    vector lamp_centre[{0}], lamp_across[{0}], lamp_along[{0}], lobe_towards[{0}], lobe_half[{0}];\n"
-        "    float lamp_disk[{0}], lamp_solid_angle[{0}];\n"
-        "    float lobe_weight[{0}], lobe_exponent[{0}], lobe_radius[{0}], lobe_end[{0}], lobe_extent[{0}];\n"
-        "    color lobe_value[{0}], lobe_colour[{0}], covered = 0.0, covered_before = 0.0;\n"
-        "    float ray_x, ray_y, ray_z, lamp_met = 0.0, density_under = 0.0;\n    int lamps = 0, lobes = 0;\n"
-        "    for (int lamp = 0; lamp < {0}; lamp++)\n"
-        "        if (lamp_shape[lamp][0] > 0.0)\n            lamps = lamp + 1;\n",
-        lamps_);
-    out +=
-        "    vector horizon = brdfc_local(N, frame_t, frame_b, frame_n);\n"
-        "    // The lamps, and at last the direction that was drawn.\n"
-        "    for (int lamp = 0; lamp <= lamps; lamp++) {\n"
-        "        float wi_x, wi_y, wi_z, lobe_height, lamp_emphasis;\n"
-        "        if (lamp < lamps) {\n"
-        "            vector centre_here, across_here, along_here, beam_here;\n"
-        "            float disk_here, beam_edge, beam_blend, lobe_room = 1.0;\n"
-        "            if (brdfc_lamp(lamp_place[lamp], lamp_turn[lamp], lamp_scale[lamp], lamp_shape[lamp], "
-        "centre_here, across_here,\n"
-        "                           along_here, disk_here, beam_here, beam_edge, beam_blend) == 0)\n"
-        "                continue;\n"
-        "            lamp_centre[lobes] = brdfc_local(centre_here, frame_t, frame_b, frame_n);\n"
-        "            lamp_across[lobes] = brdfc_local(across_here, frame_t, frame_b, frame_n);\n"
-        "            lamp_along[lobes] = brdfc_local(along_here, frame_t, frame_b, frame_n);\n"
-        "            lamp_disk[lobes] = disk_here;\n";
-    out +=
-        "            vector shining_centre = lamp_centre[lobes], shining_across = lamp_across[lobes];\n"
-        "            vector shining_along = lamp_along[lobes];\n            float shining_disk = disk_here;\n"
-        "            if (beam_edge > 0.0) {\n"
-        "                vector beam = brdfc_local(beam_here, frame_t, frame_b, frame_n);\n"
-        "                vector lit_centre, lit_across, lit_along;\n                float lit_disk;\n";
-    out += indented(steps.beam.statements, 4);
-    for (const char* what : {"centre", "across", "along", "disk"})
-      out += fmt::format("                lamp_{0}[lobes] = lit_{0};\n", what);
-    out += "            }\n";
-    // Bump Map Correction bends the normals of lobes towards what is lower, and from Blender 5.0 on Cycles evaluates no
-    // lobe towards what is below the interpolated normal.
-    out += fmt::format(
-        "            vector to_centre = normalize(lamp_centre[lobes]);\n"
-        "            to_centre = frame_t * to_centre[0] + frame_b * to_centre[1] + frame_n * to_centre[2];\n"
-        "            if (dot(N, to_centre) <= 0.0 || brdfc_is_below(to_centre, {}))\n                continue;\n",
-        number(kMirrorRise));
-    if (!through_)
-      out += "            float lamp_above;\n" + indented(steps.above.statements, 3) +
-             "            if (lamp_above <= 0.0)\n                continue;\n";
-    out +=
-        "            // Numbers of its own: what a lobe gives at another's lamp must not go with where that is met.\n"
-        "            vector v_all = brdfc_random(1 + lamp, path_length);\n"
-        "            float v_1 = v_all[0], v_2 = v_all[1];\n";
-    out += earlier_lobes("", steps.room.statements);
-    out += "            float to_lamp_x, to_lamp_y, to_lamp_z, to_half_x, to_half_y, to_half_z;\n";
-    out += indented(steps.aim.statements, 3);
-    out +=
-        "            if (lamp_emphasis == 0.0)\n                continue;\n"
-        "            lobe_towards[lobes] = vector(to_lamp_x, to_lamp_y, to_lamp_z);\n"
-        "            lobe_half[lobes] = vector(to_half_x, to_half_y, to_half_z);\n"
-        "            float lamp_low;\n            {\n";
-    out += indented(steps.low.statements, 4) +
-           "            }\n            if (lamp_low < 0.0 && brdfc_cuts_off() != 0) {\n" +
-           indented(steps.cut.statements, 4) +
-           "                if (lamp_emphasis == 0.0)\n                    continue;\n            }\n";
-    out +=
-        "            // Drawn directions do not meet it, or are not to: see brdfc_lamp().\n"
-        "            if (lamp_shape[lamp][1] < 0.0)\n                lamp_solid_angle[lobes] = 1e-20;\n"
-        "        } else {\n"
-        "            float tossed;\n";
-    out += indented(steps.toss.statements, 3);
-    out += "            if (tossed < 0.0) {\n" + indented(draw_.print(0), 4) +
-           "            } else {\n                int chosen = int(tossed);\n" + indented(steps.under.statements, 4) +
-           "            }\n"
-           "            ray_x = drawn_x;\n            ray_y = drawn_y;\n            ray_z = drawn_z;\n";
-    // Neither lamp nor seam reaches out from under its lobe.
-    out += earlier_lobes("if (dot(lobe_towards[earlier], vector(drawn_x, drawn_y, drawn_z)) > lobe_end[earlier]) ",
-                         steps.meet.statements);
-    out +=
-        "            wi_x = drawn_x;\n            wi_y = drawn_y;\n            wi_z = drawn_z;\n"
-        "        }\n"
-        "        color excess;\n        float drawn_density;\n";
-    out += indented(value_.print(0), 2);
-    out += "        if (lamp < lamps) {\n" +
-           earlier_lobes("if (dot(lobe_towards[earlier], vector(wi_x, wi_y, wi_z)) > lobe_end[earlier]) ",
-                         steps.less.statements) +
-           indented(steps.send.statements, 3) + "            lobes++;\n        } else {\n" +
-           indented(steps.rest.statements, 3) + "        }\n    }\n";
-    // Each joins the sum from the left: Cycles walks it without a stack. The weight is a colour: see kPoolNode.
-    std::string ramp;
-    for (const double c : aimed_ramp()) ramp += (ramp.empty() ? "" : ", ") + number(c);
-    out += fmt::format(
-        "    closure color aimed = 0;\n"
-        "    for (int lamp = 0; lamp < lobes; lamp++)\n"
-        "        if (lobe_weight[lamp] > 0.0) {{\n"
-        "            float lobe_level[{0}] = {{{1}}};\n"
-        "            color lobe_colours[{0}];\n"
-        "            for (int entry = 0; entry < {0}; entry++)\n                lobe_colours[entry] = "
-        "lobe_level[entry] * lobe_colour[lamp];\n"
-        "            vector half_way = lobe_half[lamp];\n"
-        "            half_way = frame_t * half_way[0] + frame_b * half_way[1] + frame_n * half_way[2];\n"
-        "            color lobe_followed = lobe_weight[lamp];\n"
-        "            aimed = lobe_followed * phong_ramp(half_way, lobe_exponent[lamp], lobe_colours) + aimed;\n"
-        "        }}\n",
-        kRampSize, ramp);
+  Statements statements() const {
+    Statements out = declare_draws();
+    append(out, {declare_all("float", components("drawn")), declare("color", "rest_colour"),
+                 declare("float", "rest_weight")});
+    if (lamps_ == 0) {
+      append(out, print::scope(draw_.statements()));
+      append(out, {declare("color", "excess"), declare_drawn_as_wi(), Block{value_.statements()},
+                   Block{{run(steps_.alone)}}});
+      return out;
+    }
+    for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out.push_back(slots_array(what));
+    append(out, state());
+    out.push_back(declare("vector", "horizon", in_frame("N")));
+    out.push_back(Comment{"The lamps, and at last the direction that was drawn."});
+    Statements turn = {
+        declare_all("float", {"wi_x", "wi_y", "wi_z", "lobe_height", "lamp_emphasis"}),
+        If{is_lamp(), aim(), draw()},
+        declare("color", "excess"),
+        declare("float", "drawn_density"),
+    };
+    append(turn, value_.statements());
+    turn.push_back(If{is_lamp(), send(), {run(steps_.rest)}});
+    out.push_back(Loop{"lamp", "lamps", turn, true});
+    append(out, closures());
     return out;
   }
 
  private:
-  std::string slots_array(const std::string& what) const {
-    std::string list;
-    for (int i = 1; i <= lamps_; ++i) list += fmt::format("{}Lamp{}{}", i > 1 ? ", " : "", what, i);
-    std::string name = what;
-    name[0] = char(std::tolower(name[0]));
-    return fmt::format("    vector lamp_{}[{}] = {{{}}};\n", name, lamps_, list);
+  static Run run(const Recording& r) { return {r.program, r.taken}; }
+  /// Whether a turn of the loop is a lamp's, and not that of the drawn direction.
+  static Value is_lamp() { return operation("lamp", "<", "lamps"); }
+
+  static Statement declare_drawn_as_wi() {
+    return Declare{"float", {{"drawn_density"}, {"wi_x", {"drawn_x"}}, {"wi_y", {"drawn_y"}}, {"wi_z", {"drawn_z"}}}};
+  }
+
+  /// What the sockets hold, as an array.
+  Statement slots_array(const std::string& what) const {
+    Variable array{"lamp_" + what, {}, lamps_};
+    array.name[5] = char(std::tolower(what[0]));
+    for (int i = 1; i <= lamps_; ++i) array.values.push_back(fmt::format("Lamp{}{}", what, i));
+    return Declare{"vector", {array}};
+  }
+
+  /// Declares what is known of lamps and lobes, and counts the sockets up to the last that is in use.
+  Statements state() const {
+    const auto arrays = [&](const char* type, const std::vector<std::string>& names) {
+      Declare all{type, {}};
+      for (const std::string& name : names) all.variables.push_back({name, {}, lamps_});
+      return all;
+    };
+    Declare colours = arrays("color", {"lobe_value", "lobe_colour"});
+    for (const char* name : {"covered", "covered_before"}) colours.variables.push_back({name, {0.0}});
+    return {
+        arrays("vector", {"lamp_centre", "lamp_across", "lamp_along", "lobe_towards", "lobe_half"}),
+        arrays("float", {"lamp_disk", "lamp_solid_angle"}),
+        arrays("float", {"lobe_weight", "lobe_exponent", "lobe_radius", "lobe_end", "lobe_extent"}),
+        colours,
+        Declare{"float", {{"ray_x"}, {"ray_y"}, {"ray_z"}, {"lamp_met", {0.0}}, {"density_under", {0.0}}}},
+        Declare{"int", {{"lamps", {0}}, {"lobes", {0}}}},
+        Loop{"lamp",
+             lamps_,
+             {If{operation(element(of_lamp("lamp_shape"), 0), ">", 0.0), {assign("lamps", Value("lamp") + 1)}}}},
+    };
+  }
+
+  /// Aims a lobe at the lamp, or goes on with the next one.
+  Statements aim() const {
+    Statements out = {
+        declare_all("vector", {"centre_here", "across_here", "along_here", "beam_here"}),
+        Declare{"float", {{"disk_here"}, {"beam_edge"}, {"beam_blend"}, {"lobe_room", {1.0}}}},
+        If{operation(call("brdfc_lamp", {of_lamp("lamp_place"), of_lamp("lamp_turn"), of_lamp("lamp_scale"),
+                                         of_lamp("lamp_shape"), "centre_here", "across_here", "along_here", "disk_here",
+                                         "beam_here", "beam_edge", "beam_blend"}),
+                     "==", 0),
+           {Continue{}}},
+        assign(of_new("lamp_centre"), in_frame("centre_here")),
+        assign(of_new("lamp_across"), in_frame("across_here")),
+        assign(of_new("lamp_along"), in_frame("along_here")),
+        assign(of_new("lamp_disk"), "disk_here"),
+        Declare{"vector", {{"shining_centre", {of_new("lamp_centre")}}, {"shining_across", {of_new("lamp_across")}}}},
+        declare("vector", "shining_along", of_new("lamp_along")),
+        declare("float", "shining_disk", "disk_here"),
+    };
+    Statements lit = {
+        declare("vector", "beam", in_frame("beam_here")),
+        declare_all("vector", {"lit_centre", "lit_across", "lit_along"}),
+        declare("float", "lit_disk"),
+        run(steps_.beam),
+    };
+    for (const std::string what : {"centre", "across", "along", "disk"})
+      lit.push_back(assign(element("lamp_" + what, "lobes"), "lit_" + what));
+    // Bump Map Correction bends the normals of lobes towards what is lower, and from Blender 5.0 on Cycles evaluates no
+    // lobe towards what is below the interpolated normal.
+    append(out, {
+                    If{operation("beam_edge", ">", 0.0), lit},
+                    declare("vector", "to_centre", call("normalize", {of_new("lamp_centre")})),
+                    assign("to_centre", in_scene_of("to_centre")),
+                    If{print::any_of({operation(call("dot", {"N", "to_centre"}), "<=", 0.0),
+                                      call("brdfc_is_below", {"to_centre", kMirrorRise})}),
+                       {Continue{}}},
+                });
+    if (!through_)
+      append(out,
+             {declare("float", "lamp_above"), run(steps_.above), If{operation("lamp_above", "<=", 0.0), {Continue{}}}});
+    const Statement none_left = If{operation("lamp_emphasis", "==", 0.0), {Continue{}}};
+    append(out,
+           {
+               Comment{"Numbers of its own: what a lobe gives at another's lamp must not go with where that is met."},
+               declare("vector", "v_all", call("brdfc_random", {Value(1) + "lamp", "path_length"})),
+               Declare{"float", {{"v_1", {element("v_all", 0)}}, {"v_2", {element("v_all", 1)}}}},
+               earlier_lobes({run(steps_.room)}),
+               declare_all("float", {"to_lamp_x", "to_lamp_y", "to_lamp_z", "to_half_x", "to_half_y", "to_half_z"}),
+               run(steps_.aim),
+               none_left,
+               assign(of_new("lobe_towards"), vector_of("to_lamp")),
+               assign(of_new("lobe_half"), vector_of("to_half")),
+               declare("float", "lamp_low"),
+               Block{{run(steps_.low)}},
+               If{print::all_of({operation("lamp_low", "<", 0.0), operation(call("brdfc_cuts_off"), "!=", 0)}),
+                  {run(steps_.cut), none_left}},
+               Comment{"Drawn directions do not meet it, or are not to: see brdfc_lamp()."},
+               If{operation(element(of_lamp("lamp_shape"), 1), "<", 0.0), {assign(of_new("lamp_solid_angle"), 1e-20)}},
+           });
+    return out;
+  }
+
+  /// Draws a direction, and adds up what lamps make of it.
+  Statements draw() const {
+    Statements out = {
+        declare("float", "tossed"),
+        run(steps_.toss),
+        If{operation("tossed", "<", 0.0),
+           draw_.statements(),
+           {declare("int", "chosen", call("int", {"tossed"})), run(steps_.under)}},
+    };
+    for (const char* axis : {"_x", "_y", "_z"})
+      out.push_back(assign(std::string("ray") + axis, std::string("drawn") + axis));
+    // Neither lamp nor seam reaches out from under its lobe.
+    out.push_back(earlier_lobes({If{under_lobe("drawn"), {run(steps_.meet)}}}));
+    for (const char* axis : {"_x", "_y", "_z"})
+      out.push_back(assign(std::string("wi") + axis, std::string("drawn") + axis));
+    return out;
+  }
+
+  /// Gives the lobe that was aimed its value.
+  Statements send() const {
+    return {earlier_lobes({If{under_lobe("wi"), {run(steps_.less)}}}), run(steps_.send), print::Increment{"lobes"}};
   }
 
   /// Done with every lobe so far, in the loop over the lamps.
-  static std::string earlier_lobes(const char* condition, const std::string& statements) {
-    return fmt::format("            for (int earlier = 0; earlier < lobes; earlier++)\n                {}{{\n",
-                       condition) +
-           indented(statements, 5) + "                }\n";
+  static Statement earlier_lobes(Statements body) { return Loop{"earlier", "lobes", std::move(body)}; }
+  static Value under_lobe(const std::string& direction) {
+    return operation(call("dot", {of_earlier("lobe_towards"), vector_of(direction)}), ">", of_earlier("lobe_end"));
+  }
+  /// From the shader's frame.
+  static Value in_scene_of(const char* v) { return in_scene(element(v, 0), element(v, 1), element(v, 2)); }
+
+  /// The closures of all lobes. Each joins the sum from the left: Cycles walks it without a stack. The weight is a
+  /// colour: see kPoolNode.
+  static Statements closures() {
+    constexpr int kSize = int(kRampSize);
+    Variable level{"lobe_level", {}, kSize};
+    for (const double c : aimed_ramp()) level.values.push_back(c);
+    const Statements one = {
+        Declare{"float", {level}},
+        Declare{"color", {{"lobe_colours", {}, kSize}}},
+        Loop{"entry",
+             kSize,
+             {assign(element("lobe_colours", "entry"), element("lobe_level", "entry") * of_lamp("lobe_colour"))}},
+        declare("vector", "half_way", of_lamp("lobe_half")),
+        assign("half_way", in_scene_of("half_way")),
+        declare("color", "lobe_followed", of_lamp("lobe_weight")),
+        assign("aimed",
+               Value("lobe_followed") * call("phong_ramp", {"half_way", of_lamp("lobe_exponent"), "lobe_colours"}) +
+                   "aimed"),
+    };
+    return {declare("closure color", "aimed", 0),
+            Loop{"lamp", "lobes", {If{operation(of_lamp("lobe_weight"), ">", 0.0), one}}}};
   }
 
+  const AimedSteps& steps_ = aimed_steps();
   ChoiceSwitch draw_, value_;
   int lamps_, operations_ = 0;
   bool through_;
@@ -229,9 +307,13 @@ class Aimed final : public OslForm {
  public:
   Aimed() : OslForm("aimed") {}
 
-  /// An exact form for all choices leaves nothing to aim.
+  /// One that is preferred to it and exists for all values leaves nothing to aim.
   bool in_whole_pack(const Model& model) const override {
-    return model.has_scatter() && (!model.has_exact() || !form("exact")->values(model, {}).empty());
+    if (!model.has_scatter()) return false;
+    const auto own = std::ranges::find(forms(), static_cast<const Form*>(this));
+    return std::none_of(forms().begin(), own, [&](const Form* f) {
+      return f->when() == When::Always && f->in_whole_pack(model) && f->values(model, {}).empty();
+    });
   }
   bool draws() const override { return true; }
   bool aims() const override { return true; }
@@ -261,33 +343,30 @@ class Aimed final : public OslForm {
 
   std::vector<Recording> recordings(const Model& model, const ParamValues& values,
                                     const Setting& setting) const override {
-    const AimedRecording r = record_aimed(model, values, 4, setting.base, setting.views);
-    const AimedSteps& s = aimed_steps(4);
+    const AimedRecording r = record_aimed(model, values, setting.base, setting.views);
+    const AimedSteps& s = aimed_steps();
     return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.cut, s.less, s.send, s.rest};
   }
 
  protected:
-  void write_closures(ShaderText&) const override;
+  void make_closures(ShaderBody&) const override;
 };
 
 /// Closures that Cycles would evaluate as others than the rest takes off are left out of the base.
-void leave_out_of_base(ShaderText& text, const std::vector<RecordedClosure>& base) {
+void leave_out_of_base(ShaderBody& body, const std::vector<RecordedClosure>& base) {
   for (std::size_t c = 0; c < base.size(); ++c) {
+    if (body.model.info().look == Look::Matte && !base[c].turned) continue;
     // About a bent normal: by Bump Map Correction Cycles darkens matte ones, and from Blender 5.0 on it evaluates none
     // towards what is below the interpolated normal.
-    std::string out = "frame_n != shading_n";
-    if (base[c].turned) {
-      // Bump Map Correction would bend it.
-      out += fmt::format(
-          " || brdfc_is_below(reflect(-I, frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * normal_{0}_z), "
-          "{1})",
-          c, number(kMirrorRise));
-    }
-    if (text.model.info().look == Look::Matte && !base[c].turned) continue;
-    text.statements += fmt::format("    if ({})\n        weight_{} = 0.0;\n", out, c);
+    std::vector<Value> out = {operation("frame_n", "!=", "shading_n")};
+    // Bump Map Correction would bend it.
+    if (base[c].turned)
+      out.push_back(
+          call("brdfc_is_below", {call("reflect", {-Value("I"), in_scene(fmt::format("normal_{}", c))}), kMirrorRise}));
+    body.add(If{print::any_of(out), {assign(fmt::format("weight_{}", c), 0.0)}});
   }
   // But for matte ones about normals of their own, which it darkens anywhere.
-  text.shader.leaning = std::any_of(base.begin(), base.end(), [](const RecordedClosure& c) {
+  body.shader.leaning = std::any_of(base.begin(), base.end(), [](const RecordedClosure& c) {
     return c.turned && c.kind == ClosureKind::DiffuseRamp;
   });
 }
@@ -300,55 +379,55 @@ std::string Aimed::under_sizeless_lamps(int lamps, int slots) const {
                      lamps, left_out);
 }
 
-void Aimed::write_closures(ShaderText& text) const {
-  const Model& model = text.model;
-  const Setting& setting = text.setting;
-  Shader& shader = text.shader;
+void Aimed::make_closures(ShaderBody& body) const {
+  const Model& model = body.model;
+  const Setting& setting = body.setting;
+  Shader& shader = body.shader;
   ChoiceSwitch by_choice(model.info(), setting.fixed);
-  AimedText lamps(model.info(), setting.fixed, setting.max_lamps, model.has_through());
-  const auto base = text.record(by_choice, [&](const Choices& choices, const ParamValues& values) {
-    const AimedRecording r = record_aimed(model, values, 0, setting.base, setting.views);
-    lamps.add(choices, r, text.arrays);
+  AimedLamps lamps(model.info(), setting.fixed, setting.max_lamps, model.has_through());
+  const auto base = body.record(by_choice, [&](const Choices& choices, const ParamValues& values) {
+    const AimedRecording r = record_aimed(model, values, setting.base, setting.views);
+    lamps.add(choices, r, body.arrays);
     return r.base;
   });
-  text.declare(base);
+  body.declare(base);
   shader.facets = false;  // none that is seen by more than the camera
-  text.statements += block(by_choice.print(0), 1);
-  text.scale(base, setting.base == AimedBase::Fitted ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)
+  body.add(print::scope(by_choice.statements()));
+  body.scale(base, setting.base == AimedBase::Fitted ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)
                                                      : std::set<std::string>());
+  const auto weight = [](std::size_t c) { return fmt::format("weight_{}", c); };
   // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then the
   // rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
   for (std::size_t c = 0; c < base.size(); ++c)
     if (has_facets(base[c].kind))
-      text.statements += fmt::format("    if (raytype(\"camera\") == 0)\n        weight_{} = 0.0;\n", c);
-  leave_out_of_base(text, base);
-  text.statements += lamps.print();
+      body.add(If{operation(call("raytype", {print::quotation("camera")}), "==", 0), {assign(weight(c), 0.0)}});
+  leave_out_of_base(body, base);
+  body.add(lamps.statements());
   shader.lamps = setting.max_lamps;
   shader.operations += lamps.operations();
   shader.slots += (setting.max_lamps + 1) * slots(ClosureKind::PhongRamp);
   shader.closure_bytes += ray_bytes(model);
   const bool aimed = setting.max_lamps > 0;
-  const char* wi = aimed ? "ray_{0}" : "drawn_{0}";
-  const auto part = [&](const char* axis) { return fmt::format(fmt::runtime(wi), axis); };
-  const std::string ray =
-      fmt::format("    vector ray = frame_t * {} + frame_b * {} + frame_n * {};\n", part("x"), part("y"), part("z"));
+  const Statement ray = declare("vector", "ray", in_scene(aimed ? "ray" : "drawn"));
   shader.lamp_bytes = aimed ? pool_bytes(ClosureKind::PhongRamp) + kPoolNode : 0;
-  if (aimed) text.terms.push_back("aimed");
-  // As a colour: see kPoolNode.
-  if (!model.has_through()) {
-    text.statements += "    color rest_followed = rest_weight;\n" + ray + lost_below(model, "ray", "rest_followed");
-    std::string of_base;
-    for (std::size_t c = 0; c < base.size(); ++c)
-      of_base += fmt::format("{}weight_{} != color(0.0)", c > 0 ? " || " : "", c);
+  if (aimed) body.terms.push_back("aimed");
+  if (model.has_through()) {
+    body.add(ray);
+    body.add(lost_below(model, "ray", "rest_weight"));
+    body.terms.push_back(call("brdfc_signed_ray_anywhere", {"rest_weight", "rest_colour", "ray", "I", "frame_n"}));
+  } else {
+    // As a colour: see kPoolNode.
+    body.add(declare("color", "rest_followed", "rest_weight"));
+    body.add(ray);
+    body.add(lost_below(model, "ray", "rest_followed"));
+    std::vector<Value> of_base;
+    for (std::size_t c = 0; c < base.size(); ++c) of_base.push_back(operation(weight(c), "!=", call("color", {0.0})));
     if (!base.empty())
-      text.statements +=
-          fmt::format("    if ({}) {{\n        rest_followed *= {};\n        rest_colour /= {};\n    }}\n", of_base,
-                      number(kRestFollowed), number(kRestFollowed));
+      body.add(If{print::any_of(of_base),
+                  {Assign{"rest_followed", kRestFollowed, "*="}, Assign{"rest_colour", kRestFollowed, "/="}}});
+    body.terms.push_back(Value("rest_followed") * call("brdfc_ray_coloured", {"ray", "I", "rest_colour"}));
   }
-  if (model.has_through()) text.statements += ray + lost_below(model, "ray", "rest_weight");
-  text.terms.push_back(model.has_through() ? "brdfc_signed_ray_anywhere(rest_weight, rest_colour, ray, I, frame_n)"
-                                           : "rest_followed * brdfc_ray_coloured(ray, I, rest_colour)");
-  text.turn(base);
+  body.turn(base);
 }
 
 }  // namespace

@@ -26,10 +26,6 @@
 
 namespace brdfc::forms {
 
-/// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample;
-/// empty ones cost nothing.
-inline constexpr int kMaxLamps = 8;
-
 /// A lamp as a flat patch, in units of any length: a disk or ellipse with these half axes, or a rectangle. A sun has
 /// its centre at distance 1.
 template <class T> struct LampPatch {

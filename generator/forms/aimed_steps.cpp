@@ -3,8 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <map>
-#include <mutex>
+#include <utility>
 
 #include "forms/aimed.h"
 
@@ -16,19 +15,13 @@ Vec3<Expr> input_vector(const std::string& name) {
   return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
 }
 
-}  // namespace
-
-const AimedSteps& aimed_steps(int indent) {
-  static std::mutex mutex;
-  static std::map<int, AimedSteps> made;
-  const std::lock_guard lock(mutex);
-  if (const auto it = made.find(indent); it != made.end()) return it->second;
+AimedSteps record_steps() {
   Recorder recorder;
   AimedSteps steps;
   const auto record_step = [&](const auto& outputs) {
     Program program;
     outputs(program);
-    return recording_of(program, indent, {});
+    return recording_of(std::move(program), {});
   };
   const auto kept_lobe = [](const std::string& index) {
     const auto of = [&](const char* what) { return fmt::format("lobe_{}[{}]", what, index); };
@@ -138,7 +131,14 @@ const AimedSteps& aimed_steps(int indent) {
   };
   steps.rest = record_rest(lobes, before);
   steps.alone = record_rest(Expr(0), Met<Expr>());
-  return made.emplace(indent, std::move(steps)).first->second;
+  return steps;
+}
+
+}  // namespace
+
+const AimedSteps& aimed_steps() {
+  static const AimedSteps steps = record_steps();
+  return steps;
 }
 
 }  // namespace brdfc::forms

@@ -24,6 +24,6 @@ struct AimedSteps {
   Recording rest;   ///< reads excess, drawn_density, lobes and what meet assigned; assigns rest_weight and rest_colour
   Recording alone;  ///< the same without lamps: reads excess and drawn_density
 };
-const AimedSteps& aimed_steps(int indent);
+const AimedSteps& aimed_steps();
 
 }  // namespace brdfc::forms

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "forms/choice_switch.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <set>
 
-#include "print/osl_text.h"
+#include "print/osl_program.h"
 
 namespace brdfc::forms {
 namespace {
+
+using print::Statements;
+using print::Value;
 
 /// Whether every value of choice k stands in the combinations with the others as in c.
 bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size) {
@@ -22,63 +23,59 @@ bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, 
 
 }  // namespace
 
-void ChoiceSwitch::add(const Choices& choices, const std::string& statements) {
-  for (auto& [text, combinations] : cases_)
-    if (text == statements) {
+void ChoiceSwitch::add(const Choices& choices, Statements statements) {
+  for (auto& [known, combinations] : cases_)
+    if (known == statements) {
       combinations.push_back(choices);
       return;
     }
-  cases_.push_back({statements, {choices}});
+  cases_.push_back({std::move(statements), {choices}});
 }
 
-std::string ChoiceSwitch::print(int indent) const {
+Statements ChoiceSwitch::statements() const {
+  if (cases_.empty()) return {};
   if (cases_.size() == 1) return cases_[0].first;
-  std::string out;
-  for (std::size_t i = 0; i < cases_.size(); ++i) {
-    const bool last = i + 1 == cases_.size();
-    out += fmt::format("{:{}}{}{{\n", "", indent,
-                       i == 0 ? "if (" + condition(cases_[i].second) + ") "
-                       : last ? std::string("else ")
-                              : "else if (" + condition(cases_[i].second) + ") ");
-    out += print::indented(cases_[i].first);
-    out += fmt::format("{:{}}}}\n", "", indent);
-  }
-  return out;
+  print::Cases all;
+  for (const auto& [statements, combinations] : cases_) all.cases.push_back({condition(combinations), statements});
+  return {all};
 }
 
-std::string ChoiceSwitch::condition(const std::vector<Choices>& combinations) const {
+Value ChoiceSwitch::condition(const std::vector<Choices>& combinations) const {
   // Only the choices that tell these combinations from the others need a test.
-  std::set<std::string> alternatives;
+  std::set<std::vector<std::pair<std::string, int>>> alternatives;
   for (const Choices& c : combinations) {
-    std::string all;
+    std::vector<std::pair<std::string, int>> tested;
     std::size_t k = 0;
     for (const ParamInfo& p : info_.params) {
       if (p.kind != ParamKind::Choice) continue;
-      const int index = c[k];
       if (p.choices.size() > 1 && !fixed_.count(p.name) && !covers(combinations, c, k, int(p.choices.size())))
-        all += (all.empty() ? "" : " && ") + fmt::format("{} == {}", p.name, index);
+        tested.push_back({p.name, c[k]});
       ++k;
     }
-    alternatives.insert(all.empty() ? "1" : all);
+    alternatives.insert(tested);
   }
-  std::string text;
-  for (const std::string& a : alternatives)
-    text += (text.empty() ? "" : " || ") + (alternatives.size() > 1 ? "(" + a + ")" : a);
-  return text;
+  std::vector<Value> conditions;
+  for (const auto& tested : alternatives) {
+    std::vector<Value> all;
+    for (const auto& [name, index] : tested) all.push_back(print::operation(name, "==", index));
+    const Value one = all.empty() ? Value(1) : print::all_of(all);
+    conditions.push_back(alternatives.size() > 1 ? Value(Value::Kind::Group, "", {one}) : one);
+  }
+  return print::any_of(conditions);
 }
 
-std::string SharedArrays::without_shared(const Recording& r) {
-  std::string own;
-  for (const std::string& array : r.arrays) {
-    const std::string name = array.substr(0, array.find('['));
-    if (known_.emplace(name, array).first->second != array) own += array;
-  }
-  return own + r.statements;
+Statements SharedArrays::run(const Recording& r) {
+  Statements out;
+  for (const print::ProgramArray& array : print::osl_arrays(*r.program, r.taken))
+    if (known_.emplace(array.name, array.table).first->second->values != array.table->values)
+      out.push_back(print::Array{array.name, array.table->values});
+  if (!r.program->outputs().empty()) out.push_back(print::Run{r.program, r.taken});
+  return out;
 }
 
-std::string SharedArrays::print() const {
-  std::string out;
-  for (const auto& [name, array] : known_) out += array;
+Statements SharedArrays::declarations() const {
+  Statements out;
+  for (const auto& [name, table] : known_) out.push_back(print::Array{name, table->values});
   return out;
 }
 

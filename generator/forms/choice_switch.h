@@ -1,43 +1,45 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements of OSL for all combinations of a model's choices.
+// Statements for all combinations of a model's choices.
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "forms/recording.h"
 #include "model/choices.h"
+#include "print/statement.h"
 
 namespace brdfc::forms {
 
-/// Statements that differ by combination of choices: equal ones are written once.
+/// Statements that differ by combination of choices: equal ones are there once.
 class ChoiceSwitch {
  public:
   /// Both must outlive it. Choices among `fixed` are tested nowhere.
   ChoiceSwitch(const ModelInfo& info, const ParamValues& fixed) : info_(info), fixed_(fixed) {}
 
-  void add(const Choices&, const std::string& statements);
-  /// Branches on the parameters' names, or the statements alone where all are equal; `indent` is that of the branches.
-  std::string print(int indent) const;
+  void add(const Choices&, print::Statements);
+  /// Cases by the parameters, or the statements alone where all are equal.
+  print::Statements statements() const;
 
  private:
-  std::string condition(const std::vector<Choices>& combinations) const;
+  print::Value condition(const std::vector<Choices>& combinations) const;
   const ModelInfo& info_;
   const ParamValues& fixed_;
-  std::vector<std::pair<std::string, std::vector<Choices>>> cases_;
+  std::vector<std::pair<print::Statements, std::vector<Choices>>> cases_;
 };
 
-/// The arrays of all statements of a shader, each once: combinations of choices share their tables.
+/// The arrays of all recordings of a shader, each once: combinations of choices share their tables.
 class SharedArrays {
  public:
-  /// The statements, before which stand the arrays whose names other ones have taken.
-  std::string without_shared(const Recording&);
-  std::string print() const;
+  /// Statements of a recording, before which stand the arrays whose names other ones have taken.
+  print::Statements run(const Recording&);
+  print::Statements declarations() const;
 
  private:
-  std::map<std::string, std::string> known_;
+  std::map<std::string, std::shared_ptr<const Table>> known_;
 };
 
 }  // namespace brdfc::forms

@@ -33,7 +33,7 @@ class Exact final : public OslForm {
   }
 
   std::vector<Recording> recordings(const Model& model, const ParamValues& values, const Setting&) const override {
-    return {record_closures(model, values, 4, [&](const Brdf<Expr>& brdf) { return closures(model, brdf); })};
+    return {record_closures(model, values, [&](const Brdf<Expr>& brdf) { return closures(model, brdf); })};
   }
 
  private:

@@ -16,6 +16,7 @@ class Fitted final : public OslForm {
     return model.has_scatter() && !model.info().properties.fit_axis.empty();
   }
   bool made_of_fit() const override { return true; }
+  bool gives_base() const override { return true; }
   bool serves(fit::Role role) const override { return role != fit::Role::Open; }
   ParamValues values(const Model& model, const ParamValues& fixed) const override {
     return values_of_fit(model, fixed);
@@ -56,7 +57,7 @@ class Fitted final : public OslForm {
       if (model.has_mirror()) sum.emplace_back(ClosureKind::Reflection, brdf.mirror(wo));
       return sum;
     };
-    return {record_closures(model, values, 4, closures, division_of(fit))};
+    return {record_closures(model, values, closures, division_of(fit))};
   }
 
  protected:

@@ -4,23 +4,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <regex>
 #include <set>
 #include <utility>
 
 #include "closures/closure_pool.h"
 #include "core/error.h"
-#include "forms/albedo_text.h"
+#include "forms/albedo_output.h"
 #include "model/horizon.h"
 #include "print/osl_library.h"
+#include "print/osl_statements.h"
 #include "print/osl_text.h"
-#include "print/osl_words.h"
 
 namespace brdfc::forms {
 namespace {
 
-using print::block;
+using print::append;
+using print::assign;
+using print::call;
+using print::element;
 using print::number;
+using print::operation;
+using print::Statements;
+using print::Value;
 
 std::string parameter(const ParamInfo& p) {
   const std::string meta =
@@ -35,68 +40,83 @@ std::string parameter(const ParamInfo& p) {
   }
 }
 
-/// Numbers that are sockets are kept within their ranges, which sliders keep but links do not: a texture may be black.
-std::string within_ranges(const ModelInfo& info, const ParamValues& fixed, const std::string& statements) {
-  std::string bounds, names;
+/// Prints a shader's statements, with numbers that are sockets kept within their ranges: sliders keep those, but links
+/// do not, and a texture may be black. The count leaves out the statements that do this.
+print::OslText within_ranges(const ModelInfo& info, const ParamValues& fixed, const Statements& statements) {
+  const std::set<std::string> read = print::names_in(statements);
+  Statements bounds, bounded;
   for (const ParamInfo& p : info.params) {
-    if (p.kind != ParamKind::Number || fixed.count(p.name)) continue;
-    if (!std::regex_search(statements, std::regex("\\b" + p.name + "\\b"))) continue;
+    if (p.kind != ParamKind::Number || fixed.count(p.name) || !read.count(p.name)) continue;
     // A parameter cannot be assigned to, but hidden by a variable of its name.
-    bounds += fmt::format("    float bounded_{0} = clamp({0}, {1}, {2});\n", p.name, number(p.min), number(p.max));
-    names += fmt::format("    float {0} = bounded_{0};\n", p.name);
+    bounds.push_back(print::declare("float", "bounded_" + p.name, call("clamp", {p.name, p.min, p.max})));
+    bounded.push_back(print::declare("float", p.name, "bounded_" + p.name));
   }
-  return bounds.empty() ? statements : bounds + "    {\n" + print::indented(names + statements, 1) + "    }\n";
+  if (bounds.empty()) return print::osl_statements(statements, 1);
+  print::OslText out = print::osl_statements(statements, 2);
+  out.text =
+      print::osl_statements(bounds, 1).text + "    {\n" + print::osl_statements(bounded, 2).text + out.text + "    }\n";
+  return out;
 }
 
 /// Statements that declare the frame.
-std::string frame_text(const Model& model, double lowest_view) {
-  std::string text = "    vector shading_n = normalize(Normal), frame_n = shading_n;\n";
-  if (const std::vector<Recording> bend = record_bending(model); !bend.empty())
-    text += "    float mirror_rise;\n" + block(bend[0].statements, 1) +
-            "    if (mirror_rise < 0.0 && brdfc_has_true_normal()) {\n" + print::indented(bend[1].statements, 2) +
-            "    }\n";
-  if (lowest_view > 0) text += fmt::format("    frame_n = brdfc_facing(frame_n, {});\n", lowest_view);
-  return text;
+Statements frame_of(const Model& model, double lowest_view) {
+  Statements out = {
+      print::Declare{"vector", {{"shading_n", {call("normalize", {"Normal"})}}, {"frame_n", {"shading_n"}}}}};
+  if (const std::vector<Recording> bend = record_bending(model); !bend.empty()) {
+    const auto run = [](const Recording& r) { return print::Run{r.program, r.taken}; };
+    out.push_back(print::declare("float", "mirror_rise"));
+    out.push_back(print::Block{{run(bend[0])}});
+    out.push_back(
+        print::If{print::all_of({operation("mirror_rise", "<", 0.0), call("brdfc_has_true_normal")}), {run(bend[1])}});
+  }
+  if (lowest_view > 0) out.push_back(assign("frame_n", call("brdfc_facing", {"frame_n", lowest_view})));
+  return out;
 }
 
-std::string closure_text(const RecordedClosure& closure, std::size_t i, const std::string& diffuse_n) {
-  const std::string n = closure.turned ? fmt::format("normal_{}", i) : "frame_n";
+std::string numbered(const char* name, std::size_t i) { return fmt::format("{}_{}", name, i); }
+
+Value closure_of(const RecordedClosure& closure, std::size_t i, const std::string& diffuse_n) {
+  const std::string n = closure.turned ? numbered("normal", i) : "frame_n";
+  const auto of = [&](const char* name) { return Value(numbered(name, i)); };
   const auto microfacet = [&](const char* distribution) {
     // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
     // stretched by it, and Cycles takes none.
-    const std::string tangent = closure.stretched == Tangent::View      ? "I"
-                                : closure.stretched == Tangent::Surface ? fmt::format("tangent_{}", i)
-                                                                        : "vector(0.0)";
-    return fmt::format("weight_{0} * microfacet(\"{1}\", {2}, {3}, alpha_{0}, {4}_{0}, 1.0, 0)", i, distribution, n,
-                       tangent, closure.stretched == Tangent::None ? "alpha" : "alpha_across");
+    const Value tangent = closure.stretched == Tangent::View      ? Value("I")
+                          : closure.stretched == Tangent::Surface ? of("tangent")
+                                                                  : call("vector", {0.0});
+    return call("microfacet", {print::quotation(distribution), n, tangent, of("alpha"),
+                               of(closure.stretched == Tangent::None ? "alpha" : "alpha_across"), 1.0, 0});
   };
-  switch (closure.kind) {
-    case ClosureKind::Diffuse:
-      return fmt::format("weight_{} * brdfc_diffuse({})", i, closure.turned ? n : diffuse_n);
-    case ClosureKind::Burley:
-      return fmt::format("weight_{0} * burley_diffuse_bsdf({1}, color(1), roughness_{0})", i, n);
-    case ClosureKind::OrenNayar:
-      return fmt::format("weight_{0} * oren_nayar_diffuse_bsdf({1}, albedo_{0}, roughness_{0})", i, n);
-    case ClosureKind::Velvet:
-      return fmt::format("weight_{0} * ashikhmin_velvet({1}, roughness_{0})", i, n);
-    case ClosureKind::DiffuseRamp:
-      return fmt::format("weight_{} * diffuse_ramp({}, ramp_{})", i, n, i);
-    case ClosureKind::Reflection:
-      return fmt::format("weight_{} * reflection({})", i, n);
-    case ClosureKind::Refraction:
-      return fmt::format("weight_{} * refraction({}, ior_{})", i, n, i);
-    case ClosureKind::GlossyToon:
-      return fmt::format("weight_{0} * glossy_toon({1}, size_{0}, smooth_{0})", i, n);
-    case ClosureKind::DiffuseToon:
-      return fmt::format("weight_{0} * diffuse_toon({1}, size_{0}, smooth_{0})", i, n);
-    case ClosureKind::PhongRamp:
-      return fmt::format("weight_{} * phong_ramp({}, exponent_{}, ramp_{})", i, n, i, i);
-    case ClosureKind::Ggx:
-      return microfacet("ggx");
-    case ClosureKind::Beckmann:
-      return microfacet("beckmann");
-  }
-  throw std::logic_error("no OSL for this closure");
+  const auto lobe = [&]() -> Value {
+    switch (closure.kind) {
+      case ClosureKind::Diffuse:
+        return call("brdfc_diffuse", {closure.turned ? n : diffuse_n});
+      case ClosureKind::Burley:
+        return call("burley_diffuse_bsdf", {n, call("color", {1}), of("roughness")});
+      case ClosureKind::OrenNayar:
+        return call("oren_nayar_diffuse_bsdf", {n, of("albedo"), of("roughness")});
+      case ClosureKind::Velvet:
+        return call("ashikhmin_velvet", {n, of("roughness")});
+      case ClosureKind::DiffuseRamp:
+        return call("diffuse_ramp", {n, of("ramp")});
+      case ClosureKind::Reflection:
+        return call("reflection", {n});
+      case ClosureKind::Refraction:
+        return call("refraction", {n, of("ior")});
+      case ClosureKind::GlossyToon:
+        return call("glossy_toon", {n, of("size"), of("smooth")});
+      case ClosureKind::DiffuseToon:
+        return call("diffuse_toon", {n, of("size"), of("smooth")});
+      case ClosureKind::PhongRamp:
+        return call("phong_ramp", {n, of("exponent"), of("ramp")});
+      case ClosureKind::Ggx:
+        return microfacet("ggx");
+      case ClosureKind::Beckmann:
+        return microfacet("beckmann");
+    }
+    throw std::logic_error("no OSL for this closure");
+  };
+  return of("weight") * lobe();
 }
 
 }  // namespace
@@ -114,18 +134,30 @@ std::vector<Recording> record_bending(const Model& model) {
   bend.output("frame_n[0]", bent.x);
   bend.output("frame_n[1]", bent.y);
   bend.output("frame_n[2]", bent.z);
-  return {recording_of(model, rise, 0), recording_of(model, bend, 0)};
+  return {recording_of(model, std::move(rise)), recording_of(model, std::move(bend))};
 }
 
 int ray_bytes(const Model& model) { return pool_bytes(ClosureKind::PhongRamp) + (model.has_through() ? kPoolNode : 0); }
 
-std::string lost_below(const Model& model, const std::string& wi, const std::string& weight) {
-  const char* reflects = model.has_through() ? "dot({0}, frame_n) > 0.0 && " : "";
-  return fmt::format(
-      fmt::runtime(std::string("    if (") + reflects + "brdfc_is_below({0}, 0.0))\n        {1} = 0.0;\n"), wi, weight);
+Statements declare_draws() {
+  print::Declare numbers{"float", {}};
+  for (int i = 0; i < 3; ++i) numbers.variables.push_back({fmt::format("u_{}", i), {element("u_all", i)}});
+  return {print::declare("vector", "u_all", call("brdfc_random", {0, "path_length"})), numbers};
 }
 
-std::vector<RecordedClosure> ShaderText::record(
+Value in_scene(Value x, Value y, Value z) {
+  return Value("frame_t") * std::move(x) + Value("frame_b") * std::move(y) + Value("frame_n") * std::move(z);
+}
+Value in_scene(const std::string& name) { return in_scene(name + "_x", name + "_y", name + "_z"); }
+
+print::Statement lost_below(const Model& model, const std::string& wi, const std::string& weight) {
+  std::vector<Value> lost;
+  if (model.has_through()) lost.push_back(operation(call("dot", {wi, "frame_n"}), ">", 0.0));
+  lost.push_back(call("brdfc_is_below", {wi, 0.0}));
+  return print::If{print::all_of(lost), {assign(weight, 0.0)}};
+}
+
+std::vector<RecordedClosure> ShaderBody::record(
     ChoiceSwitch& by_choice, const std::function<Recording(const Choices&, const ParamValues&)>& recording) {
   const ModelInfo& info = model.info();
   std::vector<RecordedClosure> closures;
@@ -133,8 +165,8 @@ std::vector<RecordedClosure> ShaderText::record(
   for (const Choices& choices : choice_combinations(info)) {
     if (!admits(info, choices, setting.fixed)) continue;
     const Recording r = recording(choices, with_choices(info, choices, setting.fixed));
-    operations = std::max(operations, r.operations);
-    by_choice.add(choices, arrays.without_shared(r));
+    operations = std::max(operations, r.operations());
+    by_choice.add(choices, arrays.run(r));
     if (r.closures.empty()) continue;
     if (!closures.empty() && closures != r.closures)
       throw std::logic_error(info.name + ": closures must be the same for every combination of choices that has any");
@@ -144,71 +176,69 @@ std::vector<RecordedClosure> ShaderText::record(
   return closures;
 }
 
-void ShaderText::declare(const std::vector<RecordedClosure>& closures, const std::string& diffuse_n) {
+void ShaderBody::declare(const std::vector<RecordedClosure>& closures, const std::string& diffuse_n) {
   for (std::size_t c = 0; c < closures.size(); ++c) {
     const ClosureKind kind = closures[c].kind;
+    const auto variable = [&](const char* type, const char* name) { add(print::declare(type, numbered(name, c))); };
+    const auto components = [&](const char* name) {
+      const std::string of = numbered(name, c);
+      add(print::declare_all("float", {of + "_x", of + "_y", of + "_z"}));
+    };
     // 0 for choices without closures.
-    statements += fmt::format("    color weight_{} = 0.0;\n", c);
-    if (has_ramp(kind)) statements += fmt::format("    color ramp_{}[{}];\n", c, kRampSize);
-    if (kind == ClosureKind::PhongRamp) statements += fmt::format("    float exponent_{};\n", c);
-    if (has_matte_roughness(kind)) statements += fmt::format("    float roughness_{};\n", c);
-    if (kind == ClosureKind::OrenNayar) statements += fmt::format("    color albedo_{};\n", c);
-    if (has_cone(kind)) statements += fmt::format("    float size_{0}, smooth_{0};\n", c);
-    if (has_facets(kind)) statements += fmt::format("    float alpha_{};\n", c);
-    if (closures[c].stretched != Tangent::None) statements += fmt::format("    float alpha_across_{};\n", c);
-    if (closures[c].stretched == Tangent::Surface)
-      statements += fmt::format("    float tangent_{0}_x, tangent_{0}_y, tangent_{0}_z;\n", c);
-    if (kind == ClosureKind::Refraction) statements += fmt::format("    float ior_{};\n", c);
-    if (closures[c].turned) statements += fmt::format("    float normal_{0}_x, normal_{0}_y, normal_{0}_z;\n", c);
+    add(print::declare("color", numbered("weight", c), 0.0));
+    if (has_ramp(kind)) add(print::Declare{"color", {{numbered("ramp", c), {}, kRampSize}}});
+    if (kind == ClosureKind::PhongRamp) variable("float", "exponent");
+    if (has_matte_roughness(kind)) variable("float", "roughness");
+    if (kind == ClosureKind::OrenNayar) variable("color", "albedo");
+    if (has_cone(kind)) add(print::declare_all("float", {numbered("size", c), numbered("smooth", c)}));
+    if (has_facets(kind)) variable("float", "alpha");
+    if (closures[c].stretched != Tangent::None) variable("float", "alpha_across");
+    if (closures[c].stretched == Tangent::Surface) components("tangent");
+    if (kind == ClosureKind::Refraction) variable("float", "ior");
+    if (closures[c].turned) components("normal");
     shader.facets = shader.facets || has_facets(kind);
     shader.leaning = shader.leaning || closures[c].turned;
-    terms.push_back(closure_text(closures[c], c, diffuse_n));
+    terms.push_back(closure_of(closures[c], c, diffuse_n));
     shader.slots += slots(kind);
     shader.closure_bytes += pool_bytes(kind);
   }
 }
 
-void ShaderText::scale(const std::vector<RecordedClosure>& closures, const std::set<std::string>& factors) {
+void ShaderBody::scale(const std::vector<RecordedClosure>& closures, const std::set<std::string>& factors) {
   for (std::size_t c = 0; c < closures.size(); ++c)
     if (closures[c].division != Division::Done) {
-      const std::string weight = fmt::format("weight_{}", c);
-      statements += fmt::format(
-          "    for (int entry = 0; entry < {}; entry++)\n        ramp_{}[entry] /= {};\n", kRampSize, c,
-          closures[c].division == Division::ByLargest ? fmt::format("brdfc_max_component({})", weight) : weight);
+      const Value weight = numbered("weight", c);
+      const Value by = closures[c].division == Division::ByLargest ? call("brdfc_max_component", {weight}) : weight;
+      add(print::Loop{"entry", int(kRampSize), {print::Assign{element(numbered("ramp", c), "entry"), by, "/="}}});
       ++shader.operations;
     }
   for (const std::string& name : factors) {
     for (std::size_t c = 0; c < closures.size(); ++c)
-      if (closures[c].kind != ClosureKind::Reflection) statements += fmt::format("    weight_{} *= {};\n", c, name);
+      if (closures[c].kind != ClosureKind::Reflection) add(print::Assign{numbered("weight", c), name, "*="});
     ++shader.operations;
   }
 }
 
-void ShaderText::turn(const std::vector<RecordedClosure>& closures) {
+void ShaderBody::turn(const std::vector<RecordedClosure>& closures) {
   for (std::size_t c = 0; c < closures.size(); ++c) {
-    if (closures[c].stretched == Tangent::Surface)
-      statements += fmt::format(
-          "    vector tangent_{0} = frame_t * tangent_{0}_x + frame_b * tangent_{0}_y + frame_n * tangent_{0}_z;\n", c);
-    if (closures[c].turned)
-      statements += fmt::format(
-          "    normal normal_{0} = normalize(frame_t * normal_{0}_x + frame_b * normal_{0}_y + frame_n * "
-          "normal_{0}_z);\n",
-          c);
+    const std::string tangent = numbered("tangent", c), normal = numbered("normal", c);
+    if (closures[c].stretched == Tangent::Surface) add(print::declare("vector", tangent, in_scene(tangent)));
+    if (closures[c].turned) add(print::declare("normal", normal, call("normalize", {in_scene(normal)})));
   }
 }
 
-void OslForm::write_closures(ShaderText& text) const {
-  ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
-  const auto closures = text.record(by_choice, [&](const Choices&, const ParamValues& values) {
-    return recordings(text.model, values, text.setting).at(0);
+void OslForm::make_closures(ShaderBody& body) const {
+  ChoiceSwitch by_choice(body.model.info(), body.setting.fixed);
+  const auto closures = body.record(by_choice, [&](const Choices&, const ParamValues& values) {
+    return recordings(body.model, values, body.setting).at(0);
   });
   // As Blender's nodes do, where closures are not parts of a sum that holds for one frame alone.
-  text.declare(closures, made_of_fit() ? "frame_n" : "shading_n");
-  text.statements += by_choice.print(4);
+  body.declare(closures, made_of_fit() ? "frame_n" : "shading_n");
+  body.add(by_choice.statements());
   // Closures of a fit are made without them.
-  text.scale(closures, made_of_fit() ? fit::roles_of(text.model, text.setting.fixed).with(fit::Role::Factor)
+  body.scale(closures, made_of_fit() ? fit::roles_of(body.model, body.setting.fixed).with(fit::Role::Factor)
                                      : std::set<std::string>());
-  text.turn(closures);
+  body.turn(closures);
 }
 
 Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, const Setting& given) const {
@@ -218,56 +248,59 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   for (const auto& [name, value] : values(model, given.fixed))
     if (fixed.emplace(name, value).first->second != value)
       input_error("{}: the {} form exists only for {}", info.name, this->name(), format_values(info, {{name, value}}));
-  ShaderText made{model, setting};
+  ShaderBody made{model, setting};
   Shader& shader = made.shader;
   shader.name = fmt::format("brdfc_{}_{}", info.name, name());
 
   ChoiceSwitch mirror(info, fixed);
   const bool with_mirror = draws() && model.has_mirror();
-  write_closures(made);
-  if (with_mirror)
-    made.record(mirror, [&](const Choices&, const ParamValues& v) { return record_mirror(model, v, 0); });
+  make_closures(made);
+  if (with_mirror) made.record(mirror, [&](const Choices&, const ParamValues& v) { return record_mirror(model, v); });
 
-  const std::string normal = frame_text(model, lowest_view());
-  std::string body = normal;
-  body +=
-      "    vector frame_t, frame_b;\n"
-      "    brdfc_frame(frame_n, Tangent, frame_t, frame_b);\n"
-      "    // Towards the viewer: I in Cycles points away from the surface.\n"
-      "    float wo_x = dot(I, frame_t);\n    float wo_y = dot(I, frame_b);\n    float wo_z = dot(I, frame_n);\n\n";
-  if (model.two_sided())
-    body +=
-        "    // frame_n is on the viewer's side; the model's z leaves the object.\n"
-        "    float side = backfacing() ? -1.0 : 1.0;\n";
-  if (model.has_medium() || draws())
-    body += "    float path_length = 0;\n    getattribute(\"path:ray_length\", path_length);\n";
-  body += made.arrays.print();
+  const Statements normal = frame_of(model, lowest_view());
+  Statements body = normal;
+  const auto add = [&](print::Statement statement) { body.push_back(std::move(statement)); };
+  add(print::declare_all("vector", {"frame_t", "frame_b"}));
+  add(print::Perform{call("brdfc_frame", {"frame_n", "Tangent", "frame_t", "frame_b"})});
+  add(print::Comment{"Towards the viewer: I in Cycles points away from the surface."});
+  for (const auto& [wo, axis] :
+       {std::pair("wo_x", "frame_t"), std::pair("wo_y", "frame_b"), std::pair("wo_z", "frame_n")})
+    add(print::declare("float", wo, call("dot", {"I", axis})));
+  add(print::Gap{});
+  if (model.two_sided()) {
+    add(print::Comment{"frame_n is on the viewer's side; the model's z leaves the object."});
+    add(print::declare("float", "side", print::choice(call("backfacing"), -1.0, 1.0)));
+  }
+  if (model.has_medium() || draws()) {
+    add(print::declare("float", "path_length", 0));
+    add(print::Perform{call("getattribute", {print::quotation("path:ray_length"), "path_length"})});
+  }
+  append(body, made.arrays.declarations());
   if (with_mirror) {
-    body += "    color mirror_weight;\n" + block(mirror.print(0), 1);
-    made.terms.push_back("mirror_weight * reflection(frame_n)");
+    add(print::declare("color", "mirror_weight"));
+    append(body, print::scope(mirror.statements()));
+    made.terms.push_back(Value("mirror_weight") * call("reflection", {"frame_n"}));
     shader.slots += slots(ClosureKind::Reflection);
     shader.closure_bytes += pool_bytes(ClosureKind::Reflection);
   }
-  body += made.statements;
+  append(body, made.statements);
   shader.closures = int(made.terms.size()) + std::max(shader.lamps - 1, 0);
   shader.closure_bytes += std::max(int(made.terms.size()) - (shader.lamps > 0 ? 1 : 0) - 1, 0) * kPoolNode;
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name(), shader.slots,
                 kMaxClosures);
-  body += "    BSDF = " + print::balanced_sum(made.terms) + ";\n\n";
-  std::string of_albedo;
+  add(assign("BSDF", print::balanced_sum(made.terms)));
+  add(print::Gap{});
+  Statements of_albedo;
   if (model.has_scatter()) {
-    of_albedo = albedo_text(info, table, fixed);
-    if (of_albedo.size() <= kMaxAlbedoText) body += std::exchange(of_albedo, "");
+    of_albedo = albedo_output(info, table, fixed);
+    if (print::osl_statements(of_albedo, 1).text.size() <= kMaxAlbedoText) append(body, std::exchange(of_albedo, {}));
   } else {
     // Delta terms alone: all of their closures are terms.
-    body += "    Albedo = weight_0";
-    for (std::size_t c = 1; c < made.terms.size(); ++c) body += fmt::format(" + weight_{}", c);
-    body += ";\n";
+    Value sum = numbered("weight", 0);
+    for (std::size_t c = 1; c < made.terms.size(); ++c) sum = sum + numbered("weight", c);
+    add(assign("Albedo", sum));
   }
-
-  // Each ends a line; the semicolons of a loop's head do not.
-  for (std::size_t at = body.find(";\n"); at != std::string::npos; at = body.find(";\n", at + 1)) ++shader.statements;
 
   std::string parameters;
   for (const ParamInfo& p : info.params) {
@@ -276,14 +309,17 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     parameters += parameter(p);
   }
   const auto text = [&](const std::string& name, const std::string& what, const std::string& sockets,
-                        const std::string& statements) {
-    return print::comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
-           print::comment(fmt::format("{}. {}", what, info.equations)) +
-           "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
-           print::narrow(print::library_for(statements) + fmt::format("\nshader {}(\n", name) + parameters + sockets +
-                         ")\n{\n" + within_ranges(info, fixed, statements) + "}\n");
+                        const Statements& statements) {
+    print::OslText bounded = within_ranges(info, fixed, statements);
+    bounded.text =
+        print::comment(fmt::format("{}: {}. Generated by brdfc {}.", info.label, info.paper, BRDFC_VERSION)) +
+        print::comment(fmt::format("{}. {}", what, info.equations)) +
+        "// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
+        print::narrow(print::library_for(print::functions_in(statements)) + fmt::format("\nshader {}(\n", name) +
+                      parameters + sockets + ")\n{\n" + bounded.text + "}\n");
+    return bounded;
   };
-  const char* albedo_output = "    output color Albedo = 0";
+  const char* albedo_socket = "    output color Albedo = 0";
   std::string sockets;
   for (int i = 1; i <= shader.lamps; ++i)
     for (const char* what : {"Place", "Turn", "Scale", "Shape"})
@@ -291,12 +327,18 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   sockets +=
       "    normal Normal = N,\n    vector Tangent = vector(0, 0, 0),\n"
       "    output closure color BSDF = 0";
-  if (of_albedo.empty()) sockets += fmt::format(",\n{}", albedo_output);
-  shader.source = text(shader.name, fmt::format("Form: {}", name()), sockets, body);
-  if (!of_albedo.empty())
+  if (of_albedo.empty()) sockets += fmt::format(",\n{}", albedo_socket);
+  print::OslText whole = text(shader.name, fmt::format("Form: {}", name()), sockets, body);
+  shader.source = std::move(whole.text);
+  shader.statements = whole.statements;
+  if (!of_albedo.empty()) {
+    Statements apart = normal;
+    apart.push_back(print::declare("float", "wo_z", call("dot", {"I", "frame_n"})));
+    append(apart, std::move(of_albedo));
     shader.albedo = text(shader.name + "_albedo", fmt::format("Albedo of the form: {}", name()),
-                         fmt::format("    normal Normal = N,\n{}", albedo_output),
-                         normal + "    float wo_z = dot(I, frame_n);\n" + of_albedo);
+                         fmt::format("    normal Normal = N,\n{}", albedo_socket), apart)
+                        .text;
+  }
   return shader;
 }
 

@@ -10,17 +10,18 @@
 #include "forms/choice_switch.h"
 #include "forms/form.h"
 #include "forms/recording.h"
+#include "print/statement.h"
 
 namespace brdfc::forms {
 
-/// A shader as it is being written.
-struct ShaderText {
+/// A shader as it is being made.
+struct ShaderBody {
   const Model& model;
   const Setting& setting;  ///< with the form's own values among what is fixed
   Shader shader = {};
   SharedArrays arrays = {};
-  std::string statements = {};          ///< after the frame is known, before BSDF is assigned
-  std::vector<std::string> terms = {};  ///< closures, the sum of which is BSDF
+  print::Statements statements = {};     ///< after the frame is known, before BSDF is assigned
+  std::vector<print::Value> terms = {};  ///< closures, the sum of which is BSDF
 
   /// Records once for each combination of choices that what is fixed admits, together with what is fixed. Returns the
   /// closures, which are the same for all that have any, and counts the operations of the longest.
@@ -33,6 +34,9 @@ struct ShaderText {
   void scale(const std::vector<RecordedClosure>&, const std::set<std::string>& factors);
   /// Brings normals and tangents of their own from the model's frame into the shader's.
   void turn(const std::vector<RecordedClosure>&);
+
+  void add(print::Statement statement) { statements.push_back(std::move(statement)); }
+  void add(print::Statements more) { append(statements, std::move(more)); }
 };
 
 class OslForm : public Form {
@@ -41,9 +45,9 @@ class OslForm : public Form {
   Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const final;
 
  protected:
-  /// Writes statements and terms of all but the mirror of a form that draws(). Here of the closures that recordings()
+  /// Makes statements and terms of all but the mirror of a form that draws(). Here of the closures that recordings()
   /// assign, its first.
-  virtual void write_closures(ShaderText&) const;
+  virtual void make_closures(ShaderBody&) const;
   /// The lowest view, as a cosine, that its closures are for: of a lower one the normal is turned; 0: any.
   virtual double lowest_view() const { return 0; }
 };
@@ -54,13 +58,17 @@ inline bool has_ramps(const Shader& shader) { return shader.slots > shader.closu
 /// Codes of what changes the light of Cycles' own closures and of a mirror beside them.
 std::vector<std::string> warnings_of_closures(const Model&, const Shader&);
 
-/// Three numbers in [0, 1) that draw a direction.
-inline constexpr const char* kDraws =
-    "    vector u_all = brdfc_random(0, path_length);\n    float u_0 = u_all[0], u_1 = u_all[1], u_2 = u_all[2];\n";
+/// Declares u_0, u_1, u_2: three numbers in [0, 1) that draw a direction.
+print::Statements declare_draws();
+
+/// A direction of the frame in the coordinates of the scene.
+print::Value in_scene(print::Value x, print::Value y, print::Value z);
+/// The same of name_x, name_y and name_z.
+print::Value in_scene(const std::string& name);
 
 /// Sets a weight to 0 where the vector `wi` of this name leaves on the viewer's side of the shading normal but goes
 /// below the true surface. Cycles ends such a path; with Bump Map Correction it would send it along the surface.
-std::string lost_below(const Model&, const std::string& wi, const std::string& weight);
+print::Statement lost_below(const Model&, const std::string& wi, const std::string& weight);
 
 /// How the shading normal is bent (model/horizon.h): whether it has to be, and to what. None for a matte model, which
 /// has no mirror direction; Blender's Diffuse node leaves its normal as it is, too.

@@ -8,7 +8,6 @@
 #include "measure/probes.h"
 #include "model/horizon.h"
 #include "model/inputs.h"
-#include "print/osl_program.h"
 
 namespace brdfc::forms {
 namespace {
@@ -39,15 +38,12 @@ fit::Varied<Expr> recorded_varied(const Model& model, const fit::Fit& fit, const
 
 }  // namespace
 
-Recording recording_of(const Program& program, int indent, const std::vector<std::string>& taken,
-                       std::vector<RecordedClosure> closures) {
-  Recording r{"", std::move(closures), program.operations(), program.inputs(), {}};
-  r.statements = print::osl_program(program, indent, taken, &r.arrays);
-  return r;
+Recording recording_of(Program program, std::vector<std::string> taken, std::vector<RecordedClosure> closures) {
+  return {std::make_shared<const Program>(std::move(program)), std::move(closures), std::move(taken)};
 }
 
-Recording recording_of(const Model& model, const Program& program, int indent, std::vector<RecordedClosure> closures) {
-  return recording_of(program, indent, parameter_names(model), std::move(closures));
+Recording recording_of(const Model& model, Program program, std::vector<RecordedClosure> closures) {
+  return recording_of(std::move(program), parameter_names(model), std::move(closures));
 }
 
 Vec3<Expr> turned_to_side(const Model& model, const Brdf<Expr>& brdf, Vec3<Expr> w) {
@@ -123,21 +119,21 @@ void output_sampled(const Model& model, const Brdf<Expr>& brdf, Program& program
   program.output("weight", s.weight);
 }
 
-Recording record_closures(const Model& model, const ParamValues& fixed, int indent, const RecordClosures& closures,
+Recording record_closures(const Model& model, const ParamValues& fixed, const RecordClosures& closures,
                           Division division) {
   Recorder recorder;
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   const std::vector<RecordedClosure> recorded = output_closures(closures(*brdf), program, division);
-  return recording_of(model, program, indent, recorded);
+  return recording_of(model, std::move(program), recorded);
 }
 
-Recording record_mirror(const Model& model, const ParamValues& fixed, int indent) {
+Recording record_mirror(const Model& model, const ParamValues& fixed) {
   Recorder recorder;
   Program program;
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   program.output("mirror_weight", brdf->mirror(recorded_wo(model, *brdf)));
-  return recording_of(model, program, indent, {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
+  return recording_of(model, std::move(program), {{ClosureKind::Reflection, false, Tangent::None, Division::Done}});
 }
 
 }  // namespace brdfc::forms

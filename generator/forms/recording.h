@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements of OSL that compute what a form's closures take: a model's formulas, recorded. All read the parameters and
-// wo_x, wo_y, wo_z, the viewer's direction in the shader's frame, whose normal is on the viewer's side.
+// What a form's closures take, as recorded programs of a model's formulas. All read the parameters and wo_x, wo_y,
+// wo_z, the viewer's direction in the shader's frame, whose normal is on the viewer's side.
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,20 +28,18 @@ struct RecordedClosure {
   bool operator==(const RecordedClosure&) const = default;
 };
 
-/// Statements for one combination of choices.
+/// What is computed for one combination of choices.
 struct Recording {
-  std::string statements;
-  std::vector<RecordedClosure> closures;  ///< whose numbers they assign: see output_closures()
-  int operations = 0;
-  std::vector<std::string> inputs;
-  std::vector<std::string> arrays;  ///< declarations of what the statements look up: they may stand further out
+  std::shared_ptr<const Program> program;
+  std::vector<RecordedClosure> closures;  ///< whose numbers it assigns: see output_closures()
+  std::vector<std::string> taken;         ///< names that its statements may not declare
+
+  int operations() const { return program->operations(); }
 };
 
-/// The program's statements. They declare no name that is `taken`.
-Recording recording_of(const Program&, int indent, const std::vector<std::string>& taken,
-                       std::vector<RecordedClosure> closures = {});
+Recording recording_of(Program, std::vector<std::string> taken, std::vector<RecordedClosure> closures = {});
 /// The same where a shader has the model's parameters.
-Recording recording_of(const Model&, const Program&, int indent, std::vector<RecordedClosure> closures = {});
+Recording recording_of(const Model&, Program, std::vector<RecordedClosure> closures = {});
 
 /// The viewer's direction, for a model of two sides with z turned outwards.
 Vec3<Expr> recorded_wo(const Model&, const Brdf<Expr>&);
@@ -72,9 +71,8 @@ void output_sampled(const Model&, const Brdf<Expr>&, Program&);
 /// What closures a form makes of a model.
 using RecordClosures = std::function<ClosureSum<Expr>(const Brdf<Expr>&)>;
 /// Assigns what they take: see output_closures(). What `fixed` lacks is an input.
-Recording record_closures(const Model&, const ParamValues& fixed, int indent, const RecordClosures&,
-                          Division = Division::Done);
+Recording record_closures(const Model&, const ParamValues& fixed, const RecordClosures&, Division = Division::Done);
 /// Assigns mirror_weight, the weight of ideal reflection.
-Recording record_mirror(const Model&, const ParamValues& fixed, int indent);
+Recording record_mirror(const Model&, const ParamValues& fixed);
 
 }  // namespace brdfc::forms

@@ -31,21 +31,24 @@ class Sampled final : public OslForm {
     const std::unique_ptr<Brdf<Expr>> brdf = model.record(values);
     Program program;
     output_sampled(model, *brdf, program);
-    return {recording_of(model, program, 4)};
+    return {recording_of(model, std::move(program))};
   }
 
  protected:
-  void write_closures(ShaderText& text) const override {
-    ChoiceSwitch by_choice(text.model.info(), text.setting.fixed);
-    text.record(by_choice,
-                [&](const Choices&, const ParamValues& v) { return recordings(text.model, v, text.setting)[0]; });
-    text.statements += std::string(kDraws) + "    float wi_x, wi_y, wi_z;\n    color weight;\n" + by_choice.print(4) +
-                       "    vector wi = frame_t * wi_x + frame_b * wi_y + frame_n * wi_z;\n" +
-                       lost_below(text.model, "wi", "weight");
-    text.terms.push_back(text.model.has_through() ? "brdfc_ray_anywhere(weight, wi, I, frame_n)"
-                                                  : "weight * brdfc_ray(wi, I)");
-    text.shader.slots = slots(ClosureKind::PhongRamp);
-    text.shader.closure_bytes = ray_bytes(text.model);
+  void make_closures(ShaderBody& body) const override {
+    ChoiceSwitch by_choice(body.model.info(), body.setting.fixed);
+    body.record(by_choice,
+                [&](const Choices&, const ParamValues& v) { return recordings(body.model, v, body.setting)[0]; });
+    body.add(declare_draws());
+    body.add(print::declare_all("float", {"wi_x", "wi_y", "wi_z"}));
+    body.add(print::declare("color", "weight"));
+    body.add(by_choice.statements());
+    body.add(print::declare("vector", "wi", in_scene("wi")));
+    body.add(lost_below(body.model, "wi", "weight"));
+    body.terms.push_back(body.model.has_through() ? print::call("brdfc_ray_anywhere", {"weight", "wi", "I", "frame_n"})
+                                                  : print::Value("weight") * print::call("brdfc_ray", {"wi", "I"}));
+    body.shader.slots = slots(ClosureKind::PhongRamp);
+    body.shader.closure_bytes = ray_bytes(body.model);
   }
 };
 

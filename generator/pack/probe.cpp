@@ -3,11 +3,19 @@
 
 #include "model/inputs.h"
 #include "print/osl_library.h"
-#include "print/osl_program.h"
+#include "print/osl_statements.h"
 #include "trace/osl_arithmetic.h"
 
 namespace brdfc::pack {
 namespace {
+
+using print::assign;
+using print::call;
+using print::choice;
+using print::declare;
+using print::operation;
+using print::Statements;
+using print::Value;
 
 struct Recorded {
   Program eval, sample;
@@ -76,30 +84,37 @@ std::string probe_source(const Model& model, const ParamValues& choices) {
   for (const ParamInfo& p : model.info().params) taken.insert(taken.end(), {p.name, "p_" + p.name});
   // Inputs of the node, because Cycles passes on only attributes that nodes ask for.
   std::string parameters = "    float show = 0,\n    vector wi = 0,\n    vector wo = 0,\n    vector numbers = 0,\n";
-  std::string body;
+  Statements body;
   for (const char* name : {"wi", "wo"})
-    for (int i = 0; i < 3; ++i) body += fmt::format("    float {}_{} = {}[{}];\n", name, "xyz"[i], name, i);
-  for (int i = 0; i < 3; ++i) body += fmt::format("    float u_{} = numbers[{}];\n", i, i);
+    for (int i = 0; i < 3; ++i)
+      body.push_back(declare("float", fmt::format("{}_{}", name, "xyz"[i]), print::element(name, i)));
+  for (int i = 0; i < 3; ++i) body.push_back(declare("float", fmt::format("u_{}", i), print::element("numbers", i)));
   for (const ParamInfo& p : model.info().params) {
     if (p.kind == ParamKind::Choice) continue;
-    const bool color = p.kind == ParamKind::Color;
-    parameters += fmt::format("    {} p_{} = 0,\n", color ? "color" : "float", p.name);
-    body += fmt::format("    {} {} = p_{};\n", color ? "color" : "float", p.name, p.name);
+    const char* type = p.kind == ParamKind::Color ? "color" : "float";
+    parameters += fmt::format("    {} p_{} = 0,\n", type, p.name);
+    body.push_back(declare(type, p.name, "p_" + p.name));
   }
-  body +=
-      "    color first = 0;\n    if (show < 0.5 || show > 2.5) {\n        color shown_f;\n        float shown_pdf;\n" +
-      print::osl_program(r.eval, 8, taken) +
-      "        first = show > 2.5 ? color(shown_pdf) : shown_f;\n    } else {\n"
-      "        float shown_x, shown_y, shown_z, shown_pdf;\n        color shown_weight;\n" +
-      print::osl_program(r.sample, 8, taken) +
-      "        first = show < 1.25 ? color(shown_x, shown_y, shown_z) : show < 1.75 ? color(shown_pdf) : "
-      "shown_weight;\n"
-      "    }\n"
-      "    for (int i = 0; i < 3; i++)\n"
-      "        if (!isfinite(first[i]))\n            first[i] = -31337.0;\n"
-      "    BSDF = first * emission();\n";
-  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + print::library_for(body) + "\nshader brdfc_probe(\n" +
-         parameters + "    output closure color BSDF = 0)\n{\n" + body + "}\n";
+  Statements eval = {declare("color", "shown_f"), declare("float", "shown_pdf")};
+  append(eval, print::run_with_arrays(std::make_shared<const Program>(r.eval), taken));
+  const Value pdf = call("color", {"shown_pdf"});
+  eval.push_back(assign("first", choice(operation("show", ">", 2.5), pdf, "shown_f")));
+  Statements sample = {print::declare_all("float", {"shown_x", "shown_y", "shown_z", "shown_pdf"}),
+                       declare("color", "shown_weight")};
+  append(sample, print::run_with_arrays(std::make_shared<const Program>(r.sample), taken));
+  sample.push_back(
+      assign("first", choice(operation("show", "<", 1.25), call("color", {"shown_x", "shown_y", "shown_z"}),
+                             choice(operation("show", "<", 1.75), pdf, "shown_weight"))));
+  const Value channel = print::element("first", "i");
+  append(body, {
+                   declare("color", "first", 0),
+                   print::If{print::any_of({operation("show", "<", 0.5), operation("show", ">", 2.5)}), eval, sample},
+                   print::Loop{"i", 3, {print::If{!call("isfinite", {channel}), {assign(channel, -31337.0)}}}},
+                   assign("BSDF", Value("first") * call("emission")),
+               });
+  return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + print::library_for(print::functions_in(body)) +
+         "\nshader brdfc_probe(\n" + parameters + "    output closure color BSDF = 0)\n{\n" +
+         print::osl_statements(body, 1).text + "}\n";
 }
 
 std::vector<std::array<ProbeValues, 4>> run_probe(const Model& model, const ParamValues& choices,

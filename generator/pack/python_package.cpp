@@ -93,17 +93,27 @@ class Functions {
     Recorder recorder(Precision::Double);
     const std::unique_ptr<Brdf<Expr>> brdf = model_.record(with_choices(info, choices));
     const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
+    // All before programs are made of them: what one formula names has that name in the others, too.
+    Rgb<Expr> f, reflected, refracted;
+    Expr density;
+    Sample<Expr> s;
+    if (model_.has_scatter()) {
+      f = brdf->eval(wi, wo);
+      density = brdf->pdf(wi, wo);
+      s = brdf->sample(wo, input3("u"));
+    }
+    if (model_.has_mirror()) reflected = brdf->mirror(wo);
+    if (model_.has_transmit()) refracted = brdf->transmit(wo);
     Program eval, pdf, sample, mirror, transmit;
     if (model_.has_scatter()) {
-      eval.output("f", brdf->eval(wi, wo));
-      pdf.output("pdf", brdf->pdf(wi, wo));
-      const Sample<Expr> s = brdf->sample(wo, input3("u"));
+      eval.output("f", f);
+      pdf.output("pdf", density);
       sample.output("wi", s.wi);
       sample.output("weight", s.weight);
       sample.output("pdf", s.pdf);
     }
-    if (model_.has_mirror()) mirror.output("weight", brdf->mirror(wo));
-    if (model_.has_transmit()) transmit.output("weight", brdf->transmit(wo));
+    if (model_.has_mirror()) mirror.output("weight", reflected);
+    if (model_.has_transmit()) transmit.output("weight", refracted);
     const std::array<std::string, 5> names = {
         function("eval", suffix, eval, {"wi", "wo"}), function("pdf", suffix, pdf, {"wi", "wo"}),
         function("sample", suffix, sample, {"wo", "u"}), function("mirror", suffix, mirror, {"wo"}),

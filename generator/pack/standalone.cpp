@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cctype>
 #include <functional>
+#include <memory>
+#include <set>
 
 #include "forms/choice_switch.h"
 #include "forms/form.h"
@@ -11,6 +13,7 @@
 #include "model/choices.h"
 #include "print/osl_library.h"
 #include "print/osl_program.h"
+#include "print/osl_statements.h"
 #include "print/osl_text.h"
 #include "print/reserved.h"
 #include "trace/program.h"
@@ -31,7 +34,7 @@ std::string arguments(const ModelInfo& info) {
 using Outputs = std::function<void(const Brdf<Expr>&, Program&)>;
 
 /// Statements that assign the outputs, for every combination of choices.
-std::string statements(const Model& model, const Outputs& outputs) {
+print::Statements statements(const Model& model, const Outputs& outputs) {
   const std::set<std::string>& own = print::osl_function_words();
   std::vector<std::string> taken(own.begin(), own.end());
   for (const ParamInfo& p : model.info().params) taken.push_back(p.name);
@@ -42,9 +45,9 @@ std::string statements(const Model& model, const Outputs& outputs) {
     const std::unique_ptr<Brdf<Expr>> brdf = model.record(with_choices(model.info(), choices));
     Program program;
     outputs(*brdf, program);
-    by_choice.add(choices, print::osl_program(program, 4, taken));
+    by_choice.add(choices, print::run_with_arrays(std::make_shared<const Program>(std::move(program)), taken));
   }
-  return by_choice.print(4);
+  return by_choice.statements();
 }
 
 std::string components(const std::string& name) {
@@ -52,7 +55,9 @@ std::string components(const std::string& name) {
 }
 
 struct Function {
-  std::string doc, type, name, arguments, before, body, result;
+  std::string doc, type, name, arguments, before;
+  print::Statements body;
+  std::string result;
 };
 
 std::string text_of(const Model& model, const Function& f) {
@@ -60,7 +65,7 @@ std::string text_of(const Model& model, const Function& f) {
   return print::comment(f.doc) +
          fmt::format("{} brdfc_{}_{}({}{}{})\n{{\n", f.type, model.info().name, f.name, f.arguments,
                      f.arguments.empty() || own.empty() ? "" : ", ", own) +
-         f.before + f.body + fmt::format("    return {};\n}}\n", f.result);
+         f.before + print::osl_statements(f.body, 1).text + fmt::format("    return {};\n}}\n", f.result);
 }
 
 std::string guarded(const std::string& name, const std::string& text) {
@@ -105,20 +110,18 @@ std::vector<Function> functions_of(const Model& model) {
                          statements(model, [](const Brdf<Expr>& brdf,
                                               Program& p) { p.output("pdf", brdf.pdf(input3("wi"), input3("wo"))); }),
                          "pdf"});
+    print::Statements sample = statements(model, [](const Brdf<Expr>& brdf, Program& p) {
+      const Sample<Expr> s = brdf.sample(input3("wo"), {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
+      p.output("wi", s.wi);
+      p.output("pdf", s.pdf);
+      p.output("value", s.weight);
+    });
+    sample.push_back(print::assign("wi", print::call("vector", {"wi_x", "wi_y", "wi_z"})));
     functions.push_back({"Draws wi by three numbers in [0, 1); returns f cos / pdf. A pdf of 0: no direction.", "color",
                          "sample", "vector wo, vector numbers, output vector wi, output float pdf",
                          components("wo") + "    float u_0 = numbers[0], u_1 = numbers[1], u_2 = numbers[2];\n"
                                             "    float wi_x, wi_y, wi_z;\n    color value;\n",
-                         statements(model,
-                                    [](const Brdf<Expr>& brdf, Program& p) {
-                                      const Sample<Expr> s = brdf.sample(
-                                          input3("wo"), {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
-                                      p.output("wi", s.wi);
-                                      p.output("pdf", s.pdf);
-                                      p.output("value", s.weight);
-                                    }) +
-                             "    wi = vector(wi_x, wi_y, wi_z);\n",
-                         "value"});
+                         std::move(sample), "value"});
   }
   const auto delta = [&](const char* doc, const char* name, Rgb<Expr> (Brdf<Expr>::*member)(const Vec3<Expr>&) const) {
     functions.push_back({doc, "color", name, "vector wo", components("wo") + "    color value;\n",
@@ -165,18 +168,18 @@ std::string header_of(const Model& model, const std::vector<Function>& functions
 
 std::map<std::filesystem::path, std::string> standalone_files(const std::vector<std::string>& names) {
   std::map<std::filesystem::path, std::string> files;
-  std::string bodies;
+  std::set<std::string> called;
   for (const auto& [name, model] : models()) {
     if (!names.empty() && std::find(names.begin(), names.end(), name) == names.end()) continue;
     files[name + ".osl"] = shader_of(*model);
     const std::vector<Function> functions = functions_of(*model);
     files[fmt::format("include/brdfc_{}.h", name)] = header_of(*model, functions);
-    for (const Function& f : functions) bodies += f.body;
+    for (const Function& f : functions) called.merge(print::functions_in(f.body));
   }
   for (const std::string& name : names) find_model(name);  // an unknown one is an error
   files["include/brdfc_library.h"] =
       "// What the headers of brdfc's models call.\n// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
-      guarded("library", print::library_for(bodies));
+      guarded("library", print::library_for(called));
   return files;
 }
 

@@ -156,6 +156,11 @@ const Form& aiming_form() {
   throw std::logic_error("no form aims at lamps");
 }
 
+/// Whether closures can be fitted that are the base of an aimed form.
+bool has_fitted_base(const Needs& needs) {
+  return std::ranges::any_of(forms::forms(), [&](const Form* f) { return f->gives_base() && !unfit(needs, *f); });
+}
+
 /// That an aimed form has for the lamps there are.
 int lamp_slots(const Budget& budget) { return std::min(budget.lamps.value_or(forms::kMaxLamps), forms::kMaxLamps); }
 
@@ -291,7 +296,7 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   });
   // A fit that an error was asked about is there anyway. Its costs were not measured, so that a time leaves it out.
   const bool aimed = std::any_of(plan.forms.begin(), plan.forms.end(), [](const Form* form) { return form->aims(); });
-  if (aimed && (budget.fit_bases || budget.error) && !budget.time && !unfit(needs, *forms::form("fitted")))
+  if (aimed && (budget.fit_bases || budget.error) && !budget.time && has_fitted_base(needs))
     plan.base = forms::AimedBase::Fitted;
   for (FormChoice& choice : plan.choices)
     if (choice.form->aims() && plan.base == forms::AimedBase::Fitted) {

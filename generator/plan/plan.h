@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/cosines.h"
-#include "forms/aimed.h"
 #include "forms/form.h"
 #include "model/model.h"
 #include "plan/costs.h"

@@ -81,7 +81,7 @@ class NumpyPrinter : public ProgramPrinter {
   }
 
   Text text(int id) const override {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = program_.node(id);
     switch (n.op) {
       case Op::Const:
         if (n.type == ExprType::Bool) return {n.value[0] != 0 ? "True" : "False", 6};
@@ -209,10 +209,9 @@ std::string numpy_table(const Table& table) {
 
 std::string numpy_function(const Program& program, const std::string& name, const std::vector<std::string>& arguments,
                            NumpyTables& tables) {
-  const Recorder& r = Recorder::current();
   const std::vector<bool>& reachable = program.reachable();
   for (std::size_t i = 0; i < reachable.size(); ++i) {
-    const ExprNode& n = r.node(int(i));
+    const ExprNode& n = program.node(int(i));
     if (reachable[i] && n.op == Op::Lookup && tables.emplace(n.name, n.table).first->second != n.table)
       throw ExprError("two tables are named " + n.name);
   }

@@ -44,9 +44,11 @@ std::set<std::string> calls_in(const std::string& text) {
 
 }  // namespace
 
-std::string library_for(const std::string& text) {
+std::string library_for(const std::set<std::string>& called) {
   static const std::vector<Function> functions = parse_library();
-  std::set<std::string> wanted = calls_in(text), known;
+  std::set<std::string> wanted, known;
+  for (const std::string& name : called)
+    if (name.starts_with("brdfc_")) wanted.insert(name);
   // A function may only call those above it, so one pass from the end finds all that is needed.
   for (auto f = functions.rbegin(); f != functions.rend(); ++f) {
     known.insert(f->name);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <set>
 #include <string>
 
 namespace brdfc::print {
 
-/// The functions of osl/brdfc.osl.in that `text` calls, and those they call, in the order of the file. A call of a
-/// brdfc_ function that the library does not have is a std::logic_error.
-std::string library_for(const std::string& text);
+/// Those of these functions that are osl/brdfc.osl.in's, which begin with brdfc_, and those they call, in the order of
+/// the file. One that the library does not have is a std::logic_error.
+std::string library_for(const std::set<std::string>& functions);
 
 }  // namespace brdfc::print

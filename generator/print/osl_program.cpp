@@ -13,20 +13,24 @@
 namespace brdfc::print {
 namespace {
 
+/// Operations that OSL has no function for, but the library has.
+bool is_of_library(Op op) { return op == Op::Log1p || op == Op::Expm1 || op == Op::MaxComponent; }
+std::string library_name(Op op) { return std::string("brdfc_") + name_of(op); }
+
 /// Where OSL's spelling lives: text of a subexpression and how tightly it binds.
 class OslPrinter : public ProgramPrinter {
  public:
   using ProgramPrinter::ProgramPrinter;
 
-  /// The arrays that look-ups read, before all statements.
-  std::vector<std::string> arrays(int indent) {
-    std::vector<std::string> all;
+  /// The arrays that look-ups read; to be called before statements are printed.
+  std::vector<ProgramArray> arrays() {
+    std::vector<ProgramArray> all;
     for (std::size_t i = 0; i < reachable_.size(); ++i) {
-      const ExprNode& n = r_.node(int(i));
+      const ExprNode& n = program_.node(int(i));
       if (!reachable_[i] || n.op != Op::Lookup || array_names_.count(n.name)) continue;
       const std::string name = fresh(n.name);
       array_names_[n.name] = name;
-      all.push_back(compact_array(name, n.table->values, indent));
+      all.push_back({name, n.table});
     }
     return all;
   }
@@ -50,7 +54,7 @@ class OslPrinter : public ProgramPrinter {
   std::string loop_end() const override { return "}"; }
 
   Text text(int id) const override {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = program_.node(id);
     switch (n.op) {
       case Op::Const:
         if (n.type == ExprType::Bool) return {n.value[0] != 0 ? "1" : "0", 6};
@@ -82,7 +86,7 @@ class OslPrinter : public ProgramPrinter {
       case Op::Log1p:
       case Op::Expm1:
       case Op::MaxComponent:
-        return call(std::string("brdfc_") + name_of(n.op), n);
+        return call(library_name(n.op), n);
       case Op::Less:
       case Op::LessEqual:
         return infix(name_of(n.op), n, 2);
@@ -95,17 +99,19 @@ class OslPrinter : public ProgramPrinter {
       case Op::Select: {
         // Both arms of an OSL conditional must have one type.
         const auto arm = [&](std::size_t i) {
-          const bool promote = n.type == ExprType::Color && r_.node(n.args[i]).type != ExprType::Color;
+          const bool promote = n.type == ExprType::Color && program_.node(n.args[i]).type != ExprType::Color;
           return promote ? "color(" + use(n.args[i], 0) + ")" : use(n.args[i], 1);
         };
         return {use(n.args[0], 1) + " ? " + arm(1) + " : " + arm(2), 0};
       }
       case Op::Lookup: {
-        std::vector<std::string> positions;
-        for (std::size_t i = 0; i < n.args.size(); ++i)
-          positions.push_back(
-              fmt::format("{} * clamp({}, 0.0, 1.0)", number(n.table->axes[i].size() - 1), use(n.args[i], 0)));
-        return {table_call(*n.table, array_names_.at(n.name), positions), 6};
+        std::string sizes, positions;
+        for (std::size_t i = 0; i < n.args.size(); ++i) {
+          const int size = n.table->axes[i].size();
+          sizes += fmt::format(", {}", size);
+          positions += fmt::format(", {} * clamp({}, 0.0, 1.0)", number(size - 1), use(n.args[i], 0));
+        }
+        return {table_function(*n.table) + "(" + array_names_.at(n.name) + sizes + positions + ")", 6};
       }
       case Op::LoopOut:
         return {loop_out(n), 6};
@@ -119,20 +125,34 @@ class OslPrinter : public ProgramPrinter {
 
 }  // namespace
 
-std::string osl_program(const Program& program, int indent, const std::vector<std::string>& taken,
-                        std::vector<std::string>* arrays) {
+OslText osl_assignments(const Program& program, int indent, const std::vector<std::string>& taken) {
   OslPrinter printer(program, taken);
-  std::string out;
-  for (const std::string& array : printer.arrays(arrays ? 4 : indent)) {
-    if (arrays)
-      arrays->push_back(array);
-    else
-      out += array;
-  }
-  out += printer.statements(indent);
+  printer.arrays();
+  OslText out{printer.statements(indent), printer.count() + int(program.outputs().size())};
   for (const auto& [name, id] : program.outputs())
-    out += fmt::format("{:{}}{} = {};\n", "", indent, name, printer.use(id, 0));
+    out.text += fmt::format("{:{}}{} = {};\n", "", indent, name, printer.use(id, 0));
   return out;
+}
+
+std::vector<ProgramArray> osl_arrays(const Program& program, const std::vector<std::string>& taken) {
+  return OslPrinter(program, taken).arrays();
+}
+
+std::string osl_program(const Program& program, int indent, const std::vector<std::string>& taken) {
+  std::string out;
+  for (const ProgramArray& a : osl_arrays(program, taken)) out += compact_array(a.name, a.table->values, indent);
+  return out + osl_assignments(program, indent, taken).text;
+}
+
+std::set<std::string> library_calls(const Program& program) {
+  std::set<std::string> names;
+  for (int id = 0; id < program.size(); ++id) {
+    if (!program.reachable()[std::size_t(id)]) continue;
+    const ExprNode& n = program.node(id);
+    if (is_of_library(n.op)) names.insert(library_name(n.op));
+    if (n.op == Op::Lookup) names.insert(table_function(*n.table));
+  }
+  return names;
 }
 
 }  // namespace brdfc::print

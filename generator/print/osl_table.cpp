@@ -16,15 +16,23 @@ std::string position_name(const std::string& suffix, std::size_t axis) {
 }
 
 /// A coordinate on the axis' scale, as its array of knots is.
-std::string scaled(const TableAxis& axis, const std::string& coordinate) {
+Value scaled(const TableAxis& axis, const Value& coordinate) {
   switch (axis.scale) {
     case AxisScale::Log:
-      return fmt::format("log(max({}, {}))", coordinate, number(axis.values.front()));
+      return call("log", {call("max", {coordinate, axis.values.front()})});
     case AxisScale::Log1p:
-      return fmt::format("log(1.0 + {})", coordinate);
+      return call("log", {Value(1.0) + coordinate});
     default:
       return coordinate;
   }
+}
+
+/// A look-up in one channel.
+Value table_call(const Table& t, const std::string& array, const std::string& suffix) {
+  std::vector<Value> arguments = {array};
+  for (const TableAxis& a : t.axes) arguments.push_back(int(a.values.size()));
+  for (std::size_t a = 0; a < t.axes.size(); ++a) arguments.push_back(position_name(suffix, a));
+  return call(table_function(t), arguments);
 }
 
 }  // namespace
@@ -39,47 +47,49 @@ std::string compact_array(const std::string& name, const std::vector<double>& va
   return out + "};\n";
 }
 
-std::string table_arrays(const Table& t, const std::string& suffix) {
-  std::string out;
+Statements table_arrays(const Table& t, const std::string& suffix) {
+  Statements out;
+  const auto add = [&](std::string name, std::vector<double> values) {
+    out.push_back(Array{std::move(name), std::move(values), Array::Layout::Aligned});
+  };
   for (std::size_t a = 0; a < t.axes.size(); ++a) {
     std::vector<double> knots;
     for (const double k : t.axes[a].values)
       knots.push_back(t.axes[a].scale == AxisScale::Log1p ? std::log1p(k) : to_scale(t.axes[a].scale, k));
-    out += array(fmt::format("knots_{}_{}", suffix, a), knots);
+    add(fmt::format("knots_{}_{}", suffix, a), knots);
   }
-  if (t.channels == 1) return out + array("table_" + suffix, t.values);
+  if (t.channels == 1) {
+    add("table_" + suffix, t.values);
+    return out;
+  }
   for (std::size_t c = 0; c < 3; ++c) {
     std::vector<double> channel;
     for (std::size_t i = c; i < t.values.size(); i += 3) channel.push_back(t.values[i]);
-    out += array(fmt::format("table_{}_{}", "rgb"[c], suffix), channel);
+    add(fmt::format("table_{}_{}", "rgb"[c], suffix), channel);
   }
   return out;
 }
 
-std::string positions(const Table& t, const std::vector<std::string>& coordinates, const std::string& suffix) {
-  std::string out;
+Statements positions(const Table& t, const std::vector<Value>& coordinates, const std::string& suffix) {
+  Statements out;
   for (std::size_t a = 0; a < t.axes.size(); ++a)
-    out += fmt::format("    float {} = brdfc_position(knots_{}_{}, {}, {});\n", position_name(suffix, a), suffix, a,
-                       t.axes[a].values.size(), scaled(t.axes[a], coordinates.at(a)));
+    out.push_back(declare("float", position_name(suffix, a),
+                          call("brdfc_position", {fmt::format("knots_{}_{}", suffix, a), int(t.axes[a].values.size()),
+                                                  scaled(t.axes[a], coordinates.at(a))})));
   return out;
 }
 
-std::string look_up(const Table& t, const std::string& suffix) {
-  if (t.axes.empty()) return t.channels == 1 ? number(t.values[0]) : color({t.values[0], t.values[1], t.values[2]});
-  std::vector<std::string> at;
-  for (std::size_t a = 0; a < t.axes.size(); ++a) at.push_back(position_name(suffix, a));
-  if (t.channels == 1) return table_call(t, "table_" + suffix, at);
-  return fmt::format("color({}, {}, {})", table_call(t, "table_r_" + suffix, at),
-                     table_call(t, "table_g_" + suffix, at), table_call(t, "table_b_" + suffix, at));
+Value look_up(const Table& t, const std::string& suffix) {
+  if (t.axes.empty())
+    return t.channels == 1 ? Value(t.values[0]) : call("color", {t.values[0], t.values[1], t.values[2]});
+  const auto of = [&](const char* name) { return table_call(t, name + suffix, suffix); };
+  return t.channels == 1 ? of("table_") : call("color", {of("table_r_"), of("table_g_"), of("table_b_")});
 }
 
-std::string table_call(const Table& t, const std::string& array, const std::vector<std::string>& positions) {
+std::string table_function(const Table& t) {
   if (t.axes.empty() || t.axes.size() > 4)
     throw std::logic_error(fmt::format("no look-up in OSL for {} axes", t.axes.size()));
-  std::string text = fmt::format("brdfc_table{}({}", t.axes.size(), array);
-  for (const TableAxis& a : t.axes) text += fmt::format(", {}", a.values.size());
-  for (const std::string& x : positions) text += ", " + x;
-  return text + ")";
+  return fmt::format("brdfc_table{}", t.axes.size());
 }
 
 }  // namespace brdfc::print

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "print/statement.h"
 #include "tables/table.h"
 
 namespace brdfc::print {
@@ -17,16 +18,16 @@ std::string compact_array(const std::string& name, const std::vector<double>& va
 
 /// Arrays of a table that positions() and look_up() read: of the knots of each axis on its scale, and of each channel.
 /// Their names end in _`suffix`.
-std::string table_arrays(const Table&, const std::string& suffix);
+Statements table_arrays(const Table&, const std::string& suffix);
 
-/// Declares where coordinates lie among the knots of each axis, for look_up(); `coordinates` are OSL for values in
-/// units of the axes. Nothing for a constant.
-std::string positions(const Table&, const std::vector<std::string>& coordinates, const std::string& suffix);
+/// Declares where coordinates, values in units of the axes, lie among the knots of each axis, for look_up(). Nothing
+/// for a constant.
+Statements positions(const Table&, const std::vector<Value>& coordinates, const std::string& suffix);
 
 /// The interpolated value: a float, or a color of three channels. Throws std::logic_error for more than four axes.
-std::string look_up(const Table&, const std::string& suffix);
+Value look_up(const Table&, const std::string& suffix);
 
-/// A look-up in one channel that is in `array`: at positions among the knots, OSL for numbers from 0 to size - 1.
-std::string table_call(const Table&, const std::string& array, const std::vector<std::string>& positions);
-
+/// The function of the library that looks a channel up: of its array, the size of each axis, and at positions among
+/// the knots, from 0 to size - 1.
+std::string table_function(const Table&);
 }  // namespace brdfc::print

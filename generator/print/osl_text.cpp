@@ -57,7 +57,8 @@ std::string indented(const std::string& text, std::size_t levels) {
   std::size_t start = 0;
   while (start < text.size()) {
     const std::size_t end = text.find('\n', start);
-    out += std::string(4 * levels, ' ') + text.substr(start, end + 1 - start);
+    if (end > start) out += std::string(4 * levels, ' ');
+    out += text.substr(start, end + 1 - start);
     start = end + 1;
   }
   return out;
@@ -75,12 +76,6 @@ std::string narrow(const std::string& text) {
   return out;
 }
 
-std::string block(const std::string& statements, std::size_t levels) {
-  if (statements.empty()) return {};
-  const std::string edge(4 * levels, ' ');
-  return edge + "{\n" + indented(statements, levels + 1) + edge + "}\n";
-}
-
 std::string array(const std::string& name, const std::vector<double>& values) {
   std::string out = fmt::format("    float {}[{}] = {{", name, values.size());
   std::size_t width = 200;
@@ -94,15 +89,6 @@ std::string array(const std::string& name, const std::vector<double>& values) {
     width += v.size() + 2;
   }
   return out + "\n    };\n";
-}
-
-std::string balanced_sum(const std::vector<std::string>& terms) {
-  if (terms.empty()) return "0";
-  if (terms.size() == 1) return terms[0];
-  const auto middle = terms.begin() + std::ptrdiff_t((terms.size() + 1) / 2);
-  const std::string left = balanced_sum({terms.begin(), middle}), right = balanced_sum({middle, terms.end()});
-  const auto group = [](const std::string& s, bool compound) { return compound ? "(" + s + ")" : s; };
-  return group(left, middle - terms.begin() > 1) + " + " + group(right, terms.end() - middle > 1);
 }
 
 }  // namespace brdfc::print

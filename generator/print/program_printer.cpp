@@ -6,14 +6,14 @@
 namespace brdfc::print {
 
 ProgramPrinter::ProgramPrinter(const Program& program, const std::vector<std::string>& taken)
-    : r_(Recorder::current()),
+    : program_(program),
       reachable_(program.reachable()),
       taken_(taken.begin(), taken.end()),
       uses_(reachable_.size(), 0) {
   for (const std::string& name : program.inputs()) taken_.insert(name);
   for (std::size_t i = 0; i < reachable_.size(); ++i)
     if (reachable_[i])
-      for (int a : r_.node(int(i)).args) ++uses_[std::size_t(a)];
+      for (int a : program_.node(int(i)).args) ++uses_[std::size_t(a)];
   for (const auto& [name, id] : program.outputs()) {
     taken_.insert(name);
     ++uses_[std::size_t(id)];
@@ -22,14 +22,14 @@ ProgramPrinter::ProgramPrinter(const Program& program, const std::vector<std::st
 
 std::string ProgramPrinter::statements(int indent) {
   std::string out;
-  statements(-1, r_.size(), indent, out);
+  statements(-1, program_.size(), indent, out);
   return out;
 }
 
 /// Statements of one scope (-1: outside every loop).
 void ProgramPrinter::statements(int scope, int limit, int indent, std::string& out) {
   for (int id = 0; id < limit; ++id) {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = program_.node(id);
     if (!reachable_[std::size_t(id)] || n.scope != scope) continue;
     if (n.op == Op::Loop)
       loop(id, indent, out);
@@ -46,7 +46,7 @@ std::string ProgramPrinter::use(int id, int precedence) const {
 }
 
 bool ProgramPrinter::wants_variable(int id) const {
-  const ExprNode& n = r_.node(id);
+  const ExprNode& n = program_.node(id);
   switch (n.op) {
     case Op::Const:
     case Op::Input:
@@ -66,15 +66,16 @@ std::string ProgramPrinter::fresh(const std::string& base) {
 }
 
 void ProgramPrinter::declare(int id, int indent, std::string& out) {
-  const ExprNode& n = r_.node(id);
+  const ExprNode& n = program_.node(id);
   const std::string value = text(id).s;
   const std::string name = fresh(n.hint.empty() ? "t" : n.hint);
   out += fmt::format("{:{}}{}\n", "", indent, declaration(n.type, name, value));
+  ++count_;
   names_[id] = name;
 }
 
 void ProgramPrinter::loop(int id, int indent, std::string& out) {
-  const ExprNode& n = r_.node(id);
+  const ExprNode& n = program_.node(id);
   const std::size_t size = n.args.size() / 2;
   const int serial = int(n.value[0]);
   const auto line = [&](int in, const std::string& statement) { out += fmt::format("{:{}}{}\n", "", in, statement); };
@@ -84,7 +85,8 @@ void ProgramPrinter::loop(int id, int indent, std::string& out) {
     line(indent, declaration(ExprType::Real, vars[k], use(n.args[k], 0)));
   }
   for (int v = 0; v < id; ++v)
-    if (r_.node(v).op == Op::LoopVar && r_.node(v).scope == serial) names_[v] = vars[std::size_t(r_.node(v).index)];
+    if (program_.node(v).op == Op::LoopVar && program_.node(v).scope == serial)
+      names_[v] = vars[std::size_t(program_.node(v).index)];
   line(indent, loop_head(fresh("i"), n.index));
   statements(serial, id, indent + 4, out);
   // All of the next state before any of it is assigned: one element may use another's old value.
@@ -94,6 +96,7 @@ void ProgramPrinter::loop(int id, int indent, std::string& out) {
     line(indent + 4, declaration(ExprType::Real, next[k], use(n.args[size + k], 0)));
   }
   for (std::size_t k = 0; k < size; ++k) line(indent + 4, assignment(vars[k], next[k]));
+  count_ += int(3 * size);
   if (const std::string end = loop_end(); !end.empty()) line(indent, end);
   loop_vars_[id] = std::move(vars);
 }

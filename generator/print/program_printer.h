@@ -11,16 +11,17 @@
 
 namespace brdfc::print {
 
-/// A language derives from this and spells what is virtual. The current recorder must be the one that the program was
-/// recorded with.
+/// A language derives from this and spells what is virtual.
 class ProgramPrinter {
  public:
-  /// No statement declares a name of `taken`, of an input or of an output.
+  /// No statement declares a name of `taken`, of an input or of an output. The program must outlive it.
   ProgramPrinter(const Program&, const std::vector<std::string>& taken);
   virtual ~ProgramPrinter() = default;
 
   /// The statements that the outputs need.
   std::string statements(int indent);
+  /// How many those are, without the heads of loops.
+  int count() const { return count_; }
   /// A value as an operand of something that binds as tightly as that.
   std::string use(int id, int precedence) const;
 
@@ -46,7 +47,7 @@ class ProgramPrinter {
   Text infix(const char* op, const ExprNode&, int precedence) const;
   const std::string& loop_out(const ExprNode&) const;
 
-  const Recorder& r_;
+  const Program& program_;
   const std::vector<bool>& reachable_;
 
  private:
@@ -55,6 +56,7 @@ class ProgramPrinter {
   void declare(int id, int indent, std::string& out);
   void loop(int id, int indent, std::string& out);
 
+  int count_ = 0;
   std::set<std::string> taken_;
   std::vector<int> uses_;
   std::map<int, std::string> names_;

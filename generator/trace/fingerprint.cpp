@@ -27,13 +27,12 @@ std::string digits_of(const Table& table) {
 }  // namespace
 
 std::string fingerprint(const Program& program) {
-  const Recorder& r = Recorder::current();
   const std::vector<bool>& reached = program.reachable();
   std::vector<std::string> of(reached.size());
   std::map<const Table*, std::string> tables;
   for (std::size_t id = 0; id < reached.size(); ++id) {
     if (!reached[id]) continue;
-    const ExprNode& n = r.node(int(id));
+    const ExprNode& n = program.node(int(id));
     std::string text = fmt::format("{} {}", name_of(n.op), int(n.type));
     switch (n.op) {
       case Op::Const:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a recording is for: outputs, the nodes that these reach, and their execution.
+// What a recording is for: outputs, the nodes that these reach, and their execution. A program owns its nodes, so that
+// it may be kept, printed and run after its recorder is gone.
 #pragma once
 
 #include <array>
@@ -24,11 +25,13 @@ template <class T, class S> void set_input(Inputs<T>& inputs, const std::string&
   set_input(inputs, name + "_z", v.z);
 }
 
-/// The outputs of a recording: names and the nodes that give them.
+/// The outputs of a recording: names and the nodes that give them. While it is made, the recorder of its values must be
+/// the current one; to read it, print it or run it takes none.
 class Program {
  public:
-  void output(const std::string& name, const Expr& value) { outputs_.push_back({name, value.id()}); }
-  void output(const std::string& name, const Rgb<Expr>& value) { outputs_.push_back({name, value.id()}); }
+  /// Throws ExprError if the values of two recorders are given to one program.
+  void output(const std::string& name, const Expr& value) { add(name, value.id()); }
+  void output(const std::string& name, const Rgb<Expr>& value) { add(name, value.id()); }
 
   /// name_x, name_y and name_z.
   void output(const std::string& name, const Vec3<Expr>& value) {
@@ -39,8 +42,12 @@ class Program {
 
   /// In the order in which they were named.
   const std::vector<std::pair<std::string, int>>& outputs() const { return outputs_; }
-  /// By node of the current recorder, which must be the one the outputs were recorded with.
-  const std::vector<bool>& reachable() const;
+  /// Nodes have the numbers that they have in the recorder, arguments smaller ones. Those from 0 to size() - 1 that are
+  /// reachable() are there.
+  int size() const { return int(nodes_.size()); }
+  const ExprNode& node(int id) const { return nodes_[std::size_t(id)]; }
+  /// By node: whether an output depends on it.
+  const std::vector<bool>& reachable() const { return reachable_; }
   /// Operations the outputs reach: what the shader executes, selections with both arms.
   int operations() const;
   /// Names of the inputs the outputs depend on.
@@ -49,9 +56,16 @@ class Program {
   template <class T> std::map<std::string, std::array<T, 3>> run(const Inputs<T>&) const;
 
  private:
+  void add(const std::string& name, int id);
+
   std::vector<std::pair<std::string, int>> outputs_;
-  mutable std::vector<bool> reachable_;  // of the first so many outputs
-  mutable std::size_t outputs_seen_ = 0;
+  std::vector<ExprNode> nodes_;
+  std::vector<bool> reachable_;
+  const Recorder* recorder_ = nullptr;  // never followed: it may be gone
 };
+
+/// Whether they have the same outputs, of the same operations on the same inputs, with the same names. In which order
+/// these were recorded makes no difference.
+bool operator==(const Program&, const Program&);
 
 }  // namespace brdfc::inline trace

@@ -17,6 +17,7 @@
 #include "model/sampling.h"
 #include "pack/probe.h"
 #include "plan/plan.h"
+#include "print/osl_program.h"
 
 namespace brdfc {
 
@@ -115,14 +116,13 @@ std::vector<std::string> declared_in(const std::string& statements) {
 std::set<std::string> declared_by(const Model& model, const forms::Form* kind, const ParamValues& fixed) {
   std::set<std::string> names;
   const auto add = [&](const forms::Recording& r) {
-    for (const std::string& name : declared_in(r.statements)) names.insert(name);
-    for (const std::string& array : r.arrays) names.insert(declared_in(array).at(0));
+    for (const std::string& name : declared_in(print::osl_program(*r.program, 0, r.taken))) names.insert(name);
   };
   for (const Choices& c : choice_combinations(model.info())) {
     if (!admits(model.info(), c, fixed)) continue;
     const ParamValues values = with_choices(model.info(), c, fixed);
     for (const forms::Recording& r : kind->recordings(model, values)) add(r);
-    if (model.has_mirror()) add(forms::record_mirror(model, values, 4));
+    if (model.has_mirror()) add(forms::record_mirror(model, values));
   }
   for (const forms::Recording& r : forms::record_bending(model)) add(r);
   return names;
@@ -150,14 +150,15 @@ TEST(OslWords, AStatementOfAModelMayHaveAnyForAName) {
   const detail::ModelOf<Hinted> model;
   for (const forms::Form* kind : {forms::form("exact"), forms::form("sampled")}) {
     const forms::Recording r = kind->recordings(model, {}).at(0);
-    const std::vector<std::string> names = declared_in(r.statements);
+    const std::string text = print::osl_program(*r.program, 4, r.taken);
+    const std::vector<std::string> names = declared_in(text);
     EXPECT_GE(names.size(), all_words().size() + 4) << "each has its own";
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size()) << "twice the same";
     for (const std::string& name : names) {
       EXPECT_FALSE(print::is_osl_word(name)) << name;
       EXPECT_EQ(model.info().param(name), nullptr) << name << ": a parameter, also where statements do not read it";
     }
-    EXPECT_THAT(r.statements, HasSubstr("float count_1 = sin("));
+    EXPECT_THAT(text, HasSubstr("float count_1 = sin("));
     EXPECT_NO_THROW(kind->write(model, table_of(model)));
   }
   EXPECT_THAT(pack::probe_source(model, {}), HasSubstr("float shown_f_1 = sin("));

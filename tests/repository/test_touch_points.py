@@ -45,6 +45,15 @@ def test_a_model_is_a_file():
     assert sorted(files) == sorted(MODELS)
 
 
+@pytest.mark.parametrize("room", ["forms", "plan", "pack"])
+def test_no_form_is_asked_for_by_name(room):
+    """What differs between forms is asked of them: a new one has nothing else to change."""
+    sources = [p for p in (ROOT / "generator" / room).iterdir() if p.suffix in (".cpp", ".h")]
+    assert sources
+    named = [p.name for p in sources if re.search(r'\bform\("', p.read_text(encoding="utf-8"))]
+    assert not named
+
+
 @pytest.mark.parametrize("file", BY_HAND)
 def test_every_model_has_its_row(file):
     assert not rows_missing(file, BY_HAND[file], MODELS)
