@@ -229,8 +229,8 @@ class Directions:
         weighed = (f_cos * self.weight[:, None]).astype(np.float32)
         views = [slice(*ends) for ends in itertools.pairwise(self.starts)]
         # Not by BLAS, whose threads wait for one another where others compute as well.
-        lobes = np.stack([np.einsum("nl,nc->lc", of_lobe[v], weighed[v]) for v in views])
-        return lobes + of_mirror[:, :, None] * mirror[:, None]
+        lobes = np.stack([np.einsum("nl,nc->cl", of_lobe[v], weighed[v]) for v in views])
+        return lobes.swapaxes(1, 2) + of_mirror[:, :, None] * mirror[:, None]
 
 
 @functools.lru_cache(maxsize=8)
