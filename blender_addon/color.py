@@ -24,13 +24,29 @@ _SRGB = (
 _ENCODED = np.linspace(0, 1, 4 * 255 + 1)
 
 
+#: Linear Rec.709 of the linear colours of each working space that scene files may name; white stays
+#: white.
+_TO_REC709 = {
+    "Linear Rec.709": np.eye(3),
+    "Linear Rec.2020": np.array(
+        [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]]
+    ),
+    "ACEScg": np.array(
+        [[1.7051, -0.6218, -0.0833], [-0.1303, 1.1408, -0.0105], [-0.0240, -0.1290, 1.1530]]
+    ),
+}
+
+
 def working_space():
     """The name of the working space."""
     if hasattr(bpy.data, "colorspace"):
         return bpy.data.colorspace.working_space
-    # Before 5.0 there is no name: Blender has Rec.709, a configuration of the user's may not.
-    usual = np.allclose(_matrix("from_scene_linear_to_rec709_linear", None), np.eye(3), atol=1e-4)
-    return "Linear Rec.709" if usual else "scene_linear of the OpenColorIO configuration"
+    # Before 5.0 there is no name, but the matrices that Blender makes of the configuration.
+    own = _matrix("from_scene_linear_to_rec709_linear", None)
+    for name, known in _TO_REC709.items():
+        if np.allclose(own, known, atol=2e-3):
+            return name
+    return "scene_linear of the OpenColorIO configuration"
 
 
 def set_srgb(image):

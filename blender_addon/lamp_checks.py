@@ -203,6 +203,42 @@ def _not_aimed(node, count, scene):
             )
 
 
+def _without_shadow(form, scene):
+    """Cycles' rays do not pass what stands before such a lamp, and so find none of its light there;
+    what light sampling finds does (docs/cycles.md)."""
+    found = [
+        item
+        for item in lamps.lamps_of(scene)
+        if not item.data.use_shadow
+        and lamps.has_importance(item.data)
+        and not lamps.is_sizeless(item.data)
+    ]
+    if not found:
+        return
+    if form.get("lamps"):
+        yield (
+            "cast_shadow",
+            "WARNING",
+            say(
+                "Cast Shadow is off for lamps ({lamps}): behind other objects part of their light "
+                "is missing, as with Blender's own nodes; turn off their Multiple Importance, too",
+                more="Up to 7 % of the light of a lamp that looks 15 degrees wide, 13 % of one of "
+                "37 degrees; a Glossy node lacks 10 % of the first",
+                lamps=_names(found),
+            ),
+        )
+    elif "zero_size_lights" in form.get("warnings", []):
+        yield (
+            "cast_shadow",
+            "WARNING",
+            say(
+                "Cast Shadow is off for lamps ({lamps}): behind other objects this material gets "
+                "none of their light; use another render method",
+                lamps=_names(found),
+            ),
+        )
+
+
 def of_node(node, form, scene):
     """(code, severity, sentence) of what is wrong with a scene's lamps for a group node's form."""
     if not form or scene.render.engine != "CYCLES":
@@ -211,5 +247,6 @@ def of_node(node, form, scene):
         yield from _not_aimed(node, form["lamps"], scene)
     if "clamp_mirror" in form.get("warnings", []):
         yield from _in_mirror(scene)
+    yield from _without_shadow(form, scene)
     if not nodes.is_native(node.node_tree):
         yield from _ray_visibility(scene)

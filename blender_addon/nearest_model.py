@@ -41,6 +41,8 @@ class Width:
     low: float
     high: float
     power: float
+    #: About what it is over that power for most nodes.
+    usual: float = 1.0
     #: Parameters of the same meaning across the tangent, and what stretch does to both.
     across: str = ""
     stretched: float = 0.0
@@ -74,7 +76,7 @@ def _base(native):
 
 
 _SLOPE = {"low": 1e-3, "high": 1.0, "power": 2}
-_EXPONENT = {"low": 1.0, "high": 1e6, "power": -4}
+_EXPONENT = {"low": 1.0, "high": 1e6, "power": -4, "usual": 2.0}
 _COLORED = (
     Candidate(
         "cook_torrance",
@@ -226,8 +228,9 @@ class Directions:
         of_lobe, of_mirror = self._from_lamps
         weighed = (f_cos * self.weight[:, None]).astype(np.float32)
         views = [slice(*ends) for ends in itertools.pairwise(self.starts)]
-        lobes = np.stack([of_lobe[here].T @ weighed[here] for here in views])
-        return lobes + of_mirror[:, :, None] * mirror[:, None]
+        # Not by BLAS, whose threads wait for one another where others compute as well.
+        lobes = np.stack([np.einsum("nl,nc->cl", of_lobe[v], weighed[v]) for v in views])
+        return lobes.swapaxes(1, 2) + of_mirror[:, :, None] * mirror[:, None]
 
 
 @functools.lru_cache(maxsize=8)
@@ -335,21 +338,22 @@ def nearest(natives, colors, colored, models):
                 closely[key] = _factor(candidate, targets, between)
             error = _mean(Target.error, candidate, targets, closely[key])
             fits.append((error, closely[key], candidate))
-    _, factor, candidate = min(fits, key=lambda f: f[0])
-    errors = tuple(_light_and_error(candidate, targets, factor, c) for c in colors)
+    error, factor, candidate = min(fits, key=lambda f: f[0])
+    known = {native.color: (_light(targets), error)}
+    errors = tuple(known.get(c) or _light_and_error(candidate, targets, factor, c) for c in colors)
     return Fit(candidate, factor, errors, best[0])
+
+
+def _light(targets):
+    """The light of nodes, mean over them."""
+    return float(np.mean([t.total.mean() for t in targets]))
 
 
 def _light_and_error(candidate, targets, factor, color):
     """The light of nodes of another colour than these, and a candidate's error with the factor of
     its width, mean over the nodes."""
-    found = []
-    for t in targets:
-        if t.native.color != color:
-            t = Target(replace(t.native, color=color))
-        values = with_width(candidate, t.native, factor)
-        found.append((float(t.total.mean()), t.error(candidate.model, values)))
-    return tuple(np.mean(found, 0).tolist())
+    targets = [Target(replace(t.native, color=color)) for t in targets]
+    return _light(targets), _mean(Target.error, candidate, targets, factor)
 
 
 def _mean(measure, candidate, targets, factor):
@@ -371,9 +375,11 @@ def _rough_width(candidate, targets):
 
     r = np.array([max(t.native.roughness, 1e-3) for t in targets])
     ends = np.log([width.low, width.high])[:, None] - width.power * np.log(r)[None]
-    grid = np.linspace(ends.min(), ends.max(), 16)
-    best = min(grid, key=off)
-    step = grid[1] - grid[0]
+    grid, step = np.linspace(ends.min(), ends.max(), 16, retstep=True)
+    usual = math.log(width.usual)
+    below, best, above = (off(x) for x in (usual - step, usual, usual + step))
+    # Where it is not about what it mostly is, all there are.
+    best = usual if below > best < above else min(grid, key=off)
     low, high = max(best - step, grid[0]), min(best + step, grid[-1])
     best = _lowest(off, low, best, high)
     return max(best - step / 3, grid[0]), best, min(best + step / 3, grid[-1])

@@ -207,6 +207,11 @@ def fixed(model_name):
     return canonical(model(model_name).get("fixed", {}))
 
 
+def fixed_optical(model_name):
+    """What those of them say of a substance that say any of it, as `optical` of parameters."""
+    return model(model_name).get("fixed_optical", {})
+
+
 def canonical(found):
     """Values of parameters as JSON has them, in the form of check_value()."""
     return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}

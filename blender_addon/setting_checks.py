@@ -6,6 +6,7 @@ import numpy as np
 
 from . import lamp_checks, lamps, nodes, shader_trees
 from .i18n import say
+from .lamps import emission
 
 #: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
 #: pixel is about 1e-6 of the distance; an orthographic camera has no direction to help out.
@@ -91,21 +92,8 @@ def _is_lit_as_a_new_scene(scene):
             max(sockets["Color"].default_value[:3]) * sockets["Strength"].default_value <= 1
             for sockets in colors
         )
-        and not any(_shines(material) for material in bpy.data.materials)
+        and not any(emission.may_shine(material) for material in bpy.data.materials)
     )
-
-
-def _shines(material):
-    """Whether a material may give light."""
-    for node in nodes.all_nodes(material):
-        if node.bl_idname == "ShaderNodeEmission":
-            return True
-        strength = node.inputs.get("Emission Strength")
-        if strength is not None and (
-            shader_trees.is_driven(strength) or strength.default_value > 0
-        ):
-            return True
-    return False
 
 
 def _clamp_mirror(material, scene):

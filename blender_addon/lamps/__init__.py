@@ -9,7 +9,7 @@ are right otherwise, whatever it says.
 
 from .filling import count, ensure_group, follow, see, seen
 from .handlers import register, unregister
-from .lights import is_sizeless
+from .lights import has_importance, is_sizeless
 from .scenes import lamps_of
 from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
@@ -25,6 +25,7 @@ __all__ = [
     "ensure_group",
     "find_group",
     "follow",
+    "has_importance",
     "is_group",
     "is_sizeless",
     "lamps_of",

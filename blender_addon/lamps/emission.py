@@ -94,15 +94,25 @@ def is_even(owner):
     return True
 
 
-def of_material(material):
-    """Radiance of a material that light sampling looks for, 0 of most."""
-    if material.cycles.emission_sampling == "NONE":
-        return 0.0
-    return sum(
+def _radiances(material):
+    """Of the nodes that emit, as far as the material shows them."""
+    return [
         _strength(shown, _EMITTERS[shown.node.bl_idname])
         for shown in shader_trees.shown(material)
         if shown.node.bl_idname in _EMITTERS
-    )
+    ]
+
+
+def of_material(material):
+    """Radiance of a material that light sampling looks for, 0 of most."""
+    return 0.0 if material.cycles.emission_sampling == "NONE" else sum(_radiances(material))
+
+
+def may_shine(material):
+    """Whether a material gives light, now or where it is animated; also one that light sampling
+    leaves out."""
+    found = _radiances(material)
+    return any(found) or bool(found and animated(material.node_tree))
 
 
 def sides(light):

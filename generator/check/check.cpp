@@ -12,6 +12,7 @@
 namespace brdfc::check {
 
 Trial::Trial(const Model& model, const Options& options) : model_(model), seed_(options.seed), effort_(options.effort) {
+  require_bound(model);
   std::vector<ParamValues> chosen =
       measure::thin_out(info(), measure::slider_cases(info(), 3, seed_), std::size_t(std::max(6, scaled(16))));
   const std::size_t usual = chosen.size();

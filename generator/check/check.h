@@ -39,7 +39,7 @@ struct Options {
 };
 /// Rows for one model: what it declares, tried at defaults, random and extreme parameters, and what every model must
 /// keep. A property declared absent must visibly be absent somewhere. A value that is NaN, infinite or negative fails
-/// every check that meets it, with model, parameters, directions and value in `where`.
+/// every check that meets it, with model, parameters, directions and value in `where`. Throws as require_bound().
 std::vector<Row> check_model(const Model&, const Options& = {});
 
 /// A glance at what nothing can be built without. Throws ValueError that names the model, the checks that fail and the

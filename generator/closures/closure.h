@@ -144,6 +144,9 @@ template <class T> T matte_loss(const T& c) {
   return T(kPi / 2 - 2.0 / 3) - grooves;
 }
 
+/// The mean of matte_loss() over all directions, by their cosines.
+inline constexpr double kMeanMatteLoss = kPi / 2 - 2.0 / 3 - (2 * kPi - 5.6) / 3;
+
 /// f of the closure OrenNayar without its weight. M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model,
 /// SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model, with light that facets
 /// reflect again as J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough Diffuse BRDF, JCGT 2025.
@@ -153,9 +156,8 @@ template <class T> Rgb<T> rough_matte(const T& roughness, const Rgb<T>& albedo, 
   const T s = cosine - cosTheta_i * cosTheta_o;
   const T t = select(s > T(0), s / maximum(maximum(cosTheta_i, cosTheta_o), tiny<T>()), s);
   // 1 - E(c) = b matte_loss(c) and its mean b matte_loss_mean, so that smooth surfaces lose no digits.
-  constexpr double kMeanLoss = kPi / 2 - 2.0 / 3 - (2 * kPi - 5.6) / 3;
-  const T again = b * matte_loss(cosTheta_i) * matte_loss(cosTheta_o) * T(kInvPi / kMeanLoss);
-  const T mean_loss = b * T(kMeanLoss);
+  const T again = b * matte_loss(cosTheta_i) * matte_loss(cosTheta_o) * T(kInvPi / kMeanMatteLoss);
+  const T mean_loss = b * T(kMeanMatteLoss);
   const Rgb<T> twice = albedo * albedo * ((T(1) - mean_loss) * again) / (Rgb<T>(T(1)) - albedo * mean_loss);
   return albedo * (Rgb<T>(a + b * t) + twice);
 }

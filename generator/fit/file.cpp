@@ -16,11 +16,15 @@
 namespace brdfc::fit {
 namespace {
 
-/// What the tables of a fit along an axis run over: files have their sizes alone.
-std::vector<TableAxis> fit_axes(const std::string& table, const std::vector<int>& sizes) {
+/// What the tables of a fit run over, `along` an axis or not: files have their sizes alone.
+std::vector<TableAxis> fit_axes(const std::string& table, const std::vector<int>& sizes, bool along) {
   static const std::vector<std::string> position = {"place_on_axis"}, errors = {"place", "number"},
+                                        by_view = {"place_of_view", "position_in_ramp"},
                                         others = {"knot", "place_of_view", "position_in_ramp"};
-  const std::vector<std::string>& names = table == "position_on_axis" ? position : table == "errors" ? errors : others;
+  const std::vector<std::string>& names = table == "position_on_axis" ? position
+                                          : table == "errors"         ? errors
+                                          : along                     ? others
+                                                                      : by_view;
   std::vector<TableAxis> axes;
   for (std::size_t i = 0; i < sizes.size(); ++i) axes.push_back(even_axis(names.at(i), sizes[i]));
   return axes;
@@ -78,7 +82,7 @@ void write_fit(const FitTables& fit, const Model& model, const ParamValues& valu
   write_table_image(image, path);
 }
 
-FitTables read_fit(const FitAxis& axis, const Terms& all_terms, const std::string& hash,
+FitTables read_fit(const std::optional<FitAxis>& axis, const Terms& all_terms, const std::string& hash,
                    const std::filesystem::path& path) {
   FitTables fit;
   fit.axis = axis;
@@ -96,18 +100,18 @@ FitTables read_fit(const FitAxis& axis, const Terms& all_terms, const std::strin
       const std::string name = t.at("name");
       std::optional<std::vector<double>> values = values_in(image, t.at("row"), count, 1);
       if (!values) input_error("{}: tables: {} has more numbers than there are", path.string(), t.at("name").dump());
-      tables[name] = make_table(name, fit_axes(name, sizes), std::move(*values));
+      tables[name] = make_table(name, fit_axes(name, sizes, axis.has_value()), std::move(*values));
     }
     fit.knots = meta.at("knots").get<std::vector<double>>();
     fit.family = meta.at("family");
     fit.grey = meta.at("grey");
     fit.tint = {meta.at("tint").at(0), meta.at("tint").at(1), meta.at("tint").at(2)};
-    fit.position = tables.at("position_on_axis");
+    if (axis) fit.position = tables.at("position_on_axis");
     const std::size_t terms = fit.terms.terms.size();
     const auto term = [&](const std::string& name, std::size_t t) {
       return tables.at(terms == 1 ? name : fmt::format("{}_{}", name, t));
     };
-    for (std::size_t t = 0; t < terms; ++t) fit.amplitude.push_back(term("amplitude", t));
+    for (std::size_t t = 0; axis && t < terms; ++t) fit.amplitude.push_back(term("amplitude", t));
     const auto& facets = meta.at("facets");
     for (std::size_t i = 0; i < facets.size(); ++i)
       fit.facets.push_back({facets[i] == "ggx" ? ClosureKind::Ggx : ClosureKind::Beckmann,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "fit/fit_tables.h"
@@ -16,8 +17,8 @@ namespace brdfc::fit {
 void write_fit(const FitTables&, const Model&, const ParamValues& values, const std::string& hash,
                const std::filesystem::path&);
 
-/// A fit along this axis and over these terms, made with factors of 1, number for number as write_fit() got it. Throws
-/// InputError naming the path if it can't be read, has another hash, or is not a fit of this shape.
-FitTables read_fit(const FitAxis&, const Terms&, const std::string& hash, const std::filesystem::path&);
+/// A fit along this axis, or none, and over these terms, made with factors of 1, number for number as write_fit() got
+/// it. Throws InputError naming the path if it can't be read, has another hash, or is not a fit of this shape.
+FitTables read_fit(const std::optional<FitAxis>&, const Terms&, const std::string& hash, const std::filesystem::path&);
 
 }  // namespace brdfc::fit

@@ -14,24 +14,22 @@ namespace brdfc::fit {
 Fit::Fit(const Model& model, const ParamValues& given, From from) {
   const Roles& roles = roles_of(model, given);
   const ParamInfo* number = roles.axis();
-  if (!number) {
-    tables_ = make_fit(model, roles.fitted());
-    return;
-  }
-  // The same fit whether factors and mixed parameters are known or sockets.
-  const auto [values, factor] = along_axis(model, roles.fitted());
+  // Along a number the same fit whether factors and mixed parameters are known or sockets.
+  const auto [values, factor] = number ? along_axis(model, roles.fitted()) : Split{roles.fitted(), Rgb<double>(1.0)};
   const auto make = [&, &v = values] { return make_fit(model, v); };
   if (from == From::Scratch) {
     tables_ = make();
   } else {
     const StoreKey key = stored_fit(model, values);
+    // One without an axis is made in seconds, of which nothing is said.
+    const std::string what = number ? fmt::format("stored fit of {} {} over {}", model.info().name,
+                                                  format_values(model.info(), values), number->name)
+                                    : std::string();
     tables_ = kept_or_made(
-        key,
-        fmt::format("stored fit of {} {} over {}", model.info().name, format_values(model.info(), values),
-                    number->name),
-        "about a minute",
+        key, what, "about a minute",
         [&, &v = values](const std::filesystem::path& path) {
-          return read_fit(fit_axis(*number), roles_of(model, v).terms(), key.hash(), path);
+          return read_fit(number ? std::optional(fit_axis(*number)) : std::nullopt, roles_of(model, v).terms(),
+                          key.hash(), path);
         },
         make,
         [&, &v = values](const FitTables& made, const std::filesystem::path& path) {

@@ -9,10 +9,12 @@
 namespace brdfc::fit {
 
 StoreKey stored_fit(const Model& model, const ParamValues& given) {
-  const ParamValues values = along_axis(model, given).values;
-  StoreKey key("fits", model.info().name);
+  const bool along = roles_of(model, given).axis() != nullptr;
+  const ParamValues values = along ? along_axis(model, given).values : given;
+  // Apart, since of these there may be many, and others take a minute.
+  StoreKey key(along ? "fits" : "fits_of_values", model.info().name);
   key.add("values", format_values(model.info(), values));
-  key.add("axis", text_of(fit_axis(*roles_of(model, values).axis())));
+  key.add("axis", along ? text_of(fit_axis(*roles_of(model, values).axis())) : "none");
   key.add("formula", measure::formula_of(model, values));
   return key.add_settings(kSettings).add_settings(kViewSettings);
 }

@@ -34,6 +34,30 @@ Closure<T> facets(ClosureKind kind, const Rgb<T>& weight, const T& alpha_x, cons
   return c;
 }
 
+/// Rough matte facets that reflect light once: f = weight / pi (1 + ratio t), where t = (wi.wo - wi.z wo.z), towards
+/// the viewer over the larger cosine. The closure has these as facets of little albedo, between which next to nothing
+/// is reflected again: 1e-5 of it at most.
+template <class T> Closure<T> rough_facets(const Rgb<T>& weight, const T& ratio) {
+  constexpr double kAlbedo = 1e-2;
+  Closure<T> c(ClosureKind::OrenNayar, weight * ((T(1) + ratio * T(0.5 - 2 * kInvPi / 3)) / T(kAlbedo)));
+  c.roughness = ratio;
+  c.albedo = Rgb<T>(T(kAlbedo));
+  return c;
+}
+
+/// Rough matte facets of the albedo `rho` between which light goes on until it leaves: J. Portsmouth, P. Kutz, S. Hill:
+/// EON: A Practical Energy-Preserving Rough Diffuse BRDF, JCGT 2025, with the albedo that is exact. Cycles' closure
+/// multiplies what facets reflect again by their colour once more than that. Of white ones it is right, and the rest is
+/// what is reflected once.
+template <class T> ClosureSum<T> lossless_rough_facets(const Rgb<T>& rho, const T& roughness) {
+  const T scale = T(1) + roughness * T(0.5 - 2 * kInvPi / 3);
+  const T lost = roughness * T(kInvPi * kMeanMatteLoss) / scale;
+  Closure<T> white(ClosureKind::OrenNayar, rho * rho * (T(1) - lost) / (Rgb<T>(T(1)) - rho * lost));
+  white.roughness = roughness;
+  white.albedo = Rgb<T>(T(1));
+  return {white, rough_facets((rho - white.weight) / scale, roughness)};
+}
+
 /// cos^e alpha about the mirror direction, without colours of its own.
 template <class T> Closure<T> power_closure(const Rgb<T>& weight, const T& exponent) {
   Closure<T> c(ClosureKind::PhongRamp, weight);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "model/model.h"
 
+#include <algorithm>
+
 #include "core/nearest.h"
 #include "model/registry.h"
 
@@ -40,6 +42,28 @@ const PackedFormulas* fastest([[maybe_unused]] const PackedFormulas* baseline,
   if (__builtin_cpu_supports("x86-64-v3")) return x86_64_v3;
 #endif
   return baseline;
+}
+
+void require_bound(const Model& model) {
+  if (const auto wrong = model.misbound()) input_error("{}: {}", model.info().name, *wrong);
+}
+
+std::optional<std::string> detail::misbound(std::vector<BoundMember> members, std::size_t size) {
+  std::ranges::sort(members, {}, &BoundMember::first);
+  std::size_t bound = 0;
+  for (std::size_t i = 0; i <= members.size(); ++i) {
+    const bool last = i == members.size();
+    const std::size_t next = last ? size : members[i].first;
+    if (next < bound)
+      return fmt::format("parameters() binds {} and {} to one member", members[i - 1].name, members[i].name);
+    if (next > bound)
+      return fmt::format("parameters() leaves out a member, {}: every member of a model has to be a parameter",
+                         members.empty() ? "the first one"
+                         : i == 0        ? fmt::format("which stands before {}", members[0].name)
+                                         : fmt::format("which stands after {}", members[i - 1].name));
+    if (!last) bound = members[i].end;
+  }
+  return std::nullopt;
 }
 
 bool register_model(std::unique_ptr<Model> model, const char* file) {

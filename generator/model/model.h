@@ -24,6 +24,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "closures/closure.h"
@@ -119,6 +120,8 @@ class Model {
  public:
   virtual ~Model() = default;
   virtual const ModelInfo& info() const = 0;
+  /// What is wrong with the members that parameters() binds, as the rest of a sentence; nothing if each is bound once.
+  virtual std::optional<std::string> misbound() const { return std::nullopt; }
   /// False for a model with delta terms alone.
   virtual bool has_scatter() const = 0;
   virtual bool has_mirror() const = 0;
@@ -142,6 +145,9 @@ class Model {
   /// A choice that is not fixed takes its default. A Recorder must be active.
   virtual std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const = 0;
 };
+
+/// Throws InputError naming the model if parameters() leaves out a member: it would hold what was in memory.
+void require_bound(const Model&);
 
 /// Name to model, in alphabetical order. Throws InputError if one is declared wrongly (model/registry.h), as the two
 /// functions below do.
@@ -201,6 +207,23 @@ struct RecordVisitor {
   }
   void operator()(Choice& member, const ChoiceSpec& s) const { BindVisitor<Expr>{values}(member, s); }
 };
+
+/// Where a parameter's member lies within its model, in bytes.
+struct BoundMember {
+  std::size_t first, end;
+  std::string name;
+};
+/// Notes them; `begin` is the model.
+struct PlaceVisitor {
+  const void* begin;
+  std::vector<BoundMember>& out;
+  template <class Member, class Spec> void operator()(const Member& member, const Spec& s) const {
+    const std::size_t first = std::size_t(reinterpret_cast<const char*>(&member) - static_cast<const char*>(begin));
+    out.push_back({first, first + sizeof(Member), s.name});
+  }
+};
+/// As Model::misbound(), of a model of so many bytes, 0 for one without members.
+std::optional<std::string> misbound(std::vector<BoundMember>, std::size_t size);
 
 template <class M>
 concept HasScatter = requires(const M& m, const Vec3<double>& w) {
@@ -442,6 +465,13 @@ template <template <class> class M> class ModelOf final : public Model {
     prototype.parameters(SchemaVisitor{info_.params});
   }
   const ModelInfo& info() const override { return info_; }
+  std::optional<std::string> misbound() const override {
+    // Of floats, whose members leave no bytes unused between them.
+    M<float> prototype{};
+    std::vector<BoundMember> members;
+    prototype.parameters(PlaceVisitor{&prototype, members});
+    return detail::misbound(std::move(members), std::is_empty_v<M<float>> ? 0 : sizeof(M<float>));
+  }
   bool has_scatter() const override { return HasScatter<M<double>>; }
   bool has_mirror() const override { return HasMirror<M<double>>; }
   bool has_exact() const override { return HasExact<M<double>> || !has_scatter(); }

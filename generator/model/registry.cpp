@@ -49,6 +49,7 @@ void Registry::add(std::unique_ptr<Model> model, const std::string& file) {
   const std::string name = model->info().name;
   try {
     check(model->info());
+    require_bound(*model);
     const auto [first, is_new] = files_.emplace(name, file);
     if (!is_new) input_error("two models are named {}, the other in {}", name, first->second);
     models_.emplace(name, std::move(model));

@@ -16,7 +16,7 @@ class Registry {
   /// Never throws for a declaration. `file` is the one it stands in.
   void add(std::unique_ptr<Model>, const std::string& file);
   /// Throws InputError with a sentence a declaration that is wrong: a name that is taken or is no identifier, a
-  /// parameter named twice, ranges that contradict one another.
+  /// parameter named twice, ranges that contradict one another, a member that is no parameter.
   const std::map<std::string, std::unique_ptr<Model>>& models() const;
 
  private:

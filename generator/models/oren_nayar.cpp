@@ -101,10 +101,12 @@ template <class T> struct OrenNayar {
     return sample_if(above(wi, wo), wi, eval(wi, wo) * pi<T>(), cosine_pdf(wi));
   }
 
-  /// What f is for most of the light: less than the mean, which the side towards the viewer raises.
-  ClosureSum<T> base(const Vec3<T>& wo) const {
-    const Rgb<T> direct = rho * (C1() + T(0.15) * T(0.45) * share(0.09) * sin2_theta(wo));
-    return {Closure<T>(ClosureKind::Diffuse, form == Full ? direct + rho * rho * (T(0.17) * share(0.13)) : direct)};
+  /// C1 and C2 are those of Cycles' rough facets, whose light towards the viewer has the same shape, and what facets
+  /// reflect again is nearly Lambert's.
+  ClosureSum<T> base(const Vec3<T>&) const {
+    const T ratio = T(0.45) * share(0.09) / C1();
+    const Rgb<T> again = rho * rho * (form == Full ? T(0.17) * share(0.13) : T(0));
+    return {rough_facets(rho * C1(), ratio), Closure<T>(ClosureKind::Diffuse, again)};
   }
 };
 

@@ -112,6 +112,13 @@ Json values_json(const ParamValues& values) {
   return j;
 }
 
+Json optical_json(const Model& model, const ParamValues& values) {
+  Json j = Json::object();
+  for (const ParamInfo& p : model.info().params)
+    if (p.optical != Optical::None && values.count(p.name)) j[p.name] = name_of(p.optical);
+  return j;
+}
+
 Json table_json(const measure::AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {
   Json grids = Json::array(), terms = Json::array();
   for (const Table& g : t.grids) {

@@ -20,6 +20,8 @@ Json looks_json();
 /// Of what is not fixed. `needs` of one: by choice, those without which no formula reads it.
 Json parameters_json(const Model&, const ParamValues& fixed);
 Json values_json(const ParamValues&);
+/// ParamInfo::optical of those of these parameters that have any, by name.
+Json optical_json(const Model&, const ParamValues&);
 Json error_json(const forms::FormError&);
 /// Without what is fixed. `file`: where the pack has the table as an image.
 Json table_json(const measure::AlbedoTable&, const std::string& file, const Model&, const ParamValues& fixed);

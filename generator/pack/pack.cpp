@@ -117,6 +117,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
        {"scatter", model.has_scatter()}};
   j["parameters"] = parameters_json(model, plan.fixed);
   j["fixed"] = values_json(plan.fixed);
+  if (const Json roles = optical_json(model, plan.fixed); !roles.empty()) j["fixed_optical"] = roles;
   if (!plan.views.all()) j["view_cosines"] = {plan.views.low, plan.views.high};
 
   measure::AlbedoTable table;

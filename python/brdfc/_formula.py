@@ -6,8 +6,6 @@ In a formula a real is an array (N,), a colour (3, N), what is constant (), (1,)
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,15 +22,17 @@ def table(sizes: tuple[int, ...], text: str) -> NDArray[np.float64]:
 
 def lookup(values: NDArray[np.float64], *coordinates) -> NDArray[np.float64]:
     """Multilinear between values on a regular grid over [0, 1]^d; outside, the nearest end."""
-    index, fraction = [], []
+    below, fraction, offsets, stride = 0, [], [0], values.size
     for size, x in zip(values.shape, coordinates, strict=True):
+        stride //= size
         position = np.clip(x, 0.0, 1.0) * (size - 1)
-        index.append(np.minimum(np.asarray(position).astype(np.intp), size - 2))
-        fraction.append(position - index[-1])
-    total = 0.0
-    for corner in itertools.product((0, 1), repeat=len(index)):
-        weight = 1.0
-        for up, f in zip(corner, fraction, strict=True):
-            weight = weight * (f if up else 1.0 - f)
-        total = total + weight * values[tuple(i + up for i, up in zip(index, corner, strict=True))]
-    return total
+        index = np.minimum(np.asarray(position).astype(np.intp), size - 2)
+        below = below + index * stride
+        fraction.append(position - index)
+        offsets = [at + up for at in offsets for up in (0, stride)]
+    flat = values.ravel()
+    corners = [flat[below + at] for at in offsets]
+    for f in reversed(fraction):
+        pairs = zip(corners[::2], corners[1::2], strict=True)
+        corners = [(1.0 - f) * low + f * high for low, high in pairs]
+    return corners[0]

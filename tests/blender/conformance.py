@@ -147,6 +147,8 @@ CASES = [
     _rough_matte((0.8, 0.5, 0.2), 0.7),
     _rough_matte((1.0, 0.9, 0.1), 1.0),
     _rough_matte((0.8, 0.5, 0.2), 0.7, normal="m"),
+    # What oren_nayar's base is made of: facets of little albedo.
+    _rough_matte((0.01, 0.01, 0.01), 0.3),
     *(_velvet(sigma) for sigma in (0.2, 0.6, 1.0)),
     _velvet(0.6, normal="m"),
     Case("diffuse_ramp", "diffuse_ramp(n, ramp)", ("diffuse_ramp", *RAMP_VALUES)),

@@ -147,6 +147,37 @@ def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
     assert extension.api.get_parameters(glass) == before
 
 
+@pytest.mark.parametrize(
+    ("model", "own", "other"),
+    [
+        ("fresnel_conductor", "copper", "gold"),
+        ("cook_torrance", "copper", "gold"),
+        ("fresnel_dielectric", "water", "diamond"),
+    ],
+)
+@pytest.mark.parametrize("free", ["all", "one", "none"])
+def test_a_substance_that_a_scenes_own_extension_lacks(
+    extension, empty, use_pack, model, own, other, free
+):
+    """It is refused where one of its numbers is a constant there, and nothing is set by half."""
+    api = extension.api
+    values = api.set_substance(api.new_material(model), own)
+    varies = {"all": set(values), "one": set(list(values)[:1]), "none": set()}[free]
+    given = {name: {"varies": True} if name in varies else v for name, v in values.items()}
+    use_pack({"m": {"model": model, "parameters": given}})
+    material = api.new_material(model)
+    assert set(api.set_substance(material, own)) == varies
+    before = api.get_parameters(material)
+    if varies == set(values):
+        assert set(api.set_substance(material, other)) == varies
+        assert api.get_parameters(material) != before
+        return
+    folded = ", ".join(name for name in values if name not in varies)
+    with pytest.raises(ValueError, match=f"was built for one scene: {folded} of .* can't be those"):
+        api.set_substance(material, other)
+    assert api.get_parameters(material) == before
+
+
 def test_glass_absorbs_what_k_says(extension, empty, color, tmp_path):
     """Beer's law at every wavelength, after the stated thickness; density is per Blender unit."""
     glass, file = extension.api.new_material("glass"), tmp_path / "own.csv"

@@ -43,7 +43,7 @@ def convert(extension, empty):
 
 
 def nearest_model(convert):
-    return import_module(f"{convert.__package__}.nearest_model")
+    return import_module("..nearest_model", convert.__package__)
 
 
 def only(plans):

@@ -942,6 +942,46 @@ def test_a_new_material_in_a_new_file_greets_without_warnings(extension, model):
     assert ("filter_glossy" in codes(extension, material, scene)) == (model in brought)
 
 
+@pytest.mark.parametrize(
+    ("shines", "change"),
+    [
+        (False, lambda node, tree, material: None),
+        (True, lambda node, tree, material: setattr(_strength_of(node), "default_value", 2.0)),
+        (True, lambda node, tree, material: _strength_of(node).keyframe_insert("default_value")),
+        (True, lambda node, tree, material: _sampled_by_chance(node, material)),
+        (False, lambda node, tree, material: tree.nodes.new("ShaderNodeEmission")),
+    ],
+    ids=["dark", "bright", "animated", "met by chance", "not shown"],
+)
+def test_what_shines_brings_the_warning_of_a_mirror(extension, shines, change):
+    """Whatever shines beside the lamp of a new file, and not what no material shows."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    scene = bpy.context.scene
+    material = extension.api.new_material("schlick")
+    extension.api.enable_osl(scene)
+    extension.api.see_lamps(scene)
+    other = bpy.data.materials.new("Other")
+    other.use_nodes = True
+    tree = other.node_tree
+    tree.nodes.clear()
+    emission, output = (
+        tree.nodes.new(f"ShaderNode{kind}") for kind in ("Emission", "OutputMaterial")
+    )
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    _strength_of(emission).default_value = 0.0
+    change(emission, tree, other)
+    assert ("filter_glossy" in codes(extension, material, scene)) == shines
+
+
+def _strength_of(emission):
+    return emission.inputs["Strength"]
+
+
+def _sampled_by_chance(emission, material):
+    _strength_of(emission).default_value = 2.0
+    material.cycles.emission_sampling = "NONE"
+
+
 def test_denoising_at_its_defaults_is_no_reason_to_warn(extension, empty):
     """Measured: what Cycles' own denoiser makes of too bright an albedo differs by 0.1 % of the
     light from what it makes of the picture alone."""

@@ -85,14 +85,31 @@ def test_scenes_load_under_configurations_of_aces(extension_zip, tmp_path, confi
         "environment": {"image": "sky.exr", "strength": 1},
     }
     (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
-    for out in ("a.exr", "a.png"):
-        done = subprocess.run(
-            [sys.executable, DRIVER, "--extension", extension_zip, "--scene", tmp_path / "s.json"]
+
+    def drive(source, out):
+        return subprocess.run(
+            [sys.executable, DRIVER, "--extension", extension_zip, "--scene", tmp_path / source]
             + ["--out", tmp_path / out],
             capture_output=True,
             text=True,
             env=os.environ | {"OCIO": f"ocio://{config}"},
         )
+
+    for out in ("a.exr", "a.png"):
+        done = drive("s.json", out)
         assert done.returncode == 0, done.stderr[-2000:]
     found = open_image_io().ImageBuf(str(tmp_path / "a.exr")).get_pixels()[..., :3]
     np.testing.assert_allclose(found, np.broadcast_to([0.2, 0.6, 0.1], found.shape), rtol=1e-4)
+    # Its working space by name, and another one, of which Blender has a choice from 5.0 on.
+    chooses = hasattr(bpy.data, "colorspace")
+    for space, taken in (("ACEScg", True), ("Linear Rec.2020", chooses)):
+        named = content | {"working_space": space, "environment": {"color": [0.2, 0.6, 0.1]}}
+        (tmp_path / "named.json").write_text(json.dumps(named), encoding="utf-8")
+        done = drive("named.json", "b.exr")
+        if not taken:
+            assert done.returncode == 2
+            assert "expected 'ACEScg', the working space of Blender" in done.stderr
+            continue
+        assert done.returncode == 0, done.stderr[-2000:]
+        found = open_image_io().ImageBuf(str(tmp_path / "b.exr")).get_pixels()[..., :3]
+        np.testing.assert_allclose(found, np.broadcast_to([0.2, 0.6, 0.1], found.shape), rtol=1e-4)

@@ -919,6 +919,13 @@ def copies_by_faces(scene, material):
     return [(0, 0, 5)]
 
 
+def copies_by_vertices(scene, material):
+    parent = emissive_plane(scene, None, [(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    parent.location.z, parent.instance_type = 5, "VERTS"
+    square(scene, material, 0.1).parent = parent
+    return [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
+
+
 def copies_by_particles(scene, material):
     item = square(scene, material, 0.1)
     collection = in_collection(scene, item)
@@ -968,6 +975,7 @@ def copies_by_nodes_of_what_they_make(scene, material):
         copies_by_collection,
         copies_by_nested_collections,
         copies_by_faces,
+        copies_by_vertices,
         copies_by_particles,
         copies_by_nodes_of_an_object,
         copies_by_nodes_of_what_they_make,
@@ -984,6 +992,97 @@ def test_copies_of_what_shines(extension, ball, empty, place):
         return
     assert sorted(tuple(s[:3].round(4)) for s in numbers) == sorted(places)
     assert {s[9] for s in numbers} == {3}
+
+
+def bulb(scene, at=(0, 0, 0)):
+    """A lamp that no picture shows by itself."""
+    data = bpy.data.lights.new("Bulb", "POINT")
+    data.shadow_soft_size = 0.1
+    item = bpy.data.objects.new("Bulb", data)
+    item.location = at
+    scene.collection.objects.link(item)
+    return item
+
+
+def lamps_by(kind):
+    """A lamp at each vertex or face of a square of 2 m."""
+
+    def place(scene):
+        parent = emissive_plane(scene, None, [(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        parent.location.z, parent.instance_type = 5, kind
+        parent.show_instancer_for_render = False  # half of each lamp is behind it
+        bulb(scene).parent = parent
+        return [(0, 0, 5)] if kind == "FACES" else [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
+
+    return place
+
+
+def lamps_by_nodes_of_an_object(scene):
+    item = bulb(scene)
+    in_collection(scene, item)
+
+    def info(tree):
+        node = tree.nodes.new("GeometryNodeObjectInfo")
+        node.inputs["Object"].default_value = item
+        node.inputs["As Instance"].default_value = True
+        return node.outputs["Geometry"]
+
+    placing(scene, info)
+    return [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
+
+
+def lamps_by_nodes_of_a_collection(scene):
+    collection = in_collection(scene, bulb(scene))
+
+    def info(tree):
+        node = tree.nodes.new("GeometryNodeCollectionInfo")
+        node.inputs["Collection"].default_value = collection
+        return node.outputs[0]
+
+    placing(scene, info)
+    return [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        lamps_by("VERTS"),
+        lamps_by("FACES"),
+        lamps_by_nodes_of_an_object,
+        lamps_by_nodes_of_a_collection,
+    ],
+    ids=["vertices", "faces", "object", "collection"],
+)
+def test_copies_of_lamps(extension, ball, empty, place):
+    """As many as Cycles shows, and where: a floor looks the same under lamps that stand there."""
+    places = place(empty)
+    bpy.context.view_layer.update()
+    extension.api.see_lamps(empty)
+    numbers = slots(empty)
+    assert sorted(tuple(s[:3].round(4)) for s in numbers) == sorted(places)
+    assert {(s[9], round(float(s[10]), 4)) for s in numbers} <= {(1, 0.1)}
+    copies = floor_picture(empty)
+    for item in [o for o in empty.collection.all_objects if o.type in {"LIGHT", "MESH"}]:
+        if item.name.startswith(("Bulb", "Panel", "Placing")):
+            bpy.data.objects.remove(item)
+    for at in places:
+        bulb(empty, at)
+    np.testing.assert_allclose(copies, floor_picture(empty), rtol=0.02)
+
+
+def floor_picture(scene):
+    """Light by quarter of a matte floor of 4 m that lies below what shines, seen from above."""
+    if "Floor" not in bpy.data.objects:
+        floor = emissive_plane(scene, None, [(-2, -2), (2, -2), (2, 2), (-2, 2)])
+        floor.name, floor.location.z = "Floor", -2
+        floor.data.materials.append(helpers.node_material("ShaderNodeBsdfDiffuse"))
+        bpy.data.objects["Sphere"].hide_render = True
+        helpers.add_camera(scene, (0, 0, 0), (0, 0, 0), orthographic=4)
+        scene.render.resolution_x = scene.render.resolution_y = 16
+        scene.cycles.samples = 64
+        scene.cycles.max_bounces = 0
+    picture = helpers.render(scene)[..., 1]
+    return [picture[y : y + 8, x : x + 8].mean() for x in (0, 8) for y in (0, 8)]
 
 
 def test_many_copies_of_what_shines(extension, ball, empty):
@@ -1211,6 +1310,10 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
         item.data.update_tag()
         item.data.use_shadow = False
         assert slots(empty)[0][10] == pytest.approx(-0.5), kind
+        (found,) = extension.api.warnings(material, empty)
+        assert (found.code, found.severity) == ("cast_shadow", "WARNING") and kind in found.message
+        item.data.cycles.use_multiple_importance_sampling = False
+        assert extension.api.warnings(material, empty) == []
         bpy.data.objects.remove(item)
     near = add_lamp(empty, "POINT", "Near", location=(0, 0, 2), shadow_soft_size=1.9)
     near.data.cycles.use_multiple_importance_sampling = False
@@ -1225,6 +1328,29 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
     assert len(slots(empty)) == 8
     (found,) = extension.api.warnings(material, empty)
     assert found.code == "multiple_importance" and "fainter" in found.message
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [("aimed", "Multiple Importance, too"), ("sampled", "none of their light"), ("twin", "")],
+)
+def test_lamps_without_shadows_are_a_finding(extension, empty, form, expected):
+    """tests/blender/test_highlights.py has what is lost; Blender's own nodes lose it as well."""
+    extension.scene_loader.apply_clean_settings(empty)
+    extension.api.enable_osl(empty)
+    material = extension.api.new_material("ward", form)
+    helpers.add_sphere(empty, material, segments=8)
+    item = add_lamp(empty, "POINT", "Key", shadow_soft_size=0.5)
+
+    def findings():
+        return [f for f in extension.api.warnings(material, empty) if f.code == "cast_shadow"]
+
+    assert findings() == []
+    item.data.use_shadow = False
+    item.data.update_tag()
+    found = findings()
+    assert len(found) == bool(expected)
+    assert all(expected in f.message and "Key" in f.message for f in found)
 
 
 IES = """IESNA:LM-63-1995

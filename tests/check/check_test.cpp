@@ -28,6 +28,18 @@ template <class T> struct Lost {
   Sample<T> sample(const Vec3<T>&, const Vec3<T>&) const { return {{T(0), T(0), T(1)}, Rgb<T>(T(0)), T(0)}; }
 };
 
+/// Leaves a member out of its parameters.
+template <class T> struct Forgetful : Lost<T> {
+  Rgb<T> rho;
+  T k;
+  static ModelInfo info() {
+    return {.name = "forgetful", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
+  }
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
+  }
+};
+
 namespace {
 
 using namespace faulty;
@@ -78,6 +90,14 @@ TEST(Checks, SeeASamplerThatLeavesTwoPercentOut) {
   const auto r = outcome<kSampler>();
   EXPECT_FALSE(r.at("chi-square"));
   EXPECT_TRUE(r.at("sampled albedo"));
+}
+TEST(Checks, NameAMemberThatIsNoParameter) {
+  const detail::ModelOf<Forgetful> model;
+  const auto says = testing::ThrowsMessage<InputError>(
+      "forgetful: parameters() leaves out a member, which stands after rho: every member of a model has to be a "
+      "parameter");
+  EXPECT_THAT([&] { check_model(model); }, says);
+  EXPECT_THAT([&] { require_vital(model); }, says);
 }
 TEST(Checks, NameDirectionsThatAreNoUnitVectors) {
   const detail::ModelOf<Faulty<kLong>::Type> model;

@@ -12,6 +12,7 @@ import numpy as np
 import OpenImageIO as oiio
 import PyOpenColorIO as ocio
 import pytest
+from colors import converted
 from support import CONFIG, SPACES, TOOL, run, scene
 
 REC709, REC2020, ACESCG = SPACES
@@ -58,14 +59,6 @@ def refused(done, *words):
     assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
     for word in words:
         assert word in done.stderr, done.stderr
-
-
-def converted(colors, first, second, config=CONFIG):
-    pixels = np.array(colors, np.float32, order="C")
-    cpu = ocio.Config.CreateFromFile(str(config)).getProcessor(first, second)
-    lossless = ocio.OptimizationFlags.OPTIMIZATION_LOSSLESS
-    cpu.getOptimizedCPUProcessor(lossless).applyRGB(pixels.reshape(-1, 3))
-    return pixels
 
 
 def test_what_is_not_finite_is_black_and_what_is_negative_stays(tmp_path):

@@ -7,8 +7,8 @@ import sys
 
 import numpy as np
 import OpenImageIO as oiio
-import PyOpenColorIO as ocio
 import pytest
+from colors import converted
 from support import CONFIG, ROOT, SPACES, run, scene
 
 sys.path.insert(0, str(ROOT / "script"))
@@ -59,14 +59,6 @@ def patches(pixels):
 def in_file(path):
     picture = oiio.ImageBuf(str(path))
     return patches(picture.get_pixels(oiio.FLOAT)), picture.spec()
-
-
-def converted(colors, first, second):
-    pixels = np.array(colors, np.float32, order="C")
-    cpu = ocio.Config.CreateFromFile(str(CONFIG)).getProcessor(first, second)
-    lossless = ocio.OptimizationFlags.OPTIMIZATION_LOSSLESS
-    cpu.getOptimizedCPUProcessor(lossless).applyRGB(pixels.reshape(-1, 3))
-    return pixels
 
 
 def test_a_scene_has_one_look_in_every_working_space(tmp_path):

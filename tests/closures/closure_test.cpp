@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/sequence.h"
+#include "model/base_terms.h"
 #include "model/sampling.h"
 
 namespace brdfc {
@@ -67,6 +68,44 @@ TEST(Closure, ARoughMatteSurfaceIsReciprocal) {
   const Rgb<double> there = evaluate(c, a, b) / a.z, back = evaluate(c, b, a) / b.z;
   EXPECT_NEAR(there.r, back.r, 1e-14);
   EXPECT_NEAR(there.b, back.b, 1e-14);
+}
+
+/// The model as its authors print it, with the exact albedo of facets; f cos.
+Rgb<double> eon(const Rgb<double>& rho, double r, const Vec3<double>& wi, const Vec3<double>& wo) {
+  const double c1 = 0.5 - 2 / (3 * kPi), c2 = 2. / 3 - 28 / (15 * kPi), AF = 1 / (1 + c1 * r), BF = r * AF;
+  const auto E = [&](double mu) {
+    const double s = std::sqrt(1 - mu * mu);
+    return AF + BF / kPi * (s * (std::acos(mu) - s * mu) + 2. / 3 * ((s / mu) * (1 - s * s * s) - s));
+  };
+  const double s = dot(wi, wo) - wi.z * wo.z, t = s > 0 ? s / std::max(wi.z, wo.z) : s, mean = AF * (1 + c2 * r);
+  const Rgb<double> again = rho * rho * mean / (Rgb<double>(1.0) - rho * (1 - mean));
+  const Rgb<double> f = rho * (AF * (1 + r * t)) + again * ((1 - E(wo.z)) * (1 - E(wi.z)) / (1 - mean));
+  return f * (wi.z / kPi);
+}
+
+TEST(Closure, LosslessRoughFacetsAreASumOfTwo) {
+  const Rgb<double> rho(0.95, 0.5, 0.05);
+  for (const double r : {0.05, 0.3, 1.})
+    for (const auto& [wi, wo] : {std::pair{at(30, 1), at(70, 1.5)}, {at(50, 0.4), at(75, 3)}, {at(5, 0), at(85, 2)}}) {
+      const ClosureSum<double> sum = lossless_rough_facets(rho, r);
+      const Rgb<double> found = evaluate(sum, wi, wo), expected = eon(rho, r, wi, wo);
+      for (const Closure<double>& c : sum) EXPECT_GE(std::min({c.weight.r, c.weight.g, c.weight.b}), 0);
+      EXPECT_NEAR(found.r, expected.r, 2e-5 * expected.r) << r;
+      EXPECT_NEAR(found.g, expected.g, 2e-5 * expected.g) << r;
+      EXPECT_NEAR(found.b, expected.b, 2e-5 * expected.b) << r;
+      // One closure of this colour reflects too little again.
+      EXPECT_LT(evaluate(rough_matte(r, rho), wi, wo).g, expected.g * (1 - 1e-3 * r));
+    }
+}
+
+TEST(Closure, RoughFacetsReflectOnce) {
+  for (const double ratio : {0., 0.2, 1.}) {
+    const Closure<double> c = rough_facets(Rgb<double>(0.5), ratio);
+    for (const auto& [wi, wo] : {std::pair{at(30, 1), at(70, 1.5)}, {at(50, 0.4), at(75, 3)}}) {
+      const double s = dot(wi, wo) - wi.z * wo.z, t = s > 0 ? s / std::max(wi.z, wo.z) : s;
+      EXPECT_NEAR(evaluate(c, wi, wo).g, 0.5 * wi.z / kPi * (1 + ratio * t), 1e-5);
+    }
+  }
 }
 
 /// Its loss in the form that Cycles' source has, which divides by the cosine.

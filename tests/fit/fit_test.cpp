@@ -14,6 +14,8 @@
 
 #include "closures/lobe.h"
 #include "core/hash.h"
+#include "environment.h"
+#include "fit/stored.h"
 #include "forms/aimed.h"
 #include "forms/form.h"
 #include "measure/albedo.h"
@@ -451,6 +453,26 @@ TEST(StoredFits, AreAsCloseAsMeasuredAlongTheWholeSlider) {
     hold("albedo", spread(albedo), row.albedo);
     EXPECT_LE(fit.mean_l1({}), 0.15) << row.model;
   }
+}
+
+/// A build of a model of one's own makes it once.
+TEST(Fit, OfConstantsIsKeptInTheCache) {
+  const TempFolder folder;
+  const Environment environment("BRDFC_CACHE", folder.path().string());
+  const Model& model = find_model("oren_nayar");
+  const ParamValues values = roles_of(model, complete(model.info(), {{"sigma", 0.123}})).fitted();
+  const Fit made(model, values);
+  const auto path = find_cached(stored_fit(model, values));
+  ASSERT_TRUE(path);
+  // A file that is written anew takes its place.
+  std::filesystem::create_hard_link(*path, folder.path() / "same");
+  const Fit read(model, values);
+  EXPECT_EQ(std::filesystem::hard_link_count(*path), 2u);
+  ASSERT_EQ(read.errors().size(), made.errors().size());
+  const Vec3<double> wo = direction(0.4, 0.3), wi = direction(0.7, 2);
+  EXPECT_EQ(evaluate(read.closures(wo, read.varied(values)), wi, wo).g,
+            evaluate(made.closures(wo, made.varied(values)), wi, wo).g);
+  EXPECT_NE(stored_fit(model, complete(model.info(), {{"sigma", 0.124}})).hash(), stored_fit(model, values).hash());
 }
 
 /// The errors that are kept with a fit are those of what is kept: in the middle of each slider, measured anew.

@@ -7,8 +7,52 @@
 #include <gtest/gtest.h>
 
 namespace brdfc {
+
+// Not in the anonymous namespace, where Clang would call their functions unused.
+namespace registry_test {
+
+enum class Wrong { Nothing, First, Middle, Last, Only, Twice };
+
+/// Minnaert's parameters and a choice, bound as they should be or not.
+template <Wrong W> struct Draft {
+  template <class T> struct Type {
+    Rgb<T> rho;
+    T k;
+    Choice law;
+
+    static ModelInfo info() { return {.name = "draft", .look = Look::Matte}; }
+    template <class Visitor> void parameters(const Visitor& v) {
+      if (W == Wrong::Only) return;
+      if (W != Wrong::First) v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
+      if (W != Wrong::Middle) v(k, NumberSpec{"k", "Darkening", 1, 1, 2, 1, 2, ""});
+      if (W == Wrong::Twice) v(k, NumberSpec{"l", "Brightening", 1, 1, 2, 1, 2, ""});
+      if (W != Wrong::Last) v(law, ChoiceSpec{"law", "Law", {"one", "other"}, ""});
+    }
+    Rgb<T> mirror(const Vec3<T>&) const { return rho * k; }
+  };
+};
+
+template <class T> struct OneNumber {
+  T k{1};
+  static constexpr double kOf = 2;  // a constant is no member
+
+  static ModelInfo info() { return {.name = "draft", .look = Look::Matte}; }
+  template <class Visitor> void parameters(const Visitor&) {}
+  Rgb<T> mirror(const Vec3<T>&) const { return Rgb<T>(T(kOf)); }
+};
+
+template <class T> struct NoNumber {
+  static ModelInfo info() { return {.name = "draft", .look = Look::Matte}; }
+  template <class Visitor> void parameters(const Visitor&) {}
+  Rgb<T> mirror(const Vec3<T>&) const { return Rgb<T>(T(1)); }
+};
+
+}  // namespace registry_test
+
 namespace {
 
+using registry_test::Draft;
+using registry_test::Wrong;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -123,6 +167,33 @@ TEST(Registry, RefusesLabelsThatOtherSocketsHave) {
   other.name = "m";
   info.params.push_back(other);
   EXPECT_THAT(complaint(info), HasSubstr("draft: m: expected another label than 'Glossiness'"));
+}
+
+/// What asking for the models says of one whose class this is.
+template <template <class> class M> std::string complaint_of() {
+  Registry registry;
+  registry.add(std::make_unique<detail::ModelOf<M>>(), "draft.cpp");
+  try {
+    registry.models();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Registry, RefusesMembersThatAreNoParameters) {
+  EXPECT_EQ(complaint_of<Draft<Wrong::Nothing>::Type>(), "");
+  EXPECT_EQ(complaint_of<registry_test::NoNumber>(), "");
+  const auto left_out = [](const std::string& where) {
+    return "draft.cpp: draft: parameters() leaves out a member, " + where +
+           ": every member of a model has to be a parameter";
+  };
+  EXPECT_EQ(complaint_of<Draft<Wrong::First>::Type>(), left_out("which stands before k"));
+  EXPECT_EQ(complaint_of<Draft<Wrong::Middle>::Type>(), left_out("which stands after rho"));
+  EXPECT_EQ(complaint_of<Draft<Wrong::Last>::Type>(), left_out("which stands after k"));
+  EXPECT_EQ(complaint_of<registry_test::OneNumber>(), left_out("the first one"));
+  EXPECT_EQ(complaint_of<Draft<Wrong::Only>::Type>(), left_out("the first one"));
+  EXPECT_EQ(complaint_of<Draft<Wrong::Twice>::Type>(), "draft.cpp: draft: parameters() binds k and l to one member");
 }
 
 TEST(Registry, TellsAllThatIsWrongAtOnce) {

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "core/data_dir.h"
+#include "environment.h"
 #include "fit/settings.h"
 #include "measure/albedo_settings.h"
 #include "support.h"
@@ -91,20 +92,6 @@ TEST(Store, SaysWhatItHasNotAndReplacesWhatIsOld) {
   EXPECT_FALSE(std::filesystem::exists(old.path()));
   EXPECT_TRUE(std::filesystem::exists(other.path())) << "a model whose name begins alike";
 }
-
-/// Sets an environment variable until the test ends.
-class Environment {
- public:
-  Environment(const char* name, const std::string& value) : name_(name) {
-    if (const char* before = getenv(name)) before_ = before;
-    setenv(name, value.c_str(), 1);
-  }
-  ~Environment() { before_ ? setenv(name_, before_->c_str(), 1) : unsetenv(name_); }
-
- private:
-  const char* name_;
-  std::optional<std::string> before_;
-};
 
 /// A result that is a word, and how often it was made.
 struct Word {

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a node of Blender's is to a conversion: its kind, what reaches its sockets, and why one is
+not converted."""
+
+import functools
+
+import bpy
+
+from .. import animation, shader_trees, shader_values
+from ..i18n import Sentence, say
+from ..native_bsdf import Native
+
+#: Roughnesses at which a model is to be near where a texture gives it.
+ROUGHNESSES = (0.2, 0.5, 0.8)
+#: Colour at which the width is sought where nothing is known of what is linked.
+GREY = (0.5, 0.5, 0.5)
+#: Colours between which that one may lie: the error of a plan is a range.
+DARK, BRIGHT = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+
+KINDS = {
+    "ShaderNodeBsdfDiffuse": "diffuse",
+    "ShaderNodeBsdfAnisotropic": "glossy",
+    "ShaderNodeBsdfPrincipled": "principled",
+    "ShaderNodeBsdfGlass": "glass",
+}
+#: Nodes that stay beside models, for they do what models don't.
+STAYING = {
+    f"ShaderNode{name}"
+    for name in (
+        *("AddShader", "Background", "BsdfTransparent", "Emission", "Holdout", "MixShader"),
+        "Script",
+    )
+}
+#: Sockets that must keep the value at which they do nothing; no model has what they do.
+_OFF = {
+    "Subsurface Weight": (0.0, "Subsurface"),
+    "Transmission Weight": (0.0, "Transmission"),
+    "Coat Weight": (0.0, "Coat"),
+    "Sheen Weight": (0.0, "Sheen"),
+    "Thin Film Thickness": (0.0, "Thin Film"),
+    "Thin Wall": (0.0, "Thin Wall"),
+}
+#: Sockets whose meaning is known here, by kind; what is set of others is a refusal. Those of
+#: subsurface, coat, sheen and thin film do nothing while that is off.
+KNOWN_SOCKETS = {
+    "diffuse": {"Color", "Roughness", "Normal", "Weight"},
+    "glossy": {"Color", "Roughness", "Anisotropy", "Rotation", "Normal", "Tangent", "Weight"},
+    "glass": {
+        *("Color", "Roughness", "IOR", "Normal", "Weight"),
+        *("Thin Film Thickness", "Thin Film IOR"),
+    },
+    "principled": {
+        *_OFF,
+        *("Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Normal", "Weight"),
+        *("Diffuse Roughness", "Specular IOR Level", "Specular Tint"),
+        *("Anisotropic", "Anisotropic Rotation", "Tangent"),
+        *("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy"),
+        *("Coat Roughness", "Coat IOR", "Coat Tint", "Coat Normal"),
+        *("Sheen Roughness", "Sheen Tint", "Thin Film IOR"),
+        *("Emission Color", "Emission Strength"),
+    },
+}
+#: The same of settings of the nodes themselves.
+_KNOWN_SETTINGS = {"distribution", "subsurface_method"}
+
+
+#: Sockets of which importers and makers of materials often have an image that is one colour.
+_OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"}
+
+
+class Refused(ValueError):
+    """Why a node is not converted, in a few words."""
+
+
+@functools.cache
+def _fresh(kind):
+    """{identifier: value} of the sockets of a new node."""
+    tree = bpy.data.node_groups.new("Fresh", "ShaderNodeTree")
+    try:
+        return {s.identifier: _held(s) for s in tree.nodes.new(kind).inputs}
+    finally:
+        bpy.data.node_groups.remove(tree)
+
+
+def _held(socket):
+    value = getattr(socket, "default_value", None)
+    return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+
+class Inputs:
+    """What reaches a node's sockets. Raises Refused for what varies in a way that no model
+    follows."""
+
+    def __init__(self, node):
+        self._node, self._moved = node, animation.moved(node)
+        self._values = shader_values.Constants(), shader_values.Constants(images=True)
+        self._found = {}
+
+    def __contains__(self, name):
+        return name in self._node.inputs
+
+    def reaches(self, name):
+        """Whether the output of a node reaches a socket; the link to it may stay."""
+        return shader_trees.is_driven(self._node.inputs[name])
+
+    def constant(self, name):
+        """The value of a socket, also behind links; None where it is not constant."""
+        if name not in self._found:
+            values = self._values[name in _OFTEN_ONE_COLOR]
+            self._found[name] = values.told(self._node.inputs[name])
+        return self._found[name]
+
+    def mean(self, name):
+        """The value, or its mean over images; None where neither is known."""
+        known = self.constant(name)
+        return shader_values.mean(self._node.inputs[name]) if known is None else known
+
+    def follows(self, name):
+        """Whether a link gives a socket a value that is not constant. An animation of the socket
+        itself is refused, for it would end with the node."""
+        if self.constant(name) is not None:
+            return False
+        if self.reaches(name):
+            return True
+        raise Refused(say("{socket} is animated", socket=Sentence(name)))
+
+    def value(self, name, default=0.0):
+        """Of a socket that has to be constant."""
+        if name not in self:
+            return default
+        if self.follows(name):
+            raise Refused(say("{socket} is linked", socket=Sentence(name)))
+        return self.constant(name)
+
+    def colors(self, name):
+        """The colour at which a model is sought, and those at which its error is told."""
+        if self.follows(name) and (known := self.mean(name)) is None:
+            return GREY, (DARK, BRIGHT)
+        known = tuple(max(c, 0.0) for c in self.mean(name))
+        return known, (known,)
+
+    def setting(self, name):
+        """Of the node itself."""
+        if (self._node.as_pointer(), name) in self._moved:
+            label = self._node.bl_rna.properties[name].name
+            raise Refused(say("{socket} is animated", socket=Sentence(label)))
+        return getattr(self._node, name)
+
+    def check_unknown(self, known):
+        """Raises Refused for what is set of the sockets and settings that a later version of
+        Blender has added."""
+        for socket in self._node.inputs:
+            if socket.name in known or not socket.enabled:
+                continue
+            fresh = _fresh(self._node.bl_idname).get(socket.identifier)
+            animated = animation.value_of(socket) in self._moved
+            if self.reaches(socket.name) or animated or _held(socket) != fresh:
+                raise Refused(say("it has {what}", what=Sentence(socket.name)))
+        for setting in self._node.bl_rna.properties:
+            name = setting.identifier
+            if name in _KNOWN_SETTINGS or name in bpy.types.ShaderNode.bl_rna.properties:
+                continue
+            plain = setting.type in {"BOOLEAN", "INT", "FLOAT", "ENUM"}
+            if plain and not setting.is_readonly and self.setting(name) != setting.default:
+                raise Refused(say("it has {what}", what=Sentence(setting.name)))
+
+
+def given_of(node, inputs):
+    """What all Natives of a node share, and the roughnesses that they have."""
+    kind = KINDS[node.bl_idname]
+    inputs.setting("mute")
+    inputs.check_unknown(KNOWN_SOCKETS[kind])
+    given = {"kind": kind, "color": inputs.colors(color_of(kind))[0]}
+    if kind in ("glossy", "principled"):
+        distribution = inputs.setting("distribution")
+        if distribution not in ("GGX", "MULTI_GGX", "BECKMANN"):
+            name = node.bl_rna.properties["distribution"].enum_items[distribution].name
+            raise Refused(say("its distribution is {kind}", kind=Sentence(name)))
+        given["beckmann"] = distribution == "BECKMANN"
+        given["multiscatter"] = distribution == "MULTI_GGX"
+        given["stretch"] = _stretch(inputs, kind)
+    if kind == "principled":
+        for name, (off, what) in _OFF.items():
+            if inputs.value(name, off) != off:
+                raise Refused(say("it has {what}", what=Sentence(what)))
+        if inputs.value("Specular Tint", (1, 1, 1)) != (1, 1, 1):
+            raise Refused(say("it has a Specular Tint"))
+        level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
+        given["f0"] = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.9)
+        metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
+        given["metallic"] = min(max(metallic, 0.0), 1.0)
+        given["diffuse_roughness"] = inputs.value("Diffuse Roughness")
+    if inputs.follows("Roughness"):
+        return given, ROUGHNESSES
+    return given, (min(max(inputs.value("Roughness"), 0.0), 1.0),)
+
+
+def color_of(kind):
+    return "Base Color" if kind == "principled" else "Color"
+
+
+def natives(node):
+    """The node as Native, at one roughness or, where that is linked, at several. Raises Refused."""
+    given, roughnesses = given_of(node, Inputs(node))
+    return [Native(**given, roughness=r) for r in roughnesses]
+
+
+def _stretch(inputs, kind):
+    """Width of the lobe along the tangent over that across it."""
+    a = inputs.value("Anisotropic" if kind == "principled" else "Anisotropy")
+    if a == 0:
+        return 1.0
+    turn = inputs.value("Anisotropic Rotation" if kind == "principled" else "Rotation")
+    if turn != 0 or not inputs.reaches("Tangent"):
+        raise Refused(say("it is anisotropic without a Tangent that is linked, or turned"))
+    if kind == "principled":
+        return 1 / (1 - 0.9 * min(max(a, 0.0), 1.0))
+    return (1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2
+
+
+def glows(inputs):
+    """Whether a Principled node shines by itself."""
+    names = ("Emission Color", "Emission Strength")
+    for name in names:
+        known = inputs.constant(name)
+        if known is not None and not any(known if isinstance(known, tuple) else (known,)):
+            return False
+    for name in names:
+        inputs.follows(name)
+    return True
+
+
+def is_transparent(inputs):
+    """Whether a Principled node lets something of what is behind it through."""
+    return inputs.follows("Alpha") or inputs.constant("Alpha") < 1

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Puts models in the places of nodes, and the nodes back."""
+
+from dataclasses import dataclass, replace
+
+import bpy
+
+from .. import bump_correction, editable, nodes, pack, shader_trees, shader_values
+from .node_values import KINDS
+from .plans import Part
+
+#: Custom property of a group node: the name of the node that it stands in for.
+BEFORE = "brdfc_before"
+#: And whether Bump Map Correction was on then; without it an earlier version converted the node,
+#: which turned it off.
+CORRECTED = "brdfc_before_bump_map_correction"
+#: Of nodes that were added for it: the name of the group node.
+HELPS = "brdfc_helps"
+
+
+def apply(plans):
+    """Puts the models into the materials: links stay, and the nodes of before, which nothing shows
+    any more, so that restore() finds them. Returns how many nodes were converted.
+
+    All groups are made before anything is changed. Raises ValueError, also where a node is not
+    what the plan was made of any more, CompileError.
+    """
+    wanted = [replace(p, node=p.seen.now()) for p in plans if not p.refusal]
+    editable.check(*(p.material for p in wanted))
+    # What is linked may have any value.
+    made = [[_Made(part, *_resolved(part)) for part in p.parts] for p in wanted]
+    known = set(bpy.data.node_groups)
+    try:
+        for one in (one for each in made for one in each):
+            nodes.ensure_group(one.part.model, one.form)
+    except BaseException:
+        nodes.remove_unused_groups(known)
+        raise
+    for p, parts in zip(wanted, made, strict=True):
+        _replace(p, parts)
+    return len(wanted)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A Part, its form, and its values as sockets take them."""
+
+    part: Part
+    form: str
+    values: dict
+
+
+def _resolved(part):
+    values = {k: pack.check_value(part.model, k, v) for k, v in part.values.items()}
+    return pack.resolve(part.model, "auto", values | dict.fromkeys(part.links)), values
+
+
+def _source(socket):
+    """The output that is linked to a socket, if that has any effect."""
+    if not shader_trees.is_driven(socket):
+        return None
+    return next(link.from_socket for link in socket.links if shader_trees.counts(link))
+
+
+def _replace(p, parts):
+    node = p.node
+    groups = [_add(p, made) for made in parts]
+    group, *metal = groups
+    group[BEFORE] = node.name
+    for other in metal:
+        other[HELPS] = group.name
+        other.location.y -= 300
+    shader = _joined(p, groups)
+    for link in [link for link in node.outputs[0].links if shader_trees.counts(link)]:
+        target = link.to_socket
+        p.material.node_tree.links.remove(link)
+        p.material.node_tree.links.new(shader, target)
+    node.location = (node.location.x, node.location.y - 700)
+
+
+def _add(p, made):
+    """The group node of a model, with the links of the node that it stands in for."""
+    tree, node = p.material.node_tree, p.node
+    group = nodes.add_group_node(tree, made.part.model, made.form)
+    group.location = node.location
+    group[CORRECTED] = bump_correction.recorded(p.material)
+    for name, value in made.values.items():
+        nodes.set_value(group, name, value)
+    present = nodes.sockets(group)
+    for name, socket in made.part.links.items():
+        if source := _source(node.inputs[socket]):
+            tree.links.new(source, present[name])
+    for name in (pack.NORMAL, pack.TANGENT):
+        if name in node.inputs and (source := _source(node.inputs[name])):
+            tree.links.new(source, present[name])
+    for name, *law in made.part.widths:
+        tree.links.new(_follow(tree, group, _source(node.inputs["Roughness"]), *law), present[name])
+    return group
+
+
+def _joined(p, groups):
+    """The shader of what stands in for a node: its models, and what else of it they lack."""
+    shader, *metal = (group.outputs["BSDF"] for group in groups)
+    if metal:
+        shader = _mix(p, groups[0], "Metallic", shader, metal[0])
+    if p.glows:
+        emission = _helper(p, groups[0], "ShaderNodeEmission")
+        for name, socket in (("Color", "Emission Color"), ("Strength", "Emission Strength")):
+            _give(p, emission.inputs[name], socket)
+        add = _helper(p, groups[0], "ShaderNodeAddShader")
+        p.material.node_tree.links.new(shader, add.inputs[0])
+        p.material.node_tree.links.new(emission.outputs[0], add.inputs[1])
+        shader = add.outputs[0]
+    if p.transparent:
+        clear = _helper(p, groups[0], "ShaderNodeBsdfTransparent")
+        shader = _mix(p, groups[0], "Alpha", clear.outputs[0], shader)
+    return shader
+
+
+def _helper(p, group, kind):
+    """A node that helps a group to stand in for another node."""
+    tree = p.material.node_tree
+    count = sum(n.get(HELPS) == group.name for n in tree.nodes)
+    helper = tree.nodes.new(kind)
+    helper.location = (group.location.x + 220, group.location.y + 60 - 60 * count)
+    helper.hide, helper[HELPS] = True, group.name
+    return helper
+
+
+def _mix(p, group, name, first, second):
+    mix = _helper(p, group, "ShaderNodeMixShader")
+    _give(p, mix.inputs[0], name)
+    p.material.node_tree.links.new(first, mix.inputs[1])
+    p.material.node_tree.links.new(second, mix.inputs[2])
+    return mix.outputs[0]
+
+
+def _give(p, socket, name):
+    """What reaches a socket of the node that is replaced, for another socket."""
+    own = p.node.inputs[name]
+    if source := _source(own):
+        p.material.node_tree.links.new(source, socket)
+        return
+    value = shader_values.constant(own)
+    socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+
+
+def _follow(tree, group, roughness, factor, power, low, high):
+    """factor * roughness^power, held to the range of the parameter."""
+    source = roughness
+    for i, (operation, *operands) in enumerate(
+        (
+            ("MAXIMUM", 1e-3),
+            ("POWER", power),
+            ("MULTIPLY", factor),
+            ("MAXIMUM", low),
+            ("MINIMUM", high),
+        )
+    ):
+        math_node = tree.nodes.new("ShaderNodeMath")
+        math_node.operation, math_node.hide = operation, True
+        math_node.location = (group.location.x - 200, group.location.y - 40 * i)
+        math_node[HELPS] = group.name
+        tree.links.new(source, math_node.inputs[0])
+        math_node.inputs[1].default_value = operands[0]
+        source = math_node.outputs[0]
+    return source
+
+
+def is_converted(node):
+    """Whether a node stands in for one of Blender's own."""
+    return nodes.is_ours(node) and BEFORE in node
+
+
+def _before(group):
+    before = group.id_data.nodes.get(group[BEFORE])
+    return before if before is not None and before.bl_idname in KINDS else None
+
+
+def _outgoing(group, helpers):
+    """The links by which a group and the nodes that help it are shown."""
+    every = [group, *helpers]
+    shaders = [s for node in every for s in node.outputs if s.type == "SHADER"]
+    return [link for s in shaders for link in s.links if link.to_node not in every]
+
+
+def restore(material):
+    """Puts the nodes of before back, and the settings; where they are gone, the twin, which
+    Blender's own nodes are as well. Returns how many nodes were put back. Raises ValueError where
+    there is neither."""
+    editable.check(material)
+    if material.node_tree is None:
+        return 0
+    tree = material.node_tree
+    pairs = [(n, _before(n)) for n in tree.nodes if is_converted(n)]
+    for group, before in pairs:
+        if before is None:  # refused before anything is changed
+            others = [n for n in tree.nodes if n.get(HELPS) == group.name and nodes.is_ours(n)]
+            for model in (group, *others):
+                pack.resolve(nodes.identity(model)[0], "twin", nodes.all_values(model))
+    corrected = [bool(group.get(CORRECTED, True)) for group, _ in pairs]
+    for group, before in pairs:
+        helpers = [n for n in tree.nodes if n.get(HELPS) == group.name]
+        if before is None:
+            for model in [group, *filter(nodes.is_ours, helpers)]:
+                nodes.switch(model, "twin")
+            for key in (BEFORE, CORRECTED):
+                group.pop(key, None)
+            continue
+        for link in _outgoing(group, helpers):
+            target = link.to_socket
+            tree.links.remove(link)
+            tree.links.new(before.outputs[0], target)
+        before.location = group.location
+        for helper in helpers:
+            tree.nodes.remove(helper)
+        tree.nodes.remove(group)
+    if pairs:
+        bump_correction.restore(material, all(corrected))
+    nodes.remove_unused_groups()
+    return len(pairs)

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Materials of a scene file: models, values, textures and substances.
+#include <algorithm>
+
+#include "model/optical.h"
+#include "reference/procedural.h"
+#include "reference/scene_files.h"
+
+namespace brdfc::reference {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+class MaterialReader {
+ public:
+  MaterialReader(SceneFiles& files, bool alone) : files_(files), scene_(files.scene), alone_(alone) {}
+
+  void read(const JsonView& j) {
+    json& out = scene_.resolved["materials"] = json::object();
+    for (const auto& [id, m] : j.members()) {
+      m.only({"model", "optical", "thickness", "parameters", "representation"});
+      Material material;
+      material.id = id;
+      std::vector<std::string> names;
+      for (const auto& [name, model] : models()) names.push_back(name);
+      material.model = &find_model(m.at("model").choice(names));
+      const ModelInfo& info = material.model->info();
+      json& resolved = out[id] = {{"model", info.name}, {"parameters", json::object()}};
+      if (const auto optical = m.find("optical")) {
+        std::optional<double> thickness;
+        if (const auto t = m.find("thickness")) thickness = t->number(kThinnest, kThickest);
+        material.values = optical_parameters(*optical, info, thickness);
+        for (const auto& [name, value] : material.values)
+          resolved["parameters"][name] = std::visit([](const auto& v) { return json(v); }, value);
+      } else if (const auto thickness = m.find("thickness")) {
+        thickness->error("expected \"optical\" beside it, which says what absorbs");
+      }
+      const ParamValues of_substance = material.values;
+      if (const auto parameters = m.find("parameters"))
+        for (const auto& [name, value] : parameters->members()) {
+          const ParamInfo* p = info.param(name);
+          if (!p) {
+            std::vector<std::string> known;
+            for (const ParamInfo& each : info.params) known.push_back(each.name);
+            value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
+          }
+          if (of_substance.count(name)) value.error("\"optical\" says what it is, expected one of the two");
+          if (alone_ && value.json().is_object()) {
+            value.only({"varies"});
+            if (!value.at("varies").boolean()) value.at("varies").fail("true, or the parameter's value");
+            material.varying.insert(name);
+          } else if (value.json().is_object()) {
+            value.only({"texture"});
+            if (p->kind == ParamKind::Choice) value.error("a choice can't be textured");
+            const auto image = read_texture(value.at("texture"), *p, resolved["parameters"][name]);
+            material.values[name] = texture_mean(value, *p, *image);
+            material.textures[name] = image;
+          } else {
+            material.values[name] = read_value(value, *p);
+            resolved["parameters"][name] = value.json();
+          }
+        }
+      if (const auto v = m.find("representation")) material.representation = v->text();
+      resolved["representation"] = material.representation;
+      try {
+        material.values = complete(info, material.values);
+      } catch (const InputError& e) {
+        m.error(e.what());
+      }
+      scene_.materials.push_back(std::move(material));
+    }
+    if (scene_.materials.empty()) j.error("expected at least one material");
+  }
+
+ private:
+  static std::size_t channels_of(const ParamInfo& info) { return info.kind == ParamKind::Number ? 1 : 3; }
+
+  std::shared_ptr<const Image> read_texture(const JsonView& j, const ParamInfo& info, json& resolved) {
+    Image image;
+    if (j.json().is_object() && j.has("procedural")) {
+      j.at("procedural").choice({"checker"});
+      j.only({"procedural", "a", "b", "cells"});
+      const auto a = j.at("a").numbers<3>(0, kBright), b = j.at("b").numbers<3>(0, kBright);
+      image = checker_texture({a[0], a[1], a[2]}, {b[0], b[1], b[2]}, j.at("cells").integer(1, 256));
+    } else {
+      const bool named = j.json().is_string();
+      if (!named) j.only({"image", "colorspace"});
+      const JsonView file = named ? j : j.at("image");
+      image = files_.read_picture(file, named ? "auto" : files_.read_colorspace(j));
+      limit(image, info, files_.beside(file.text()).string());
+    }
+    std::string name;
+    auto kept = files_.keep(std::move(image), name);
+    resolved = {{"texture", {{"image", name}, {"colorspace", "linear"}}}};
+    return kept;
+  }
+
+  /// What is beyond the range of the parameter becomes the end of it, as in the shaders.
+  void limit(Image& image, const ParamInfo& info, const std::string& name) {
+    std::size_t count = 0, first = 0;
+    float worst = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+      for (std::size_t c = 0; c < channels_of(info); ++c) {
+        float& x = image.rgb[i + c];
+        const float inside = std::clamp(x, float(info.min), float(info.max));
+        if (x == inside) continue;
+        if (count++ == 0) first = i / 3, worst = x;
+        x = inside;
+      }
+    if (count)
+      files_.note(
+          fmt::format("{}: {} outside of [{:g}, {:g}], the range of \"{}\", the first {:g} at ({}, {}); taken for the "
+                      "end of the range",
+                      name, count == 1 ? "1 value is" : fmt::format("{} values are", count), info.min, info.max,
+                      info.name, worst, first % image.width, first / image.width));
+  }
+
+  ParamValue read_value(const JsonView& j, const ParamInfo& info) {
+    if (info.kind == ParamKind::Choice) return j.choice(info.choices);
+    if (info.kind == ParamKind::Number) return j.number(info.min, info.max);
+    if (j.json().is_number()) {
+      const double grey = j.number(info.min, info.max);
+      return std::array<double, 3>{grey, grey, grey};
+    }
+    return j.numbers<3>(info.min, info.max);
+  }
+
+  /// Those that a substance sets, in the working space.
+  ParamValues optical_parameters(const JsonView& j, const ModelInfo& info, std::optional<double> thickness) {
+    try {
+      const Substance substance = find_substance(j.text(), files_.path().parent_path());
+      for (const std::string& text : substance.notes) files_.note(text);
+      return parameters_of(
+          info, substance, [&](const Xyz& xyz) { return files_.colors().from_xyz(xyz); }, thickness);
+    } catch (const InputError& e) {
+      j.error(e.what());
+    }
+  }
+
+  /// The mean, after a check that every texel is in the range of the parameter.
+  static ParamValue texture_mean(const JsonView& j, const ParamInfo& info, const Image& image) {
+    std::array<double, 3> sum{0, 0, 0};
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+      for (std::size_t c = 0; c < channels_of(info); ++c) {
+        const double x = image.rgb[i + c];
+        if (!(x >= info.min && x <= info.max))
+          j.error(fmt::format("the texture has the value {:g} at pixel ({}, {}), expected [{:g}, {:g}]", x,
+                              i / 3 % image.width, i / 3 / image.width, info.min, info.max));
+        sum[c] += x;
+      }
+    for (double& x : sum) x /= double(image.rgb.size() / 3);
+    if (info.kind == ParamKind::Number) return sum[0];
+    return sum;
+  }
+
+  SceneFiles& files_;
+  Scene& scene_;
+  bool alone_;
+};
+
+}  // namespace
+
+void read_materials(const JsonView& j, SceneFiles& files, bool alone) { MaterialReader(files, alone).read(j); }
+
+}  // namespace brdfc::reference
