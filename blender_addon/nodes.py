@@ -9,7 +9,17 @@ import json
 
 import bpy
 
-from . import animation, compiler, editable, lamps, pack, shader_trees, stand_in, twin
+from . import (
+    animation,
+    compiler,
+    editable,
+    formula_nodes,
+    lamps,
+    pack,
+    shader_trees,
+    stand_in,
+    twin,
+)
 from .compiler import CompileError
 from .group_sockets import VECTORS, add_parameter, vector_socket
 from .i18n import say
@@ -37,7 +47,7 @@ def is_native(group):
 def is_fitted(node):
     """Whether the form of a group node is closures, or Blender's own, fitted to the model; others
     reflect what the model does, on average."""
-    return is_native(node.node_tree) or identity(node)[1] == "fitted"
+    return identity(node)[1] in ("twin", "fitted")
 
 
 def source_text(group):
@@ -119,32 +129,75 @@ def script_problem(group):
     return problem and f"of the Albedo output {problem}"
 
 
-def _start_group(group, outputs=OUTPUTS):
-    """Output sockets, and the nodes that stand for the group's inputs and outputs."""
+def _add_outputs(group, outputs):
     kinds = {"SHADER": "NodeSocketShader", "RGBA": "NodeSocketColor"}
-    for output, kind in ((name, kinds[OUTPUTS[name]]) for name in outputs):
-        group.interface.new_socket(output, in_out="OUTPUT", socket_type=kind)
+    for name in (n for n in OUTPUTS if n in outputs):
+        group.interface.new_socket(name, in_out="OUTPUT", socket_type=kinds[OUTPUTS[name]])
+
+
+def _start_group(group, outputs):
+    """Output sockets, and the nodes that stand for the group's inputs and outputs."""
+    _add_outputs(group, outputs)
     return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
 
 
-def _fill_native_group(group, model_name, representation, source):
-    """A twin has the sockets of the other forms; what it looks like does not hang on a tangent."""
-    group_input, group_output = _start_group(group)
+def _fill_native_group(group, model_name, representation, source, twin_group):
+    """Forms of Blender's own nodes have the sockets of the others; what a twin looks like does not
+    hang on a tangent. `twin_group`: that of the model's twin, or None."""
+    data = json.loads(source)
+    label = pack.model(model_name)["label"]
+    group_input = group.nodes.new("NodeGroupInput")
     group_input.location = (-300, 0)
-    sockets, outputs = {}, {}
+    sockets, parameters = {}, {}
     for name, parameter in pack.socket_parameters(model_name, representation).items():
         relay = group.nodes.new("NodeReroute")
-        relay.location = (-100, -40 * len(outputs))
+        relay.location = (-100, -40 * len(parameters))
         sockets[name] = add_parameter(group, group_input, relay.inputs[0], parameter)
-        outputs[name] = relay.outputs[0]
+        parameters[name] = relay.outputs[0]
     sockets |= {name: vector_socket(group, name, text) for name, text in VECTORS.items()}
-    normal = group_input.outputs[pack.NORMAL]
-    tables = f"{pack.model(model_name)['label']} (twin)"
-    made = twin.wire(group, json.loads(source), normal, outputs, tables)
-    for name, output in zip(OUTPUTS, made, strict=True):
+    normal, tangent = (group_input.outputs[name] for name in VECTORS)
+    if representation == "twin":
+        made = dict(
+            zip(OUTPUTS, twin.wire(group, data, normal, parameters, f"{label} (twin)"), strict=True)
+        )
+    else:
+        slots = []
+        if names := _lamp_inputs(model_name, representation):
+            shared = _add_lamps(group)
+            slots = lamps.by_slot([shared.outputs[name] for name in names])
+        constants = pack.constants(model_name, representation)
+        made = formula_nodes.wire(
+            group,
+            data,
+            normal,
+            tangent,
+            parameters | formula_nodes.numbers(constants),
+            slots,
+            label,
+        )
+        instead = None
+        if twin_group is not None:
+            sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
+            inputs = {i: sources.get(name) for name, i in twin_group[TAG]["sockets"].items()}
+            instead = stand_in.twin_of(group, twin_group, inputs)
+        elif stand_in.has_node(model_name) and "baked" not in group[TAG]:
+            instead = stand_in.node_of(group, model_name, parameters, constants)
+        if instead is not None:
+            made = stand_in.add_in_eevee(group, made, instead)
+    _add_outputs(group, made)
+    group_output = group.nodes.new("NodeGroupOutput")
+    for name, output in made.items():
         group.links.new(output, group_output.inputs[name])
     group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
     group[TAG]["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
+
+
+def _add_lamps(group):
+    """The node that tells where the lamps are."""
+    shared = group.nodes.new("ShaderNodeGroup")
+    shared.node_tree = lamps.ensure_group()
+    shared.location = (-500, -400)
+    return shared
 
 
 def _add_script(group, text, what):
@@ -192,9 +245,7 @@ def _fill_group(group, model_name, representation, texts, twin_group):
         sockets[name] = vector_socket(group, name, text_)
         group.links.new(group_input.outputs[-2], inputs[name])
     if lamp_inputs := _lamp_inputs(model_name, representation):
-        shared = group.nodes.new("ShaderNodeGroup")
-        shared.node_tree = lamps.ensure_group()
-        shared.location = (-500, -400)
+        shared = _add_lamps(group)
         for name in lamp_inputs:
             group.links.new(shared.outputs[name], inputs[name])
     sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
@@ -243,7 +294,7 @@ def unite(groups):
     """Has groups that came from another file give way to equal ones of the open file."""
     stand_in.keep_one_text()
     # Twins first: they are parts of the others.
-    for group in sorted(groups, key=lambda group: not is_native(group)):
+    for group in sorted(groups, key=lambda group: group[TAG]["representation"] != "twin"):
         _give_way(group)
 
 
@@ -281,7 +332,8 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
     if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
         sources |= dict([of_albedo])
     # Lean ones hold no more than a render needs.
-    stands_in = not native and not baked and "twin" in pack.model(model_name)["representations"]
+    has_twin = "twin" in pack.model(model_name)["representations"]
+    stands_in = representation != "twin" and not baked and has_twin
     known = set(bpy.data.node_groups)
     twin_group = ensure_group(model_name, "twin") if stands_in else None
     texts = [] if native else [stand_in.new_text(f"{stem}.osl") for stem in sources]
@@ -310,7 +362,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
             }
             group[TAG]["baked"] = json.dumps(entry)
         if native:
-            _fill_native_group(group, model_name, representation, source)
+            _fill_native_group(group, model_name, representation, source, twin_group)
         else:
             for text, source in zip(texts, sources.values(), strict=True):
                 text.write(source)
@@ -516,6 +568,7 @@ def remove_group(group):
     for tree in inner:
         if tree.users == 0:
             remove_group(tree)
+    formula_nodes.remove_unused_parts()
     lamps.remove_unused_group()
 
 

@@ -160,9 +160,9 @@ def resolve(model_name, representation, values=None):
     name = representation
     if name == "auto":
         forms = entry["representations"]
-        native = [n for n in forms if "nodes" in forms[n]]
-        others = [n for n in forms if n != entry["auto"] and n not in native]
-        order = [*([] if osl_available() else native), entry["auto"], *others]
+        twin = [n for n in forms if n == "twin"]
+        others = [n for n in forms if n != entry["auto"] and "nodes" not in forms[n]]
+        order = [*([] if osl_available() else twin), entry["auto"], *others]
         name = next((n for n in order if refusal(model_name, n, values) is None), order[0])
     if name not in entry["representations"]:
         known = ", ".join(["auto", *sorted(entry["representations"])])

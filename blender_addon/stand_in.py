@@ -11,6 +11,8 @@ import bpy
 
 #: Name of the node that runs this, and of its output.
 NODE = "Runs"
+#: Name of the node that has a value in EEVEE alone.
+EEVEE = "In EEVEE"
 _FILE = "brdfc_runs.osl"
 _SOURCE = """// SPDX-License-Identifier: GPL-3.0-or-later
 // 1 where Open Shading Language runs; what can't run it takes the output for 0.
@@ -111,9 +113,29 @@ def add(group, script, outputs, instead):
     stands in, as far as both have them. script: a script node in the group that runs text()."""
     script.name = script.label = NODE
     script.location = (0, 300)
-    instead["BSDF"].node.location = (0, 200)
+    return _mixed(group, script.outputs[NODE], instead, outputs)
+
+
+def add_in_eevee(group, outputs, instead):
+    """Returns outputs, by name: in Cycles those given, and in EEVEE those of what stands in. Cycles
+    leaves a Shader to RGB node out, and what is linked to that keeps its own value."""
+    lit = group.nodes.new("ShaderNodeEmission")
+    lit.inputs["Color"].default_value = (1, 1, 1, 1)
+    lit.inputs["Strength"].default_value = 1.0
+    seen = group.nodes.new("ShaderNodeShaderToRGB")
+    seen.name = seen.label = EEVEE
+    lit.location, seen.location = (-150, 300), (0, 300)
+    group.links.new(lit.outputs[0], seen.inputs[0])
+    mixed = _mixed(group, seen.outputs["Color"], outputs, instead)
+    # Formulas have no albedo of their own where directions are random: that of the twin.
+    return {**instead, **outputs, **mixed}
+
+
+def _mixed(group, chosen, at_0, at_1):
+    """Outputs by name: those of one where the output `chosen` is 0, of the other where it is 1."""
+    at_0["BSDF"].node.location = (0, 200)
     made = {}
-    for name in outputs.keys() & instead.keys():
+    for name in at_0.keys() & at_1.keys():
         if name == "BSDF":
             mix = group.nodes.new("ShaderNodeMixShader")
             factor, first, second = mix.inputs
@@ -126,10 +148,10 @@ def add(group, script, outputs, instead):
             factor, first, second = (by_identifier[n] for n in names)
             made[name] = by_identifier["Result_Color"]
         mix.location = (150, -200 * len(made))
-        factor.default_value = 0.0  # where there is no script node
-        group.links.new(script.outputs[NODE], factor)
-        group.links.new(instead[name], first)
-        group.links.new(outputs[name], second)
+        factor.default_value = 0.0  # where nothing chooses
+        group.links.new(chosen, factor)
+        group.links.new(at_0[name], first)
+        group.links.new(at_1[name], second)
     return made
 
 

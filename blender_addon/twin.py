@@ -10,79 +10,7 @@ import math
 import bpy
 import numpy as np
 
-_DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
-
-
-class _Wiring:
-    """Adds nodes to a group, column by column, and links what they are given."""
-
-    def __init__(self, tree):
-        self.tree, self.count = tree, 0
-
-    def node(self, kind, **settings):
-        node = self.tree.nodes.new(kind)
-        node.hide = True
-        node.location = (200 * (self.count // 20), -60 * (self.count % 20))
-        self.count += 1
-        for key, value in settings.items():
-            setattr(node, key, value)
-        return node
-
-    def give(self, socket, value):
-        """A constant, or the output of another node."""
-        if hasattr(value, "is_output"):
-            self.tree.links.new(value, socket)
-        else:
-            socket.default_value = value
-
-    def math(self, operation, *values):
-        node = self.node("ShaderNodeMath", operation=operation)
-        for socket, value in zip(node.inputs, values, strict=False):
-            self.give(socket, value)
-        return node.outputs["Value"]
-
-    def vector(self, operation, *values, scale=None, output="Vector"):
-        node = self.node("ShaderNodeVectorMath", operation=operation)
-        for socket, value in zip(node.inputs, values, strict=False):
-            self.give(socket, value)
-        if scale is not None:
-            self.give(node.inputs["Scale"], scale)
-        return node.outputs[output]
-
-    def curve(self, x, heights):
-        """The table of heights, evenly spaced over [0, 1] and linear between, at x."""
-        node = self.node("ShaderNodeFloatCurve")
-        mapping, curve = node.mapping, node.mapping.curves[0]
-        mapping.use_clip = False
-        last = len(heights) - 1
-        curve.points[0].location, curve.points[1].location = (0, heights[0]), (1, heights[last])
-        for i in range(1, last):
-            curve.points.new(i / last, heights[i])
-        for point in curve.points:
-            point.handle_type = "VECTOR"
-        mapping.update()
-        self.give(node.inputs["Value"], x)
-        return node.outputs["Value"]
-
-    def bsdf(self, kind, color, normal, roughness=0.0):
-        if kind == "diffuse":
-            node = self.node("ShaderNodeBsdfDiffuse")
-        else:
-            node = self.node(
-                "ShaderNodeBsdfAnisotropic", distribution=_DISTRIBUTIONS.get(kind, "GGX")
-            )
-        self.give(node.inputs["Color"], color)
-        self.give(node.inputs["Roughness"], roughness)
-        self.give(node.inputs["Normal"], normal)
-        return node.outputs["BSDF"]
-
-    def sum(self, shaders):
-        while len(shaders) > 1:
-            node = self.node("ShaderNodeAddShader")
-            self.give(node.inputs[0], shaders[0])
-            self.give(node.inputs[1], shaders[1])
-            shaders = [*shaders[2:], node.outputs["Shader"]]
-        return shaders[0]
+from .wiring import DISTRIBUTIONS, Wiring
 
 
 class _Curves:
@@ -203,7 +131,7 @@ def wire(tree, data, normal, parameters, name):
     `parameters`: outputs by name. Those that `data` does not name multiply all but a mirror.
     `name`: of the image that is made where tables run over a slider.
     """
-    w = _Wiring(tree)
+    w = Wiring(tree)
     axis, mixed = data["axis"], [parameters[n] for n in data["mixed"]]
     known = [*data["mixed"], *([axis["parameter"]] if axis else [])]
     factors = [output for n, output in parameters.items() if n not in known]
@@ -232,7 +160,7 @@ def wire(tree, data, normal, parameters, name):
             shaders.append(w.bsdf(kind, colour, normal))
             continue
         colour = looked.colour(closure["weight"], weights)
-        if kind not in _DISTRIBUTIONS:
+        if kind not in DISTRIBUTIONS:
             shaders.append(w.bsdf(kind, colour, normal))
             continue
         half = w.vector("SCALE", colour, scale=0.5)

@@ -14,12 +14,13 @@ from .scenes import lamps_of
 from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
-from .slots import NO_NEED, SLOTS, Lamp, elsewhere, part_names, too_many
+from .slots import NO_NEED, SLOTS, Lamp, by_slot, elsewhere, part_names, too_many
 
 __all__ = [
     "NO_NEED",
     "SLOTS",
     "Lamp",
+    "by_slot",
     "count",
     "elsewhere",
     "ensure_group",

@@ -23,6 +23,11 @@ def part_names(count):
     return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
 
 
+def by_slot(parts):
+    """What part_names() has in one list, a list for each slot."""
+    return [parts[i : i + len(PARTS)] for i in range(0, len(parts), len(PARTS))]
+
+
 #: Why a lamp is left out that drawn directions meet.
 NO_NEED = say("so large or near that random rays meet it often")
 

@@ -11,10 +11,11 @@ const Form& exact();
 const Form& aimed();
 const Form& sampled();
 const Form& fitted();
+const Form& nodes();
 const Form& twin();
 
 const std::vector<const Form*>& forms() {
-  static const std::vector<const Form*> all = {&exact(), &aimed(), &sampled(), &fitted(), &twin()};
+  static const std::vector<const Form*> all = {&exact(), &aimed(), &sampled(), &fitted(), &nodes(), &twin()};
   return all;
 }
 

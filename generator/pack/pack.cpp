@@ -149,7 +149,8 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
                                     : shader;
     const forms::FormError error = form->error(model, setting);
     const std::optional<double> cost = form->cost_is_measured(setting) ? costs.of(model, *form) : std::nullopt;
-    const std::string file = form->native() ? "twins/" + shader.name + ".json" : "shaders/" + shader.name + ".osl";
+    const std::string file = form->native() ? (form->made_of_fit() ? "twins/" : "nodes/") + shader.name + ".json"
+                                            : "shaders/" + shader.name + ".osl";
     built.files[file] = shader.source;
     const std::string albedo_file = "shaders/" + shader.name + "_albedo.osl";
     if (!shader.albedo.empty()) built.files[albedo_file] = shader.albedo;

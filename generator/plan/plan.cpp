@@ -266,9 +266,13 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
       consider(*form, missing, false);
       continue;
     }
+    // What no fit is made for is there for all models alike, and taken by those who ask for it.
+    if (form->when() == Form::When::Asked && !form->made_of_fit() &&
+        std::none_of(chosen.begin(), chosen.end(), [&](const Chosen& c) { return c.form == form; }))
+      continue;
     const bool offered = form->when() == Form::When::WithinBudget && budget.offer && drawn &&
                          within_time(needs, aimed_or_allowed(aiming_form(), needs, budget), budget).form == form;
-    consider(*form, unfit(needs, *form), offered || (form->native() && budget.twin));
+    consider(*form, unfit(needs, *form), offered || (form->native() && form->made_of_fit() && budget.twin));
   }
   return choices;
 }

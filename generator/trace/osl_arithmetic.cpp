@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/series.h"
 #include "trace/op.h"
 
 namespace brdfc::inline trace {
@@ -15,21 +16,6 @@ thread_local int alive = 0;
 float divide(float a, float b) {
   const float q = a / b;
   return b != 0 && std::isfinite(q) ? q : 0;
-}
-
-// As osl/brdfc.osl.in has them.
-float osl_expm1(float x) {
-  if (std::abs(x) < 0.4f)
-    return x * (1 + x * (1 / 2.0f + x * (1 / 6.0f + x * (1 / 24.0f + x * (1 / 120.0f + x * (1 / 720.0f + x / 5040))))));
-  return OIIO::fast_exp(x) - 1;
-}
-
-float osl_log1p(float x) {
-  if (std::abs(x) < 0.4f) {
-    const float z = x / (2 + x), z2 = z * z;
-    return 2 * z * (1 + z2 * (1 / 3.0f + z2 * (1 / 5.0f + z2 * (1 / 7.0f + z2 * (1 / 9.0f + z2 / 11)))));
-  }
-  return OIIO::fast_log(1 + x);
 }
 
 }  // namespace
@@ -50,10 +36,11 @@ float apply_as_osl(Op op, const float* a) {
       return OIIO::fast_exp(a[0]);
     case Op::Log:
       return OIIO::fast_log(a[0]);
+    // As osl/brdfc.osl.in has them.
     case Op::Log1p:
-      return osl_log1p(a[0]);
+      return series_log1p(a[0], OIIO::fast_log(1 + a[0]));
     case Op::Expm1:
-      return osl_expm1(a[0]);
+      return series_expm1(a[0], OIIO::fast_exp(a[0]));
     case Op::Sin:
       return OIIO::fast_sin(a[0]);
     case Op::Cos:

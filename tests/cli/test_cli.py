@@ -74,7 +74,7 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
     entry = manifest["models"]["lafortune"]
     assert entry["auto"] == "aimed"
     forms = entry["representations"]
-    assert list(forms) == ["aimed", "sampled", "fitted", "twin"]
+    assert list(forms) == ["aimed", "sampled", "fitted", "nodes", "twin"]
     assert forms["sampled"]["only"] == {}
     assert forms["fitted"]["only"] == {"cxy": -1, "cz": 0.8}
     assert forms["fitted"]["axis"] == {"name": "e", "min": 1, "max": 100}
@@ -85,9 +85,9 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
 def test_list_json_is_the_schema():
     models = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
     assert set(MODELS) <= set(models)
-    assert models["lambert"]["representations"] == ["exact", "sampled", "twin"]
-    assert models["coupled"]["representations"] == ["exact", "aimed", "sampled", "twin"]
-    assert models["ashikhmin_shirley"]["representations"] == ["aimed", "sampled", "twin"]
+    assert models["lambert"]["representations"] == ["exact", "sampled", "nodes", "twin"]
+    assert models["coupled"]["representations"] == ["exact", "aimed", "sampled", "nodes", "twin"]
+    assert models["ashikhmin_shirley"]["representations"] == ["aimed", "sampled", "nodes", "twin"]
     assert models["coupled"]["mirror"] is True
     parameters = {p["name"]: p for p in models["ashikhmin_shirley"]["parameters"]}
     assert parameters["rs"]["kind"] == "color" and parameters["rs"]["default"] == [0.05] * 3

@@ -368,7 +368,9 @@ TEST_F(PackFiles, ManifestAndFilesAgree) {
   EXPECT_EQ(lambert.at("representations").at("exact").at("closure_bytes"), 40);
   EXPECT_EQ(lambert.at("representations").at("exact").at("lamp_bytes"), 0);
   for (const auto& [form, r] : lambert.at("representations").items())
-    EXPECT_TRUE(fs::exists(pack.folder / r.at(form == "twin" ? "nodes" : "shader").get<std::string>())) << form;
+    EXPECT_TRUE(
+        fs::exists(pack.folder / r.at(form == "twin" || form == "nodes" ? "nodes" : "shader").get<std::string>()))
+        << form;
   EXPECT_TRUE(fs::exists(pack.folder / lambert.at("albedo").at("table").get<std::string>()));
   EXPECT_TRUE(fs::exists(pack.folder / "blender_manifest.toml"));
   for (const auto& entry : fs::recursive_directory_iterator(pack.folder)) EXPECT_NE(entry.path().extension(), ".oso");

@@ -49,7 +49,7 @@ def sources():
 def texts(forms):
     """{text: place} of all that is translated; `forms`: names of the models' forms, of which
     Blender's own nodes have another where people see it."""
-    found = {form.capitalize(): "a form" for form in forms if form != "twin"}
+    found = {form.capitalize(): "a form" for form in forms if form not in ("nodes", "twin")}
     for file, tree in sources():
         for node in ast.walk(tree):
             given = list(_of_call(node)) if isinstance(node, ast.Call) else []

@@ -1,0 +1,431 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A model's formulas as Blender's own Math nodes, which Cycles runs on every device.
+
+The tool writes formulas as lists of operations, the extension's nodes/*.json; here they become node
+groups, and are wired to the frame of the surface, to lamps and to the closures that carry what
+they give: one Toon BSDF for each lamp, one for a random direction, and for ideal reflection and
+refraction Blender's own nodes.
+"""
+
+import hashlib
+import json
+import math
+
+import bpy
+
+from .wiring import Wiring
+
+#: Custom property of the group of a part: hash of what it computes. Equal parts share a group.
+PART = "brdfc_part"
+_SOCKETS = {
+    "FLOAT": "NodeSocketFloat",
+    "VECTOR": "NodeSocketVector",
+    "SHADER": "NodeSocketShader",
+}
+#: Operations of a group, at most.
+_STEP = 60
+_AXES = ("x", "y", "z")
+
+
+class _Formula:
+    """Adds the nodes of one list of operations."""
+
+    def __init__(self, wiring, inputs):
+        self.w, self.inputs = wiring, inputs
+        self.results, self.parts = [], {}
+
+    def operand(self, value, vector=False):
+        if isinstance(value, str):
+            return self.results[int(value[1:])] if value[0] == "$" else self.inputs[value]
+        return (value,) * 3 if vector and not isinstance(value, list) else value
+
+    def add(self, kind, *operands):
+        w = self.w
+        if kind in ("X", "Y", "Z"):
+            (source,) = operands
+            if source not in self.parts:
+                node = w.node("ShaderNodeSeparateXYZ")
+                w.give(node.inputs[0], self.operand(source))
+                self.parts[source] = node.outputs
+            return self.parts[source][kind]
+        if kind == "COMBINE":
+            node = w.node("ShaderNodeCombineXYZ")
+            for socket, value in zip(node.inputs, operands, strict=True):
+                w.give(socket, self.operand(value))
+            return node.outputs[0]
+        if kind in ("MIX", "V_MIX"):
+            vector = kind == "V_MIX"
+            at_0, at_1 = (self.operand(o, vector) for o in operands[1:])
+            return w.mix(self.operand(operands[0]), at_0, at_1, vector)
+        if kind == "V_SCALE":
+            vector, scale = self.operand(operands[0], True), self.operand(operands[1])
+            return w.vector("SCALE", vector, scale=scale)
+        if kind.startswith("V_"):
+            return w.vector(kind[2:], *(self.operand(o, True) for o in operands))
+        return w.math(kind, *map(self.operand, operands))
+
+    def wire(self, data):
+        for operation in data["operations"]:
+            self.results.append(self.add(*operation))
+        return {
+            name: self.operand(value, kind == "VECTOR") for name, kind, value in data["outputs"]
+        }
+
+
+def _group(title, content, inputs, outputs, fill):
+    """The group that has this content, which the file may have. `inputs` and `outputs`: names and
+    kinds; fill(wiring, inputs by name) returns outputs by name."""
+    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+    for group in bpy.data.node_groups:
+        if group.library is None and group.get(PART) == digest:
+            return group
+    group = bpy.data.node_groups.new(f"brdfc {title}", "ShaderNodeTree")
+    group[PART] = digest
+    for in_out, sockets in (("INPUT", inputs), ("OUTPUT", outputs)):
+        for name, kind in sockets:
+            group.interface.new_socket(name, in_out=in_out, socket_type=_SOCKETS[kind])
+    w = Wiring(group)
+    start = w.node("NodeGroupInput")
+    made = fill(w, {s.name: s for s in start.outputs if s.name})
+    end = w.node("NodeGroupOutput")
+    for name, value in made.items():
+        w.give(end.inputs[name], value)
+    return group
+
+
+def _instance(w, group, inputs, label):
+    """Adds a group to a tree; its outputs by name."""
+    node = w.node("ShaderNodeGroup")
+    node.node_tree = group
+    node.label = label
+    for socket in node.inputs:
+        w.give(socket, inputs[socket.name])
+    return {socket.name: socket for socket in node.outputs}
+
+
+def _steps(data):
+    """A long list of operations as several short ones, each of which takes what those before it
+    give: Blender looks at a whole tree whenever it is linked."""
+    operations = data["operations"]
+    kinds = dict(data["inputs"])
+    for index, (kind, *_) in enumerate(operations):
+        kinds[f"${index}"] = "VECTOR" if kind == "COMBINE" or kind.startswith("V_") else "FLOAT"
+    wanted = [value for _, _, value in data["outputs"] if isinstance(value, str)]
+    for first in range(0, len(operations), _STEP):
+        last = min(first + _STEP, len(operations))
+        here = operations[first:last]
+        own = {f"${i}" for i in range(first, last)}
+        taken = list(dict.fromkeys(o for op in here for o in op[1:] if isinstance(o, str)))
+        later = {o for op in operations[last:] for o in op[1:] if isinstance(o, str)} | {*wanted}
+        given = [name for name in sorted(own, key=lambda n: int(n[1:])) if name in later]
+        names = {f"${first + i}": f"${i}" for i in range(len(here))}
+        names |= {o: f"before_{o[1:]}" for o in taken if o[0] == "$" and o not in own}
+        yield {
+            "inputs": [[names.get(o, o), kinds[o], o] for o in taken if o not in own],
+            "operations": [
+                [kind, *(names.get(o, o) if isinstance(o, str) else o for o in operands)]
+                for kind, *operands in here
+            ],
+            "outputs": [[f"result_{o[1:]}", kinds[o], names[o], o] for o in given],
+        }
+
+
+def _part_group(title, data):
+    """The group of a part."""
+    inputs = data["inputs"]
+    outputs = [output[:2] for output in data["outputs"]]
+    if len(data["operations"]) <= _STEP:
+        return _group(title, data, inputs, outputs, lambda w, given: _Formula(w, given).wire(data))
+
+    def fill(w, given):
+        known = dict(given)
+        for step in _steps(data):
+            short = {
+                "inputs": [entry[:2] for entry in step["inputs"]],
+                "operations": step["operations"],
+                "outputs": [entry[:3] for entry in step["outputs"]],
+            }
+            group = _part_group(title, short)
+            made = _instance(w, group, {e[0]: known[e[2]] for e in step["inputs"]}, "")
+            known |= {e[3]: made[e[0]] for e in step["outputs"]}
+        return {
+            name: known[value] if isinstance(value, str) else value
+            for name, _, value in data["outputs"]
+        }
+
+    return _group(title, data, inputs, outputs, fill)
+
+
+class _Parts:
+    """Parts of a model, as nodes of its group."""
+
+    def __init__(self, wiring, data, title):
+        self.w, self.data, self.title = wiring, data["parts"], title
+
+    def has(self, name):
+        return name in self.data
+
+    def add(self, name, **inputs):
+        """Adds a part; its outputs by name. `inputs`: numbers, outputs, or dicts of vectors' parts
+        by axis, which are inputs NAME_x and so on."""
+        group = _part_group(f"{self.title}: {name}", self.data[name])
+        return _instance(self.w, group, inputs, name)
+
+    def inputs(self, name):
+        """Names and kinds of what a part takes."""
+        return {name: kind for name, kind in self.data[name]["inputs"]}
+
+    def on(self, wiring):
+        """The same parts, for another tree."""
+        return _Parts(wiring, {"parts": self.data}, self.title)
+
+
+def _by_axis(name, values):
+    return {f"{name}_{axis}": value for axis, value in zip(_AXES, values, strict=True)}
+
+
+class _Surface:
+    """What the shading point looks like: frame, viewer, random numbers."""
+
+    def __init__(self, w, parts, normal, tangent):
+        self.w = w
+        geometry = w.node("ShaderNodeNewGeometry")
+        self.place, self.view = geometry.outputs["Position"], geometry.outputs["Incoming"]
+        self.true_normal = geometry.outputs["True Normal"]
+        self.backfacing = geometry.outputs["Backfacing"]
+        self.strand = w.node("ShaderNodeHairInfo").outputs["Is Strand"]
+        self.path_length = w.node("ShaderNodeLightPath").outputs["Ray Length"]
+        missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
+        own = w.vector("SCALE", geometry.outputs["Normal"], scale=missing)
+        self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
+        if parts.has("bend"):
+            vectors = {"true": self.true_normal, "view": self.view, "normal": self.normal}
+            inputs = {}
+            for name, vector in vectors.items():
+                inputs |= _by_axis(name, w.separate(vector))
+            bent = parts.add("bend", strand=self.strand, **inputs)
+            self.normal = w.combine(*(bent[f"normal_{axis}"] for axis in _AXES))
+        self._frame(tangent)
+        self.wo = parts.add("raise", **_by_axis("wo", self.local(self.view)))
+
+    def _frame(self, tangent):
+        """As brdfc_frame() in OSL: a tangent of length 0 asks for the object's z axis."""
+        w = self.w
+
+        def axis(direction):
+            node = w.node("ShaderNodeVectorTransform", vector_type="VECTOR")
+            node.convert_from, node.convert_to = "OBJECT", "WORLD"
+            node.inputs[0].default_value = direction
+            return node.outputs[0]
+
+        def across(direction):
+            along = w.vector("DOT_PRODUCT", direction, self.normal, output="Value")
+            lying = w.vector("SCALE", self.normal, scale=along)
+            return w.vector("SUBTRACT", direction, lying)
+
+        missing = w.math("LESS_THAN", w.vector("LENGTH", tangent, output="Value"), 1e-20)
+        given = across(w.mix(missing, tangent, axis((0, 0, 1)), True))
+        short = w.math("LESS_THAN", w.vector("LENGTH", given, output="Value"), 1e-4)
+        self.tangent = w.vector("NORMALIZE", w.mix(short, given, across(axis((1, 0, 0))), True))
+        self.bitangent = w.vector("CROSS_PRODUCT", self.normal, self.tangent)
+
+    @property
+    def axes(self):
+        return self.tangent, self.bitangent, self.normal
+
+    def local(self, vector):
+        return _local(self.w, vector, self.axes)
+
+    def world(self, x, y, z):
+        """A vector of the frame in the world's axes."""
+        w = self.w
+        total = None
+        for part, axis in zip((x, y, z), self.axes, strict=True):
+            scaled = w.vector("SCALE", axis, scale=part)
+            total = scaled if total is None else w.vector("ADD", total, scaled)
+        return total
+
+
+def _local(w, vector, axes):
+    """The three parts of a vector in a frame."""
+    return [w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes]
+
+
+def _random(w, place, view, path_length, index):
+    """Three numbers in [0, 1), as brdfc_random() in OSL."""
+
+    def noise(vector, number):
+        node = w.node("ShaderNodeTexWhiteNoise", noise_dimensions="4D")
+        w.give(node.inputs["Vector"], vector)
+        w.give(node.inputs["W"], number)
+        return node.outputs["Color"]
+
+    far = w.math("MULTIPLY_ADD", index, 17.0, path_length)
+    return w.separate(w.vector("FRACTION", w.vector("ADD", noise(place, index), noise(view, far))))
+
+
+#: What a shading point sees of a slot, and what it makes of it.
+_SEEN = [
+    ["towards", "VECTOR"],
+    ["angle", "FLOAT"],
+    ["drop", "FLOAT"],
+    ["widened", "FLOAT"],
+    ["active", "FLOAT"],
+    ["chord", "FLOAT"],
+]
+_SLOT = ("place", "turn", "scale", "shape")
+
+
+def _seen_group(parts):
+    """The group that makes of a slot the cone that its lamp fills."""
+    vectors = (*_SLOT, "at", "view")
+
+    def fill(w, found):
+        split = {}
+        for name in vectors:
+            split |= _by_axis(name, w.separate(found[name]))
+        cone = parts.on(w).add("cone", **split)
+        axis = w.combine(*(cone[f"towards_{a}"] for a in _AXES))
+        return {"towards": axis, **{name: cone[name] for name, _ in _SEEN[1:]}}
+
+    content = ["seen", parts.data["cone"]]
+    return _group("lamp seen", content, [[name, "VECTOR"] for name in vectors], _SEEN, fill)
+
+
+def _lamp_group(parts):
+    """The group that makes of a cone the closure that carries what the model gives there."""
+    own = {f"wi_{axis}" for axis in _AXES}
+    vectors = ("towards", "at", "view", "tangent", "bitangent", "normal")
+    numbers = ("index", "length", "angle", "drop", "widened", "shown", "room")
+    inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
+    inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name not in own]
+
+    def fill(w, found):
+        here = parts.on(w)
+        u = _random(w, found["at"], found["view"], found["length"], found["index"])
+        towards = _by_axis("towards", w.separate(found["towards"]))
+        point = here.add("point", drop=found["drop"], u_0=u[0], u_1=u[1], **towards)
+        frame = (found["tangent"], found["bitangent"], found["normal"])
+        wi = _local(w, w.combine(*(point[f"wi_{a}"] for a in _AXES)), frame)
+        value = here.add("value", **(found | _by_axis("wi", wi)))["value"]
+        cone = {name: found[name] for name in ("angle", "widened", "room")}
+        lobe = here.add("lobe", value=value, u_2=u[2], **cone)
+        toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
+        return {"BSDF": w.shown(found["shown"], toon)}
+
+    content = ["lamp", {name: parts.data[name] for name in ("point", "value", "lobe")}]
+    return _group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
+
+
+def _keep_apart(w, lamps):
+    """Finds out which lamps are shown by a closure, and how wide that may be made: of two whose
+    cones overlap the earlier one, which is wider, is left to random directions."""
+    for lamp in lamps:
+        lamp["shown"], lamp["room"] = lamp["active"], 1.0
+    for i, lamp in enumerate(lamps):
+        hidden = None
+        for other in lamps[i + 1 :]:
+            apart = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
+            beside, beside_other = (w.math("SUBTRACT", apart, s["chord"]) for s in (other, lamp))
+            near = w.math("LESS_THAN", beside, lamp["chord"])
+            both = w.math("MULTIPLY", near, other["active"])
+            hidden = both if hidden is None else w.math("MAXIMUM", hidden, both)
+            for mine, its, room in ((lamp, other, beside), (other, lamp, beside_other)):
+                free = w.mix(its["active"], 1.0, room)
+                mine["room"] = w.math("MINIMUM", mine["room"], free)
+        if hidden is not None:
+            left = w.math("SUBTRACT", 1.0, hidden)
+            lamp["shown"] = w.math("MULTIPLY", lamp["active"], left)
+
+
+def wire(tree, data, normal, tangent, parameters, slots, title):
+    """Builds the nodes of a model; returns outputs by name: its BSDF and, where closures of
+    Blender's own are all of it, its Albedo.
+
+    `data` is what nodes/*.json has; `normal` and `tangent` outputs that are 0 where the surface's
+    own are meant; `parameters`: outputs or numbers by name; `slots`: four outputs for each lamp;
+    `title` begins the names of the groups that are made.
+    """
+    w = Wiring(tree)
+    parts = _Parts(w, data, title)
+    parameters = dict(parameters)
+    for name, (low, high) in data["bounds"].items():
+        inside = w.math("MAXIMUM", parameters[name], low)
+        parameters[name] = w.math("MINIMUM", inside, high)
+    surface = _Surface(w, parts, normal, tangent)
+    side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
+    given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}
+    shaders = []
+    if parts.has("closures"):
+        colours = parts.add("closures", **given)
+        for closure in data["closures"]:
+            colour = colours[closure["weight"]]
+            if closure["kind"] != "refraction":
+                shaders.append(w.bsdf(closure["kind"], colour, surface.normal))
+                continue
+            # The node takes the inverse on the inner side.
+            ior = colours[closure["ior"]]
+            inverse = w.math("DIVIDE", 1.0, ior)
+            ior = w.mix(surface.backfacing, ior, inverse)
+            shaders.append(w.refraction(colour, ior, surface.normal))
+    if not parts.has("draw"):
+        total = None
+        for closure in data["closures"]:
+            colour = colours[closure["weight"]]
+            total = colour if total is None else w.vector("ADD", total, colour)
+        return {"BSDF": w.sum(shaders), "Albedo": total}
+    lamps = []
+    if slots:
+        given |= parts.add("once", **given)
+        frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
+        here = {"at": surface.place, "view": surface.view}
+        given |= {**here, "length": surface.path_length, **dict(frame)}
+        seen, lit = _seen_group(parts), _lamp_group(parts)
+        for slot in slots:
+            values = here | dict(zip(_SLOT, slot, strict=True))
+            lamps.append(_instance(w, seen, values, "lamp seen"))
+        _keep_apart(w, lamps)
+    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
+    for index, lamp in enumerate(lamps):
+        made = _instance(w, lit, given | lamp | {"index": 1.0 + index}, "lamp")
+        shaders.append(made["BSDF"])
+    return {"BSDF": w.sum(shaders)}
+
+
+def _rest(w, parts, surface, given, lamps, narrow):
+    """The closure of the drawn direction, which carries all light that lamps' closures do not."""
+    u = _random(w, surface.place, surface.view, surface.path_length, 0.0)
+    numbers = {f"u_{i}": number for i, number in enumerate(u)}
+    drawn = parts.add("draw", **given, **numbers)
+    ray = surface.world(*(drawn[f"wi_{a}"] for a in _AXES))
+    height = w.vector("DOT_PRODUCT", ray, surface.true_normal, output="Value")
+    # Rays leave hairs on all sides.
+    hidden = w.math(
+        "MULTIPLY", w.math("LESS_THAN", height, 0.0), w.math("SUBTRACT", 1.0, surface.strand)
+    )
+    for lamp in lamps:
+        apart = w.vector("DISTANCE", ray, lamp["towards"], output="Value")
+        inside = w.math("LESS_THAN", apart, lamp["chord"])
+        hidden = w.math("MAXIMUM", hidden, w.math("MULTIPLY", inside, lamp["shown"]))
+    chance = w.separate(w.vector("FRACTION", w.vector("SCALE", w.combine(*u), scale=4096.0)))[0]
+    colour = parts.add("rest", weight=drawn["weight"], u=chance, lost=hidden)["color"]
+    size = narrow * 2 / math.pi
+    return w.toon(colour, size, w.half(ray, surface.view))
+
+
+def numbers(constants):
+    """Those of the values of parameters that formulas may take: no choices."""
+    return {name: value for name, value in constants.items() if not isinstance(value, str)}
+
+
+def _unused():
+    for group in bpy.data.node_groups:
+        if group.library is None and PART in group and group.users == 0:
+            return group
+    return None
+
+
+def remove_unused_parts():
+    """Takes the groups of parts out of the file that no model has."""
+    while group := _unused():
+        bpy.data.node_groups.remove(group)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's own nodes, made and linked one by one: what trees of them are written with."""
+
+#: Of glossy nodes, by kind of closure.
+DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
+
+
+class Wiring:
+    """Adds nodes to a group, column by column, and links what they are given."""
+
+    def __init__(self, tree):
+        self.tree, self.count = tree, 0
+
+    def node(self, kind, **settings):
+        node = self.tree.nodes.new(kind)
+        node.hide = True
+        node.location = (200 * (self.count // 20), -60 * (self.count % 20))
+        self.count += 1
+        for key, value in settings.items():
+            setattr(node, key, value)
+        return node
+
+    def give(self, socket, value):
+        """A constant, or the output of another node."""
+        if hasattr(value, "is_output"):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def math(self, operation, *values):
+        node = self.node("ShaderNodeMath", operation=operation)
+        for socket, value in zip(node.inputs, values, strict=False):
+            self.give(socket, value)
+        return node.outputs["Value"]
+
+    def vector(self, operation, *values, scale=None, output="Vector"):
+        node = self.node("ShaderNodeVectorMath", operation=operation)
+        for socket, value in zip(node.inputs, values, strict=False):
+            self.give(socket, value)
+        if scale is not None:
+            self.give(node.inputs["Scale"], scale)
+        return node.outputs[output]
+
+    def curve(self, x, heights):
+        """The table of heights, evenly spaced over [0, 1] and linear between, at x."""
+        node = self.node("ShaderNodeFloatCurve")
+        mapping, curve = node.mapping, node.mapping.curves[0]
+        mapping.use_clip = False
+        last = len(heights) - 1
+        curve.points[0].location, curve.points[1].location = (0, heights[0]), (1, heights[last])
+        for i in range(1, last):
+            curve.points.new(i / last, heights[i])
+        for point in curve.points:
+            point.handle_type = "VECTOR"
+        mapping.update()
+        self.give(node.inputs["Value"], x)
+        return node.outputs["Value"]
+
+    def bsdf(self, kind, color, normal, roughness=0.0):
+        if kind == "diffuse":
+            node = self.node("ShaderNodeBsdfDiffuse")
+        else:
+            node = self.node(
+                "ShaderNodeBsdfAnisotropic", distribution=DISTRIBUTIONS.get(kind, "GGX")
+            )
+        self.give(node.inputs["Color"], color)
+        self.give(node.inputs["Roughness"], roughness)
+        self.give(node.inputs["Normal"], normal)
+        return node.outputs["BSDF"]
+
+    def sum(self, shaders):
+        while len(shaders) > 1:
+            node = self.node("ShaderNodeAddShader")
+            self.give(node.inputs[0], shaders[0])
+            self.give(node.inputs[1], shaders[1])
+            shaders = [*shaders[2:], node.outputs["Shader"]]
+        return shaders[0]
+
+    def mix(self, factor, at_0, at_1, vector=False):
+        """at_0 (1 - factor) + at_1 factor, of numbers or of vectors."""
+        kind = "Vector" if vector else "Float"
+        node = self.node("ShaderNodeMix", data_type=kind.upper(), clamp_factor=False)
+        by_identifier = {socket.identifier: socket for socket in (*node.inputs, *node.outputs)}
+        self.give(by_identifier["Factor_Float"], factor)
+        self.give(by_identifier[f"A_{kind}"], at_0)
+        self.give(by_identifier[f"B_{kind}"], at_1)
+        return by_identifier[f"Result_{kind}"]
+
+    def combine(self, x, y, z):
+        node = self.node("ShaderNodeCombineXYZ")
+        for socket, value in zip(node.inputs, (x, y, z), strict=True):
+            self.give(socket, value)
+        return node.outputs[0]
+
+    def separate(self, vector):
+        node = self.node("ShaderNodeSeparateXYZ")
+        self.give(node.inputs[0], vector)
+        return list(node.outputs)
+
+    def half(self, a, b):
+        """The direction halfway between two."""
+        return self.vector("NORMALIZE", self.vector("ADD", a, b))
+
+    def toon(self, color, size, normal):
+        """A closure that is level within a cone about the mirror direction."""
+        node = self.node("ShaderNodeBsdfToon", component="GLOSSY")
+        self.give(node.inputs["Color"], color)
+        self.give(node.inputs["Size"], size)
+        self.give(node.inputs["Smooth"], 0.0)
+        self.give(node.inputs["Normal"], normal)
+        return node.outputs[0]
+
+    def refraction(self, color, ior, normal):
+        node = self.node("ShaderNodeBsdfRefraction")
+        self.give(node.inputs["Color"], color)
+        self.give(node.inputs["Roughness"], 0.0)
+        self.give(node.inputs["IOR"], ior)
+        self.give(node.inputs["Normal"], normal)
+        return node.outputs[0]
+
+    def shown(self, factor, shader):
+        """A shader times a factor; where that is 0 what the shader needs is not computed."""
+        node = self.node("ShaderNodeMixShader")
+        self.give(node.inputs[0], factor)
+        self.give(node.inputs[2], shader)
+        return node.outputs[0]

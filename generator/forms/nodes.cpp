@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The form of nodes: a model's formulas as trees of Blender's own Math nodes, around its Toon, Glossy and Diffuse
+// nodes. Runs wherever Cycles does, with Open Shading Language and without. How its parts are wired is in the
+// extension's formula_nodes.py; what they are made of is here: recordings as JSON.
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "closures/closure_pool.h"
+#include "forms/error.h"
+#include "forms/form.h"
+#include "forms/node_lamps.h"
+#include "measure/probes.h"
+#include "model/choices.h"
+#include "model/horizon.h"
+#include "print/node_program.h"
+
+namespace brdfc::forms {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using print::NodeOperand;
+using print::NodeProgram;
+
+Json operand_json(const NodeOperand& o) {
+  if (o.result >= 0) return "$" + std::to_string(o.result);
+  if (!o.input.empty()) return o.input;
+  if (!o.color) return float(o.value[0]);
+  return {float(o.value[0]), float(o.value[1]), float(o.value[2])};
+}
+
+Json json_of(const NodeProgram& program) {
+  Json inputs = Json::array(), operations = Json::array(), outputs = Json::array();
+  for (const auto& [name, color] : program.inputs) inputs.push_back({name, color ? "VECTOR" : "FLOAT"});
+  for (const print::NodeOperation& o : program.operations) {
+    Json line = {o.kind};
+    for (const NodeOperand& a : o.operands) line.push_back(operand_json(a));
+    operations.push_back(line);
+  }
+  for (const auto& [name, o] : program.outputs)
+    outputs.push_back({name, o.color ? "VECTOR" : "FLOAT", operand_json(o)});
+  return {{"inputs", inputs}, {"operations", operations}, {"outputs", outputs}, {"live", program.live}};
+}
+
+/// Records a program by itself.
+template <class Outputs> NodeProgram recorded(const Outputs& outputs) {
+  Recorder recorder;
+  Program program;
+  outputs(program);
+  return print::node_program(program);
+}
+
+/// The parts that are the same for all models.
+NodeProgram record_bend() {
+  return recorded([](Program& p) {
+    const Vec3<Expr> g = input3("true"), wo = input3("view"), n = input3("normal");
+    const Condition bends = mirror_rise(g, wo, n) < Expr(0.0) && Expr::input("strand") < Expr(0.5);
+    p.output("normal", select(bends, bent_normal(g, wo, n), n));
+  });
+}
+NodeProgram record_raise() {
+  return recorded([](Program& p) { p.output("wo", raise_to_horizon(input3("wo"))); });
+}
+LampCone<Expr> cone_input() {
+  return {input3("towards"), Expr::input("angle"), Expr::input("drop"), Expr::input("widened"), Expr(1.0)};
+}
+NodeProgram record_cone() {
+  return recorded([](Program& p) {
+    const LampCone<Expr> cone =
+        cone_of(LampSlot<Expr>{input3("place"), input3("turn"), input3("scale"), input3("shape")}, input3("at"),
+                input3("view"));
+    p.output("towards", cone.towards);
+    p.output("angle", cone.angle);
+    p.output("drop", cone.drop);
+    p.output("widened", cone.widened);
+    p.output("active", cone.active);
+    p.output("chord", chord(cone.angle));
+  });
+}
+NodeProgram record_point() {
+  return recorded([](Program& p) {
+    p.output("wi", point_of(input3("towards"), Expr::input("drop"), Expr::input("u_0"), Expr::input("u_1")));
+  });
+}
+NodeProgram record_lobe() {
+  return recorded([](Program& p) {
+    const ToonLobe<Expr> lobe =
+        toon_lobe(cone_input(), Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
+    p.output("color", lobe.color);
+    p.output("size", lobe.size);
+  });
+}
+/// The drawn direction's weight; `lost`: 1 where it lies in the cone of a lamp or below the surface.
+NodeProgram record_rest() {
+  return recorded([](Program& p) {
+    const Rgb<Expr> weight = Rgb<Expr>::input("weight");
+    const Expr factor = kept(max_component(weight), Expr::input("u"));
+    p.output("color", weight * (factor * (Expr(1.0) - Expr::input("lost"))));
+  });
+}
+
+bool is_native(ClosureKind kind) {
+  return kind == ClosureKind::Diffuse || kind == ClosureKind::Reflection || kind == ClosureKind::Refraction;
+}
+const char* kind_of(ClosureKind kind) {
+  switch (kind) {
+    case ClosureKind::Diffuse:
+      return "diffuse";
+    case ClosureKind::Reflection:
+      return "mirror";
+    default:
+      return "refraction";
+  }
+}
+
+/// The closures that equal the model, where nodes make all of them; with choices bound.
+std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<Expr>& brdf) {
+  std::optional<ClosureSum<Expr>> sum = brdf.exact(recorded_wo(model, brdf));
+  if (!sum) return std::nullopt;
+  for (const Closure<Expr>& c : *sum)
+    if (!is_native(c.kind) || c.turned) return std::nullopt;
+  return sum;
+}
+
+ParamValues default_choices(const ModelInfo& info) {
+  ParamValues out;
+  for (const ParamInfo& p : info.params)
+    if (p.kind == ParamKind::Choice) out[p.name] = p.choices[std::size_t(p.value[0])];
+  return out;
+}
+
+bool has_native_closures(const Model& model, const ParamValues& values) {
+  Recorder recorder;
+  return native_closures(model, *model.record(values)).has_value();
+}
+
+class Nodes final : public Form {
+ public:
+  Nodes() : Form("nodes") {}
+
+  When when() const override { return When::Asked; }
+  bool in_whole_pack(const Model& model) const override { return !why_not(model, default_choices(model.info())); }
+  bool draws() const override { return true; }
+  bool native() const override { return true; }
+  /// One combination of choices, so that a group has one tree.
+  ParamValues values(const Model& model, const ParamValues& fixed) const override {
+    ParamValues out = default_choices(model.info());
+    for (auto& [name, value] : out)
+      if (const auto it = fixed.find(name); it != fixed.end()) value = it->second;
+    return out;
+  }
+  std::optional<std::string> why_not(const Model& model, const ParamValues& fixed) const override {
+    const ParamValues bound = values(model, fixed);
+    Recorder recorder;
+    if (model.has_scatter() && measure::two_sided(model, *model.record(bound)) && !has_native_closures(model, bound))
+      return "Blender's nodes can't send rays through a surface in a direction of their own";
+    return std::nullopt;
+  }
+
+  FormError error(const Model& model, const Setting&) const override { return error_of_samples(model); }
+  std::vector<std::string> warnings(const Model& model, const Shader&) const override {
+    std::vector<std::string> codes = {"clamp_indirect", "clamp_direct", "orthographic_far", "normal_pass"};
+    if (model.has_mirror()) codes.insert(codes.end(), {"multiple_importance", "filter_glossy", "clamp_mirror"});
+    return codes;
+  }
+  bool highlights(const Model& model, const Shader&) const override { return !model.has_mirror(); }
+  Shader write(const Model& model, const measure::AlbedoTable&, const Setting& setting) const override {
+    return write_nodes(model, values(model, setting.fixed), setting.fixed, setting.max_lamps);
+  }
+
+ private:
+  static Shader write_nodes(const Model&, const ParamValues& choices, const ParamValues& given, int max_lamps);
+};
+
+Shader Nodes::write_nodes(const Model& model, const ParamValues& choices, const ParamValues& given, int max_lamps) {
+  ParamValues fixed = given;
+  fixed.insert(choices.begin(), choices.end());
+  Shader out;
+  out.name = fmt::format("brdfc_{}_nodes", model.info().name);
+  Json parts = Json::object(), bounds = Json::object(), closures = Json::array();
+  const auto add = [&](const char* name, const NodeProgram& program) {
+    parts[name] = json_of(program);
+    out.operations += int(program.operations.size());
+  };
+  for (const ParamInfo& p : model.info().params)
+    if (p.kind == ParamKind::Number && !fixed.count(p.name)) bounds[p.name] = {p.min, p.max};
+  if (model.info().look != Look::Matte) add("bend", record_bend());
+  add("raise", record_raise());
+  bool lamps = false;
+  {
+    Recorder recorder;
+    const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
+    if (std::optional<ClosureSum<Expr>> sum = native_closures(model, *brdf)) {
+      Program program;
+      for (std::size_t i = 0; i < sum->size(); ++i) {
+        Closure<Expr>& c = (*sum)[i];
+        if (model.has_medium()) c.weight = c.weight * medium(*brdf, Expr::input("side"), Expr::input("path_length"));
+        const std::string weight = fmt::format("weight_{}", i), ior = fmt::format("ior_{}", i);
+        program.output(weight, c.weight);
+        Json closure = {{"kind", kind_of(c.kind)}, {"weight", weight}};
+        if (c.kind == ClosureKind::Refraction) {
+          program.output(ior, c.ior);
+          closure["ior"] = ior;
+        }
+        closures.push_back(closure);
+      }
+      add("closures", print::node_program(program));
+    } else {
+      lamps = max_lamps > 0;
+      const Vec3<Expr> wo = input3("wo"), wi = input3("wi");
+      {
+        Program program;
+        program.output("value", brdf->eval(wi, wo) * abs(wi.z));
+        const print::NodePrograms made = print::node_programs(program, {"wi_x", "wi_y", "wi_z"}, "kept_");
+        add("once", made.once);
+        add("value", made.each);
+      }
+      {
+        Program program;
+        const Sample<Expr> s = brdf->sample(wo, recorded_u());
+        program.output("wi", s.wi);
+        program.output("weight", s.weight);
+        add("draw", print::node_program(program));
+      }
+      if (model.has_mirror()) {
+        Program program;
+        program.output("weight_0", brdf->mirror(wo));
+        add("closures", print::node_program(program));
+        closures.push_back({{"kind", "mirror"}, {"weight", "weight_0"}});
+      }
+    }
+  }
+  if (parts.contains("draw")) add("rest", record_rest());
+  if (lamps) {
+    add("cone", record_cone());
+    add("point", record_point());
+    add("lobe", record_lobe());
+    out.lamps = max_lamps;
+  }
+  out.closures = int(closures.size()) + int(parts.contains("draw")) + out.lamps;
+  // Of the lamps' the extension takes those off that no lamp fills, by what other forms take for one.
+  out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
+  out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
+  out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
+  out.source = Json{{"format", 3},      {"narrow", kNarrow},    {"lamps", out.lamps},
+                    {"bounds", bounds}, {"closures", closures}, {"parts", parts}}
+                   .dump() +
+               "\n";
+  return out;
+}
+
+}  // namespace
+
+const Form& nodes() {
+  static const Nodes form;
+  return form;
+}
+
+}  // namespace brdfc::forms

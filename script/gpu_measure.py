@@ -1,0 +1,446 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Cycles' devices make of the models; script/gpu runs it, once a device.
+
+Needs `bpy` with NumPy, and beside it the files that script/gpu puts there: this machine may have
+neither the tool nor a network. `expect` computes what is measured against, with the tool; `measure`
+renders on one device and adds to a file of JSON after each step, so that what was measured before a
+crash is kept; `compare` prints tables of such files.
+"""
+
+import argparse
+import datetime
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from importlib import import_module
+from pathlib import Path
+
+PACKAGE = "bl_ext.user_default.brdfc_shaders"
+#: Device, and whether Open Shading Language runs there.
+MODES = {
+    "cpu": ("CPU", False),
+    "cpu-osl": ("CPU", True),
+    "cuda": ("CUDA", False),
+    "optix": ("OPTIX", False),
+    "optix-osl": ("OPTIX", True),
+}
+#: Towards the sun of the facets; the camera is above.
+SUN = (0.5, 0.2, 0.8)
+FACETS = 100
+#: Values far from the defaults, in which single precision shows.
+STIFF = {
+    "ashikhmin_shirley": {"nu": 100.0, "nv": 1e4, "rs": 0.9, "rd": 0.0},
+    "blinn": {"e": 2000.0},
+    "cook_torrance": {"m": 0.03},
+    "glossy_reflector": {"e": 10.0},
+    "max_phong": {"e": 5.0},
+    "phong": {"e": 5000.0},
+    "radziszewski_alda": {"n": 50.0},
+    "schlick": {"rough": 0.01, "p": 0.5},
+    "ward": {"ax": 0.02, "ay": 0.3},
+}
+#: Models on the ball: every number of lamps for the first ones, four lamps for the others.
+BALLS = {"ashikhmin_shirley": {}, "ward": {}}
+OTHERS = {
+    "cook_torrance": {},
+    "radziszewski_alda": {"n": 4.0},
+    "coupled": {},
+    "schlick": {},
+    "phong": {"e": 100.0},
+}
+LAMPS = (0, 1, 2, 4, 8)
+BLOCK = 8
+
+
+def read(path):
+    return json.loads(Path(path).read_text(encoding="utf-8"))
+
+
+def install(folder):
+    """The extension of the folder, in user settings of this run's own; its modules by name."""
+    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="brdfc-gpu-")
+    import bpy
+
+    sys.path.insert(0, str(folder))
+    (archive,) = Path(folder).glob("brdfc_shaders-*.zip")
+    bpy.ops.preferences.addon_enable(module="bl_pkg")
+    bpy.ops.extensions.package_install_files(
+        filepath=str(archive), repo="user_default", enable_on_install=True
+    )
+    return {n: import_module(f"{PACKAGE}.{n}") for n in ("api", "nodes", "pack", "scene_loader")}
+
+
+def use_device(kind):
+    """Has Blender render on the devices of a kind; their names."""
+    import bpy
+
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    if kind == "CPU":
+        preferences.compute_device_type = "NONE"
+        return ["CPU"]
+    preferences.compute_device_type = kind
+    preferences.get_devices()
+    for device in preferences.devices:
+        device.use = device.type == kind
+    return [device.name for device in preferences.devices if device.use]
+
+
+def empty_scene():
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    return bpy.context.scene
+
+
+def set_device(scene, mode):
+    kind, osl = MODES[mode]
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU" if kind == "CPU" else "GPU"
+    scene.cycles.shading_system = osl
+
+
+# ---- facets: light without a size against the formula ------------------------------------------
+
+
+def facet_cases(models, form):
+    """[(model, values)] of what has a form: defaults, and stiff ends."""
+    cases = [(name, {}) for name in models if form in models[name]["representations"]]
+    return cases + [(name, v) for name, v in STIFF.items() if (name, {}) in cases]
+
+
+def facets(modules, cases, forms, mode, samples):
+    """A Goniometer of cases under a sun of angle 0, and which case each facet is of."""
+    import numpy as np
+    from goniometer import Goniometer, tilted, unit
+
+    rng = np.random.default_rng(17)
+    which = np.repeat(np.arange(len(cases)), FACETS)
+    normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
+    near = unit(unit(unit(SUN) + (0, 0, 1)) + 0.1 * rng.normal(size=(len(which), 3)))
+    normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
+    scene = empty_scene()
+    modules["scene_loader"].apply_clean_settings(scene, max_bounces=0)
+    made = [modules["api"].new_material(n, f, **v) for (n, v), f in zip(cases, forms, strict=True)]
+    meter = Goniometer(scene, made, normals, samples=samples, which=which)
+    set_device(scene, mode)
+    wi = meter.local(meter.add_sun(unit(SUN)))
+    modules["api"].see_lamps(scene)
+    return meter, which, wi
+
+
+def expect(folder, tool):
+    """Writes facets.json: f cos of every case, facet by facet, as the tool computes it."""
+    modules = install(folder)
+    from helpers import evaluate
+
+    def run(*arguments, stdin=""):
+        done = subprocess.run(
+            [tool, *map(str, arguments)], input=stdin, text=True, capture_output=True
+        )
+        if done.returncode:
+            raise RuntimeError(done.stderr)
+        return done.stdout
+
+    cases = facet_cases(modules["pack"].manifest()["models"], "nodes")
+    meter, which, wi = facets(modules, cases, ["nodes"] * len(cases), "cpu", 1)
+    wo = meter.wo()
+    out = []
+    for i, (name, values) in enumerate(cases):
+        lit = (which == i) & (wi[:, 2] > 1e-3)
+        f = evaluate(run, name, values, wi[lit], wo[lit]) * wi[lit, 2:]
+        out.append({"model": name, "values": values, "f": f.tolist()})
+    (Path(folder) / "facets.json").write_text(json.dumps(out), encoding="utf-8")
+
+
+def measure_facets(folder, modules, mode, form):
+    """[{model, values, form, relative L1}] of a form, where a model has it, else of `auto`."""
+    import numpy as np
+
+    models = modules["pack"].manifest()["models"]
+    expected = read(Path(folder) / "facets.json")
+    cases = [(e["model"], e["values"]) for e in expected]
+    forms = [form if form in models[n]["representations"] else "auto" for n, _ in cases]
+    start = time.perf_counter()
+    meter, which, wi = facets(modules, cases, forms, mode, 64)
+    made = time.perf_counter()
+    picture = meter.measure()
+    rendered = time.perf_counter()
+    rows = []
+    for i, e in enumerate(expected):
+        lit = (which == i) & (wi[:, 2] > 1e-3)
+        f = np.array(e["f"])
+        row = {"model": e["model"], "values": e["values"], "form": forms[i]}
+        if f.sum() > 0:  # of mirrors a sun without an angle shows nothing
+            error = np.sort(np.abs(picture[lit] - f).sum(1))
+            # A drawn direction's lobe may be met by chance, once in 1e5 samples: a facet in thirty.
+            row["off"] = float(error[: len(error) - len(error) // 30].sum() / f.sum())
+            row["worst_facet"] = float(error[-1] / f.sum() * len(f))
+        row["finite"] = bool(np.isfinite(picture[lit]).all())
+        rows.append(row)
+    return {"rows": rows, "make_s": made - start, "render_s": rendered - made}
+
+
+# ---- balls: noise, time and means under lamps --------------------------------------------------
+
+
+def ball_scene(modules, model, values, form, lamps, size, mode):
+    """A ball of a material on a floor, under so many point lamps and a dim sky."""
+    import noise_scenes
+    from mathutils import Vector
+
+    scene = empty_scene()
+    noise_scenes.settings(scene, size)
+    scene.render.threads_mode = "AUTO"
+    scene.render.use_persistent_data = True
+    noise_scenes.world(scene, 0.2)
+    floor = [noise_scenes.rectangle(-20, 20, -20, 20, 0)]
+    noise_scenes.quads(scene, "Floor", noise_scenes.grey("Floor", 0.5), floor)
+    ball = noise_scenes.sphere(scene, "Ball", None, 1.0, noise_scenes.CENTRE)
+    distance = (noise_scenes.CAMERA - noise_scenes.CENTRE).length
+    angle = 2 * math.atan(math.tan(math.asin(1 / distance)) * 7 / 6)
+    noise_scenes.camera(scene, noise_scenes.CAMERA, noise_scenes.CENTRE, angle)
+    for index in range(lamps):
+        turn = 2.4 * index
+        towards = Vector((math.sin(turn), -math.cos(turn), 0.4 + 0.15 * index)).normalized()
+        noise_scenes.lamp(
+            scene, "POINT", f"Lamp {index}", towards, share=1 / lamps, shadow_soft_size=0.1
+        )
+    if form == "glossy":
+        material = noise_scenes.node_material("Glossy", "ShaderNodeBsdfAnisotropic", Roughness=0.3)
+    else:
+        material = modules["api"].new_material(model, form, **values)
+    ball.data.materials.append(material)
+    set_device(scene, mode)
+    modules["api"].see_lamps(scene)
+    return scene
+
+
+def measure_ball(modules, mode, case, size, samples):
+    """Time, noise and means by blocks of one ball."""
+    import numpy as np
+    from helpers import render
+
+    model, values, form, lamps = case
+    start = time.perf_counter()
+    scene = ball_scene(modules, model, values, form, lamps, size, mode)
+    made = time.perf_counter() - start
+    times, pictures = {}, []
+    # GPUs take as many samples at once as fit: only a longer picture tells the time.
+    timed = samples * (16 if MODES[mode][0] != "CPU" else 1)
+    for name, seed, count in (
+        ("first", 1, 1),
+        ("shortest", 1, 1),
+        ("one", 2, samples),
+        ("other", 3, samples),
+        ("timed", 4, timed),
+    ):
+        if name == "timed" and timed == samples:
+            times[name] = min(times["one"], times["other"])
+            continue
+        scene.cycles.seed, scene.cycles.samples = seed, count
+        start = time.perf_counter()
+        picture = render(scene)[..., :3]
+        times[name] = time.perf_counter() - start
+        if name in ("one", "other"):
+            pictures.append(picture)
+    a, b = pictures
+    blocks = [
+        p.reshape(size // BLOCK, BLOCK, size // BLOCK, BLOCK, 3).mean((1, 3)) for p in pictures
+    ]
+    mean = (a + b) / 2
+    noise = ((a - b) ** 2 / 2 / (mean**2 + 1e-2)).mean() * samples
+    per_sample = (times["timed"] - times["shortest"]) / ((timed - 1) * size * size)
+    return {
+        "model": model,
+        "values": values,
+        "form": form,
+        "lamps": lamps,
+        "make_s": made,
+        "seconds": times,
+        "ns_per_sample": per_sample * 1e9,
+        "rel_mse_of_one_sample": float(noise),
+        "mean": mean.mean((0, 1)).tolist(),
+        "finite": bool(np.isfinite(mean).all()),
+        "blocks": [np.round(x, 7).tolist() for x in blocks],
+    }
+
+
+def ball_cases(mode, tiny):
+    """[(model, values, form, lamps)], what matters most first."""
+    forms = ["nodes"] if not MODES[mode][1] else ["aimed"]
+    lamps = (1, 4) if tiny else LAMPS
+    cases = [("glossy", {}, "glossy", n) for n in lamps]
+    some = dict(list(BALLS.items())[:1]) if tiny else BALLS
+    cases += [(m, v, f, n) for m, v in some.items() for f in forms for n in lamps]
+    if not tiny:
+        cases += [(m, v, f, 4) for m, v in OTHERS.items() for f in forms]
+        if mode == "optix-osl" or mode == "cpu-osl":
+            cases += [(m, v, "nodes", 4) for m, v in list(BALLS.items())[:1]]
+            cases += [(m, v, "sampled", 4) for m, v in list(BALLS.items())[:1]]
+    return cases
+
+
+def driver():
+    """What nvidia-smi says of cards and driver."""
+    command = [
+        "nvidia-smi",
+        "--query-gpu=name,driver_version,memory.total",
+        "--format=csv,noheader",
+    ]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def measure(folder, mode, out, tiny):
+    modules = install(folder)
+    import bpy
+
+    kind, osl = MODES[mode]
+    result = {
+        "mode": mode,
+        "osl": osl,
+        "blender": bpy.app.version_string,
+        "extension": modules["pack"].manifest()["generator"],
+        "date": datetime.datetime.now().isoformat(timespec="seconds"),
+        "cores": os.cpu_count(),
+        "nvidia": driver(),
+        "balls": [],
+    }
+
+    def keep():
+        Path(out).write_text(json.dumps(result) + "\n", encoding="utf-8")
+
+    try:
+        result["devices"] = use_device(kind)
+    except Exception as error:  # a build without that device
+        result["devices"], result["error"] = [], repr(error)
+    keep()
+    if not result["devices"]:
+        print(f"{mode}: no device")
+        return
+    print(f"{mode}: {', '.join(result['devices'])}")
+    size, samples = (64, 16) if tiny else (160, 128)
+
+    def measure_the_facets():
+        form = "aimed" if osl else "nodes"
+        result["facets"] = measure_facets(folder, modules, mode, form)
+        keep()
+        for row in result["facets"]["rows"]:
+            print(f"  {row['model']} {row['values'] or ''} {row['form']}: {row.get('off', 0):.2g}")
+
+    # With OSL every shader is compiled for the device, which may take minutes.
+    if not osl:
+        measure_the_facets()
+    for case in ball_cases(mode, tiny):
+        try:
+            row = measure_ball(modules, mode, case, size, samples)
+        except Exception as error:  # what else there is to measure
+            row = {"model": case[0], "form": case[2], "lamps": case[3], "error": repr(error)}
+        result["balls"].append(row)
+        keep()
+        shown = row.get("error") or f"{row['ns_per_sample']:.0f} ns, mean {row['mean'][1]:.5f}"
+        print(f"  {case[0]} {case[2]} {case[3]} lamps: {shown}", flush=True)
+    if osl:
+        measure_the_facets()
+    result["complete"] = True
+    keep()
+
+
+# ---- comparison --------------------------------------------------------------------------------
+
+
+def compared(row, other):
+    """Relative difference of means with its standard error, and the mean square of differences of
+    blocks over what their noise explains: 1 where both are the same picture."""
+    import numpy as np
+
+    (a, b), (c, d) = (np.array(r["blocks"]) for r in (row, other))
+    difference = (a + b) / 2 - (c + d) / 2
+    noise = ((a - b) ** 2 + (c - d) ** 2) / 4
+    mean = ((c + d) / 2).mean()
+    count = math.sqrt(difference.size / 3)
+    return {
+        "mean": float(difference.mean() / mean),
+        "error": float(difference.mean(-1).std() / count / mean),
+        "blocks": float((difference**2).sum() / max(noise.sum(), 1e-30)),
+    }
+
+
+def find(results, mode, row, form=None):
+    key = (row["model"], form or row["form"], row["lamps"])
+    for other in results.get(mode, {}).get("balls", []):
+        if "blocks" in other and (other["model"], other["form"], other["lamps"]) == key:
+            return other
+    return None
+
+
+def compare(files, out):
+    """One file of all, without blocks, and tables on the screen."""
+    results = {r["mode"]: r for r in map(read, files)}
+    for mode, result in results.items():
+        print(f"== {mode}: {', '.join(result['devices']) or 'no device'} {result['nvidia'] or ''}")
+        rows = result.get("facets", {}).get("rows", [])
+        off = [r["off"] for r in rows if "off" in r]
+        if off:
+            worst = max((r for r in rows if "off" in r), key=lambda r: r["off"])
+            print(
+                f"   facets under a sun of angle 0: {len(off)} cases, worst relative L1 "
+                f"{worst['off']:.2g} ({worst['model']} {worst['values']})"
+            )
+        for row in result["balls"]:
+            if "blocks" not in row:
+                print(f"   {row['model']} {row['form']} {row['lamps']} lamps: {row['error']}")
+                continue
+            line = f"   {row['model']:18} {row['form']:8} {row['lamps']} lamps"
+            line += f" {row['ns_per_sample']:8.1f} ns  noise {row['rel_mse_of_one_sample']:.3g}"
+            glossy = find(results, mode, {"model": "glossy", "lamps": row["lamps"]}, "glossy")
+            if glossy:
+                row["time_over_glossy"] = row["ns_per_sample"] / glossy["ns_per_sample"]
+                line += f"  {row['time_over_glossy']:.2f} x Glossy"
+            others = {"cpu": find(results, "cpu", row)}
+            others["aimed on the CPU"] = find(results, "cpu-osl", row, "aimed")
+            for name, other in others.items():
+                if other is None or other is row:
+                    continue
+                c = compared(row, other)
+                row.setdefault("against", {})[name] = c
+                line += (
+                    f"  {name}: {100 * c['mean']:+.2f}±{100 * c['error']:.2f} % ({c['blocks']:.2f})"
+                )
+            print(line)
+    for result in results.values():
+        for row in result["balls"]:
+            row.pop("blocks", None)
+    Path(out).write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers(dest="command", required=True)
+    command = commands.add_parser("expect")
+    command.add_argument("tool")
+    command = commands.add_parser("measure")
+    command.add_argument("mode", choices=MODES)
+    command.add_argument("out")
+    command.add_argument("--tiny", action="store_true")
+    command = commands.add_parser("compare")
+    command.add_argument("out")
+    command.add_argument("files", nargs="+")
+    options = parser.parse_args()
+    folder = Path(__file__).resolve().parent
+    if options.command == "expect":
+        expect(folder, options.tool)
+    elif options.command == "measure":
+        measure(folder, options.mode, options.out, options.tiny)
+    else:
+        compare(options.files, options.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Models as trees of Blender's own nodes, without Open Shading Language: right under lamps, in
+worlds, with links and without the extension."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from helpers import add_camera, add_lamp, add_sphere, add_world, albedo, render, sphere_scene
+from test_aimed import SUNS, off_under_a_sun
+
+SLOW = pytest.mark.slow
+BLOCK = 8
+
+
+def settings(extension, scene, samples, osl, size=64):
+    extension.scene_loader.apply_clean_settings(scene, samples=samples, max_bounces=0)
+    scene.cycles.shading_system = osl
+    scene.render.resolution_x = scene.render.resolution_y = size
+
+
+@pytest.mark.parametrize("towards", SUNS, ids=str)
+def test_a_sun_without_an_angle(extension, empty, tool, towards):
+    """Every model with defaults, stiff ends and random values: f cos to 1e-3 (relative L1)."""
+    extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
+    empty.cycles.shading_system = False
+    # Closures of small weight are kept by chance, which is noise where a stiff lobe has faded.
+    found = off_under_a_sun(extension, empty, tool, "nodes", towards, 512)
+    assert {name for name, *_ in found} == {
+        name for name, model in extension.api.models().items() if model["scatter"]
+    }
+    for name, values, off, _ in found:
+        # A cosine in single precision to a power, as in test_aimed.py.
+        exponent = max([0, *(v for k, v in values.items() if k in ("e", "es"))])
+        assert off < max(1e-3, 8e-7 * exponent), f"{name} {values}: relative L1 {off:.3g}"
+
+
+CASES = [
+    ("ashikhmin_shirley", {}),
+    ("ward", {"ax": 0.3, "ay": 0.1}),
+    pytest.param("cook_torrance", {}, marks=SLOW),
+    pytest.param("coupled", {}, marks=SLOW),
+    pytest.param("lafortune", {}, marks=SLOW),
+    pytest.param("oren_nayar", {}, marks=SLOW),
+    pytest.param("phong", {"e": 100.0}, marks=SLOW),
+    pytest.param("radziszewski_alda", {"n": 4.0}, marks=SLOW),
+    pytest.param("schlick", {}, marks=SLOW),
+]
+
+
+def white_world(scene):
+    add_world(scene, 1.0)
+
+
+def lamps(scene):
+    """A ball, a sun with an angle, a rectangle, and a lamp without a size."""
+    add_world(scene, 0.3)
+    add_lamp(scene, "POINT", "Ball", (-2, -4, 3), energy=400, shadow_soft_size=0.6)
+    add_lamp(scene, "SUN", "Sun", turn=(0.6, -0.5, 0), energy=1.0, angle=0.2)
+    add_lamp(
+        scene, "AREA", "Area", (3, -4, 0), (math.pi / 2, 0, 0.6), energy=300, shape="RECTANGLE",
+        size=3.0, size_y=1.5,
+    )  # fmt: skip
+    add_lamp(scene, "POINT", "Point", (1, -4, 4), energy=300, shadow_soft_size=0.0)
+
+
+def one_before_the_other(scene):
+    """Cones of lamps that overlap, as seen from the ball."""
+    add_lamp(scene, "POINT", "Near", (-2, -4, 3), energy=300, shadow_soft_size=0.6)
+    add_lamp(scene, "POINT", "Far", (-4.2, -8, 6), energy=1000, shadow_soft_size=0.3)
+    add_lamp(scene, "POINT", "Beside", (-2.5, -4.2, 2.8), energy=300, shadow_soft_size=0.0)
+
+
+def blocks_of(extension, model, values, form, light, samples, pictures=6):
+    """Means of blocks of pixels, a picture a row: (pictures, blocks)."""
+    found = []
+    for seed in range(pictures):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        settings(extension, scene, samples, osl=form != "nodes")
+        scene.cycles.seed = seed
+        add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
+        add_sphere(scene, extension.api.new_material(model, form, **values), segments=128)
+        light(scene)
+        bpy.context.view_layer.update()
+        extension.api.see_lamps(scene)
+        picture = render(scene)[..., 1]
+        side = len(picture) // BLOCK
+        found.append(picture.reshape(side, BLOCK, side, BLOCK).mean((1, 3)).ravel())
+    return np.array(found)
+
+
+def difference(a, b):
+    """Relative difference of means with its standard error, and the mean square difference of
+    blocks over what their noise explains."""
+
+    def of(x):
+        return x.mean(0), x.var(0, ddof=1) / len(x), x.mean(1).var(ddof=1) / len(x)
+
+    (ma, va, ea), (mb, vb, eb) = of(a), of(b)
+    relative = ma.mean() / mb.mean() - 1
+    lit = mb > 0.02 * mb.max()
+    return (
+        relative,
+        math.sqrt(ea + eb) / mb.mean(),
+        ((ma - mb)[lit] ** 2).sum() / (va + vb)[lit].sum(),
+    )
+
+
+@pytest.mark.parametrize(("model", "values"), CASES)
+def test_a_white_world(extension, model, values):
+    """Blocks of a ball are those of directions drawn in Open Shading Language."""
+    a, b = (blocks_of(extension, model, values, f, white_world, 64) for f in ("nodes", "sampled"))
+    off, error, noise = difference(a, b)
+    print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
+    assert abs(off) < 4.5 * error + 1e-3
+    assert noise < 1.7  # of some 50 blocks with variances of ten pictures
+
+
+@pytest.mark.parametrize("light", [lamps, one_before_the_other], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(("model", "values"), CASES)
+def test_lamps(extension, model, values, light):
+    """Blocks of a ball are those of the form that aims at lamps, which has been held against the
+    reference renderer: no lamp counts twice, and none is lost."""
+    forms = {"nodes": 128, "aimed": 128}
+    a, b = (blocks_of(extension, model, values, f, light, n) for f, n in forms.items())
+    off, error, noise = difference(a, b)
+    print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
+    assert abs(off) < 4.5 * error + 5e-3
+    assert noise < 2.0
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [("lambertian_specular", {}), ("shirley_1991", {}), ("fresnel_conductor", {}), ("glass", {})],
+)
+def test_closures_of_blenders_own(extension, empty, tool, model, values):
+    """Where diffuse, mirror and refraction nodes are all of a model: a ball in a white world."""
+    pictures = {}
+    for form in ("nodes", "exact"):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.scene_loader.apply_clean_settings(scene, samples=256, max_bounces=16)
+        scene.cycles.shading_system = form == "exact"
+        sphere_scene(scene, extension.api.new_material(model, form, **values), 24, 256)
+        pictures[form] = render(scene)[..., :3]
+    off = np.abs(pictures["nodes"] - pictures["exact"]).mean() / pictures["exact"].mean()
+    assert off < 5e-3
+
+
+def test_links_and_ranges(extension, empty, tool):
+    """A parameter that a node controls, and one that a link brings out of its range, which counts
+    as the end of that."""
+    settings(extension, empty, 256, osl=False, size=16)
+    material = extension.api.new_material("ward", "nodes", ks=0.6, ax=0.5, ay=0.3)
+    add_sphere(empty, material)
+    add_camera(empty)
+    add_world(empty)
+    plain = render(empty)
+    (node,) = extension.nodes.group_nodes(material)
+    tree, found = material.node_tree, extension.nodes.sockets(node)
+    for name, value in (("ax", 0.5), ("ay", 0.3)):
+        number = tree.nodes.new("ShaderNodeValue")
+        number.outputs[0].default_value = value
+        tree.links.new(number.outputs[0], found[name])
+        found[name].default_value = 0.02
+    np.testing.assert_array_equal(render(empty), plain)
+    number.outputs[0].default_value = 7.0
+    beyond = render(empty)
+    assert np.abs(beyond - plain).max() > 1e-3
+    number.outputs[0].default_value = extension.pack.parameters("ward")["ay"]["max"]
+    np.testing.assert_array_equal(render(empty), beyond)
+
+
+def test_a_choice_without_nodes_is_a_sentence(extension, empty):
+    """Trees are made for the default choices."""
+    with pytest.raises(ValueError, match="Formula Nodes is only for Normalisation = Bounded"):
+        extension.api.new_material("ward", "nodes", normalisation="duer")
+    material = extension.api.new_material("ward", "aimed", normalisation="duer")
+    with pytest.raises(ValueError, match="only for"):
+        extension.api.switch_representation(material, "nodes")
+    assert extension.nodes.identity(extension.nodes.group_nodes(material)[0])[1] == "aimed"
+
+
+def test_auto_takes_other_forms(extension, empty):
+    for name in extension.api.models():
+        assert extension.pack.resolve(name, "auto") not in ("nodes", "twin")
+
+
+def test_a_group_a_model_and_none_that_is_left(extension, empty):
+    """Materials of a model share its groups, which go with the last one."""
+    first = extension.api.new_material("phong", "nodes")
+    before = len(bpy.data.node_groups)
+    second = extension.api.new_material("phong", "nodes", e=50.0)
+    assert len(bpy.data.node_groups) == before
+    for material in (first, second):
+        extension.api.switch_representation(material, "aimed")
+    assert not [g for g in bpy.data.node_groups if extension.nodes.formula_nodes.PART in g]
+    assert sorted(g.name for g in bpy.data.node_groups if "Phong" in g.name) == [
+        "Phong (aimed)",
+        "Phong (twin)",
+    ]
+
+
+def test_a_saved_file_renders_without_the_extension(extension, empty, tmp_path):
+    from helpers import render_without_the_extension
+
+    settings(extension, empty, 64, osl=False, size=16)
+    add_sphere(empty, extension.api.new_material("ward", "nodes"))
+    add_camera(empty)
+    add_lamp(empty, "POINT", location=(2, -4, 3), energy=300, shadow_soft_size=0.1)
+    add_world(empty, 0.2)
+    bpy.context.view_layer.update()
+    extension.api.see_lamps(empty)
+    here = render(empty)
+    path = tmp_path / "nodes.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    there = render_without_the_extension(path, 1, tmp_path)
+    np.testing.assert_allclose(there, here, rtol=1e-5, atol=1e-6)
+
+
+def test_albedo_in_a_white_world(extension, empty, tool):
+    """Facing the viewer a surface reflects its albedo."""
+    settings(extension, empty, 4096, osl=False, size=4)
+    values = {"m": 0.4}
+    material = extension.api.new_material("cook_torrance", "nodes", **values)
+    bpy.ops.mesh.primitive_plane_add(size=4)
+    bpy.context.object.data.materials.append(material)
+    add_camera(empty, (0, 0, 50), (0, 0, 0), orthographic=1.0)
+    add_world(empty)
+    found = render(empty)[..., :3].mean((0, 1))
+    np.testing.assert_allclose(found, albedo(tool, "cook_torrance", values, [1.0])[0], rtol=3e-3)
