@@ -22,9 +22,10 @@ _SOCKETS = {
     "VECTOR": "NodeSocketVector",
     "SHADER": "NodeSocketShader",
 }
+#: The one operation on vectors that gives a number.
+_DOT = "V_DOT_PRODUCT"
 #: Operations of a group, at most.
 _STEP = 60
-_AXES = ("x", "y", "z")
 
 
 class _Formula:
@@ -60,6 +61,8 @@ class _Formula:
         if kind == "V_SCALE":
             vector, scale = self.operand(operands[0], True), self.operand(operands[1])
             return w.vector("SCALE", vector, scale=scale)
+        if kind == _DOT:
+            return w.vector(kind[2:], *(self.operand(o, True) for o in operands), output="Value")
         if kind.startswith("V_"):
             return w.vector(kind[2:], *(self.operand(o, True) for o in operands))
         return w.math(kind, *map(self.operand, operands))
@@ -109,7 +112,8 @@ def _steps(data):
     operations = data["operations"]
     kinds = dict(data["inputs"])
     for index, (kind, *_) in enumerate(operations):
-        kinds[f"${index}"] = "VECTOR" if kind == "COMBINE" or kind.startswith("V_") else "FLOAT"
+        vector = kind == "COMBINE" or (kind.startswith("V_") and kind != _DOT)
+        kinds[f"${index}"] = "VECTOR" if vector else "FLOAT"
     wanted = [value for _, _, value in data["outputs"] if isinstance(value, str)]
     for first in range(0, len(operations), _STEP):
         last = min(first + _STEP, len(operations))
@@ -166,8 +170,7 @@ class _Parts:
         return name in self.data
 
     def add(self, name, **inputs):
-        """Adds a part; its outputs by name. `inputs`: numbers, outputs, or dicts of vectors' parts
-        by axis, which are inputs NAME_x and so on."""
+        """Adds a part; its outputs by name. `inputs`: numbers and outputs by name."""
         group = _part_group(f"{self.title}: {name}", self.data[name])
         return _instance(self.w, group, inputs, name)
 
@@ -178,10 +181,6 @@ class _Parts:
     def on(self, wiring):
         """The same parts, for another tree."""
         return _Parts(wiring, {"parts": self.data}, self.title)
-
-
-def _by_axis(name, values):
-    return {f"{name}_{axis}": value for axis, value in zip(_AXES, values, strict=True)}
 
 
 class _Surface:
@@ -200,13 +199,9 @@ class _Surface:
         self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
         if parts.has("bend"):
             vectors = {"true": self.true_normal, "view": self.view, "normal": self.normal}
-            inputs = {}
-            for name, vector in vectors.items():
-                inputs |= _by_axis(name, w.separate(vector))
-            bent = parts.add("bend", strand=self.strand, **inputs)
-            self.normal = w.combine(*(bent[f"normal_{axis}"] for axis in _AXES))
+            self.normal = parts.add("bend", strand=self.strand, **vectors)["normal"]
         self._frame(tangent)
-        self.wo = parts.add("raise", **_by_axis("wo", self.local(self.view)))
+        self.wo = parts.add("raise", wo=self.local(self.view))
 
     def _frame(self, tangent):
         """As brdfc_frame() in OSL: a tangent of length 0 asks for the object's z axis."""
@@ -236,19 +231,19 @@ class _Surface:
     def local(self, vector):
         return _local(self.w, vector, self.axes)
 
-    def world(self, x, y, z):
+    def world(self, vector):
         """A vector of the frame in the world's axes."""
         w = self.w
         total = None
-        for part, axis in zip((x, y, z), self.axes, strict=True):
+        for part, axis in zip(w.separate(vector), self.axes, strict=True):
             scaled = w.vector("SCALE", axis, scale=part)
             total = scaled if total is None else w.vector("ADD", total, scaled)
         return total
 
 
 def _local(w, vector, axes):
-    """The three parts of a vector in a frame."""
-    return [w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes]
+    """A vector in a frame."""
+    return w.combine(*(w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes))
 
 
 def _random(w, place, view, path_length, index):
@@ -281,12 +276,8 @@ def _seen_group(parts):
     vectors = (*_SLOT, "at", "view")
 
     def fill(w, found):
-        split = {}
-        for name in vectors:
-            split |= _by_axis(name, w.separate(found[name]))
-        cone = parts.on(w).add("cone", **split)
-        axis = w.combine(*(cone[f"towards_{a}"] for a in _AXES))
-        return {"towards": axis, **{name: cone[name] for name, _ in _SEEN[1:]}}
+        cone = parts.on(w).add("cone", **found)
+        return {name: cone[name] for name, _ in _SEEN}
 
     content = ["seen", parts.data["cone"]]
     return _group("lamp seen", content, [[name, "VECTOR"] for name in vectors], _SEEN, fill)
@@ -294,20 +285,17 @@ def _seen_group(parts):
 
 def _lamp_group(parts):
     """The group that makes of a cone the closure that carries what the model gives there."""
-    own = {f"wi_{axis}" for axis in _AXES}
     vectors = ("towards", "at", "view", "tangent", "bitangent", "normal")
     numbers = ("index", "length", "angle", "drop", "widened", "shown", "room")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
-    inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name not in own]
+    inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
 
     def fill(w, found):
         here = parts.on(w)
         u = _random(w, found["at"], found["view"], found["length"], found["index"])
-        towards = _by_axis("towards", w.separate(found["towards"]))
-        point = here.add("point", drop=found["drop"], u_0=u[0], u_1=u[1], **towards)
+        point = here.add("point", u_0=u[0], u_1=u[1], **found)["wi"]
         frame = (found["tangent"], found["bitangent"], found["normal"])
-        wi = _local(w, w.combine(*(point[f"wi_{a}"] for a in _AXES)), frame)
-        value = here.add("value", **(found | _by_axis("wi", wi)))["value"]
+        value = here.add("value", **(found | {"wi": _local(w, point, frame)}))["value"]
         cone = {name: found[name] for name in ("angle", "widened", "room")}
         lobe = here.add("lobe", value=value, u_2=u[2], **cone)
         toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
@@ -397,7 +385,7 @@ def _rest(w, parts, surface, given, lamps, narrow):
     u = _random(w, surface.place, surface.view, surface.path_length, 0.0)
     numbers = {f"u_{i}": number for i, number in enumerate(u)}
     drawn = parts.add("draw", **given, **numbers)
-    ray = surface.world(*(drawn[f"wi_{a}"] for a in _AXES))
+    ray = surface.world(drawn["wi"])
     height = w.vector("DOT_PRODUCT", ray, surface.true_normal, output="Value")
     # Rays leave hairs on all sides.
     hidden = w.math(

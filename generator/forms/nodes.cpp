@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "closures/closure_pool.h"
 #include "forms/error.h"
@@ -43,12 +44,16 @@ Json json_of(const NodeProgram& program) {
   return {{"inputs", inputs}, {"operations", operations}, {"outputs", outputs}, {"live", program.live}};
 }
 
+/// What parts have vectors for.
+const std::set<std::string> kVectors = {"at",   "normal", "place", "scale", "shape", "towards",
+                                        "true", "turn",   "view",  "wi",    "wo"};
+
 /// Records a program by itself.
 template <class Outputs> NodeProgram recorded(const Outputs& outputs) {
   Recorder recorder;
   Program program;
   outputs(program);
-  return print::node_program(program);
+  return print::node_program(program, kVectors);
 }
 
 /// The parts that are the same for all models.
@@ -205,14 +210,14 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& choices, const 
         }
         closures.push_back(closure);
       }
-      add("closures", print::node_program(program));
+      add("closures", print::node_program(program, kVectors));
     } else {
       lamps = max_lamps > 0;
       const Vec3<Expr> wo = input3("wo"), wi = input3("wi");
       {
         Program program;
         program.output("value", brdf->eval(wi, wo) * abs(wi.z));
-        const print::NodePrograms made = print::node_programs(program, {"wi_x", "wi_y", "wi_z"}, "kept_");
+        const print::NodePrograms made = print::node_programs(program, {"wi_x", "wi_y", "wi_z"}, "kept_", kVectors);
         add("once", made.once);
         add("value", made.each);
       }
@@ -221,12 +226,12 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& choices, const 
         const Sample<Expr> s = brdf->sample(wo, recorded_u());
         program.output("wi", s.wi);
         program.output("weight", s.weight);
-        add("draw", print::node_program(program));
+        add("draw", print::node_program(program, kVectors));
       }
       if (model.has_mirror()) {
         Program program;
         program.output("weight_0", brdf->mirror(wo));
-        add("closures", print::node_program(program));
+        add("closures", print::node_program(program, kVectors));
         closures.push_back({{"kind", "mirror"}, {"weight", "weight_0"}});
       }
     }

@@ -165,13 +165,28 @@ class Lowering {
 /// Writes what Lowering left, depth first, so that few values live at once.
 class Writer {
  public:
-  /// `cuts`: values that come from elsewhere, by node.
-  Writer(const Recorder& r, std::map<int, std::string> cuts)
-      : r_(r), cuts_(std::move(cuts)), uses_(std::size_t(r.size())), need_(std::size_t(r.size()), -1) {}
+  /// `cuts`: values that come from elsewhere, by node; `vectors`: see node_program().
+  Writer(const Recorder& r, std::map<int, std::string> cuts, const std::set<std::string>& vectors)
+      : r_(r),
+        cuts_(std::move(cuts)),
+        vectors_(vectors),
+        uses_(std::size_t(r.size())),
+        need_(std::size_t(r.size()), -1) {}
 
   NodeProgram write(const std::vector<std::pair<std::string, int>>& outputs) {
     for (const auto& [name, id] : outputs) count_uses(id);
-    for (const auto& [name, id] : outputs) out_.outputs.push_back({name, operand(id)});
+    for (int id = 0; id < r_.size(); ++id)
+      if (uses_[std::size_t(id)] > 0) find_dot(id);
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      const std::string base = base_of(outputs[i].first, 'x');
+      if (base.empty()) {
+        out_.outputs.push_back({outputs[i].first, operand(outputs[i].second)});
+        continue;
+      }
+      const Triple triple = {outputs[i].second, outputs.at(i + 1).second, outputs.at(i + 2).second};
+      out_.outputs.push_back({base, plan(triple) ? vector(triple) : combined(triple)});
+      i += 2;
+    }
     count_live();
     return std::move(out_);
   }
@@ -183,7 +198,147 @@ class Writer {
     bool inverted;
   };
 
+  /// x, y and z of a vector.
+  using Triple = std::array<int, 3>;
+  /// How the operands of a triple of equal operations go together: those of one vector, or a number for all three.
+  struct Joined {
+    std::vector<Triple> operands;
+  };
+
   bool is_color(int id) const { return r_.node(id).type == ExprType::Color; }
+
+  /// The vector that NAME_x (or _y or _z) is a part of, or "".
+  std::string base_of(const std::string& name, char axis) const {
+    if (name.size() < 3 || name[name.size() - 2] != '_' || name.back() != axis) return "";
+    const std::string base = name.substr(0, name.size() - 2);
+    return vectors_.count(base) ? base : "";
+  }
+  std::string input_of(const Triple& t) const {
+    std::string base;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const ExprNode& n = r_.node(t[c]);
+      const std::string of = n.op == Op::Input && !cuts_.count(t[c]) ? base_of(n.name, "xyz"[c]) : "";
+      if (of.empty() || (c > 0 && of != base)) return "";
+      base = of;
+    }
+    return base;
+  }
+  bool all(const Triple& t, Op op) const {
+    return std::ranges::all_of(t, [&](int id) { return r_.node(id).op == op && !cuts_.count(id); });
+  }
+  static bool same(const Triple& t) { return t[0] == t[1] && t[1] == t[2]; }
+
+  /// Whether three numbers are a vector of which nodes compute all at once.
+  bool plan(const Triple& t) {
+    if (same(t)) return false;
+    if (all(t, Op::Const) || !input_of(t).empty()) return true;
+    if (const auto it = planned_.find(t); it != planned_.end()) return it->second.has_value();
+    planned_[t] = join(t);
+    return planned_[t].has_value();
+  }
+  std::optional<Joined> join(const Triple& t) {
+    const Op op = r_.node(t[0]).op;
+    if (!all(t, op)) return std::nullopt;
+    const auto argument = [&](std::size_t c, std::size_t i) { return r_.node(t[c]).args[i]; };
+    const auto column = [&](std::size_t i) { return Triple{argument(0, i), argument(1, i), argument(2, i)}; };
+    switch (op) {
+      case Op::Neg:
+        if (plan(column(0))) return Joined{{column(0)}};
+        return std::nullopt;
+      case Op::Select:
+        if (same(column(0)) && (plan(column(1)) || plan(column(2)))) return Joined{{column(0), column(1), column(2)}};
+        return std::nullopt;
+      case Op::Sub:
+        if (plan(column(0)) && plan(column(1))) return Joined{{column(0), column(1)}};
+        return std::nullopt;
+      case Op::Div:
+        if (plan(column(0)) && (same(column(1)) || plan(column(1)))) return Joined{{column(0), column(1)}};
+        return std::nullopt;
+      case Op::Add:
+      case Op::Mul:
+        // Either way round in each.
+        for (unsigned turned = 0; turned < 8; ++turned) {
+          const auto at = [&](std::size_t c, std::size_t i) { return argument(c, (turned >> c & 1) ? 1 - i : i); };
+          const Triple first = {at(0, 0), at(1, 0), at(2, 0)}, second = {at(0, 1), at(1, 1), at(2, 1)};
+          if (plan(first) && (plan(second) || (op == Op::Mul && same(second)))) return Joined{{first, second}};
+        }
+        return std::nullopt;
+      default:
+        return std::nullopt;
+    }
+  }
+
+  NodeOperand combined(const Triple& t) {
+    std::vector<NodeOperand> parts;
+    for (int id : t) parts.push_back(operand(id));
+    return add("COMBINE", parts, true);
+  }
+
+  /// What plan() allows.
+  NodeOperand vector(const Triple& t) {
+    if (const std::string base = input_of(t); !base.empty()) return input(base, true);
+    if (all(t, Op::Const))
+      return {-1, "", {r_.node(t[0]).value[0], r_.node(t[1]).value[0], r_.node(t[2]).value[0]}, true};
+    if (const auto it = made_.find(t); it != made_.end()) return it->second;
+    return made_[t] = make_vector(t, planned_.at(t)->operands);
+  }
+  NodeOperand make_vector(const Triple& t, const std::vector<Triple>& of) {
+    switch (r_.node(t[0]).op) {
+      case Op::Neg:
+        return add("V_SCALE", {vector(of[0]), number(-1)}, true);
+      case Op::Add:
+        return add("V_ADD", {vector(of[0]), vector(of[1])}, true);
+      case Op::Sub:
+        return add("V_SUBTRACT", {vector(of[0]), vector(of[1])}, true);
+      case Op::Mul:
+        if (same(of[1])) return add("V_SCALE", {vector(of[0]), operand(of[1][0])}, true);
+        return add("V_MULTIPLY", {vector(of[0]), vector(of[1])}, true);
+      case Op::Div:
+        if (same(of[1]))
+          return add("V_SCALE", {vector(of[0]), add("DIVIDE", {number(1), operand(of[1][0])}, false)}, true);
+        return add("V_DIVIDE", {vector(of[0]), vector(of[1])}, true);
+      default: {
+        const Truth chosen = truth(of[0][0]);
+        const auto arm = [&](const Triple& a) { return plan(a) ? vector(a) : combined(a); };
+        const NodeOperand yes = arm(of[1]), no = arm(of[2]);
+        return add("V_MIX", {chosen.value, chosen.inverted ? yes : no, chosen.inverted ? no : yes}, true);
+      }
+    }
+  }
+
+  /// Takes note of a sum of three products of the parts of two vectors.
+  void find_dot(int id) {
+    const auto product = [&](int a) {
+      return r_.node(a).op == Op::Mul && r_.node(a).type == ExprType::Real && !cuts_.count(a);
+    };
+    const ExprNode& n = r_.node(id);
+    if (n.op != Op::Add || n.type != ExprType::Real || cuts_.count(id)) return;
+    for (const std::size_t i : {0, 1}) {
+      const int sum = n.args[i], last = n.args[1 - i];
+      const ExprNode& s = r_.node(sum);
+      if (s.op != Op::Add || cuts_.count(sum) || !product(last) || !product(s.args[0]) || !product(s.args[1])) continue;
+      const Triple products = {s.args[0], s.args[1], last};
+      for (unsigned turned = 0; turned < 8; ++turned) {
+        const auto at = [&](std::size_t c, std::size_t k) {
+          return r_.node(products[c]).args[(turned >> c & 1) ? 1 - k : k];
+        };
+        const Triple a = {at(0, 0), at(1, 0), at(2, 0)}, b = {at(0, 1), at(1, 1), at(2, 1)};
+        if (!plan(a) || !plan(b)) continue;
+        dots_[id] = {a, b};
+        take_parts(a);
+        take_parts(b);
+        return;
+      }
+    }
+  }
+  /// Parts of a vector that is computed are taken from it.
+  void take_parts(const Triple& t) {
+    if (all(t, Op::Const) || !input_of(t).empty() || !taken_.insert(t).second) return;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (r_.node(t[c]).op != Op::Const) part_of_.try_emplace(t[c], t, c);
+    for (const Triple& of : planned_.at(t)->operands)
+      if (plan(of)) take_parts(of);
+  }
 
   void count_uses(int id) {
     if (uses_[std::size_t(id)]++ > 0 || cuts_.count(id)) return;
@@ -231,7 +386,10 @@ class Writer {
   }
 
   /// Whether nothing else takes the value, which so can be a part of another node.
-  bool own(int id) const { return uses_[std::size_t(id)] == 1 && !cuts_.count(id) && !known_.count(id); }
+  bool own(int id) const {
+    return uses_[std::size_t(id)] == 1 && !cuts_.count(id) && !known_.count(id) && !part_of_.count(id) &&
+           !dots_.count(id);
+  }
 
   /// a b + c in one node, where one of the summands is a product.
   std::optional<NodeOperand> multiply_add(const ExprNode& n) {
@@ -261,7 +419,16 @@ class Writer {
     const bool color = n.type == ExprType::Color;
     if (const auto cut = cuts_.find(id); cut != cuts_.end()) return input(cut->second, color);
     if (n.op == Op::Const) return {-1, "", n.value, color};
-    if (n.op == Op::Input) return input(n.name, color);
+    if (n.op == Op::Input) {
+      for (const char axis : {'x', 'y', 'z'})
+        if (const std::string base = base_of(n.name, axis); !base.empty())
+          return add(std::string(1, char(axis - 'x' + 'X')), {input(base, true)}, false);
+      return input(n.name, color);
+    }
+    if (const auto dot = dots_.find(id); dot != dots_.end())
+      return add("V_DOT_PRODUCT", {vector(dot->second[0]), vector(dot->second[1])}, false);
+    if (const auto part = part_of_.find(id); part != part_of_.end())
+      return add(std::string(1, "XYZ"[part->second.second]), {vector(part->second.first)}, false);
     if (n.type == ExprType::Bool) {
       const Truth t = truth(id);
       return t.inverted ? add("SUBTRACT", {number(1), t.value}, false) : t.value;
@@ -389,6 +556,12 @@ class Writer {
 
   const Recorder& r_;
   std::map<int, std::string> cuts_;
+  const std::set<std::string>& vectors_;
+  std::map<Triple, std::optional<Joined>> planned_;
+  std::map<Triple, NodeOperand> made_;
+  std::map<int, std::array<Triple, 2>> dots_;
+  std::set<Triple> taken_;
+  std::map<int, std::pair<Triple, std::size_t>> part_of_;
   std::vector<int> uses_, need_;
   std::map<int, NodeOperand> known_;
   std::map<int, Truth> truths_;
@@ -406,11 +579,13 @@ template <class Use> auto with_lowered(const Program& program, const Use& use) {
 
 }  // namespace
 
-NodeProgram node_program(const Program& program) {
-  return with_lowered(program, [](const Recorder& r, const Program& p) { return Writer(r, {}).write(p.outputs()); });
+NodeProgram node_program(const Program& program, const std::set<std::string>& vectors) {
+  return with_lowered(program,
+                      [&](const Recorder& r, const Program& p) { return Writer(r, {}, vectors).write(p.outputs()); });
 }
 
-NodePrograms node_programs(const Program& program, const std::set<std::string>& varying, const std::string& prefix) {
+NodePrograms node_programs(const Program& program, const std::set<std::string>& varying, const std::string& prefix,
+                           const std::set<std::string>& vectors) {
   return with_lowered(program, [&](const Recorder& r, const Program& p) {
     const std::vector<bool>& reachable = p.reachable();
     std::vector<bool> varies(reachable.size());
@@ -432,7 +607,7 @@ NodePrograms node_programs(const Program& program, const std::set<std::string>& 
         for (int a : n.args) pass(a);
     }
     for (const auto& [name, id] : p.outputs()) pass(id);
-    return NodePrograms{Writer(r, {}).write(passed), Writer(r, cuts).write(p.outputs())};
+    return NodePrograms{Writer(r, {}, vectors).write(passed), Writer(r, cuts, vectors).write(p.outputs())};
   });
 }
 

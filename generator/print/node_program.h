@@ -50,8 +50,10 @@ struct NodeProgram {
 /// SVM's stack, in floats.
 inline constexpr int kSvmStack = 255;
 
-/// The current recorder must be the one the outputs were recorded with.
-NodeProgram node_program(const Program&);
+/// The current recorder must be the one the outputs were recorded with. Inputs and outputs NAME_x, NAME_y and NAME_z,
+/// for a name among `vectors`, are one vector NAME: sums, products with numbers and dot products of vectors are one
+/// node each.
+NodeProgram node_program(const Program&, const std::set<std::string>& vectors = {});
 
 /// The same in two steps, where a program runs several times with the same values of all inputs but some.
 struct NodePrograms {
@@ -59,6 +61,7 @@ struct NodePrograms {
   NodeProgram each;
 };
 /// `prefix`: names of what goes from one to the other begin with it.
-NodePrograms node_programs(const Program&, const std::set<std::string>& varying, const std::string& prefix);
+NodePrograms node_programs(const Program&, const std::set<std::string>& varying, const std::string& prefix,
+                           const std::set<std::string>& vectors = {});
 
 }  // namespace brdfc::print

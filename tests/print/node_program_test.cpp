@@ -32,6 +32,7 @@ Value compute(const NodeOperation& o, const std::vector<Value>& a) {
     for (const Value& x : a) at.push_back(x[0]);
     return grey(lookup(o.table, at));
   }
+  if (kind == "DOT_PRODUCT") return grey(a[0][0] * a[1][0] + a[0][1] * a[1][1] + a[0][2] * a[1][2]);
   return each([&](std::size_t c) -> float {
     const float x = a[0][c], y = a.size() > 1 ? a[1][c] : 0, z = a.size() > 2 ? a[2][c] : 0;
     if (kind == "ADD") return x + y;
@@ -158,7 +159,7 @@ TEST_P(NodesOfModels, AreTheRecording) {
     const Sample<Expr> s = brdf->sample(wo, {Expr::input("u_0"), Expr::input("u_1"), Expr::input("u_2")});
     program.output("drawn", s.wi);
     program.output("weight", s.weight);
-    const NodePrograms nodes = node_programs(program, {"wi_x", "wi_y", "wi_z"}, "kept_");
+    const NodePrograms nodes = node_programs(program, {"wi_x", "wi_y", "wi_z"}, "kept_", {"wi", "wo", "drawn"});
     EXPECT_LT(nodes.each.live + int(nodes.once.outputs.size()), kSvmStack);
     for (int trial = 0; trial < 100; ++trial) {
       ParamValues values = chosen;
@@ -180,8 +181,14 @@ TEST_P(NodesOfModels, AreTheRecording) {
       for (const char* u : {"u_0", "u_1", "u_2"}) set_input(inputs, u, unit(random));
       const auto expected = program.run(inputs);
       Values given(inputs.begin(), inputs.end());
+      for (const char* name : {"wi", "wo"})
+        for (std::size_t c = 0; c < 3; ++c) given[name][c] = given.at(std::string(name) + "_" + "xyz"[c])[0];
       given.merge(run(nodes.once, given));
-      const Values found = run(nodes.each, given);
+      Values found = run(nodes.each, given);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float x = found.at("drawn")[c];
+        found[std::string("drawn_") + "xyz"[c]] = {x, x, x};
+      }
       for (const auto& [name, value] : expected)
         for (std::size_t c = 0; c < 3; ++c) {
           const float scale = std::max(std::abs(value[c]), name == "value" ? 1e-5f : 1e-3f);
