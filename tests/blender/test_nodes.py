@@ -20,20 +20,24 @@ def settings(extension, scene, samples, osl, size=64):
     scene.render.resolution_x = scene.render.resolution_y = size
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
     """Every model with defaults, stiff ends and random values: f cos to 1e-3 (relative L1)."""
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     empty.cycles.shading_system = False
-    # Closures of small weight are kept by chance, which is noise where a stiff lobe has faded.
-    found = off_under_a_sun(extension, empty, tool, "nodes", towards, 512)
+    found = off_under_a_sun(extension, empty, tool, "nodes", towards, 32, pictures=4)
     assert {name for name, *_ in found} == {
         name for name, model in extension.api.models().items() if model["scatter"]
     }
-    for name, values, off, _ in found:
+    for name, values, off, noise, _ in found:
         # A cosine in single precision to a power, as in test_aimed.py.
         exponent = max([0, *(v for k, v in values.items() if k in ("e", "es"))])
-        assert off < max(1e-3, 8e-7 * exponent), f"{name} {values}: relative L1 {off:.3g}"
+        # Closures of small weight are kept by chance, which is noise where a lobe has faded; of
+        # some hundred facets with spreads of four pictures it is known to a tenth.
+        limit = max(1e-3, 8e-7 * exponent) + 1.3 * noise
+        assert off < limit, f"{name} {values}: relative L1 {off:.3g}, noise {noise:.3g}"
+        assert noise < 0.1
 
 
 CASES = [
