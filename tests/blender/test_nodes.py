@@ -123,6 +123,7 @@ def test_a_white_world(extension, model, values):
     assert noise < 1.7  # of some 50 blocks with variances of ten pictures
 
 
+@pytest.mark.full
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("light", [lamps, one_before_the_other], ids=lambda f: f.__name__)
 @pytest.mark.parametrize(("model", "values"), CASES)
