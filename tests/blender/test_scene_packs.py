@@ -139,6 +139,7 @@ def stands_in(node):
 
 
 @pytest.mark.full
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("part", FOLDED)
 def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pack, part):
     api, nodes, pack = extension.api, extension.nodes, extension.pack
