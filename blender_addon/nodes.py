@@ -146,6 +146,8 @@ def _fill_native_group(group, model_name, representation, source, twin_group):
     hang on a tangent. `twin_group`: that of the model's twin, or None."""
     data = json.loads(source)
     label = pack.model(model_name)["label"]
+    # A twin's sockets keep the identifiers that files have: outputs come first.
+    _add_outputs(group, OUTPUTS if representation == "twin" else ())
     group_input = group.nodes.new("NodeGroupInput")
     group_input.location = (-300, 0)
     sockets, parameters = {}, {}
@@ -184,7 +186,8 @@ def _fill_native_group(group, model_name, representation, source, twin_group):
             instead = stand_in.node_of(group, model_name, parameters, constants)
         if instead is not None:
             made = stand_in.add_in_eevee(group, made, instead)
-    _add_outputs(group, made)
+    if representation != "twin":
+        _add_outputs(group, made)
     group_output = group.nodes.new("NodeGroupOutput")
     for name, output in made.items():
         group.links.new(output, group_output.inputs[name])
