@@ -3,8 +3,8 @@
 // closures that take light away, so what a closure carries of a lamp has to be left out elsewhere and can't be taken
 // off.
 //
-//   lamps  one Toon closure a lamp, level over the cone that the lamp fills, with the model's f cos at a random point
-//   of it rest   a direction drawn from the model, which carries nothing where it lies in such a cone
+// Lamps: one Toon closure each, level over the cone that the lamp fills, with the model's f cos at a random point of
+// it. Rest: a direction drawn from the model, which carries nothing where it lies in such a cone.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the widest that fits into it, and
 // what it has beside that drawn directions meet. A closure of small weight is lost, so the cone of a small lamp is
@@ -39,8 +39,10 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const Vec3<T>& a
   constexpr double kWidest = 1.5, kLeastRise = 0.01, kPoint = 1e-4;
   const T kind = slot.shape.x, w = slot.scale.z;
   const Vec3<T>&turn = slot.turn, &shape = slot.shape;
-  const auto ball =
-      kind<T(1.5), sun = kind> T(1.5) && kind<T(2.5), flat = kind> T(2.5) && kind<T(4.5), sky = kind> T(4.5);
+  const auto ball = kind < T(1.5);
+  const auto sun = kind > T(1.5) && kind < T(2.5);
+  const auto flat = kind > T(2.5) && kind < T(4.5);
+  const auto sky = kind > T(4.5);
   const Vec3<T> axis = {T(2) * (turn.x * turn.z + w * turn.y), T(2) * (turn.y * turn.z - w * turn.x),
                         T(1) - T(2) * (turn.x * turn.x + turn.y * turn.y)};
   const T level = cos(turn.x);

@@ -13,7 +13,6 @@
 #include "forms/form.h"
 #include "forms/node_lamps.h"
 #include "measure/probes.h"
-#include "model/choices.h"
 #include "model/horizon.h"
 #include "print/node_program.h"
 
@@ -171,16 +170,17 @@ class Nodes final : public Form {
   }
   bool highlights(const Model& model, const Shader&) const override { return !model.has_mirror(); }
   Shader write(const Model& model, const measure::AlbedoTable&, const Setting& setting) const override {
-    return write_nodes(model, values(model, setting.fixed), setting.fixed, setting.max_lamps);
+    ParamValues fixed = setting.fixed;
+    fixed.merge(default_choices(model.info()));
+    return write_nodes(model, fixed, setting.max_lamps);
   }
 
  private:
-  static Shader write_nodes(const Model&, const ParamValues& choices, const ParamValues& given, int max_lamps);
+  /// `fixed` has every choice.
+  static Shader write_nodes(const Model&, const ParamValues& fixed, int max_lamps);
 };
 
-Shader Nodes::write_nodes(const Model& model, const ParamValues& choices, const ParamValues& given, int max_lamps) {
-  ParamValues fixed = given;
-  fixed.insert(choices.begin(), choices.end());
+Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_lamps) {
   Shader out;
   out.name = fmt::format("brdfc_{}_nodes", model.info().name);
   Json parts = Json::object(), bounds = Json::object(), closures = Json::array();
