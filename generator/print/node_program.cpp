@@ -29,11 +29,10 @@ struct NodeValue {
 /// Records a program anew with the operations alone that nodes have.
 class Lowering {
  public:
-  /// `from` holds the program, the current recorder is another one.
-  Lowering(const Recorder& from, const Program& program, std::vector<bool> reachable)
-      : r_(from), reachable_(std::move(reachable)), values_(reachable_.size()) {
-    for (int id = 0; id < int(reachable_.size()); ++id)
-      if (reachable_[std::size_t(id)] && r_.node(id).scope < 0) step(id);
+  /// With the current recorder.
+  explicit Lowering(const Program& program) : p_(program), values_(std::size_t(program.size())) {
+    for (int id = 0; id < p_.size(); ++id)
+      if (p_.reachable()[std::size_t(id)] && p_.node(id).scope < 0) step(id);
     for (const auto& [name, id] : program.outputs()) {
       const NodeValue& v = values_[std::size_t(id)];
       if (v.type == ExprType::Color)
@@ -46,7 +45,7 @@ class Lowering {
 
  private:
   void step(int id) {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = p_.node(id);
     if (n.op == Op::Loop)
       unroll(id, n);
     else if (n.op == Op::LoopOut)
@@ -62,8 +61,8 @@ class Lowering {
     for (std::size_t k = 0; k < size; ++k) state.push_back(arg(n, k));
     for (int i = 0; i < n.index; ++i) {
       for (int body = 0; body < id; ++body) {
-        const ExprNode& b = r_.node(body);
-        if (b.scope != serial || !reachable_[std::size_t(body)]) continue;
+        const ExprNode& b = p_.node(body);
+        if (b.scope != serial || !p_.reachable()[std::size_t(body)]) continue;
         if (b.op == Op::LoopVar)
           values_[std::size_t(body)] = state[std::size_t(b.index)];
         else
@@ -155,8 +154,7 @@ class Lowering {
     }
   }
 
-  const Recorder& r_;
-  std::vector<bool> reachable_;
+  const Program& p_;
   std::vector<NodeValue> values_;
   std::map<int, std::vector<NodeValue>> loops_;
   Program out_;
@@ -166,16 +164,16 @@ class Lowering {
 class Writer {
  public:
   /// `cuts`: values that come from elsewhere, by node; `vectors`: see node_program().
-  Writer(const Recorder& r, std::map<int, std::string> cuts, const std::set<std::string>& vectors)
-      : r_(r),
+  Writer(const Program& program, std::map<int, std::string> cuts, const std::set<std::string>& vectors)
+      : p_(program),
         cuts_(std::move(cuts)),
         vectors_(vectors),
-        uses_(std::size_t(r.size())),
-        need_(std::size_t(r.size()), -1) {}
+        uses_(std::size_t(program.size())),
+        need_(std::size_t(program.size()), -1) {}
 
   NodeProgram write(const std::vector<std::pair<std::string, int>>& outputs) {
     for (const auto& [name, id] : outputs) count_uses(id);
-    for (int id = 0; id < r_.size(); ++id)
+    for (int id = 0; id < p_.size(); ++id)
       if (uses_[std::size_t(id)] > 0) find_dot(id);
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       const std::string base = base_of(outputs[i].first, 'x');
@@ -205,7 +203,7 @@ class Writer {
     std::vector<Triple> operands;
   };
 
-  bool is_color(int id) const { return r_.node(id).type == ExprType::Color; }
+  bool is_color(int id) const { return p_.node(id).type == ExprType::Color; }
 
   /// The vector that NAME_x (or _y or _z) is a part of, or "".
   std::string base_of(const std::string& name, char axis) const {
@@ -216,7 +214,7 @@ class Writer {
   std::string input_of(const Triple& t) const {
     std::string base;
     for (std::size_t c = 0; c < 3; ++c) {
-      const ExprNode& n = r_.node(t[c]);
+      const ExprNode& n = p_.node(t[c]);
       const std::string of = n.op == Op::Input && !cuts_.count(t[c]) ? base_of(n.name, "xyz"[c]) : "";
       if (of.empty() || (c > 0 && of != base)) return "";
       base = of;
@@ -224,7 +222,7 @@ class Writer {
     return base;
   }
   bool all(const Triple& t, Op op) const {
-    return std::ranges::all_of(t, [&](int id) { return r_.node(id).op == op && !cuts_.count(id); });
+    return std::ranges::all_of(t, [&](int id) { return p_.node(id).op == op && !cuts_.count(id); });
   }
   static bool same(const Triple& t) { return t[0] == t[1] && t[1] == t[2]; }
 
@@ -237,9 +235,9 @@ class Writer {
     return planned_[t].has_value();
   }
   std::optional<Joined> join(const Triple& t) {
-    const Op op = r_.node(t[0]).op;
+    const Op op = p_.node(t[0]).op;
     if (!all(t, op)) return std::nullopt;
-    const auto argument = [&](std::size_t c, std::size_t i) { return r_.node(t[c]).args[i]; };
+    const auto argument = [&](std::size_t c, std::size_t i) { return p_.node(t[c]).args[i]; };
     const auto column = [&](std::size_t i) { return Triple{argument(0, i), argument(1, i), argument(2, i)}; };
     switch (op) {
       case Op::Neg:
@@ -278,12 +276,12 @@ class Writer {
   NodeOperand vector(const Triple& t) {
     if (const std::string base = input_of(t); !base.empty()) return input(base, true);
     if (all(t, Op::Const))
-      return {-1, "", {r_.node(t[0]).value[0], r_.node(t[1]).value[0], r_.node(t[2]).value[0]}, true};
+      return {-1, "", {p_.node(t[0]).value[0], p_.node(t[1]).value[0], p_.node(t[2]).value[0]}, true};
     if (const auto it = made_.find(t); it != made_.end()) return it->second;
     return made_[t] = make_vector(t, planned_.at(t)->operands);
   }
   NodeOperand make_vector(const Triple& t, const std::vector<Triple>& of) {
-    switch (r_.node(t[0]).op) {
+    switch (p_.node(t[0]).op) {
       case Op::Neg:
         return add("V_SCALE", {vector(of[0]), number(-1)}, true);
       case Op::Add:
@@ -309,18 +307,18 @@ class Writer {
   /// Takes note of a sum of three products of the parts of two vectors.
   void find_dot(int id) {
     const auto product = [&](int a) {
-      return r_.node(a).op == Op::Mul && r_.node(a).type == ExprType::Real && !cuts_.count(a);
+      return p_.node(a).op == Op::Mul && p_.node(a).type == ExprType::Real && !cuts_.count(a);
     };
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = p_.node(id);
     if (n.op != Op::Add || n.type != ExprType::Real || cuts_.count(id)) return;
     for (const std::size_t i : {0, 1}) {
       const int sum = n.args[i], last = n.args[1 - i];
-      const ExprNode& s = r_.node(sum);
+      const ExprNode& s = p_.node(sum);
       if (s.op != Op::Add || cuts_.count(sum) || !product(last) || !product(s.args[0]) || !product(s.args[1])) continue;
       const Triple products = {s.args[0], s.args[1], last};
       for (unsigned turned = 0; turned < 8; ++turned) {
         const auto at = [&](std::size_t c, std::size_t k) {
-          return r_.node(products[c]).args[(turned >> c & 1) ? 1 - k : k];
+          return p_.node(products[c]).args[(turned >> c & 1) ? 1 - k : k];
         };
         const Triple a = {at(0, 0), at(1, 0), at(2, 0)}, b = {at(0, 1), at(1, 1), at(2, 1)};
         if (!plan(a) || !plan(b)) continue;
@@ -335,14 +333,14 @@ class Writer {
   void take_parts(const Triple& t) {
     if (all(t, Op::Const) || !input_of(t).empty() || !taken_.insert(t).second) return;
     for (std::size_t c = 0; c < 3; ++c)
-      if (r_.node(t[c]).op != Op::Const) part_of_.try_emplace(t[c], t, c);
+      if (p_.node(t[c]).op != Op::Const) part_of_.try_emplace(t[c], t, c);
     for (const Triple& of : planned_.at(t)->operands)
       if (plan(of)) take_parts(of);
   }
 
   void count_uses(int id) {
     if (uses_[std::size_t(id)]++ > 0 || cuts_.count(id)) return;
-    for (int a : r_.node(id).args) count_uses(a);
+    for (int a : p_.node(id).args) count_uses(a);
   }
 
   /// Registers that a value takes, were it a tree (R. Sethi, J. Ullman: The Generation of Optimal Code for Arithmetic
@@ -350,7 +348,7 @@ class Writer {
   int need(int id) {
     int& known = need_[std::size_t(id)];
     if (known >= 0) return known;
-    if (cuts_.count(id) || r_.node(id).op == Op::Const || r_.node(id).op == Op::Input) return known = 0;
+    if (cuts_.count(id) || p_.node(id).op == Op::Const || p_.node(id).op == Op::Input) return known = 0;
     int held = 0, most = is_color(id) ? 3 : 1;
     for (int a : by_need(id)) {
       most = std::max(most, held + need(a));
@@ -359,7 +357,7 @@ class Writer {
     return known = most;
   }
   std::vector<int> by_need(int id) {
-    std::vector<int> args = r_.node(id).args;
+    std::vector<int> args = p_.node(id).args;
     std::ranges::stable_sort(args, [&](int a, int b) { return need(a) > need(b); });
     return args;
   }
@@ -396,10 +394,10 @@ class Writer {
     const bool color = n.type == ExprType::Color;
     for (const std::size_t i : {0, 1}) {
       const int product = n.args[i], other = n.args[1 - i];
-      const ExprNode& p = r_.node(product);
+      const ExprNode& p = p_.node(product);
       if (p.op != Op::Mul || !own(product) || p.type != n.type) continue;
       NodeOperand added;
-      const ExprNode& o = r_.node(other);
+      const ExprNode& o = p_.node(other);
       const bool constant = o.op == Op::Const;
       if (n.op == Op::Sub && !(i == 0 && constant)) continue;
       // What takes more registers first.
@@ -415,7 +413,7 @@ class Writer {
   }
 
   NodeOperand make(int id) {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = p_.node(id);
     const bool color = n.type == ExprType::Color;
     if (const auto cut = cuts_.find(id); cut != cuts_.end()) return input(cut->second, color);
     if (n.op == Op::Const) return {-1, "", n.value, color};
@@ -511,7 +509,7 @@ class Writer {
   }
 
   Truth truth(int id) {
-    const ExprNode& n = r_.node(id);
+    const ExprNode& n = p_.node(id);
     if (cuts_.count(id) || n.op == Op::Const || n.op == Op::Input) return {operand(id), false};
     if (const auto it = truths_.find(id); it != truths_.end()) return it->second;
     Truth out{{}, false};
@@ -554,7 +552,7 @@ class Writer {
     }
   }
 
-  const Recorder& r_;
+  const Program& p_;
   std::map<int, std::string> cuts_;
   const std::set<std::string>& vectors_;
   std::map<Triple, std::optional<Joined>> planned_;
@@ -568,47 +566,43 @@ class Writer {
   NodeProgram out_;
 };
 
-/// Calls `use` with the program as it is recorded anew, while that recorder is the current one.
-template <class Use> auto with_lowered(const Program& program, const Use& use) {
-  const Recorder& from = Recorder::current();
-  std::vector<bool> reachable = program.reachable();
-  Recorder recorder(from.precision());
-  const Lowering lowering(from, program, std::move(reachable));
-  return use(recorder, lowering.program());
+/// The program with the operations alone that nodes have.
+Program lowered(const Program& program) {
+  Recorder recorder(Recorder::current().precision());
+  return Lowering(program).program();
 }
 
 }  // namespace
 
 NodeProgram node_program(const Program& program, const std::set<std::string>& vectors) {
-  return with_lowered(program,
-                      [&](const Recorder& r, const Program& p) { return Writer(r, {}, vectors).write(p.outputs()); });
+  const Program p = lowered(program);
+  return Writer(p, {}, vectors).write(p.outputs());
 }
 
 NodePrograms node_programs(const Program& program, const std::set<std::string>& varying, const std::string& prefix,
                            const std::set<std::string>& vectors) {
-  return with_lowered(program, [&](const Recorder& r, const Program& p) {
-    const std::vector<bool>& reachable = p.reachable();
-    std::vector<bool> varies(reachable.size());
-    std::map<int, std::string> cuts;
-    std::vector<std::pair<std::string, int>> passed;
-    const auto pass = [&](int id) {
-      const Op op = r.node(id).op;
-      if (varies[std::size_t(id)] || op == Op::Const || op == Op::Input || cuts.count(id)) return;
-      cuts[id] = fmt::format("{}{}", prefix, cuts.size());
-      passed.push_back({cuts[id], id});
-    };
-    for (int id = 0; id < p.size(); ++id) {
-      const ExprNode& n = r.node(id);
-      if (!reachable[std::size_t(id)]) continue;
-      bool any = n.op == Op::Input && varying.count(n.name);
-      for (int a : n.args) any = any || varies[std::size_t(a)];
-      varies[std::size_t(id)] = any;
-      if (any)
-        for (int a : n.args) pass(a);
-    }
-    for (const auto& [name, id] : p.outputs()) pass(id);
-    return NodePrograms{Writer(r, {}, vectors).write(passed), Writer(r, cuts, vectors).write(p.outputs())};
-  });
+  const Program p = lowered(program);
+  const std::vector<bool>& reachable = p.reachable();
+  std::vector<bool> varies(reachable.size());
+  std::map<int, std::string> cuts;
+  std::vector<std::pair<std::string, int>> passed;
+  const auto pass = [&](int id) {
+    const Op op = p.node(id).op;
+    if (varies[std::size_t(id)] || op == Op::Const || op == Op::Input || cuts.count(id)) return;
+    cuts[id] = fmt::format("{}{}", prefix, cuts.size());
+    passed.push_back({cuts[id], id});
+  };
+  for (int id = 0; id < p.size(); ++id) {
+    const ExprNode& n = p.node(id);
+    if (!reachable[std::size_t(id)]) continue;
+    bool any = n.op == Op::Input && varying.count(n.name);
+    for (int a : n.args) any = any || varies[std::size_t(a)];
+    varies[std::size_t(id)] = any;
+    if (any)
+      for (int a : n.args) pass(a);
+  }
+  for (const auto& [name, id] : p.outputs()) pass(id);
+  return {Writer(p, {}, vectors).write(passed), Writer(p, cuts, vectors).write(p.outputs())};
 }
 
 }  // namespace brdfc::print

@@ -50,7 +50,7 @@ struct NodeProgram {
 /// SVM's stack, in floats.
 inline constexpr int kSvmStack = 255;
 
-/// The current recorder must be the one the outputs were recorded with. Inputs and outputs NAME_x, NAME_y and NAME_z,
+/// There has to be a recorder, whose precision constants are folded in. Inputs and outputs NAME_x, NAME_y and NAME_z,
 /// for a name among `vectors`, are one vector NAME: sums, products with numbers and dot products of vectors are one
 /// node each.
 NodeProgram node_program(const Program&, const std::set<std::string>& vectors = {});
