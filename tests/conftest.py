@@ -11,6 +11,23 @@ os.environ["BRDFC_CACHE"] = ""
 EVERY_CASE = os.environ.get("BRDFC_EVIDENCE") == "all"
 
 
+def evenly(cases, count):
+    return [cases[i * (len(cases) - 1) // max(count - 1, 1)] for i in range(count)]
+
+
+def few_of(cases, count):
+    """So many of a test's cases as a list, evenly chosen with the first and the last;
+    script/evidence runs all. For what a test renders in one picture: cases that are tests of their
+    own are marked `sample`."""
+    cases = list(cases)
+    return cases if EVERY_CASE else evenly(cases, min(count, len(cases)))
+
+
+@pytest.fixture(scope="session", name="few_of")
+def few_of_fixture():
+    return few_of
+
+
 def pytest_addoption(parser):
     parser.addoption(
         "--few",
@@ -34,7 +51,6 @@ def pytest_collection_modifyitems(config, items):
         limits = [len(cases), *([few] if few is not None else [])]
         if not EVERY_CASE:
             limits += [mark.args[0] for mark in cases[0].iter_markers("sample")]
-        count = min(limits)
-        kept |= {cases[i * (len(cases) - 1) // max(count - 1, 1)] for i in range(count)}
+        kept |= set(evenly(cases, min(limits)))
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]

@@ -150,6 +150,7 @@ CONES = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("lamp", CONES)
 def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):

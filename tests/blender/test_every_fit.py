@@ -195,8 +195,8 @@ def compare(form, model, name, seen, truth):
 
 
 # Versions differ in how facets that lean are sampled.
-@pytest.mark.slow
-@pytest.mark.parametrize("form", [pytest.param("fitted", marks=[FULL, EVIDENCE]), "twin"])
+@pytest.mark.evidence
+@pytest.mark.parametrize("form", [pytest.param("fitted", marks=FULL), "twin"])
 def test_closures_of_every_model(extension, fits, tool, subtests, form):
     """Cycles evaluates what the tool says under suns, and samples it: the mean in every world
     within 5.5 standard errors, 60 comparisons a model, so one false alarm in some ten thousand

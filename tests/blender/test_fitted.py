@@ -90,6 +90,7 @@ def test_a_sun_on_a_fitted_form(lean, tool):
         assert off <= 1e-3 * largest, name
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 def test_furnace_of_a_fitted_form(lean, tool):
     """Sampling returns what evaluation says: the albedo of the model, off by what `brdfc fit`

@@ -309,6 +309,7 @@ def test_every_material_is_as_the_same_one_made_by_hand(extension, library, made
             assert said == meant
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 def test_dragged_materials_render_as_those_made_by_hand(extension, library, made, empty, subtests):
     """Of each catalogue one, on balls in a row under a lamp and a white sky. Both pictures have the

@@ -254,7 +254,7 @@ WORLDS = [
 ]
 
 
-@pytest.mark.sample(24)
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), SAMPLED)
 def test_sampled_form_in_a_world(extension, empty, tool, batch, request, model, values, world):
@@ -309,7 +309,7 @@ AIMED = with_every_model(
 )
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), AIMED)
 def test_aimed_form_in_a_world(extension, empty, tool, batch, request, model, values, world):
@@ -458,7 +458,7 @@ TABLES = with_every_model(
 )
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(("model", "values"), TABLES)
 def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, values):
     cosines = np.linspace(0.02, 1, 50)

@@ -17,7 +17,7 @@ DRIVER = ROOT / "script" / "render_scene.py"
 SEEDS = 4
 #: Scenes with isotropic material of one model, and with four models.
 SCENES = [
-    pytest.param("room-radziszewski_alda", marks=pytest.mark.slow),
+    pytest.param("room-radziszewski_alda", marks=pytest.mark.evidence),
     pytest.param("small-lamp", marks=[pytest.mark.full, pytest.mark.evidence]),
 ]
 
@@ -101,7 +101,8 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", ["sampled", "fitted", "aimed"])
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("form", ["aimed", "sampled", "fitted"])
 def test_tables_of_the_views_that_occur_show_the_same(
     extension, empty, extension_zip, tool, tmp_path, form
 ):

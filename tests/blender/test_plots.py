@@ -496,7 +496,7 @@ def inked(picture):
     return (red > 0.9) & (green < 0.5) & (np.abs(blue - 0.75) < 0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_a_form_made_for_other_values_has_its_own_curve(
     panel, plots, extension, tool, use_pack, empty
 ):

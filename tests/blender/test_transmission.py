@@ -54,6 +54,7 @@ VIEWS = [(1, 0.9), (1, 0.25), (-1, 0.9), (-1, 0.4)]  # side and cosine; the last
 
 
 @pytest.mark.slow
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("n", "ior"), [(0.0, 1.5), (20.0, 1.3)])
 def test_sampled_refraction_in_a_world(extension, empty, tool, n, ior):
     """A quad seen from both sides in a world whose colour tells the direction."""

@@ -55,6 +55,7 @@ def facets(rng, count, towards):
     return np.where((np.arange(count) % 2 == 0)[:, None], near, normals)
 
 
+@pytest.mark.evidence
 @pytest.mark.full
 def test_a_sun_on_a_twin(lean, tool):
     """Every pair is within 1e-3 of the largest value of what the tool says of the nodes."""

@@ -21,7 +21,7 @@ BLENDER_PYTHON = Path(
 )
 K, RHO = 2.5, (0.8, 0.6, 0.4)
 
-pytestmark = pytest.mark.full
+pytestmark = pytest.mark.evidence
 
 
 def run(*command, text=None):

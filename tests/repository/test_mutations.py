@@ -21,7 +21,7 @@ from support import ROOT, TOOL
 BLENDER_PYTHON = Path(
     os.environ.get("BRDFC_BLENDER_PYTHON", ROOT / ".env" / "blender-4.5" / "bin" / "python")
 )
-pytestmark = pytest.mark.full
+pytestmark = pytest.mark.evidence
 
 
 def replaced_once(text, pattern, replacement, where):
