@@ -93,6 +93,7 @@ def _group(title, content, inputs, outputs, fill):
     end = w.node("NodeGroupOutput")
     for name, value in made.items():
         w.give(end.inputs[name], value)
+    w.place_nodes()
     return group
 
 
@@ -361,7 +362,9 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
         for closure in data["closures"]:
             colour = colours[closure["weight"]]
             total = colour if total is None else w.vector("ADD", total, colour)
-        return {"BSDF": w.sum(shaders), "Albedo": total}
+        bsdf = w.sum(shaders)
+        w.place_nodes()
+        return {"BSDF": bsdf, "Albedo": total}
     lamps = []
     if slots:
         given |= parts.add("once", **given)
@@ -377,7 +380,9 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
     for index, lamp in enumerate(lamps):
         made = _instance(w, lit, given | lamp | {"index": 1.0 + index}, "lamp")
         shaders.append(made["BSDF"])
-    return {"BSDF": w.sum(shaders)}
+    bsdf = w.sum(shaders)
+    w.place_nodes()
+    return {"BSDF": bsdf}
 
 
 def _rest(w, parts, surface, given, lamps, narrow):

@@ -172,4 +172,6 @@ def wire(tree, data, normal, parameters, name):
         for operation in ("ADD", "SUBTRACT"):
             facet_normal = w.vector("NORMALIZE", w.vector(operation, middle, aside))
             shaders.append(w.bsdf(kind, half, facet_normal, roughness))
-    return w.sum(shaders), albedo
+    bsdf = w.sum(shaders)
+    w.place_nodes()
+    return bsdf, albedo

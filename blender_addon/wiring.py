@@ -6,25 +6,41 @@ DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
 
 
 class Wiring:
-    """Adds nodes to a group, column by column, and links what they are given."""
+    """Adds nodes to a group and links what they are given.
+
+    Blender looks at the whole tree whenever something of it is set, so nothing is set to what it is,
+    and places are set together: call place_nodes() when all nodes are made.
+    """
 
     def __init__(self, tree):
-        self.tree, self.count = tree, 0
+        self.tree, self.made = tree, []
 
     def node(self, kind, **settings):
+        self.made.append(len(self.tree.nodes))
         node = self.tree.nodes.new(kind)
         node.hide = True
-        node.location = (200 * (self.count // 20), -60 * (self.count % 20))
-        self.count += 1
         for key, value in settings.items():
-            setattr(node, key, value)
+            if getattr(node, key) != value:
+                setattr(node, key, value)
         return node
+
+    def place_nodes(self):
+        """Places the nodes that were made column by column."""
+        places = [0.0] * (2 * len(self.tree.nodes))
+        self.tree.nodes.foreach_get("location", places)
+        for count, index in enumerate(self.made):
+            places[2 * index : 2 * index + 2] = 200 * (count // 20), -60 * (count % 20)
+        # This, too, looks at the tree, but once.
+        self.tree.nodes.foreach_set("location", places)
 
     def give(self, socket, value):
         """A constant, or the output of another node."""
         if hasattr(value, "is_output"):
             self.tree.links.new(value, socket)
-        else:
+            return
+        found = socket.default_value
+        same = tuple(found) == tuple(value) if hasattr(found, "__len__") else found == value
+        if not same:
             socket.default_value = value
 
     def math(self, operation, *values):
