@@ -75,22 +75,10 @@ def slice_of(model, values, theta):
 
 
 def glossy_slice(alpha, theta):
-    """The same of Blender's Glossy node, white, with GGX's distribution of that width: (N,).
-
-    B. Walter et al.: Microfacet Models for Refraction through Rough Surfaces, EGSR 2007, eqs. 20,
-    33 and 34, without the light of further reflections. Width is the node's roughness squared.
-    """
-    light, out = _slice(np.radians(-INCIDENCE)), _slice(theta)
-    half = light + out
-    half = half / np.linalg.norm(half, axis=-1, keepdims=True)
-    a2 = alpha * alpha
-    cos2 = half[:, 2] ** 2
-    d = a2 / (np.pi * (cos2 * (a2 - 1) + 1) ** 2)
-
-    def shadow(z):
-        return 2 / (1 + np.sqrt(1 + a2 * (1 / np.maximum(z * z, 1e-12) - 1)))
-
-    return d * shadow(light[2]) * shadow(out[:, 2]) / (4 * light[2])
+    """The same of Blender's Glossy node, white, with GGX's distribution of that width: (N,). Width
+    is the node's roughness squared; the light of further reflections is left out."""
+    light = _slice(np.radians(-INCIDENCE))
+    return native_bsdf.facets(_slice(theta), light, (alpha, alpha))
 
 
 @functools.cache

@@ -8,8 +8,8 @@ DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
 class Wiring:
     """Adds nodes to a group and links what they are given.
 
-    Blender looks at the whole tree whenever something of it is set, so nothing is set to what it is,
-    and places are set together: call place_nodes() when all nodes are made.
+    Blender looks at the whole tree whenever something of it is set. So nothing is set to what it
+    is, and places are set together: call place_nodes() when all nodes are made.
     """
 
     def __init__(self, tree):

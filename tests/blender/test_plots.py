@@ -757,6 +757,19 @@ def test_glossy_is_ggx_with_the_light_that_facets_reflect(plots):
     assert np.sum(f_cos * np.sin(theta)) * theta[1] * 2 * np.pi == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.parametrize("roughness", [0.2, 0.5, 0.9])
+def test_glossy_masks_at_grazing_angles_as_cycles_does(plots, roughness):
+    """E. Heitz: Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs, JCGT 2014,
+    eq. 99 with GGX's Lambda: masking and shadowing are correlated by height."""
+    alpha, theta = roughness**2, np.radians([-85.0, -40.0, 0.0, 45.0, 80.0, 89.0])
+    a2, light, out = alpha**2, np.cos(np.radians(plots.INCIDENCE)), np.cos(theta)
+    cosine = np.cos((theta - np.radians(plots.INCIDENCE)) / 2)
+    ggx = a2 / (np.pi * (cosine**2 * (a2 - 1) + 1) ** 2)
+    both = out * np.sqrt(a2 + (1 - a2) * light**2) + light * np.sqrt(a2 + (1 - a2) * out**2)
+    expected = ggx * (2 * light * out / both) / (4 * light)
+    np.testing.assert_allclose(plots.glossy_slice(alpha, theta), expected, rtol=1e-9)
+
+
 def test_a_moved_slider_draws_anew_and_nothing_else_does(
     extension, panel, plots, empty, monkeypatch
 ):
