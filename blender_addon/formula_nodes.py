@@ -13,6 +13,7 @@ import math
 
 import bpy
 
+from . import svm_constants
 from .wiring import Wiring
 
 #: Custom property of the group of a part: hash of what it computes. Equal parts share a group.
@@ -59,8 +60,7 @@ class _Formula:
             at_0, at_1 = (self.operand(o, vector) for o in operands[1:])
             return w.mix(self.operand(operands[0]), at_0, at_1, vector)
         if kind == "V_SCALE":
-            vector, scale = self.operand(operands[0], True), self.operand(operands[1])
-            return w.vector("SCALE", vector, scale=scale)
+            return w.scaled(self.operand(operands[0], True), self.operand(operands[1]))
         if kind == _DOT:
             return w.vector(kind[2:], *(self.operand(o, True) for o in operands), output="Value")
         if kind.startswith("V_"):
@@ -164,8 +164,9 @@ def _part_group(title, data):
 class _Parts:
     """Parts of a model, as nodes of its group."""
 
-    def __init__(self, wiring, data, title):
-        self.w, self.data, self.title = wiring, data["parts"], title
+    def __init__(self, wiring, parts, title, constants):
+        """`constants`: the outputs of svm_constants.add_values()."""
+        self.w, self.data, self.title, self.constants = wiring, parts, title, constants
 
     def has(self, name):
         return name in self.data
@@ -173,30 +174,30 @@ class _Parts:
     def add(self, name, **inputs):
         """Adds a part; its outputs by name. `inputs`: numbers and outputs by name."""
         group = _part_group(f"{self.title}: {name}", self.data[name])
-        return _instance(self.w, group, inputs, name)
+        return _instance(self.w, group, self.constants | inputs, name)
 
     def inputs(self, name):
         """Names and kinds of what a part takes."""
         return {name: kind for name, kind in self.data[name]["inputs"]}
 
-    def on(self, wiring):
-        """The same parts, for another tree."""
-        return _Parts(wiring, {"parts": self.data}, self.title)
+    def on(self, wiring, found):
+        """The same parts, for another tree, among whose inputs these are."""
+        constants = {name: found[name] for name in svm_constants.VALUES if name in found}
+        return _Parts(wiring, self.data, self.title, constants)
 
 
 class _Surface:
     """What the shading point looks like: frame, viewer, random numbers."""
 
-    def __init__(self, w, parts, normal, tangent):
+    def __init__(self, w, parts, geometry, normal, tangent):
         self.w = w
-        geometry = w.node("ShaderNodeNewGeometry")
         self.place, self.view = geometry.outputs["Position"], geometry.outputs["Incoming"]
         self.true_normal = geometry.outputs["True Normal"]
         self.backfacing = geometry.outputs["Backfacing"]
         self.strand = w.node("ShaderNodeHairInfo").outputs["Is Strand"]
         self.path_length = w.node("ShaderNodeLightPath").outputs["Ray Length"]
         missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
-        own = w.vector("SCALE", geometry.outputs["Normal"], scale=missing)
+        own = w.scaled(geometry.outputs["Normal"], missing)
         self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
         if parts.has("bend"):
             vectors = {"true": self.true_normal, "view": self.view, "normal": self.normal}
@@ -216,7 +217,7 @@ class _Surface:
 
         def across(direction):
             along = w.vector("DOT_PRODUCT", direction, self.normal, output="Value")
-            lying = w.vector("SCALE", self.normal, scale=along)
+            lying = w.scaled(self.normal, along)
             return w.vector("SUBTRACT", direction, lying)
 
         missing = w.math("LESS_THAN", w.vector("LENGTH", tangent, output="Value"), 1e-20)
@@ -237,7 +238,7 @@ class _Surface:
         w = self.w
         total = None
         for part, axis in zip(w.separate(vector), self.axes, strict=True):
-            scaled = w.vector("SCALE", axis, scale=part)
+            scaled = w.scaled(axis, part)
             total = scaled if total is None else w.vector("ADD", total, scaled)
         return total
 
@@ -247,8 +248,9 @@ def _local(w, vector, axes):
     return w.combine(*(w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes))
 
 
-def _random(w, place, view, path_length, index):
-    """Three numbers in [0, 1), as brdfc_random() in OSL."""
+def _random(w, place, view, path_length):
+    """Three numbers in [0, 1), as those of index 0 of brdfc_random() in OSL. All that a shading
+    point draws is made of these: its closures add up, so none has to be independent of another."""
 
     def noise(vector, number):
         node = w.node("ShaderNodeTexWhiteNoise", noise_dimensions="4D")
@@ -256,75 +258,116 @@ def _random(w, place, view, path_length, index):
         w.give(node.inputs["W"], number)
         return node.outputs["Color"]
 
-    far = w.math("MULTIPLY_ADD", index, 17.0, path_length)
-    return w.separate(w.vector("FRACTION", w.vector("ADD", noise(place, index), noise(view, far))))
+    total = w.vector("ADD", noise(place, 0.0), noise(view, path_length))
+    return w.vector("FRACTION", total)
 
 
 #: What a shading point sees of a slot, and what it makes of it.
 _SEEN = [
     ["towards", "VECTOR"],
-    ["angle", "FLOAT"],
     ["drop", "FLOAT"],
-    ["widened", "FLOAT"],
-    ["active", "FLOAT"],
     ["chord", "FLOAT"],
+    ["reach", "FLOAT"],
+    ["flat", "FLOAT"],
+    ["used", "FLOAT"],
+    ["active", "FLOAT"],
+    ["above", "FLOAT"],
 ]
 _SLOT = ("place", "turn", "scale", "shape")
+_AXES = [
+    ["across", "VECTOR"],
+    ["along", "VECTOR"],
+    ["away", "VECTOR"],
+    ["half_across", "FLOAT"],
+    ["half_along", "FLOAT"],
+]
+#: Farther than two directions are apart.
+_FAR = 4.0
+#: What is added to the random numbers of one lamp to make those of the next: R. Roberts' sequence,
+#: by which any few are spread evenly.
+_SHIFT = (0.8191725, 0.6710436, 0.5497005)
 
 
 def _seen_group(parts):
     """The group that makes of a slot the cone that its lamp fills."""
-    vectors = (*_SLOT, "at", "view")
+    vectors = (*_SLOT, "at", "view", "normal")
 
     def fill(w, found):
-        cone = parts.on(w).add("cone", **found)
-        return {name: cone[name] for name, _ in _SEEN}
+        here = parts.on(w, found)
+        axes = here.add("axes", **found)
+        return axes | here.add("cone", **found, **axes)
 
-    content = ["seen", parts.data["cone"]]
-    return _group("lamp seen", content, [[name, "VECTOR"] for name in vectors], _SEEN, fill)
+    content = ["seen", parts.data["axes"], parts.data["cone"]]
+    inputs = [[name, "VECTOR"] for name in vectors]
+    return _group("lamp seen", content, inputs, _SEEN + _AXES, fill)
+
+
+def _point_of(w, towards, drop, view, u, v):
+    """A direction within the cone, each as likely as the others."""
+    beside = w.vector("NORMALIZE", w.vector("CROSS_PRODUCT", towards, view))
+    fallen = w.math("MULTIPLY", u, drop)
+    cosine = w.math("SUBTRACT", 1.0, fallen)
+    sine = w.math("SQRT", w.math("MULTIPLY", fallen, w.math("ADD", 1.0, cosine)))
+    rim = w.scaled(beside, sine)
+    tilted = w.vector("ADD", w.scaled(towards, cosine), rim)
+    return w.turned(tilted, towards, w.math("MULTIPLY", v, 2 * math.pi))
 
 
 def _lamp_group(parts):
-    """The group that makes of a cone the closure that carries what the model gives there."""
-    vectors = ("towards", "at", "view", "tangent", "bitangent", "normal")
-    numbers = ("index", "length", "angle", "drop", "widened", "shown", "room")
+    """The group that makes of a cone the closure that carries what the model gives there. Nothing
+    of it is computed where the factor `lit` is 0."""
+    vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "random")
+    numbers = ("drop", "chord", "flat", "lit", "room")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
+    inputs += _AXES
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
+    known = {name for name, _ in inputs}
+    inputs += [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
 
     def fill(w, found):
-        here = parts.on(w)
-        u = _random(w, found["at"], found["view"], found["length"], found["index"])
-        point = here.add("point", u_0=u[0], u_1=u[1], **found)["wi"]
+        here = parts.on(w, found)
+        u = w.separate(w.vector("FRACTION", found["random"]))
+        point = _point_of(w, found["towards"], found["drop"], found["view"], u[0], u[1])
+        on_flat = here.add("flat", **found, u_0=u[0], u_1=u[1])
+        point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
         value = here.add("value", **(found | {"wi": _local(w, point, frame)}))["value"]
-        cone = {name: found[name] for name in ("angle", "widened", "room")}
+        value = w.scaled(value, w.mix(found["flat"], 1.0, on_flat["emphasis"]))
+        cone = {name: found[name] for name in ("chord", "flat", "room")}
         lobe = here.add("lobe", value=value, u_2=u[2], **cone)
         toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
-        return {"BSDF": w.shown(found["shown"], toon)}
+        return {"BSDF": w.shown(found["lit"], toon)}
 
-    content = ["lamp", {name: parts.data[name] for name in ("point", "value", "lobe")}]
+    content = ["lamp", 1, {name: parts.data[name] for name in ("value", "flat", "lobe")}]
     return _group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
-def _keep_apart(w, lamps):
+def _keep_apart(w, lamps, widest):
     """Finds out which lamps are shown by a closure, and how wide that may be made: of two whose
-    cones overlap the earlier one, which is wider, is left to random directions."""
+    cones overlap the earlier one, which is wider, is left to random directions.
+
+    From the last slot to the first, so that what empty ones give, which Cycles knows, comes first.
+    """
     for lamp in lamps:
-        lamp["shown"], lamp["room"] = lamp["active"], 1.0
+        lamp["taken"] = w.mix(lamp["active"], -_FAR, lamp["reach"])
+    apart = {}
     for i, lamp in enumerate(lamps):
-        hidden = None
-        for other in lamps[i + 1 :]:
-            apart = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
-            beside, beside_other = (w.math("SUBTRACT", apart, s["chord"]) for s in (other, lamp))
-            near = w.math("LESS_THAN", beside, lamp["chord"])
-            both = w.math("MULTIPLY", near, other["active"])
-            hidden = both if hidden is None else w.math("MAXIMUM", hidden, both)
-            for mine, its, room in ((lamp, other, beside), (other, lamp, beside_other)):
-                free = w.mix(its["active"], 1.0, room)
-                mine["room"] = w.math("MINIMUM", mine["room"], free)
-        if hidden is not None:
-            left = w.math("SUBTRACT", 1.0, hidden)
-            lamp["shown"] = w.math("MULTIPLY", lamp["active"], left)
+        for j, other in enumerate(lamps[i + 1 :], i + 1):
+            distance = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
+            apart[i, j] = apart[j, i] = w.mix(other["used"], _FAR, distance)
+    for i, lamp in enumerate(lamps):
+
+        def nearest(others, room, i=i):
+            for j in others:
+                beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
+                room = w.math("MINIMUM", room, beside)
+            return room
+
+        later = nearest(range(len(lamps) - 1, i, -1), _FAR)
+        free = w.math("LESS_THAN", lamp["reach"], later)
+        lamp["shown"] = w.math("MULTIPLY", lamp["active"], free)
+        lamp["lit"] = w.math("MULTIPLY", lamp["shown"], lamp["above"])
+        lamp["room"] = nearest(range(i - 1, -1, -1), w.math("MINIMUM", later, widest))
 
 
 def wire(tree, data, normal, tangent, parameters, slots, title):
@@ -336,12 +379,15 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
     `title` begins the names of the groups that are made.
     """
     w = Wiring(tree)
-    parts = _Parts(w, data, title)
+    geometry = w.node("ShaderNodeNewGeometry")
+    constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
+    lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
+    parts = _Parts(w, lists, title, constants)
     parameters = dict(parameters)
     for name, (low, high) in data["bounds"].items():
         inside = w.math("MAXIMUM", parameters[name], low)
         parameters[name] = w.math("MINIMUM", inside, high)
-    surface = _Surface(w, parts, normal, tangent)
+    surface = _Surface(w, parts, geometry, normal, tangent)
     side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
     given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}
     shaders = []
@@ -366,28 +412,30 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
         w.place_nodes()
         return {"BSDF": bsdf, "Albedo": total}
     lamps = []
+    u = _random(w, surface.place, surface.view, surface.path_length)
     if slots:
         given |= parts.add("once", **given)
         frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
-        here = {"at": surface.place, "view": surface.view}
-        given |= {**here, "length": surface.path_length, **dict(frame)}
+        here = {"at": surface.place, "view": surface.view, **dict(frame)}
+        given |= here | constants
         seen, lit = _seen_group(parts), _lamp_group(parts)
         for slot in slots:
-            values = here | dict(zip(_SLOT, slot, strict=True))
-            lamps.append(_instance(w, seen, values, "lamp seen"))
-        _keep_apart(w, lamps)
-    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
-    for index, lamp in enumerate(lamps):
-        made = _instance(w, lit, given | lamp | {"index": 1.0 + index}, "lamp")
-        shaders.append(made["BSDF"])
+            values = dict(zip(_SLOT, slot, strict=True))
+            lamps.append(values | _instance(w, seen, here | values, "lamp seen"))
+        _keep_apart(w, lamps, data["widest"])
+    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"], u))
+    for index, lamp in enumerate(lamps, 1):
+        shift = tuple(math.fmod(index * step, 1.0) for step in _SHIFT)
+        values = given | lamp | {"random": w.vector("ADD", u, shift)}
+        shaders.append(_instance(w, lit, values, "lamp")["BSDF"])
     bsdf = w.sum(shaders)
     w.place_nodes()
     return {"BSDF": bsdf}
 
 
-def _rest(w, parts, surface, given, lamps, narrow):
+def _rest(w, parts, surface, given, lamps, narrow, random):
     """The closure of the drawn direction, which carries all light that lamps' closures do not."""
-    u = _random(w, surface.place, surface.view, surface.path_length, 0.0)
+    u = w.separate(random)
     numbers = {f"u_{i}": number for i, number in enumerate(u)}
     drawn = parts.add("draw", **given, **numbers)
     ray = surface.world(drawn["wi"])
@@ -396,12 +444,14 @@ def _rest(w, parts, surface, given, lamps, narrow):
     hidden = w.math(
         "MULTIPLY", w.math("LESS_THAN", height, 0.0), w.math("SUBTRACT", 1.0, surface.strand)
     )
-    for lamp in lamps:
-        apart = w.vector("DISTANCE", ray, lamp["towards"], output="Value")
-        inside = w.math("LESS_THAN", apart, lamp["chord"])
-        hidden = w.math("MAXIMUM", hidden, w.math("MULTIPLY", inside, lamp["shown"]))
-    chance = w.separate(w.vector("FRACTION", w.vector("SCALE", w.combine(*u), scale=4096.0)))[0]
-    colour = parts.add("rest", weight=drawn["weight"], u=chance, lost=hidden)["color"]
+    # From the last slot on, as in _keep_apart().
+    met = 0.0
+    for lamp in reversed(lamps):
+        inside = parts.add("met", **{"at": surface.place, "ray": ray} | lamp)["met"]
+        met = w.math("MAXIMUM", met, w.math("MULTIPLY", inside, lamp["shown"]))
+    lost = w.math("MAXIMUM", hidden, met)
+    chance = w.math("FRACT", w.math("MULTIPLY", u[0], 4096.0))
+    colour = parts.add("rest", weight=drawn["weight"], u=chance, lost=lost)["color"]
     size = narrow * 2 / math.pi
     return w.toon(colour, size, w.half(ray, surface.view))
 

@@ -102,6 +102,10 @@ class Wiring:
         self.give(by_identifier[f"B_{kind}"], at_1)
         return by_identifier[f"Result_{kind}"]
 
+    def scaled(self, vector, factor):
+        """A vector times a number. SVM takes half as long for it as for Vector Math's Scale."""
+        return self.mix(factor, (0.0, 0.0, 0.0), vector, True)
+
     def combine(self, x, y, z):
         node = self.node("ShaderNodeCombineXYZ")
         for socket, value in zip(node.inputs, (x, y, z), strict=True):
@@ -113,9 +117,16 @@ class Wiring:
         self.give(node.inputs[0], vector)
         return list(node.outputs)
 
+    def turned(self, vector, axis, angle):
+        """A vector turned about an axis."""
+        node = self.node("ShaderNodeVectorRotate", rotation_type="AXIS_ANGLE")
+        for name, value in (("Vector", vector), ("Axis", axis), ("Angle", angle)):
+            self.give(node.inputs[name], value)
+        return node.outputs[0]
+
     def half(self, a, b):
         """The direction halfway between two."""
-        return self.vector("NORMALIZE", self.vector("ADD", a, b))
+        return self.vector("NORMALIZE", self.mix(0.5, a, b, True))
 
     def toon(self, color, size, normal):
         """A closure that is level within a cone about the mirror direction."""

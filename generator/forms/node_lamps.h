@@ -7,10 +7,12 @@
 // it. Rest: a direction drawn from the model, which carries nothing where it lies in such a cone.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the widest that fits into it, and
-// what it has beside that drawn directions meet. A closure of small weight is lost, so the cone of a small lamp is
+// carries what all of the lamp gives. A closure of small weight is lost, so the cone of a small lamp is
 // widened until it carries kWidened of the light: that much of what shines beside the lamp counts twice. Of two cones
 // that overlap the earlier one, which the list has the wider lamps in, is left to drawn directions: both would count
 // twice there.
+//
+// These formulas run as nodes alone (print/node_program.h), whose division by 0 and whose root of less than 0 are 0.
 #pragma once
 
 #include "core/vec.h"
@@ -21,99 +23,146 @@ namespace brdfc::forms {
 /// What a slot of a lamp holds: see brdfc_lamp() in osl/brdfc.osl.in, and blender_addon/lamps/slots.py.
 template <class T> struct LampSlot { Vec3<T> place, turn, scale, shape; };
 
+/// What a slot says of how a lamp lies. It does not depend on the shading point, so Cycles computes it once.
+template <class T> struct LampAxes {
+  Vec3<T> across, along, away;  ///< unit; `away` from the side that shines
+  T half_across, half_along;    ///< of a rectangle or an ellipse: half its axes
+};
+template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
+  const Vec3<T>& q = slot.turn;
+  const T w = slot.scale.z;
+  LampAxes<T> axes;
+  axes.across = {T(1) - T(2) * (q.y * q.y + q.z * q.z), T(2) * (q.x * q.y + w * q.z), T(2) * (q.x * q.z - w * q.y)};
+  axes.along = {T(2) * (q.x * q.y - w * q.z), T(1) - T(2) * (q.x * q.x + q.z * q.z), T(2) * (q.y * q.z + w * q.x)};
+  axes.away = {T(2) * (q.x * q.z + w * q.y), T(2) * (q.y * q.z - w * q.x), T(1) - T(2) * (q.x * q.x + q.y * q.y)};
+  axes.half_across = abs(slot.shape.y * slot.scale.x) / T(2);
+  axes.half_along = abs(slot.shape.z * slot.scale.y) / T(2);
+  return axes;
+}
+
+/// What a shading point sees of a lamp. Radii are chords, how far apart the tips of unit vectors are: that takes fewer
+/// nodes than angles do.
 template <class T> struct LampCone {
   Vec3<T> towards;  ///< its axis, unit
-  T angle;          ///< its radius, with a seam
-  T drop;           ///< 1 - cos of that of the lamp within
-  T widened;        ///< 1: may be wider than the lamp, else 0
-  T active;         ///< 1; 0: the lamp is left to drawn directions, or the slot is empty
+  T drop;           ///< 1 - cos of the radius of the cone that lies within the lamp
+  T chord;          ///< of its closure's radius: that of a ball or a sun has a seam
+  T reach;          ///< of a cone about the lamp
+  T flat;           ///< 1: a rectangle or an ellipse, else 0
+  T used;           ///< 0: the slot is empty, else 1
+  T active;         ///< 0: the lamp is left to drawn directions, or the slot is empty, else 1
+  T above;          ///< 1 where a part of it is above the horizon, else 0
 };
 
-/// Half the width of the lobe of a drawn direction. It keeps off lamps by more than that.
+/// Half the width of the lobe of a drawn direction. It keeps off lamps by that.
 inline constexpr double kNarrow = 1e-3;
 
-/// At the point `at` for the viewer's direction wo, all in the world's axes.
-template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const Vec3<T>& at, const Vec3<T>& wo) {
-  /// Tangent of the radius from which on drawn directions meet a lamp well; what is left of a cone's normal's height
-  /// over its rim, at least; the radius of what has no size.
-  constexpr double kWidest = 1.5, kLeastRise = 0.01, kPoint = 1e-4;
-  const T kind = slot.shape.x, w = slot.scale.z;
-  const Vec3<T>&turn = slot.turn, &shape = slot.shape;
+/// At the point `at` for the viewer's direction wo and the normal of the horizon, all in the world's axes. What depends
+/// on the slot alone Cycles folds, so that a ball, a sun and a rectangle take the nodes of their kind.
+template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                                       const Vec3<T>& wo, const Vec3<T>& normal) {
+  /// Of the sine of the radius, squared: from where on drawn directions meet a lamp well (tangent 1.5), and that of
+  /// what has no size. What is left of a cone's normal's height over its rim, at least.
+  constexpr double kWidest = 2.25 / 3.25, kPoint = 1e-8, kLeastRise = 0.01;
+  const T kind = slot.shape.x;
   const auto ball = kind < T(1.5);
   const auto sun = kind > T(1.5) && kind < T(2.5);
   const auto flat = kind > T(2.5) && kind < T(4.5);
   const auto sky = kind > T(4.5);
-  const Vec3<T> axis = {T(2) * (turn.x * turn.z + w * turn.y), T(2) * (turn.y * turn.z - w * turn.x),
-                        T(1) - T(2) * (turn.x * turn.x + turn.y * turn.y)};
-  const T level = cos(turn.x);
-  const Vec3<T> in_sky = {level * sin(turn.y), level * cos(turn.y), sin(turn.x)};
-  const Vec3<T> centre = select(sky, in_sky, select(sun, axis, slot.place - at));
-  const T distance = maximum(length(centre), tiny<T>());
+  const T level = cos(slot.turn.x);
+  const Vec3<T> in_sky = {level * sin(slot.turn.y), level * cos(slot.turn.y), sin(slot.turn.x)};
+  const Vec3<T> centre = select(sky, in_sky, select(sun, lamp.away, slot.place - at));
+  const T distance2 = dot(centre, centre), nearness = T(1) / sqrt(distance2);
   LampCone<T> cone;
-  cone.towards = centre / distance;
-  // Tangents of radii.
-  const T sine = minimum(abs(shape.y) / distance, T(0.99));
-  const T of_ball = sine / sqrt(T(1) - sine * sine);
-  const T half = minimum(abs(shape.y) / T(2), T(1.5));
-  const T of_sun = sin(half) / cos(half);
-  const T a = abs(shape.y * slot.scale.x) / T(2), b = abs(shape.z * slot.scale.y) / T(2);
+  cone.towards = centre * nearness;
+  // Squared sines of radii.
+  const T of_ball = sqr(slot.shape.y) / distance2;
+  const T of_sun = sqr(sin(minimum(abs(slot.shape.y) / T(2), T(1.5))));
   // The widest cone about the centre within a disk: its rim touches that where the plane recedes.
-  const T facing = dot(axis, cone.towards), slant = sqrt(maximum(T(1) - facing * facing, T(0)));
-  const T within = minimum(a, b);
-  const T of_flat = within * facing / (distance + within * slant);
-  // One that drawn directions are not to meet is covered by the cone.
-  const T covering = sqrt(a * a + b * b) / distance;
-  const T tangent =
-      maximum(select(ball, of_ball, select(flat, select(shape.y < T(0), covering, of_flat), of_sun)), T(kPoint));
-  const T secant = sqrt(T(1) + tangent * tangent);
-  cone.drop = tangent * tangent / (secant * (secant + T(1)));
-  cone.angle = atan(tangent) + T(2 * kNarrow);
-  cone.widened = select(flat, T(0), T(1));
+  const T facing = dot(lamp.away, cone.towards), slant = sqrt(T(1) - facing * facing);
+  const T within = minimum(lamp.half_across, lamp.half_along) * nearness;
+  const T tangent = within * facing / (T(1) + within * slant), tangent2 = tangent * tangent;
+  const T sine2 = maximum(select(ball, of_ball, select(flat, tangent2 / (T(1) + tangent2), of_sun)), T(kPoint));
+  const T sine = sqrt(sine2);
+  cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
+  // All of a rectangle's light is made up for by what its cone has of it, which so must not be wider.
+  cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
+  const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
+  cone.reach = select(flat, diagonal * nearness + T(2 * kNarrow), cone.chord);
+  cone.flat = select(flat, T(1), T(0));
   // Cosine between the closure's normal and its axis; all of the cone has to be above that normal's horizon.
-  const T rise = length(cone.towards + wo) / T(2);
-  const auto usable = kind > T(0.5) && tangent < T(kWidest) && rise > tangent / secant + T(kLeastRise);
-  cone.active = select(usable && (!flat || facing > T(0.01)), T(1), T(0));
+  const T rise = length(cone.towards + wo);
+  const auto used = kind > T(0.5);
+  const auto usable = used && sine2 < T(kWidest) && rise > T(2) * sine + T(2 * kLeastRise);
+  const auto shines_here = select(flat, facing, T(1)) > T(0.01);
+  cone.used = select(used, T(1), T(0));
+  cone.active = select(usable && shines_here, T(1), T(0));
+  cone.above = select(T(0) < dot(cone.towards, normal) + cone.reach, T(1), T(0));
   return cone;
 }
 
-/// A direction within `drop` of the axis, each as likely as the others.
-template <class T> Vec3<T> point_of(const Vec3<T>& towards, const T& drop, const T& u, const T& v) {
-  const T q = u * drop, sine = sqrt(maximum(q * (T(2) - q), T(0))), turn = T(2) * pi<T>() * v;
-  // about_axis() is for an axis in the upper half; a cone is the same in the mirror.
-  const T up = select(towards.z < T(0), T(-1), T(1));
-  const Vec3<T> p =
-      about_axis(Vec3<T>{towards.x, towards.y, towards.z * up}, Vec3<T>{sine * cos(turn), sine * sin(turn), T(1) - q});
-  return {p.x, p.y, p.z * up};
+/// A point of a rectangle or an ellipse, by two numbers in [0, 1).
+template <class T> struct FlatPoint {
+  Vec3<T> wi;  ///< towards it, unit
+  T emphasis;  ///< what it stands for, as a solid angle, over that of the cone within the lamp
+};
+template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                                           const T& drop, const T& u, const T& v) {
+  const auto round = slot.shape.x > T(3.5);
+  const T radius = sqrt(u), turn = T(2) * pi<T>() * v;
+  const T x = select(round, radius * cos(turn), T(2) * u - T(1));
+  const T y = select(round, radius * sin(turn), T(2) * v - T(1));
+  const Vec3<T> p = lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y) + (slot.place - at);
+  const T distance2 = dot(p, p);
+  const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4)) * T(1 / (2 * kPi));
+  FlatPoint<T> out;
+  out.wi = p * (T(1) / sqrt(distance2));
+  out.emphasis = maximum(area * dot(lamp.away, out.wi), T(0)) / (distance2 * drop);
+  return out;
+}
+
+/// Whether a drawn direction meets a lamp, or passes it so near that its lobe would: 1, else 0.
+template <class T> T meets(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at, const LampCone<T>& cone,
+                           const Vec3<T>& ray) {
+  const auto flat = slot.shape.x > T(2.5) && slot.shape.x<T(4.5), round = slot.shape.x> T(3.5);
+  const Vec3<T> centre = slot.place - at;
+  const T slope = dot(lamp.away, ray), distance = dot(lamp.away, centre) / slope;
+  const Vec3<T> off = ray * distance - centre;
+  const T seam = T(kNarrow) * distance;
+  const T x = (abs(dot(off, lamp.across)) - seam) / lamp.half_across;
+  const T y = (abs(dot(off, lamp.along)) - seam) / lamp.half_along;
+  const T farthest = select(round, maximum(x, T(0)) * x + maximum(y, T(0)) * y, maximum(x, y));
+  const auto on_flat = farthest < T(1) && T(0) < slope;
+  return select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
 }
 
 /// A closure of small weight, which Cycles would drop: kept by chance, and as much brighter then. `u` from 0 to 1.
 template <class T> T kept(const T& weight, const T& u) {
   constexpr double kLeast = 1e-4;
-  const T chance = weight / T(kLeast);
-  return select(chance < T(1), select(u < chance, T(1) / maximum(chance, tiny<T>()), T(0)), T(1));
+  const T chance = weight * T(1 / kLeast);
+  return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// What a Toon closure takes that carries `value`, f cos, over the cone.
+/// What a Toon closure takes that carries `value`, f cos, over the cone. That of a ball or a sun may be wider.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as the node has it
 };
 /// `room`: how wide it may be made without covering another lamp.
 template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& room, const Rgb<T>& value, const T& u) {
-  constexpr double kWidened = 2e-4, kWidestWidened = 0.3;
+  constexpr double kWidened = 2e-4;
   const T largest = max_component(value);
-  const T wide = minimum(sqrt(T(kWidened / kPi) / maximum(largest, T(1e-6))), T(kWidestWidened));
-  const T width = maximum(cone.angle, minimum(wide, room) * cone.widened);
-  // Cycles' one_minus_cos() (util/math_base.h), rounding and all: its Toon closures divide by that.
-  const T drop = select(width > T(0.02), T(1) - cos(width), width * width / T(2));
-  const T extent = T(2) * pi<T>() * drop;
+  const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
+  const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
+  const T extent = chord2 * T(kPi);
   ToonLobe<T> out;
-  out.size = width * T(2 / kPi);
+  // The angle 2 asin(chord / 2), to 1e-4 of itself.
+  out.size = chord * (T(2 / kPi) +
+                      chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
   out.color = value * (extent * kept(largest * extent, u));
   return out;
 }
 
-/// How far apart the tips of unit vectors are that are less than an angle from each other.
-template <class T> T chord(const T& angle) { return T(2) * sin(angle / T(2)); }
+/// As wide as a cone is made that may be wider than its lamp.
+inline constexpr double kWidestWidened = 0.3;
 
 }  // namespace brdfc::forms

@@ -44,8 +44,8 @@ Json json_of(const NodeProgram& program) {
 }
 
 /// What parts have vectors for.
-const std::set<std::string> kVectors = {"at",   "normal", "place", "scale", "shape", "towards",
-                                        "true", "turn",   "view",  "wi",    "wo"};
+const std::set<std::string> kVectors = {"across", "along",   "at",   "away", "normal", "place", "ray", "scale",
+                                        "shape",  "towards", "true", "turn", "view",   "wi",    "wo"};
 
 /// Records a program by itself.
 template <class Outputs> NodeProgram recorded(const Outputs& outputs) {
@@ -66,31 +66,55 @@ NodeProgram record_bend() {
 NodeProgram record_raise() {
   return recorded([](Program& p) { p.output("wo", raise_to_horizon(input3("wo"))); });
 }
-LampCone<Expr> cone_input() {
-  return {input3("towards"), Expr::input("angle"), Expr::input("drop"), Expr::input("widened"), Expr(1.0)};
+LampSlot<Expr> slot_input() { return {input3("place"), input3("turn"), input3("scale"), input3("shape")}; }
+LampAxes<Expr> axes_input() {
+  return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
+}
+NodeProgram record_axes() {
+  return recorded([](Program& p) {
+    const LampAxes<Expr> axes = lamp_axes(slot_input());
+    p.output("across", axes.across);
+    p.output("along", axes.along);
+    p.output("away", axes.away);
+    p.output("half_across", axes.half_across);
+    p.output("half_along", axes.half_along);
+  });
 }
 NodeProgram record_cone() {
   return recorded([](Program& p) {
-    const LampCone<Expr> cone =
-        cone_of(LampSlot<Expr>{input3("place"), input3("turn"), input3("scale"), input3("shape")}, input3("at"),
-                input3("view"));
+    const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("normal"));
     p.output("towards", cone.towards);
-    p.output("angle", cone.angle);
     p.output("drop", cone.drop);
-    p.output("widened", cone.widened);
+    p.output("chord", cone.chord);
+    p.output("reach", cone.reach);
+    p.output("flat", cone.flat);
+    p.output("used", cone.used);
     p.output("active", cone.active);
-    p.output("chord", chord(cone.angle));
+    p.output("above", cone.above);
   });
 }
-NodeProgram record_point() {
+NodeProgram record_flat() {
   return recorded([](Program& p) {
-    p.output("wi", point_of(input3("towards"), Expr::input("drop"), Expr::input("u_0"), Expr::input("u_1")));
+    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), Expr::input("drop"),
+                                             Expr::input("u_0"), Expr::input("u_1"));
+    p.output("wi", point.wi);
+    p.output("emphasis", point.emphasis);
+  });
+}
+NodeProgram record_met() {
+  return recorded([](Program& p) {
+    LampCone<Expr> cone;
+    cone.towards = input3("towards");
+    cone.chord = Expr::input("chord");
+    p.output("met", meets(slot_input(), axes_input(), input3("at"), cone, input3("ray")));
   });
 }
 NodeProgram record_lobe() {
   return recorded([](Program& p) {
-    const ToonLobe<Expr> lobe =
-        toon_lobe(cone_input(), Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
+    LampCone<Expr> cone;
+    cone.chord = Expr::input("chord");
+    cone.flat = Expr::input("flat");
+    const ToonLobe<Expr> lobe = toon_lobe(cone, Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
   });
@@ -238,8 +262,10 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   }
   if (parts.contains("draw")) add("rest", record_rest());
   if (lamps) {
+    add("axes", record_axes());
     add("cone", record_cone());
-    add("point", record_point());
+    add("flat", record_flat());
+    add("met", record_met());
     add("lobe", record_lobe());
     out.lamps = max_lamps;
   }
@@ -248,8 +274,9 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
   out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
   out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
-  out.source = Json{{"format", 3},      {"narrow", kNarrow},    {"lamps", out.lamps},
-                    {"bounds", bounds}, {"closures", closures}, {"parts", parts}}
+  out.source = Json{{"format", 4},        {"narrow", kNarrow}, {"widest", kWidestWidened},
+                    {"lamps", out.lamps}, {"bounds", bounds},  {"closures", closures},
+                    {"parts", parts}}
                    .dump() +
                "\n";
   return out;

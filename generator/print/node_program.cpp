@@ -399,7 +399,11 @@ class Writer {
       NodeOperand added;
       const ExprNode& o = p_.node(other);
       const bool constant = o.op == Op::Const;
-      if (n.op == Op::Sub && !(i == 0 && constant)) continue;
+      if (n.op == Op::Sub && i == 1) {
+        if (color) continue;
+        return minus_product(p.args, other);
+      }
+      if (n.op == Op::Sub && !constant) continue;
       // What takes more registers first.
       std::vector<int> order = {p.args[0], p.args[1], other};
       std::ranges::stable_sort(order, [&](int a, int b) { return need(a) > need(b); });
@@ -410,6 +414,19 @@ class Writer {
       return add(color ? "V_MULTIPLY_ADD" : "MULTIPLY_ADD", {operand(p.args[0]), operand(p.args[1]), added}, color);
     }
     return std::nullopt;
+  }
+
+  /// c - a b as c + (-a) b, in which -a often serves several times: polynomials are written that way.
+  NodeOperand minus_product(const std::vector<int>& factors, int from) {
+    int turned = factors[0], other = factors[1];
+    if (p_.node(other).op == Op::Const || uses_[std::size_t(other)] > uses_[std::size_t(turned)])
+      std::swap(turned, other);
+    std::vector<int> order = {turned, other, from};
+    std::ranges::stable_sort(order, [&](int a, int b) { return need(a) > need(b); });
+    for (int a : order) operand(a);
+    const NodeOperand a = operand(turned);
+    const NodeOperand minus = a.is_constant() ? number(-a.value[0]) : add("MULTIPLY", {a, number(-1)}, false);
+    return add("MULTIPLY_ADD", {minus, operand(other), operand(from)}, false);
   }
 
   NodeOperand make(int id) {
