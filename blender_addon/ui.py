@@ -11,6 +11,7 @@ from . import (
     checks,
     color,
     convert,
+    device,
     editable,
     energy,
     kernel,
@@ -261,7 +262,7 @@ def draw_lamps(layout, material, scene):
     limit = checks.lamps_that_fit(scene)
     if limit is not None and limit[0] < slots:
         room, largest = limit
-        if checks.runs_on_optix(scene):
+        if device.runs_on_optix(scene):
             said = say(
                 "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
                 "Shader mixes shares it",
