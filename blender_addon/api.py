@@ -118,7 +118,8 @@ def new_material(model, representation="auto", **parameters):
 
     A material of "auto" follows the settings of the scene: where Open Shading Language does not
     run, it is made of Blender's own nodes. Raises ValueError for an unknown model, representation
-    or parameter, or a value that is out of range; CompileError when Cycles can't compile the shader. Nothing is left in the file then.
+    or parameter, or a value that is out of range; CompileError when Cycles can't compile the
+    shader. Nothing is left in the file then.
     """
     form, values = _checked(model, representation, parameters)
     representation = "auto" if representation == "auto" else form

@@ -15,8 +15,8 @@ from bpy.app.handlers import persistent
 from . import device, lamps, nodes
 from .i18n import of_error
 
-#: Whether groups are being filled; the scene of which a picture is being made; session_uid of groups
-#: that were filled by a handler.
+#: Whether groups are being filled; the scene of which a picture is being made; session_uid of
+#: groups that were filled by a handler.
 _busy = False
 _rendering = None
 _filled = set()

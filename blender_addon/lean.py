@@ -21,7 +21,7 @@ from .i18n import say
 from .jobs import Job, ProgramJob
 
 #: Forms that a budget does not choose: they are for who asks for them.
-ASKED_FOR = ("twin",)
+ASKED_FOR = ("twin", "nodes")
 
 
 class PlanError(RuntimeError):

@@ -16,7 +16,7 @@ _INSTALLED = Path(__file__).parent
 root = _INSTALLED
 FORMAT = 1
 #: Another number whenever nodes.py or twin.py wires nodes in another way.
-WIRING = 2
+WIRING = 1
 
 #: Custom property of a node group: which model and representation it is, and its sockets'
 #: identifiers.

@@ -124,8 +124,8 @@ def batch():
 
 @pytest.fixture
 def empty(extension):
-    """An empty factory file with Cycles and Open Shading Language, which is off in files that people
-    begin with. Preferences, and with them the extension, stay."""
+    """An empty factory file with Cycles and, other than files that people begin with, with Open
+    Shading Language on. Preferences, and with them the extension, stay."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
