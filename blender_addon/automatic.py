@@ -63,6 +63,13 @@ def _before_render(scene, *_):
 
 
 @persistent
+def _before_bake(*_):
+    """Blender calls no other handler before it bakes textures."""
+    if _rendering is None:
+        _quietly()
+
+
+@persistent
 def _now(*_):
     """A file was loaded or is to be saved, a picture is over."""
     global _rendering
@@ -85,6 +92,7 @@ def _before_undo(*_):
 
 _HANDLERS = {
     "depsgraph_update_post": _after_update,
+    "object_bake_pre": _before_bake,
     "render_init": _before_render,
     "render_pre": _before_render,
     "render_complete": _now,

@@ -620,7 +620,8 @@ def runs_anywhere(node):
 
 def is_stood_in_for(node):
     """Whether Blender's own nodes stand in for a node where its form does not run."""
-    has_twin = any(is_ours(n) for n in node.node_tree.nodes)
+    inner = [n.node_tree[TAG]["representation"] for n in node.node_tree.nodes if is_ours(n)]
+    has_twin = "twin" in inner
     return stand_in.is_in(node.node_tree) or (has_twin and _lacks_choice(node))
 
 

@@ -188,6 +188,25 @@ def test_a_render_follows_what_a_script_has_changed(extension, new_file):
     assert form_of(extension, material) == "exact"
 
 
+def test_baking_follows(extension, new_file):
+    """What is baked into an image is what a picture shows."""
+    few_samples(new_file, 4)
+    material = extension.api.new_material("lambert", rho=(0.5, 0.4, 0.3))
+    bpy.ops.mesh.primitive_plane_add()
+    bpy.context.object.data.materials.append(material)
+    target = material.node_tree.nodes.new("ShaderNodeTexImage")
+    target.image = bpy.data.images.new("Baked", 8, 8, float_buffer=True)
+    material.node_tree.nodes.active = target
+    baked = {}
+    for osl in (True, False):
+        new_file.cycles.shading_system = osl
+        bpy.ops.object.bake(type="COMBINED")
+        assert form_of(extension, material) == ("exact" if osl else "nodes")
+        baked[osl] = np.array(target.image.pixels).reshape(8, 8, 4)[..., :3]
+    assert baked[False].min() > 1e-3
+    np.testing.assert_allclose(baked[False].mean((0, 1)), baked[True].mean((0, 1)), rtol=0.05)
+
+
 @pytest.mark.parametrize("change", ["engine", "device", "build", "osl"])
 def test_what_lacks_osl(extension, new_file, monkeypatch, change):
     """A GPU, another engine, a Blender that was built without Open Shading Language."""

@@ -244,7 +244,9 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empt
             once = found
     assert found == once, "what was dragged once is not brought again"
     groups, texts, _ = once
-    made_of = [f"{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS[osl]]
+    made_of = [
+        f"{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS[osl]
+    ]
     ours = [name for name in groups if not name.startswith("brdfc ") or name == "brdfc Lamps"]
     assert ours == [*made_of, "brdfc Lamps"]
     assert len(texts) == (3 if osl else 0), "two shaders, and which tells whether they run"
