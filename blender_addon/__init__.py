@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import console, i18n, imports, lamps, operators, plot_panel, ui, update
+from . import automatic, console, i18n, imports, lamps, operators, plot_panel, ui, update
 
 
 def _refuse_beside_another():
@@ -24,6 +24,7 @@ def register():
     operators.register()
     ui.register()
     plot_panel.register()
+    automatic.register()
     lamps.register()
     imports.register()
     update.register()
@@ -35,6 +36,7 @@ def unregister():
     update.unregister()
     imports.unregister()
     lamps.unregister()
+    automatic.unregister()
     plot_panel.unregister()
     ui.unregister()
     operators.unregister()

@@ -20,6 +20,7 @@ from pathlib import Path
 import bpy
 
 from . import (
+    automatic,
     bump_correction,
     checks,
     convert,
@@ -115,15 +116,18 @@ def prepare_material(material):
 def new_material(model, representation="auto", **parameters):
     """Makes a material of one model. Parameters that are not given take their default.
 
-    Raises ValueError for an unknown model, representation or parameter, or a value that is out of
-    range; CompileError when Cycles can't compile the shader. Nothing is left in the file then.
+    A material of "auto" follows the settings of the scene: where Open Shading Language does not
+    run, it is made of Blender's own nodes. Raises ValueError for an unknown model, representation
+    or parameter, or a value that is out of range; CompileError when Cycles can't compile the
+    shader. Nothing is left in the file then.
     """
-    representation, values = _checked(model, representation, parameters)
-    nodes.ensure_group(model, representation)
+    form, values = _checked(model, representation, parameters)
+    representation = "auto" if representation == "auto" else form
+    nodes.ensure_group(model, representation, values=values)
     material = bpy.data.materials.new(pack.model(model)["label"])
     try:
         tree = nodes.empty_tree(material)
-        node = nodes.add_group_node(tree, model, representation)
+        node = nodes.add_group_node(tree, model, representation, values)
         for name, value in values.items():
             nodes.set_value(node, name, value)
         output = tree.nodes.new("ShaderNodeOutputMaterial")
@@ -161,7 +165,7 @@ def set_parameters(material, **parameters):
 
 def _set(node, what, parameters):
     editable.check(node.id_data)
-    model, representation = nodes.identity(node)
+    model, representation = nodes.identity(node)[0], nodes.form_in_script(node)
     lean_node = nodes.is_baked(node)
     _, values = _checked(model, "auto" if lean_node else representation, parameters)
     present = nodes.sockets(node)
@@ -447,7 +451,9 @@ def enable_osl(scene):
 
     Raises RuntimeError when this Blender has no OSL.
     """
-    return checks.enable_osl(expected.scene(scene))
+    done = checks.enable_osl(expected.scene(scene))
+    automatic.follow()
+    return done
 
 
 def enlarge_lamps(scene):
@@ -468,7 +474,6 @@ def make_local(material):
         material = material.make_local()
     nodes.make_local(material.node_tree)
     lamps.follow()
-    groups = {node.node_tree for node in nodes.group_nodes(material)}
-    twins = {n.node_tree for group in groups for n in group.nodes if nodes.is_ours(n)}
-    nodes.unite(groups | twins)
+    automatic.follow()
+    nodes.unite(nodes.with_parts({node.node_tree for node in nodes.group_nodes(material)}))
     return material

@@ -5,13 +5,21 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import closure_pool, i18n, lamp_checks, lamps, nodes, pack, shader_trees, stand_in, update
+from . import (
+    closure_pool,
+    device,
+    i18n,
+    lamp_checks,
+    lamps,
+    nodes,
+    pack,
+    shader_trees,
+    update,
+)
 from .i18n import Sentence, say
-from .setting_checks import DECLARED, black_aovs, clamp_highlight
+from .setting_checks import DECLARED, black_aovs, clamp_highlight, is_clamped_as_new
 
 BLENDER_MIN = (4, 5, 0)
-#: Devices other than the CPU whose kernels can run OSL.
-OSL_DEVICES = {"OPTIX"}
 #: The run of these shaders on an OptiX device that is on record, in words; None: there is none.
 OPTIX_RUN = None
 
@@ -26,43 +34,16 @@ class Finding:
     message: str
 
 
-def gpu_backend():
-    """Compute device type of the preferences: NONE, CUDA, OPTIX, HIP, METAL, ONEAPI."""
-    addon = bpy.context.preferences.addons.get("cycles")
-    return addon.preferences.compute_device_type if addon else "NONE"
-
-
-def device_without_osl(scene):
-    """Name of the compute device if the scene renders on one that can't run OSL, or None."""
-    backend = gpu_backend()
-    if scene.cycles.device != "GPU" or backend == "NONE" or backend in OSL_DEVICES:
-        return None
-    return backend
-
-
-def device_of_elsewhere(scene):
-    """Whether a scene renders on the CPU for want of a GPU in the preferences, which its file does
-    not hold: a computer that has one would take that."""
-    return scene.cycles.device == "GPU" and gpu_backend() == "NONE"
-
-
-def runs_on_optix(scene):
-    """Whether a scene's shaders run on a GPU, where closures have a pool of limited size."""
-    cycles = scene.cycles
-    on_gpu = scene.render.engine == "CYCLES" and cycles.device == "GPU"
-    return on_gpu and cycles.shading_system and gpu_backend() in OSL_DEVICES
-
-
 def lamps_that_fit(scene):
     """How many lamps the open file's materials can aim at on a scene's device, and the material
     that leaves room for no more; None where none aims at lamps."""
-    return closure_pool.lamps_that_fit(runs_on_optix(scene))
+    return closure_pool.lamps_that_fit(device.runs_on_optix(scene))
 
 
 def device_refusal(model_name, form, scene):
     """Why a form of a model can't run on a scene's device; None where it can."""
     size, room = pack.representation(model_name, form)["closure_bytes"], closure_pool.capacity()
-    if size > room and runs_on_optix(scene):
+    if size > room and device.runs_on_optix(scene):
         return say(
             "{form} takes more memory than OptiX has: it is for the CPU",
             more=f"{size} bytes of closures, and there is room for {room}",
@@ -103,7 +84,7 @@ def _pool_findings(material, scene):
     """Whether a material's closures fit what a scene's device has for them."""
     use, room = closure_pool.of_material(material), closure_pool.capacity()
     yield from _slot_findings(use, scene)
-    if not runs_on_optix(scene):
+    if not device.runs_on_optix(scene):
         return
     if use.size > room:
         yield Finding(
@@ -127,15 +108,12 @@ def _pool_findings(material, scene):
         )
 
 
-def is_eevee(scene):
-    """Whether a scene renders with EEVEE, which has another name in each version."""
-    return scene.render.engine.startswith("BLENDER_EEVEE")
-
-
 def engine_name(scene):
     """The render engine as people call it."""
     known = {"BLENDER_WORKBENCH": "Workbench"}
-    return "EEVEE" if is_eevee(scene) else known.get(scene.render.engine, scene.render.engine)
+    return (
+        "EEVEE" if device.is_eevee(scene) else known.get(scene.render.engine, scene.render.engine)
+    )
 
 
 def _by_twin(finding, ours):
@@ -201,7 +179,7 @@ def scene_warnings(scene):
             names=", ".join(names),
         )
         found.append(Finding("black_aovs", "WARNING", said))
-    if backend := device_without_osl(scene):
+    if backend := device.without_osl(scene):
         found.append(
             Finding(
                 "device",
@@ -209,13 +187,13 @@ def scene_warnings(scene):
                 say("{backend} devices can't run these shaders", backend=backend),
             )
         )
-    if device_of_elsewhere(scene):
+    if device.of_elsewhere(scene):
         said = say(
             "The device is GPU Compute: a computer whose preferences have a GPU renders on that, "
             "and few can run these shaders"
         )
         found.append(Finding("device_elsewhere", "WARNING", said))
-    if OPTIX_RUN is None and runs_on_optix(scene):
+    if OPTIX_RUN is None and device.runs_on_optix(scene):
         found.append(
             Finding(
                 "optix_untested",
@@ -255,7 +233,7 @@ def node_warnings(node, material, scene):
         found.append(_of_another_version(material, node, label))
     if stood_in := is_stood_in(node, scene):
         form = _twin(node) or {}
-    declared = [] if is_eevee(scene) else form.get("warnings", [])
+    declared = [] if device.is_eevee(scene) else form.get("warnings", [])
     for name, parameter in schema.items():
         value = nodes.get_value(node, name)
         if parameter["kind"] == "choice" or value is None:
@@ -305,6 +283,9 @@ def node_warnings(node, material, scene):
     for code, severity, said in lamp_checks.of_node(node, form, scene):
         found.append(Finding(code, severity, _of(label, said)))
     for code in declared:
+        # Of nodes the lamps that they know are sampled, and a new scene has no other bright light.
+        if code == "clamp_indirect" and form.get("nodes") and is_clamped_as_new(scene):
+            continue
         if code in DECLARED and (result := DECLARED[code](material, scene)):
             found.append(Finding(code, result[0], _of(label, result[1])))
     return found
@@ -316,18 +297,17 @@ UNABLE = {"no_osl", "engine", "osl_off", "device"}
 
 def of_scene(ours, scene):
     """The findings of a scene for these nodes: Blender's own run anywhere."""
-    scripted = [node for node in ours if not nodes.is_native(node.node_tree)]
+    scripted = [node for node in ours if not nodes.runs_anywhere(node)]
     found = scene_warnings(scene) if scripted else []
-    takes_nodes = scene.render.engine == "CYCLES" or is_eevee(scene)
-    if not takes_nodes or not all(stand_in.is_in(node.node_tree) for node in scripted):
+    takes_nodes = scene.render.engine == "CYCLES" or device.is_eevee(scene)
+    if not takes_nodes or not all(map(nodes.is_stood_in_for, scripted)):
         return found
     return [_by_twin(f, scripted) if f.code in UNABLE else f for f in found]
 
 
 def is_stood_in(node, scene):
     """Whether a twin is what a scene shows of a node."""
-    stands_in = stand_in.is_in(node.node_tree)
-    return stands_in and any(f.code in UNABLE for f in of_scene([node], scene))
+    return nodes.is_stood_in_for(node) and any(f.code in UNABLE for f in of_scene([node], scene))
 
 
 def why_not_run(material, scene):
@@ -359,8 +339,8 @@ def enable_osl(scene):
     if scene.render.engine != "CYCLES":
         done.append(say("Render engine changed from {engine} to Cycles", engine=engine_name(scene)))
         scene.render.engine = "CYCLES"
-    backend = device_without_osl(scene)
-    if backend or device_of_elsewhere(scene):
+    backend = device.without_osl(scene)
+    if backend or device.of_elsewhere(scene):
         backend = backend or Sentence("GPU Compute")
         done.append(say("Device changed from {backend} to the CPU", backend=backend))
         scene.cycles.device = "CPU"

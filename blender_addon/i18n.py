@@ -84,7 +84,11 @@ def rpt(text):
 
 
 #: Names of forms that people see, where they are not those of scripts.
-_FORM_NAMES = {"nodes": say("Formula Nodes"), "twin": say("Blender Nodes")}
+_FORM_NAMES = {
+    "auto": say("Automatic"),
+    "nodes": say("Formula Nodes"),
+    "twin": say("Blender Nodes"),
+}
 
 
 def form_name(form):

@@ -8,7 +8,7 @@ Blender itself would have each drag add another copy where the file has a group 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import lamps, nodes
+from . import automatic, lamps, nodes
 
 
 def _brought(context):
@@ -29,10 +29,13 @@ def _brought(context):
 def _after_import(context):
     brought = _brought(context)
     groups = [group for group in brought if nodes.TAG in group]
+    known = {group.session_uid for group in groups}
     if groups or any(lamps.is_group(group) for group in brought):
         lamps.follow()
+        automatic.follow()
     if any(item.id_type == "NODETREE" for item in context.import_items):
-        nodes.unite(groups)
+        # Some may have gone, as parts of what has become another form.
+        nodes.unite([group for group in bpy.data.node_groups if group.session_uid in known])
 
 
 def register():

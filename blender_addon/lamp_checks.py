@@ -150,7 +150,7 @@ def _others_lamps(node):
     tree = node.node_tree
     if tree.library is None:
         return None
-    inner = (getattr(n, "node_tree", None) for n in tree.nodes)
+    inner = (getattr(n, "node_tree", None) for n in nodes.made_of(tree).nodes)
     return next((group for group in inner if group is not None and lamps.is_group(group)), None)
 
 
@@ -248,5 +248,5 @@ def of_node(node, form, scene):
     if "clamp_mirror" in form.get("warnings", []):
         yield from _in_mirror(scene)
     yield from _without_shadow(form, scene)
-    if not nodes.is_native(node.node_tree):
+    if not nodes.runs_anywhere(node):
         yield from _ray_visibility(scene)

@@ -21,7 +21,7 @@ from .i18n import say
 from .jobs import Job, ProgramJob
 
 #: Forms that a budget does not choose: they are for who asks for them.
-ASKED_FOR = ("twin",)
+ASKED_FOR = ("twin", "nodes")
 
 
 class PlanError(RuntimeError):
@@ -99,8 +99,11 @@ class Planning(ProgramJob):
         a base. Raises PlanError."""
         options = [] if error is None else ["--error", f"{error:.17g}"]
         options += [] if time is None else ["--time", f"{time:.17g}x"]
-        materials = {name: _open(use.entry) if options else use.entry for name, use in used.items()}
-        options += ["--fit"] if fit else []
+        materials = {name: use.entry | {"representation": use.form} for name, use in used.items()}
+        if options:
+            materials = {name: _open(entry) for name, entry in materials.items()}
+        # Lean groups have one form, that of the file's settings.
+        options += ["--osl-only", *(["--fit"] if fit else [])]
         self._program = program()
         asked = needs(materials)
         self._used, self._materials, self._lamps = used, materials, asked.get("lamps")

@@ -5,6 +5,7 @@ A group is made once per model, representation and version of the shader, and re
 bytecode both lie inside the .blend, so a saved file renders where the extension is not installed.
 """
 
+import contextlib
 import json
 
 import bpy
@@ -12,6 +13,7 @@ import bpy
 from . import (
     animation,
     compiler,
+    device,
     editable,
     formula_nodes,
     lamps,
@@ -21,13 +23,19 @@ from . import (
     twin,
 )
 from .compiler import CompileError
-from .group_sockets import VECTORS, add_parameter, vector_socket
+from .group_sockets import VECTORS, Interface
 from .i18n import say
 from .pack import choice_label
+from .wiring import Wiring
 
 TAG = pack.TAG
 OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
 ALBEDO = "Albedo"
+#: In the tag of a group that suits itself to the scene: its form where that has Open Shading
+#: Language.
+AUTO = "auto"
+#: What the tag of a group says of its scripts.
+_OF_SCRIPTS = ("script_inputs", "albedo_apart", "albedo_inputs", "stands_in")
 _SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
 
 
@@ -131,7 +139,9 @@ def script_problem(group):
 
 def _add_outputs(group, outputs):
     kinds = {"SHADER": "NodeSocketShader", "RGBA": "NodeSocketColor"}
-    for name in (n for n in OUTPUTS if n in outputs):
+    items = group.interface.items_tree
+    present = {i.name for i in items if i.item_type == "SOCKET" and i.in_out == "OUTPUT"}
+    for name in (n for n in OUTPUTS if n in outputs and n not in present):
         group.interface.new_socket(name, in_out="OUTPUT", socket_type=kinds[OUTPUTS[name]])
 
 
@@ -139,6 +149,12 @@ def _start_group(group, outputs):
     """Output sockets, and the nodes that stand for the group's inputs and outputs."""
     _add_outputs(group, outputs)
     return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+
+
+def _outputs(model_name, representation, albedo):
+    """Names of the outputs of a form of scripts; `albedo` as in ensure_group()."""
+    apart = has_albedo_script(model_name, representation)
+    return [name for name in OUTPUTS if albedo or not apart or name != ALBEDO]
 
 
 def _fill_native_group(group, model_name, representation, source, twin_group):
@@ -150,14 +166,9 @@ def _fill_native_group(group, model_name, representation, source, twin_group):
     _add_outputs(group, OUTPUTS if representation == "twin" else ())
     group_input = group.nodes.new("NodeGroupInput")
     group_input.location = (-300, 0)
-    sockets, parameters = {}, {}
-    for name, parameter in pack.socket_parameters(model_name, representation).items():
-        relay = group.nodes.new("NodeReroute")
-        relay.location = (-100, -40 * len(parameters))
-        sockets[name] = add_parameter(group, group_input, relay.inputs[0], parameter)
-        parameters[name] = relay.outputs[0]
-    sockets |= {name: vector_socket(group, name, text) for name, text in VECTORS.items()}
-    normal, tangent = (group_input.outputs[name] for name in VECTORS)
+    interface = Interface(group, group_input, {})
+    parameters = _relays(group, interface, pack.socket_parameters(model_name, representation))
+    normal, tangent = map(interface.vector, VECTORS)
     if representation == "twin":
         made = dict(
             zip(OUTPUTS, twin.wire(group, data, normal, parameters, f"{label} (twin)"), strict=True)
@@ -192,7 +203,61 @@ def _fill_native_group(group, model_name, representation, source, twin_group):
     for name, output in made.items():
         group.links.new(output, group_output.inputs[name])
     group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
-    group[TAG]["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
+    group[TAG]["sockets"] = interface.identifiers()
+
+
+def _relays(group, interface, parameters):
+    """An output within the group for each of these parameters."""
+    found = {}
+    for name, parameter in parameters.items():
+        relay = group.nodes.new("NodeReroute")
+        relay.location = (-100, -40 * len(found))
+        interface.parameter(name, relay.inputs[0], parameter)
+        found[name] = relay.outputs[0]
+    return found
+
+
+def _fill_by_form(group, model_name, native, with_osl):
+    """Fills a group that takes the place of another form with Blender's own nodes: those of the
+    form `native`; where a choice is one that it lacks, the model's twin. Sockets stay."""
+    form = ensure_group(model_name, native)
+    tag = group[TAG]
+    _add_outputs(group, _outputs(model_name, with_osl, tag["with_albedo"]))
+    group_input, group_output = (group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output"))
+    group_input.location, group_output.location = (-500, 0), (400, 0)
+    interface = Interface(group, group_input, tag.get("sockets", {}))
+    sources = _relays(group, interface, pack.socket_parameters(model_name, with_osl))
+    sources |= {name: interface.vector(name) for name in VECTORS}
+    made = _instance(group, form, sources)
+    limits = {n: v for n, v in pack.form_values(model_name, native).items() if n in sources}
+    if limits:
+        made = _only_where(group, model_name, limits, sources, made)
+    for socket in group_output.inputs:
+        if socket.name in made:
+            group.links.new(made[socket.name], socket)
+    group_output.is_active_output = True
+    tag["sockets"] = interface.identifiers()
+    for name in _OF_SCRIPTS:
+        tag.pop(name, None)
+
+
+def _instance(group, inner, sources):
+    """The outputs, by name, of a group within another. `sources`: outputs by parameter."""
+    inputs = {i: sources.get(name) for name, i in inner[TAG]["sockets"].items()}
+    return stand_in.twin_of(group, inner, inputs)
+
+
+def _only_where(group, model_name, limits, sources, made):
+    """Outputs by name: `made` where choices are these, and those of the twin elsewhere."""
+    w, chosen = Wiring(group), None
+    for name, only in limits.items():
+        index = pack.parameters(model_name)[name]["choices"].index(only)
+        same = w.math("COMPARE", sources[name], index, 0.25)
+        chosen = same if chosen is None else w.math("MULTIPLY", chosen, same)
+    if "twin" not in pack.model(model_name)["representations"]:
+        return made | {"BSDF": w.shown(chosen, made["BSDF"])}
+    twin_ = _instance(group, ensure_group(model_name, "twin"), sources)
+    return twin_ | made | stand_in.choose(group, chosen, twin_, made)
 
 
 def _add_lamps(group):
@@ -215,8 +280,9 @@ def _fill_group(group, model_name, representation, texts, twin_group):
     that. `twin_group`: that of the model's twin, or None."""
     what = f"{model_name} ({representation})"
     apart = has_albedo_script(model_name, representation)
-    outputs = [n for n in OUTPUTS if not apart or n != ALBEDO or len(texts) > 1]
+    outputs = _outputs(model_name, representation, len(texts) > 1)
     group_input, group_output = _start_group(group, outputs)
+    group_output.is_active_output = True
     group_input.location, group_output.location = (-500, 0), (300, 0)
     script = _add_script(group, texts[0], what)
     from_scripts = {s.identifier: s for s in script.outputs}
@@ -241,12 +307,11 @@ def _fill_group(group, model_name, representation, texts, twin_group):
         )
 
     inputs = {s.identifier: s for s in script.inputs}
-    sockets = {}
+    interface = Interface(group, group_input, tag.get("sockets", {}))
     for name, parameter in pack.socket_parameters(model_name, representation).items():
-        sockets[name] = add_parameter(group, group_input, inputs[name], parameter)
-    for name, text_ in VECTORS.items():
-        sockets[name] = vector_socket(group, name, text_)
-        group.links.new(group_input.outputs[-2], inputs[name])
+        interface.parameter(name, inputs[name], parameter)
+    for name in VECTORS:
+        group.links.new(interface.vector(name), inputs[name])
     if lamp_inputs := _lamp_inputs(model_name, representation):
         shared = _add_lamps(group)
         for name in lamp_inputs:
@@ -270,7 +335,7 @@ def _fill_group(group, model_name, representation, texts, twin_group):
     if len(texts) > 1:
         for socket in albedo.inputs:
             group.links.new(sources[socket.identifier], socket)
-    tag["sockets"] = {name: socket.identifier for name, socket in sockets.items()}
+    tag["sockets"] = interface.identifiers()
 
 
 def is_ours(node):
@@ -279,25 +344,45 @@ def is_ours(node):
     return node.bl_idname == "ShaderNodeGroup" and tree is not None and TAG in tree
 
 
-def find_group(model_name, representation, albedo=False):
+def find_group(model_name, representation, albedo=False, automatic=None):
     """The group of the current version of a shader, if the file has a sound one; `albedo` as in
-    ensure_group."""
-    albedo = albedo and has_albedo_script(model_name, representation)
+    ensure_group. `automatic`: the form with Open Shading Language, of a group that suits itself to
+    the scene."""
+    albedo = albedo and has_albedo_script(model_name, automatic or representation)
     digest = pack.digest(model_name, representation)
     for group in bpy.data.node_groups:
         tag = group.get(TAG)
         if group.library is None and tag is not None and tag.get("digest") == digest:
             same = (tag["model"], tag["representation"]) == (model_name, representation)
-            if same and ("albedo_inputs" in tag) == albedo and script_problem(group) is None:
+            has_albedo = tag["with_albedo"] if AUTO in tag else "albedo_inputs" in tag
+            if same and tag.get(AUTO) == automatic and has_albedo == albedo and is_sound(group):
                 return group
     return None
+
+
+def is_sound(group):
+    """Whether a group has all that it was made with."""
+    return bool(group.nodes) and script_problem(group) is None
+
+
+def with_parts(groups):
+    """These groups, and those of this extension within them."""
+    found, new = set(), set(groups)
+    while new:
+        found |= new
+        new = {n.node_tree for group in new for n in group.nodes if is_ours(n)} - found
+    return found
 
 
 def unite(groups):
     """Has groups that came from another file give way to equal ones of the open file."""
     stand_in.keep_one_text()
-    # Twins first: they are parts of the others.
-    for group in sorted(groups, key=lambda group: group[TAG]["representation"] != "twin"):
+
+    # Parts of others first: of all forms their twins, of automatic ones their forms.
+    def depth(group):
+        return 2 if AUTO in group[TAG] else int(group[TAG]["representation"] != "twin")
+
+    for group in sorted(groups, key=depth):
         _give_way(group)
 
 
@@ -318,44 +403,23 @@ def _let_go(group):
         text.use_fake_user = False
 
 
-def ensure_group(model_name, representation="auto", baked=None, albedo=False):
+def ensure_group(model_name, representation="auto", baked=None, albedo=False, values=None):
     """Node group of a model, made if the file has none. Raises ValueError, CompileError.
 
-    Nothing is left in the file when it fails. `baked`: hash of the extension that a pack of the
-    open file alone, which pack.use() has taken, stands in for. `albedo`: with the Albedo output,
-    also where that takes a script of large tables.
+    Nothing is left in the file when it fails. That of "auto" suits itself to the scene, where the
+    model has a form for that: see suit(). `values` of parameters tell which forms there are.
+    `baked`: hash of the extension that a pack of the open file alone, which pack.use() has taken,
+    stands in for. `albedo`: with the Albedo output, also where that takes a script of large tables.
     """
-    representation = pack.resolve(model_name, representation)
+    if representation == "auto" and not baked:
+        with_osl = pack.automatic(model_name, values)
+        if pack.native_form(model_name) and not pack.is_native(model_name, with_osl):
+            return _ensure_automatic(model_name, with_osl, albedo)
+    representation = pack.resolve(model_name, representation, values)
     if group := find_group(model_name, representation, albedo):
         _let_go(group)
         return group
-    stem, source = pack.source(model_name, representation)
-    sources = {stem: source}
-    native = pack.is_native(model_name, representation)
-    if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
-        sources |= dict([of_albedo])
-    # Lean ones hold no more than a render needs.
-    has_twin = "twin" in pack.model(model_name)["representations"]
-    stands_in = representation != "twin" and not baked and has_twin
-    known = set(bpy.data.node_groups)
-    twin_group = ensure_group(model_name, "twin") if stands_in else None
-    texts = [] if native else [stand_in.new_text(f"{stem}.osl") for stem in sources]
-    names = [text.name for text in texts]
-    form = ", ".join([representation, *([ALBEDO] if len(texts) > 1 else [])])
-    group = bpy.data.node_groups.new(
-        f"{pack.model(model_name)['label']} ({form})", "ShaderNodeTree"
-    )
-    try:
-        group.color_tag = "SHADER"
-        group.description = pack.model(model_name)["doc"]
-        group[TAG] = {
-            "model": model_name,
-            "representation": representation,
-            "digest": pack.digest(model_name, representation),
-            "made_by": pack.manifest()["generator"],
-            "choices": json.dumps(pack.form_choices(model_name, representation)),
-            "only": json.dumps(pack.constants(model_name, representation)),
-        }
+    with _new_group(model_name, representation, representation, albedo) as group:
         if baked:
             # The pack will be gone.
             entry = {
@@ -364,25 +428,160 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False):
                 "parameters": pack.parameters(model_name),
             }
             group[TAG]["baked"] = json.dumps(entry)
-        if native:
-            _fill_native_group(group, model_name, representation, source, twin_group)
-        else:
-            for text, source in zip(texts, sources.values(), strict=True):
-                text.write(source)
-                text.cursor_set(0)
-            _fill_group(group, model_name, representation, texts, twin_group)
-    except BaseException:
-        remove_group(group)
-        for name in set(names) & set(bpy.data.texts.keys()):
-            bpy.data.texts.remove(bpy.data.texts[name])
-        remove_unused_groups(known)  # a twin that was made for it
-        raise
+        _fill(group, model_name, representation, albedo)
     return group
 
 
-def add_group_node(tree, model_name, representation="auto"):
-    """Adds a group node to a shader tree and returns it."""
-    group = ensure_group(model_name, representation)
+def _ensure_automatic(model_name, with_osl, albedo):
+    """Node group that suits itself to the scene; `with_osl`: its form where that has OSL."""
+    native = pack.native_form(model_name)
+    for form in (with_osl, native):
+        if group := find_group(model_name, form, albedo, with_osl):
+            _let_go(group)
+            suit(group, device.lacks_osl(lamps.current_scene()))
+            return group
+    with _new_group(model_name, "auto", with_osl, albedo) as group:
+        tag = group[TAG]
+        tag[AUTO], tag["with_albedo"] = with_osl, albedo and has_albedo_script(model_name, with_osl)
+        tag["native_only"] = json.dumps(pack.form_values(model_name, native))
+        _suit(group, native if device.lacks_osl(lamps.current_scene()) else with_osl)
+    return group
+
+
+#: Groups that are being made. Lamps are looked for then, and Blender calls handlers.
+_unfinished = []
+
+
+def is_at_work():
+    """Whether a group is being made."""
+    return bool(_unfinished)
+
+
+@contextlib.contextmanager
+def _new_group(model_name, name, form, albedo):
+    """A new group with the sockets of a form, for the body to fill; where that raises, it and what
+    it was made of are taken out of the file again."""
+    known = set(bpy.data.node_groups)
+    parts = [name, *([ALBEDO] if albedo and has_albedo_script(model_name, form) else [])]
+    title = f"{pack.model(model_name)['label']} ({', '.join(parts)})"
+    group = bpy.data.node_groups.new(title, "ShaderNodeTree")
+    _unfinished.append(group)
+    try:
+        group.color_tag = "SHADER"
+        group.description = pack.model(model_name)["doc"]
+        group[TAG] = {
+            "model": model_name,
+            "representation": form,
+            "digest": pack.digest(model_name, form),
+            "made_by": pack.manifest()["generator"],
+            "choices": json.dumps(pack.form_choices(model_name, form)),
+            "only": json.dumps(pack.constants(model_name, form)),
+        }
+        yield group
+    except BaseException:
+        remove_group(group)
+        remove_unused_groups(known)  # a twin that was made for it
+        raise
+    finally:
+        _unfinished.pop()
+
+
+def _fill(group, model_name, representation, albedo):
+    """Makes the nodes of a form in a group. Raises CompileError; texts that were made are gone
+    then."""
+    stem, source = pack.source(model_name, representation)
+    sources = {stem: source}
+    if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
+        sources |= dict([of_albedo])
+    # Lean ones hold no more than a render needs.
+    has_twin = "twin" in pack.model(model_name)["representations"]
+    stands_in = representation != "twin" and "baked" not in group[TAG] and has_twin
+    twin_group = ensure_group(model_name, "twin") if stands_in else None
+    if pack.is_native(model_name, representation):
+        _fill_native_group(group, model_name, representation, source, twin_group)
+        return
+    before = list(group.nodes)
+    texts = [stand_in.new_text(f"{stem}.osl", source) for stem, source in sources.items()]
+    names = [text.name for text in texts]
+    try:
+        _fill_group(group, model_name, representation, texts, twin_group)
+    except BaseException:
+        _remove_others(group, before)
+        for name in set(names) & set(bpy.data.texts.keys()):
+            bpy.data.texts.remove(bpy.data.texts[name])
+        raise
+
+
+def _remove_others(group, kept):
+    for node in [node for node in group.nodes if node not in kept]:
+        group.nodes.remove(node)
+
+
+def form_in_script(node):
+    """The form that says which values a node's sockets can have; of an automatic one that with
+    Open Shading Language."""
+    tag = node.node_tree[TAG]
+    return tag.get(AUTO, tag["representation"])
+
+
+def automatic_groups():
+    """Groups of this file, and of the installed version, that suit themselves to the scene."""
+    return [
+        group
+        for group in bpy.data.node_groups
+        if group.library is None and AUTO in group.get(TAG, ()) and _is_current(group)
+    ]
+
+
+def _is_current(group):
+    tag = group[TAG]
+    try:
+        return tag["digest"] == pack.digest(tag["model"], tag["representation"])
+    except ValueError:  # a model or form that the installed version does not have
+        return False
+
+
+def suit(group, lacks_osl):
+    """Has an automatic group be the form that a scene with or without Open Shading Language can
+    render; sockets stay. Returns whether it was another. Raises CompileError; it is then as it
+    was."""
+    tag = group[TAG]
+    wanted = pack.native_form(tag["model"]) if lacks_osl else tag[AUTO]
+    if wanted is None or (tag["representation"] == wanted and group.nodes):
+        return False
+    _suit(group, wanted)
+    return True
+
+
+def _suit(group, form):
+    tag, before = group[TAG].to_dict(), list(group.nodes)
+    inner = {n.node_tree.session_uid for n in before if is_ours(n)}
+    texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
+    model_name, with_osl = tag["model"], tag[AUTO]
+    try:
+        if form == with_osl:
+            _fill(group, model_name, form, tag["with_albedo"])
+        else:
+            _fill_by_form(group, model_name, form, with_osl)
+    except BaseException:
+        _remove_others(group, before)
+        group[TAG] = tag
+        raise
+    for node in before:
+        group.nodes.remove(node)
+    group[TAG]["representation"] = form
+    group[TAG]["digest"] = pack.digest(model_name, form)
+    _clear_away(inner, texts)
+
+
+def empty(group):
+    """Takes all nodes out of an automatic group; suit() makes them again."""
+    group.nodes.clear()
+
+
+def add_group_node(tree, model_name, representation="auto", values=None):
+    """Adds a group node to a shader tree and returns it; `values` as in ensure_group()."""
+    group = ensure_group(model_name, representation, values=values)
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = group
     node.width = 200
@@ -391,9 +590,48 @@ def add_group_node(tree, model_name, representation="auto"):
 
 
 def identity(node):
-    """(model, representation) of a group node."""
+    """(model, representation) of a group node. Of an automatic one the form that it has now, for
+    its choices."""
     tag = node.node_tree[TAG]
+    if _lacks_choice(node):
+        return tag["model"], tag[AUTO]
     return tag["model"], tag["representation"]
+
+
+def is_automatic(node):
+    """Whether a node has the form that the scene can render, whichever that is."""
+    return AUTO in node.node_tree[TAG]
+
+
+def _lacks_choice(node):
+    """Whether an automatic node stands where there is no Open Shading Language, with a choice that
+    its form lacks there: its twin is shown."""
+    tag = node.node_tree[TAG]
+    if tag.get(AUTO, tag["representation"]) == tag["representation"]:
+        return False
+    only = pack.canonical(json.loads(tag["native_only"]))
+    return any(not pack.same(get_value(node, name), value) for name, value in only.items())
+
+
+def runs_anywhere(node):
+    """Whether what a node shows needs no Open Shading Language."""
+    return is_native(node.node_tree) and not _lacks_choice(node)
+
+
+def is_stood_in_for(node):
+    """Whether Blender's own nodes stand in for a node where its form does not run."""
+    inner = [n.node_tree[TAG]["representation"] for n in node.node_tree.nodes if is_ours(n)]
+    has_twin = "twin" in inner
+    return stand_in.is_in(node.node_tree) or (has_twin and _lacks_choice(node))
+
+
+def made_of(group):
+    """The group that has the nodes of a form: an automatic one may have another in it."""
+    if AUTO in group[TAG] and group[TAG][AUTO] != group[TAG]["representation"]:
+        form = group[TAG]["representation"]
+        inner = (n.node_tree for n in group.nodes if is_ours(n))
+        return next((g for g in inner if g[TAG]["representation"] == form), group)
+    return group
 
 
 def is_baked(node):
@@ -420,10 +658,7 @@ def manifest_entry(node):
         entry = json.loads(tag["baked"])
         same = entry["of"] == pack.manifest()["hash"]
         return (entry["form"], entry["parameters"]) if same else None
-    try:
-        if tag["digest"] != pack.digest(model_name, representation):
-            return None
-    except ValueError:  # a model or form that the installed version does not have
+    if not _is_current(node.node_tree):
         return None
     return pack.representation(model_name, representation), pack.parameters(model_name)
 
@@ -556,21 +791,26 @@ def constants(node):
 def remove_group(group):
     """Takes a group out of the file, and its texts, images and twin, if nothing else has them."""
     texts = {n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script}
-    texts |= {*stand_in.texts()}
     images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage" and n.image}
-    inner = {n.node_tree for n in group.nodes if is_ours(n)}
+    inner = {n.node_tree.session_uid for n in group.nodes if is_ours(n)}
     bpy.data.node_groups.remove(group)
     for image in images:
         if image.users == 0:
             bpy.data.images.remove(image)
+    _clear_away(inner, texts)
+
+
+def _clear_away(uids, texts):
+    """Takes what were parts of a group out of the file where nothing else has them: groups with
+    these session_uids, and texts."""
     trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
     used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
-    for text in texts:
+    for text in {*texts, *stand_in.texts()}:
         if text not in used:
             bpy.data.texts.remove(text)
-    for tree in inner:
-        if tree.users == 0:
-            remove_group(tree)
+    # Those that go take what only they have with them.
+    while unused := [g for g in bpy.data.node_groups if g.session_uid in uids and g.users == 0]:
+        remove_group(unused[0])
     formula_nodes.remove_unused_parts()
     lamps.remove_unused_group()
 
@@ -594,8 +834,11 @@ def switch(node, representation):
     """
     editable.check(node.id_data)
     model_name, _ = identity(node)
-    form = pack.resolve(model_name, representation, constants(node))
-    _exchange(node, ensure_group(model_name, form, albedo=uses_albedo(node)))
+    values = constants(node)
+    if representation != "auto":
+        pack.resolve(model_name, representation, values)
+    group = ensure_group(model_name, representation, albedo=uses_albedo(node), values=values)
+    _exchange(node, group)
 
 
 def _exchange(node, group):
@@ -633,6 +876,10 @@ def add_albedo(node):
         raise ValueError(
             say("{node} is of another version of the extension: update it first", node=name)
         )
+    tag = node.node_tree[TAG]
+    if is_automatic(node):
+        _exchange(node, _ensure_automatic(tag["model"], tag[AUTO], albedo=True))
+        return
     _exchange(node, ensure_group(*identity(node), albedo=True))
 
 

@@ -150,20 +150,37 @@ def value_text(value):
     return f"{value:g}"
 
 
-def resolve(model_name, representation, values=None):
-    """Name of the representation. Raises ValueError.
+def native_form(model_name):
+    """Name of the form that "auto" becomes where Open Shading Language does not run: made of
+    Blender's own nodes, and equal to the model at least for some of its choices. None: there is
+    none."""
+    schema = parameters(model_name)
+    for name, form in model(model_name)["representations"].items():
+        limited = [schema[key]["kind"] for key in form["only"] if key in schema]
+        if "nodes" in form and name != "twin" and set(limited) <= {"choice"}:
+            return name
+    return None
 
-    "auto" becomes the model's preference, or the next form where `values` have one that the
-    preferred form lacks. Blender's own nodes come in only where Cycles can't run shaders.
-    """
+
+def automatic(model_name, values=None, osl=True):
+    """Name of the form that "auto" becomes with or without Open Shading Language: the model's
+    preference, or the next form where `values` have one that the preferred form lacks."""
+    entry, values = model(model_name), values or {}
+    forms, native = entry["representations"], native_form(model_name)
+    others = [n for n in forms if n != entry["auto"] and "nodes" not in forms[n]]
+    order = [entry["auto"], *others]
+    if not osl:
+        order = [n for n in (native, "twin") if n in forms] + order
+    return next((n for n in order if refusal(model_name, n, values) is None), order[0])
+
+
+def resolve(model_name, representation, values=None):
+    """Name of the representation. Raises ValueError. "auto" becomes what automatic() says of this
+    build of Blender; whether a scene has Open Shading Language turned on is not looked at."""
     entry, values = model(model_name), values or {}
     name = representation
     if name == "auto":
-        forms = entry["representations"]
-        twin = [n for n in forms if n == "twin"]
-        others = [n for n in forms if n != entry["auto"] and "nodes" not in forms[n]]
-        order = [*([] if osl_available() else twin), entry["auto"], *others]
-        name = next((n for n in order if refusal(model_name, n, values) is None), order[0])
+        name = automatic(model_name, values, osl_available())
     if name not in entry["representations"]:
         known = ", ".join(["auto", *sorted(entry["representations"])])
         raise ValueError(

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from . import api, color, lamps, nodes, pack
+from . import api, automatic, color, lamps, nodes, pack
 
 #: Representation name that stands for Blender's own Glossy node, to compare run times with.
 GLOSSY = "glossy"
@@ -434,14 +434,18 @@ def _material(name, view, representation, native):
     return material
 
 
-def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
+def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8, osl=True):
     """Settings under which Cycles computes the light transport integral, and nothing else.
 
-    Linear float EXR, samples spread evenly over the square of a pixel, OSL on the CPU; no filter
-    glossy, clamping, denoising, adaptive sampling, light threshold, guiding or approximation.
+    Linear float EXR, samples spread evenly over the square of a pixel, on the CPU, OSL on or off;
+    no filter glossy, clamping, denoising, adaptive sampling, light threshold, guiding or
+    approximation.
     """
-    api.enable_osl(scene)
     cycles = scene.cycles
+    if osl:
+        api.enable_osl(scene)
+    else:
+        scene.render.engine, cycles.shading_system = "CYCLES", False
     settings = {
         "device": "CPU",
         "samples": samples,
@@ -490,13 +494,14 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8):
     view.look, view.exposure, view.gamma = "None", 0.0, 1.0
 
 
-def load_scene(path, representation=None, name=None, native=None):
+def load_scene(path, representation=None, name=None, native=None, osl=True):
     """Makes a scene with clean settings from a resolved scene file, and makes it the active one.
 
     `representation` overrides that of every material: auto, exact, sampled, or "glossy",
     "principled" or "metallic" for Blender's own nodes. `native`: what script/native_nodes.py
-    fitted, by material and node; only Glossy can do without. Returns the bpy scene. Raises
-    ValueError naming file and key.
+    fitted, by material and node; only Glossy can do without. `osl`: whether Open Shading Language
+    is on, without which "auto" is Blender's own nodes. Returns the bpy scene. Raises ValueError
+    naming file and key.
     """
     path = Path(path)
     try:
@@ -524,6 +529,7 @@ def load_scene(path, representation=None, name=None, native=None):
         samples=int(settings.number_or("spp", 64)),
         seed=int(settings.number_or("seed", 1)),
         max_bounces=int(settings.number_or("max_bounces", 8)),
+        osl=osl,
     )
     scene.render.resolution_x = int(settings.get("width").number())
     scene.render.resolution_y = int(settings.get("height").number())
@@ -561,6 +567,7 @@ def load_scene(path, representation=None, name=None, native=None):
             _light(scene, index, entry)
     _environment(scene, view.get("environment") if view.has("environment") else None)
     bpy.context.view_layer.update()
+    automatic.follow(scene)
     if lamps.find_group() is not None:
         api.see_lamps(scene)
     return scene

@@ -96,10 +96,16 @@ def _is_lit_as_a_new_scene(scene):
     )
 
 
+def is_clamped_as_new(scene):
+    """Whether a clamp on indirect light takes nothing of a new scene's; or there is none."""
+    clamp = scene.cycles.sample_clamp_indirect
+    return clamp == 0 or (clamp >= LOW_CLAMP and _is_lit_as_a_new_scene(scene))
+
+
 def _clamp_mirror(material, scene):
     clamp = scene.cycles.sample_clamp_indirect
     return _warning(
-        0 < clamp < LOW_CLAMP or (clamp > 0 and not _is_lit_as_a_new_scene(scene)),
+        not is_clamped_as_new(scene),
         say(
             "Indirect Light is clamped to {clamp}: it darkens bright lights in this mirror; "
             "0 is exact",

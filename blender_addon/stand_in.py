@@ -22,11 +22,17 @@ shader brdfc_runs(output float Runs = 1)
 """
 
 
-def new_text(name):
-    """An empty text that goes with its last user, as all else that a group is made of: Blender
-    gives a new text a fake user, and would keep it in the file for good."""
+def new_text(name, content):
+    """A text that goes with its last user, as all else that a group is made of: Blender gives a new
+    text a fake user, and would keep it in the file for good. One that an undo has left without a
+    user is taken first."""
+    for found in bpy.data.texts:
+        if found.library is None and found.users == 0 and found.as_string() == content:
+            return found
     made = bpy.data.texts.new(name)
     made.use_fake_user = False
+    made.write(content)
+    made.cursor_set(0)
     return made
 
 
@@ -39,10 +45,7 @@ def text():
     """The script's text, of which a file has one."""
     for found in texts():
         return found
-    made = new_text(_FILE)
-    made.write(_SOURCE)
-    made.cursor_set(0)
-    return made
+    return new_text(_FILE, _SOURCE)
 
 
 def keep_one_text():
@@ -113,7 +116,7 @@ def add(group, script, outputs, instead):
     stands in, as far as both have them. script: a script node in the group that runs text()."""
     script.name = script.label = NODE
     script.location = (0, 300)
-    return _mixed(group, script.outputs[NODE], instead, outputs)
+    return choose(group, script.outputs[NODE], instead, outputs)
 
 
 def add_in_eevee(group, outputs, instead):
@@ -126,12 +129,12 @@ def add_in_eevee(group, outputs, instead):
     seen.name = seen.label = EEVEE
     lit.location, seen.location = (-150, 300), (0, 300)
     group.links.new(lit.outputs[0], seen.inputs[0])
-    mixed = _mixed(group, seen.outputs["Color"], outputs, instead)
+    mixed = choose(group, seen.outputs["Color"], outputs, instead)
     # Formulas have no albedo of their own where directions are random: that of the twin.
     return {**instead, **outputs, **mixed}
 
 
-def _mixed(group, chosen, at_0, at_1):
+def choose(group, chosen, at_0, at_1):
     """Outputs by name: those of one where the output `chosen` is 0, of the other where it is 1."""
     at_0["BSDF"].node.location = (0, 200)
     made = {}

@@ -11,6 +11,7 @@ from . import (
     checks,
     color,
     convert,
+    device,
     editable,
     energy,
     kernel,
@@ -22,6 +23,7 @@ from . import (
 )
 from .i18n import button, form_name, iface, of_error, say
 from .labels import wrapped
+from .methods import METHODS
 
 #: Headings of menus by the looks that models declare.
 LOOKS = {
@@ -170,6 +172,12 @@ def energy_text(node):
     return ", ".join(numbers) or say("not at a view angle of this scene")
 
 
+def _add_method(row, node, name, pressed):
+    """The button of a render method."""
+    item = row.operator("brdfc.switch", text=form_name(name).template, depress=pressed)
+    item.node, item.representation = node.name, name
+
+
 def _draw_form(layout, node, form, scene, changes):
     model_name, representation = nodes.identity(node)
     if lean := nodes.is_baked(node):
@@ -181,19 +189,19 @@ def _draw_form(layout, node, form, scene, changes):
     row = layout.row(align=True)
     row.enabled = changes
     values = {key: nodes.get_value(node, key) for key in pack.parameters(model_name)}
-    refusals = []
+    refusals, automatic = [], nodes.is_automatic(node)
+    if pack.native_form(model_name):
+        _add_method(row, node, "auto", automatic)
     for name in entry["representations"]:
         refusal = pack.refusal(model_name, name, values)
         if refusal := refusal or checks.device_refusal(model_name, name, scene):
             refusals.append(refusal)
             continue
-        item = row.operator(
-            "brdfc.switch",
-            text=form_name(name).template,
-            depress=name == representation and not lean,
-        )
-        item.node, item.representation = node.name, name
+        _add_method(row, node, name, name == representation and not lean and not automatic)
     column = layout.column(align=True)
+    if automatic:
+        wrapped(column, METHODS["auto"])
+    wrapped(column, METHODS[representation])
     for refusal in refusals:
         wrapped(column, refusal)
     # A button, for labels have no tooltip that could say what the number means.
@@ -261,7 +269,7 @@ def draw_lamps(layout, material, scene):
     limit = checks.lamps_that_fit(scene)
     if limit is not None and limit[0] < slots:
         room, largest = limit
-        if checks.runs_on_optix(scene):
+        if device.runs_on_optix(scene):
             said = say(
                 "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
                 "Shader mixes shares it",

@@ -20,6 +20,8 @@ class Use:
     node: object
     #: As `materials` of a scene file has it.
     entry: dict
+    #: The form that it has now, which the entry leaves open where it follows the scene.
+    form: str
     #: Of its group: another one whenever the shader is.
     shader: tuple
 
@@ -38,8 +40,15 @@ def _use(material, node):
     for name in pack.parameters(model_name):
         value = None if name in varying else nodes.get_value(node, name)
         parameters[name] = VARIES if value is None else _as_typed(value)
-    entry = {"model": model_name, "representation": representation, "parameters": parameters}
-    return Use(material, node, entry, (node.node_tree[nodes.TAG]["digest"], nodes.is_baked(node)))
+    asked = "auto" if nodes.is_automatic(node) else representation
+    entry = {"model": model_name, "representation": asked, "parameters": parameters}
+    return Use(
+        material,
+        node,
+        entry,
+        representation,
+        (node.node_tree[nodes.TAG]["digest"], nodes.is_baked(node)),
+    )
 
 
 def _names(material, node, alone):
@@ -79,11 +88,11 @@ def _change(before, after):
     old, new = before.entry, after.entry
     if old["model"] != new["model"]:
         return say("it has another model")
-    if old["representation"] != new["representation"]:
+    if before.form != after.form:
         return say(
             "its render method was {before} and is {after}",
-            before=form_name(old["representation"]),
-            after=form_name(new["representation"]),
+            before=form_name(before.form),
+            after=form_name(after.form),
         )
     for name, value in old["parameters"].items():
         if value != new["parameters"][name]:

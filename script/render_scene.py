@@ -9,8 +9,8 @@ whose repetitions take turns so that their run times can be compared:
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
-"repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ...}, ...]; all but
-scene and out are optional and default to the options of the command line. "native" names a file
+"repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ..., "osl": ...},
+...]; all but scene and out are optional and default to the options of the command line. "native" names a file
 with a scene's materials of script/native_nodes.py; "pack" a folder that `brdfc build` wrote, whose
 models the extension takes instead of its own; "timed" false leaves out the render with one sample
 that tells sampling from compiling. "out" may also be a .png or .jpg, as "view", a view transform of
@@ -138,7 +138,7 @@ def render_once(bpy, loader, job, repetition, threads=None):
     start = time.perf_counter()
     loader.pack.use(job["pack"])
     native = json.loads(Path(job["native"]).read_text("utf-8")) if job["native"] else None
-    scene = loader.load_scene(job["scene"], job["representation"], native=native)
+    scene = loader.load_scene(job["scene"], job["representation"], native=native, osl=job["osl"])
     load_wall = time.perf_counter() - start
     samples = job["spp"] or scene.cycles.samples
     if job["seed"] is not None:
@@ -206,6 +206,7 @@ def describe(bpy, loader, scene, job, samples):
             "seed": cycles.seed,
             "max_bounces": cycles.max_bounces,
             "device": cycles.device,
+            "osl": cycles.shading_system,
             "pixel_filter": cycles.pixel_filter_type,
             "threads": render.threads,
         },
@@ -224,6 +225,7 @@ def read_jobs(options):
         "timed": True,
         "denoise": options.denoise,
         "view": options.view,
+        "osl": not options.without_osl,
     }
     if options.jobs:
         try:
@@ -250,7 +252,7 @@ def read_jobs(options):
                 raise UsageError(
                     f"job {index}: {key}: expected a whole number from {least}, got {value!r}"
                 )
-        for key in ("timed", "denoise"):
+        for key in ("timed", "denoise", "osl"):
             if not isinstance(merged[key], bool):
                 got = repr(merged[key])
                 raise UsageError(f"job {index}: {key}: expected true or false, got {got}")
@@ -314,6 +316,11 @@ def main():
         help="Blender's view transform (default: Standard, else the display's own)",
     )
     parser.add_argument("--denoise", action="store_true", help="by Blender's denoiser")
+    parser.add_argument(
+        "--without-osl",
+        action="store_true",
+        help="with Open Shading Language off, as files are made: auto is Blender's own nodes then",
+    )
     parser.add_argument("--jobs", help="JSON file with a list of jobs")
     parser.add_argument(
         "--representation",

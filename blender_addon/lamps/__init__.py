@@ -7,7 +7,7 @@ A list that is out of date costs noise, and the light of lamps without a size th
 are right otherwise, whatever it says.
 """
 
-from .filling import count, ensure_group, follow, see, seen
+from .filling import count, current_scene, ensure_group, follow, see, seen
 from .handlers import register, unregister
 from .lights import has_importance, is_sizeless
 from .scenes import lamps_of
@@ -22,6 +22,7 @@ __all__ = [
     "Lamp",
     "by_slot",
     "count",
+    "current_scene",
     "elsewhere",
     "ensure_group",
     "find_group",

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import bpy
 
+from .. import device
 from . import scenes, shared_group, slots, world
 
 #: Numbers of a slot.
@@ -47,7 +48,7 @@ def limit_of(scene):
 
 def device_changed(scene):
     """Whether a scene has come to a device that limits lamps, or away from it, since last time."""
-    return _checks().runs_on_optix(scene) != memory.on_optix
+    return device.runs_on_optix(scene) != memory.on_optix
 
 
 def _worth_aiming(survey):
@@ -103,7 +104,7 @@ def _fill(scene, depsgraph, subject=None, keep=True):
                 shared_group.write(socket, new)
     lamps = _listed(survey, chosen)
     memory.scene, memory.survey = scene.session_uid, survey
-    memory.lamps, memory.limit, memory.on_optix = lamps, limit, _checks().runs_on_optix(scene)
+    memory.lamps, memory.limit, memory.on_optix = lamps, limit, device.runs_on_optix(scene)
     return lamps
 
 

@@ -188,8 +188,6 @@ class Making(ProgramJob):
     failure = LibraryError
 
     def __init__(self):
-        if not pack.osl_available():
-            raise LibraryError(pack.NO_OSL)
         self._count = len(entries())
         self._made = self._open_folder("brdfc-library-") / "library"
         self._made.mkdir()

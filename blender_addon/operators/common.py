@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators share: how they refuse, and whose material they are about."""
 
-from .. import checks, editable, nodes, pack
+from .. import checks, editable, nodes
 from ..i18n import Sentence, iface, of_error, rpt, say, tip
 
 ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
@@ -18,12 +18,6 @@ def refused(operator, error):
 
 def report_osl(operator, ours, scene):
     """Reports what keeps the shaders of these nodes from running in a scene."""
-    if not pack.osl_available():
-        said = say(
-            "This Blender has no Open Shading Language: models are made of Blender's own nodes, "
-            "and the panel shows their error"
-        )
-        operator.report({"WARNING"}, rpt(said))
     for finding in checks.of_scene(ours, scene):
         operator.report({"WARNING"}, rpt(finding.message))
 

@@ -10,35 +10,8 @@ from bpy.types import Operator
 from .. import api, color, editable, kernel, nodes, optical
 from ..i18n import Sentence, iface, of_error, rpt, say, tip
 from ..labels import wrapped
+from ..methods import METHODS
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
-
-#: What each form means to who chooses one; "form" is the word of scripts for a render method.
-METHODS = {
-    "exact": say(
-        "Exact: Cycles' own shaders add up to the model. No error, and the noise of Blender's own "
-        "nodes"
-    ),
-    "aimed": say(
-        "Aimed: Cycles samples the lamps, and random rays find all other light. No error on "
-        "average, and little noise"
-    ),
-    "sampled": say(
-        "Sampled: random rays alone, which rarely meet small lamps. No error on average, and much "
-        "noise"
-    ),
-    "fitted": say(
-        "Fitted: eight of Cycles' own shaders that come close to the model. A small error, and the "
-        "noise of Blender's own nodes"
-    ),
-    "nodes": say(
-        "Formula Nodes: the model's formulas as Blender's math nodes. No error on average, on "
-        "every device and without Open Shading Language, and more noise under skies"
-    ),
-    "twin": say(
-        "Blender Nodes: Glossy and Diffuse nodes that come close to the model. They run in EEVEE "
-        "and on GPUs too, with a larger error"
-    ),
-}
 
 
 class BRDFC_OT_switch(ChangesActiveMaterial, Operator):

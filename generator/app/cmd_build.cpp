@@ -28,7 +28,7 @@ namespace brdfc::app {
 namespace {
 
 struct Options {
-  bool all = false, json = false, twin = false, fit_bases = false;
+  bool all = false, json = false, twin = false, fit_bases = false, osl_only = false;
   std::optional<double> error, time;  ///< percent of the light; units of Blender's Glossy node
   std::string scene, materials, out, osl, addon;
   std::vector<std::string> models;
@@ -163,7 +163,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
 /// The models as OSL that needs no extension. All texts are made before the first is written.
 void write_osl(const Options& options) {
   if (!options.scene.empty() || !options.materials.empty() || !options.out.empty() || !options.addon.empty() ||
-      options.error || options.time || options.json || options.twin || options.fit_bases)
+      options.error || options.time || options.json || options.twin || options.fit_bases || options.osl_only)
     input_error("build: --osl DIR goes with --all or --model NAME alone");
   const auto files = pack::standalone_files(options.models);
   for (const auto& [name, text] : files) {
@@ -192,7 +192,8 @@ void run(const Options& options) {
                                       {"--error", options.error.has_value()},
                                       {"--time", options.time.has_value()},
                                       {"--fit", options.fit_bases},
-                                      {"--twin", options.twin}})
+                                      {"--twin", options.twin},
+                                      {"--osl-only", options.osl_only}})
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
   pack::require_target(options.out);
   const std::filesystem::path addon =
@@ -200,6 +201,7 @@ void run(const Options& options) {
   const std::filesystem::path costs = addon / "costs.csv";
   // A .blend says what its nodes are, and not what they might be.
   plan::Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, plan::Costs(costs)};
+  budget.nodes = !options.osl_only;
   if (options.error) budget.error = *options.error / 100;
   if (options.time) {
     budget.time = options.time;
@@ -277,6 +279,10 @@ void add_build_command(CLI::App& app) {
   c->add_flag("--twin", options->twin,
               "Also twins, Blender's own nodes for where Open Shading Language does not run, of every material whose\n"
               "parameters are constant")
+      ->group(forms);
+  c->add_flag("--osl-only", options->osl_only,
+              "Only for renders with Open Shading Language: without Blender's own nodes, which materials that leave\n"
+              "their form open are where it is off")
       ->group(forms);
   c->add_flag("--explain", options->json, "What forms there are, what is left out, why and what that saves, as JSON")
       ->group(forms);

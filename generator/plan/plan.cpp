@@ -266,13 +266,21 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
       consider(*form, missing, false);
       continue;
     }
-    // What no fit is made for is there for all models alike, and taken by those who ask for it.
-    if (form->when() == Form::When::Asked && !form->made_of_fit() &&
+    // What no fit is made for is there for all models alike, and taken by those who ask for it; or as what a material
+    // that leaves its form open is without OSL.
+    const bool without_osl = budget.nodes && form->native() && !form->made_of_fit() &&
+                             std::any_of(needs.begin(), needs.end(),
+                                         [&](const MaterialNeed* need) {
+                                           return need->representation == "auto" && lacking(*need, *form).empty();
+                                         }) &&
+                             !unfit(needs, *form);
+    if (form->when() == Form::When::Asked && !form->made_of_fit() && !without_osl &&
         std::none_of(chosen.begin(), chosen.end(), [&](const Chosen& c) { return c.form == form; }))
       continue;
     const bool offered = form->when() == Form::When::WithinBudget && budget.offer && drawn &&
                          within_time(needs, aimed_or_allowed(aiming_form(), needs, budget), budget).form == form;
-    consider(*form, unfit(needs, *form), offered || (form->native() && form->made_of_fit() && budget.twin));
+    consider(*form, unfit(needs, *form),
+             offered || without_osl || (form->native() && form->made_of_fit() && budget.twin));
   }
   return choices;
 }

@@ -78,6 +78,8 @@ struct Budget {
   std::vector<std::string> sizeless = {};
   /// How many lamps there are to aim at; none where that is not known.
   std::optional<int> lamps = {};
+  /// Blender's own nodes with a model's formulas come beside forms that are left open.
+  bool nodes = false;
 };
 
 /// The models of the materials, in alphabetical order: a parameter that all materials of a model set to the same

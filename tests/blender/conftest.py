@@ -98,7 +98,18 @@ def extension(extension_zip):
         filepath=str(extension_zip), repo="user_default", enable_on_install=True
     )
     assert PACKAGE in bpy.context.preferences.addons
-    names = ("api", "checks", "energy", "lean", "nodes", "operators", "pack", "scene_loader", "ui")
+    names = (
+        "api",
+        "checks",
+        "device",
+        "energy",
+        "lean",
+        "nodes",
+        "operators",
+        "pack",
+        "scene_loader",
+        "ui",
+    )
     return SimpleNamespace(
         package=PACKAGE, **{name: import_module(f"{PACKAGE}.{name}") for name in names}
     )
@@ -113,7 +124,8 @@ def batch():
 
 @pytest.fixture
 def empty(extension):
-    """An empty factory file with Cycles. Preferences, and with them the extension, stay."""
+    """An empty factory file with Cycles and, other than files that people begin with, with Open
+    Shading Language on. Preferences, and with them the extension, stay."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -121,6 +133,7 @@ def empty(extension):
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
+    scene.cycles.shading_system = True
     return scene
 
 

@@ -14,7 +14,7 @@ import pytest
 @pytest.fixture
 def optix(extension, empty, monkeypatch):
     """The empty scene on an OptiX device with Open Shading Language on."""
-    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "OPTIX")
+    monkeypatch.setattr(extension.device, "gpu_backend", lambda: "OPTIX")
     extension.api.enable_osl(empty)
     empty.cycles.device = "GPU"
     empty.cycles.sample_clamp_indirect = empty.cycles.blur_glossy = 0

@@ -628,7 +628,7 @@ def test_warning_engine_and_osl(extension, empty):
 )
 def test_warning_device(extension, empty, monkeypatch, backend, works):
     # This machine may not have the device: only the preference is pretended.
-    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: backend)
+    monkeypatch.setattr(extension.device, "gpu_backend", lambda: backend)
     material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
     empty.cycles.device = "GPU"
     untested = ["optix_untested"] if backend == "OPTIX" else []
@@ -640,7 +640,7 @@ def test_warning_device(extension, empty, monkeypatch, backend, works):
 
 def test_warning_device_of_another_computer(extension, empty, monkeypatch):
     """Without a GPU in the preferences Cycles takes the CPU, and the file keeps GPU Compute."""
-    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "NONE")
+    monkeypatch.setattr(extension.device, "gpu_backend", lambda: "NONE")
     material = clean(extension, empty, "glass")
     empty.cycles.device = "GPU"
     (finding,) = extension.api.warnings(material, empty)
@@ -653,7 +653,7 @@ def test_warning_device_of_another_computer(extension, empty, monkeypatch):
 
 def test_gpu_backend_is_the_preference(extension, empty):
     preferences = bpy.context.preferences.addons["cycles"].preferences
-    assert extension.checks.gpu_backend() == preferences.compute_device_type
+    assert extension.device.gpu_backend() == preferences.compute_device_type
 
 
 def test_warning_of_a_parameter_without_effect(extension, empty):

@@ -427,7 +427,7 @@ def test_turning_osl_on_says_that_aovs_will_be_black(extension, empty, capfd):
 def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch):
     """By the name of the material, whose twin is 15 % off; of glass that is not known, and in lean
     ones nothing stands in."""
-    material = ball(extension, empty, "phong")
+    material = ball(extension, empty, "phong", "aimed")
     light_of(empty, 1)
     assert "brdfc: " not in capsys.readouterr().out
     empty.cycles.shading_system = False
@@ -437,10 +437,10 @@ def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch
     assert said == [f"brdfc: Open Shading Language is off: {stands_in}"]
     empty.cycles.shading_system = True
     console = import_module(f"{extension.package}.console")
-    monkeypatch.setattr(extension.checks, "gpu_backend", lambda: "CUDA")
+    monkeypatch.setattr(extension.device, "gpu_backend", lambda: "CUDA")
     empty.cycles.device = "GPU"
-    glass = extension.api.new_material("glass")
-    lean = extension.api.new_material("lambert")
+    glass = extension.api.new_material("glass", "exact")
+    lean = extension.api.new_material("lambert", "exact")
     (node,) = extension.nodes.group_nodes(lean)
     node.node_tree.nodes.remove(node.node_tree.nodes["Runs"])
     for made in (glass, lean):

@@ -210,23 +210,26 @@ def test_making_it_may_be_given_up(library, made):
 
 # Dragged
 
-#: Of what is dragged: the shader's, and what stands in for it.
-FORMS = ("aimed", "twin")
+#: Groups of what is dragged, with Open Shading Language and without: what suits itself to the
+#: scene, what that is made of there, and what stands in for it.
+FORMS = {True: ("auto", "twin"), False: ("auto", "nodes", "twin")}
 
 
 def assert_aims_at(extension, material, lamp):
     """That the group of lamps in the material's model has the lamp's place."""
     bpy.context.view_layer.update()
     (node,) = extension.nodes.group_nodes(material)
-    inner = {getattr(n, "node_tree", None): n for n in node.node_tree.nodes}
+    content = extension.nodes.made_of(node.node_tree)
+    inner = {getattr(n, "node_tree", None): n for n in content.nodes}
     inner = inner[bpy.data.node_groups["brdfc Lamps"]]
     group = inner.node_tree.evaluated_get(bpy.context.evaluated_depsgraph_get())
     first = next(n for n in group.nodes if n.bl_idname == "ShaderNodeCombineXYZ")
     assert [s.default_value for s in first.inputs] == pytest.approx(list(lamp.location))
 
 
-@pytest.mark.parametrize("by_hand", [True, False])
-def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empty, by_hand):
+@pytest.mark.parametrize(("by_hand", "osl"), [(True, True), (False, True), (True, False)])
+def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empty, by_hand, osl):
+    empty.cycles.shading_system = osl
     lamp = helpers.add_lamp(empty, name="Key", location=(1, 2, 3), energy=100)
     ball = helpers.add_sphere(empty, None, segments=8)
     if by_hand:
@@ -241,9 +244,12 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empt
             once = found
     assert found == once, "what was dragged once is not brought again"
     groups, texts, _ = once
-    made_of = [f"{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS]
-    assert groups == [*made_of, "brdfc Lamps"]
-    assert len(texts) == 3, "two shaders, and which tells whether they run"
+    made_of = [
+        f"{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS[osl]
+    ]
+    ours = [name for name in groups if not name.startswith("brdfc ") or name == "brdfc Lamps"]
+    assert ours == [*made_of, "brdfc Lamps"]
+    assert len(texts) == (3 if osl else 0), "two shaders, and which tells whether they run"
     if made.reuse and not by_hand:
         assert names(bpy.data.materials) == ["Brushed Steel", "Red Plastic", "Turned Copper"]
     lamp.location = (3, -2, 1)
@@ -266,9 +272,9 @@ def test_what_is_asked_for_by_name_stays(extension, made, empty):
     """Who appends a group itself holds on to it; as who loads it from a script does."""
     extension.api.new_material("ward")
     with bpy.data.libraries.load(str(made.blend)) as (there, here):
-        here.node_groups = [name for name in there.node_groups if name == "Ward (aimed)"]
+        here.node_groups = [name for name in there.node_groups if name == "Ward (auto)"]
     (group,) = here.node_groups
-    assert group.name == "Ward (aimed).001" and extension.nodes.TAG in group
+    assert group.name == "Ward (auto).001" and extension.nodes.TAG in group
 
 
 def test_undo_of_a_drag(extension, made, empty):

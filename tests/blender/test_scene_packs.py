@@ -68,6 +68,43 @@ def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool,
     assert np.isfinite(picture).all() and picture.max() > 1e-3
 
 
+def test_a_scene_renders_from_its_own_extension_without_osl(
+    extension, empty, answers, tool, tmp_path
+):
+    """Forms that its materials leave open are Blender's own nodes then, which the extension has
+    unless it was asked for without; the picture is the same within noise."""
+    content = json.loads((SCENES / "as-fig7.json").read_text(encoding="utf-8"))
+    content["settings"] |= {"width": 32, "height": 32, "spp": 64}
+    source = tmp_path / "open.json"
+    source.write_text(json.dumps(content), encoding="utf-8")
+    built = {}
+    for name, options in (("both", []), ("osl", ["--osl-only"])):
+        made = answers.built(["build", "--scene", str(source), *options, "--out", "out"])
+        (manifest,) = (made / "out").glob("*/manifest.json")
+        built[name] = manifest.parent
+    tool("scene", source, "--out", tmp_path / "scene")
+    assert not (built["osl"] / "nodes").exists()
+    pictures, load = {}, extension.scene_loader.load_scene
+    for pack, osl, wanted in (
+        ("both", True, {"exact", "aimed"}),
+        ("both", False, {"nodes"}),
+        ("osl", True, {"exact", "aimed"}),
+    ):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        extension.pack.use(built[pack])
+        try:
+            scene = load(tmp_path / "scene" / "scene.json", osl=osl)
+            ours = [n for m in bpy.data.materials for n in extension.nodes.group_nodes(m)]
+            assert {extension.nodes.identity(node)[1] for node in ours} == wanted
+            pictures[pack, osl] = render(scene)[..., :3]
+            assert {extension.nodes.identity(node)[1] for node in ours} == wanted
+        finally:
+            extension.pack.use()
+    with_osl = pictures["both", True]
+    np.testing.assert_array_equal(pictures["osl", True], with_osl)
+    assert np.abs(pictures["both", False].mean() / with_osl.mean() - 1) < 0.01
+
+
 #: How much of a model an extension folds. With all of it constant most twins are searched for anew,
 #: which takes seconds each: these stand for them.
 FOLDED = ("all", "some", "none")

@@ -334,7 +334,7 @@ def test_how_far_off_a_twin_is_is_said_where_that_is_known(extension, empty):
         ({}, " error 1.2 %"),
         ({"ax": 0.0625, "ay": 0.3}, None),
     ):
-        material = extension.api.new_material("ward", **values)
+        material = extension.api.new_material("ward", "aimed", **values)
         (found,) = [f for f in extension.api.warnings(material, empty) if f.code == "osl_off"]
         said = "Open Shading Language is off: Blender's own nodes stand in"
         assert found.message == said + ("" if off is None else f",{off}")

@@ -121,6 +121,18 @@ TEST(Plan, NamesTheMaterialWhoseFormDoesNotExist) {
   }
 }
 
+TEST(Plan, NodesComeBesideFormsThatAreLeftOpen) {
+  const forms::Form *const nodes = forms::form("nodes"), *const aimed = forms::form("aimed");
+  Budget budget;
+  budget.nodes = true;
+  const auto forms = [&](const std::vector<MaterialNeed>& needs) { return plan_scene(needs, budget)[0].forms; };
+  EXPECT_THAT(forms({need("a", "phong", {"e=20"})}), ElementsAre(aimed, nodes));
+  EXPECT_THAT(forms({need("a", "phong", {"e=20"}, "aimed")}), ElementsAre(aimed)) << "asked for by name";
+  EXPECT_THAT(forms({need("a", "ward", {"normalisation=duer"})}), ElementsAre(aimed)) << "another choice";
+  EXPECT_THAT(forms({need("a", "ward", {"normalisation=duer"}), need("b", "ward", {})}), ElementsAre(aimed, nodes));
+  EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})})[0].forms, ElementsAre(aimed)) << "not unasked";
+}
+
 TEST(Plan, FitsWhereTheErrorIsAllowed) {
   const auto forms = [](const std::vector<MaterialNeed>& needs, double error) {
     return plan_scene(needs, {error, false})[0].forms;
