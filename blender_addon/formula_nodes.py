@@ -13,7 +13,7 @@ import math
 
 import bpy
 
-from . import svm_constants
+from . import kept_groups, svm_constants
 from .wiring import Wiring
 
 #: Custom property of the group of a part: hash of what it computes. Equal parts share a group.
@@ -75,13 +75,34 @@ class _Formula:
         }
 
 
-def _group(title, content, inputs, outputs, fill):
-    """The group that has this content, which the file may have. `inputs` and `outputs`: names and
-    kinds; fill(wiring, inputs by name) returns outputs by name."""
-    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
-    for group in bpy.data.node_groups:
+def _find(digest, among=None):
+    for group in bpy.data.node_groups if among is None else among:
         if group.library is None and group.get(PART) == digest:
             return group
+    return None
+
+
+def _appended(digest):
+    """The group of a part as it was kept, or None. Of equal parts the file's own remain."""
+    made = kept_groups.append(digest)
+    wanted = _find(digest, made)
+    own = [group for group in bpy.data.node_groups if group not in made]
+    for group in made:
+        if wanted is None:
+            bpy.data.node_groups.remove(group)
+        elif other := _find(group.get(PART), own):
+            group.user_remap(other)
+            bpy.data.node_groups.remove(group)
+    return wanted
+
+
+def _group(title, content, inputs, outputs, fill, kept=False):
+    """The group that has this content, which the file may have. `inputs` and `outputs`: names and
+    kinds; fill(wiring, inputs by name) returns outputs by name. `kept`: see kept_groups."""
+    content = [kept_groups.version(), content]
+    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+    if group := _find(digest) or (_appended(digest) if kept else None):
+        return group
     group = bpy.data.node_groups.new(f"brdfc {title}", "ShaderNodeTree")
     group[PART] = digest
     for in_out, sockets in (("INPUT", inputs), ("OUTPUT", outputs)):
@@ -94,6 +115,8 @@ def _group(title, content, inputs, outputs, fill):
     for name, value in made.items():
         w.give(end.inputs[name], value)
     w.place_nodes()
+    if kept:
+        kept_groups.keep(group, digest)
     return group
 
 
@@ -371,14 +394,38 @@ def _keep_apart(w, lamps, widest):
 
 
 def wire(tree, data, normal, tangent, parameters, slots, title):
-    """Builds the nodes of a model; returns outputs by name: its BSDF and, where closures of
-    Blender's own are all of it, its Albedo.
+    """Adds the nodes of a model, as a group; returns outputs by name: its BSDF and, where closures
+    of Blender's own are all of it, its Albedo.
 
     `data` is what nodes/*.json has; `normal` and `tangent` outputs that are 0 where the surface's
     own are meant; `parameters`: outputs or numbers by name; `slots`: four outputs for each lamp;
     `title` begins the names of the groups that are made.
     """
+    kinds = {name: kind for part in data["parts"].values() for name, kind in part["inputs"]}
+    kinds |= dict.fromkeys(data["bounds"], "FLOAT")
+    values = {"Normal": (normal, "VECTOR"), "Tangent": (tangent, "VECTOR")}
+    own = {name: f"parameter {name}" for name in parameters if name in kinds}
+    values |= {own[name]: (parameters[name], kinds[name]) for name in own}
+    placed = [[f"lamp {i} {part}" for part in _SLOT] for i in range(len(slots))]
+    for names, slot in zip(placed, slots, strict=True):
+        values |= {name: (output, "VECTOR") for name, output in zip(names, slot, strict=True)}
+
+    def fill(w, found):
+        of_slots = [[found[name] for name in names] for names in placed]
+        given = {name: found[socket] for name, socket in own.items()}
+        return _wired(w, data, found["Normal"], found["Tangent"], given, of_slots, title)
+
+    inputs = [[name, kind] for name, (_, kind) in values.items()]
+    outputs = [["BSDF", "SHADER"], *([] if "draw" in data["parts"] else [["Albedo", "VECTOR"]])]
+    group = _group(f"{title}: formulas", [data, inputs], inputs, outputs, fill, kept=True)
     w = Wiring(tree)
+    made = _instance(w, group, {name: value for name, (value, _) in values.items()}, "Formulas")
+    w.place_nodes()
+    return made
+
+
+def _wired(w, data, normal, tangent, parameters, slots, title):
+    """The nodes of a model, as outputs by name; see wire()."""
     geometry = w.node("ShaderNodeNewGeometry")
     constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
@@ -408,9 +455,7 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
         for closure in data["closures"]:
             colour = colours[closure["weight"]]
             total = colour if total is None else w.vector("ADD", total, colour)
-        bsdf = w.sum(shaders)
-        w.place_nodes()
-        return {"BSDF": bsdf, "Albedo": total}
+        return {"BSDF": w.sum(shaders), "Albedo": total}
     lamps = []
     u = _random(w, surface.place, surface.view, surface.path_length)
     if slots:
@@ -428,9 +473,7 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
         shift = tuple(math.fmod(index * step, 1.0) for step in _SHIFT)
         values = given | lamp | {"random": w.vector("ADD", u, shift)}
         shaders.append(_instance(w, lit, values, "lamp")["BSDF"])
-    bsdf = w.sum(shaders)
-    w.place_nodes()
-    return {"BSDF": bsdf}
+    return {"BSDF": w.sum(shaders)}
 
 
 def _rest(w, parts, surface, given, lamps, narrow, random):

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nodes of formulas that were made once are appended the next time, and are the same."""
+
+from importlib import import_module
+
+import bpy
+import pytest
+
+
+@pytest.fixture
+def kept(extension, empty):
+    """The module, with an empty folder."""
+    module = import_module(f"{extension.package}.kept_groups")
+    for path in module._folder().iterdir():
+        path.unlink()
+    return module
+
+
+def value(socket):
+    found = getattr(socket, "default_value", None)
+    return tuple(found) if hasattr(found, "__len__") else found
+
+
+def described(tree, seen=None):
+    """All that makes a tree what it is, with the groups in it."""
+    nodes = {node.name: i for i, node in enumerate(tree.nodes)}
+    found = []
+    for node in tree.nodes:
+        inner = getattr(node, "node_tree", None)
+        found.append(
+            (
+                node.bl_idname,
+                getattr(node, "operation", None),
+                tuple(node.location),
+                tuple(value(socket) for socket in node.inputs),
+                None if inner is None else described(inner),
+            )
+        )
+    links = sorted(
+        (
+            nodes[link.from_node.name],
+            link.from_socket.identifier,
+            nodes[link.to_node.name],
+            link.to_socket.identifier,
+        )
+        for link in tree.links
+    )
+    sockets = [(s.name, s.in_out, s.socket_type) for s in tree.interface.items_tree]
+    return found, links, sockets
+
+
+def formulas(material, extension):
+    (node,) = extension.nodes.group_nodes(material)
+    (inner,) = (n.node_tree for n in node.node_tree.nodes if n.label == "Formulas")
+    return inner
+
+
+def new_file():
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+
+
+def refuse(*_):
+    raise AssertionError("made anew")
+
+
+def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
+    models = ("ward", "ashikhmin_shirley", "glass")
+    made = {}
+    for model in models:
+        new_file()
+        made[model] = described(formulas(extension.api.new_material(model, "nodes"), extension))
+    monkeypatch.setattr(kept, "keep", refuse)
+    new_file()
+    for model in models:
+        material = extension.api.new_material(model, "nodes")
+        assert described(formulas(material, extension)) == made[model]
+    assert len(bpy.data.libraries) == 0
+    # Parts that models share are in the file once.
+    names = [group.name.split(".")[0] for group in bpy.data.node_groups]
+    assert names.count("brdfc lamp seen") == 1
+    assert not [g.name for g in bpy.data.node_groups if g.users == 0 or g.library]
+    for material in list(bpy.data.materials):
+        bpy.data.materials.remove(material)
+    extension.nodes.remove_unused_groups()
+    assert not list(bpy.data.node_groups)
+
+
+@pytest.mark.parametrize("content", [b"", b"no file of Blender", None])
+def test_a_file_that_is_damaged_is_made_anew(extension, kept, content):
+    made = described(formulas(extension.api.new_material("ward", "nodes"), extension))
+    (path,) = kept._folder().iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2] if content is None else content)
+    new_file()
+    material = extension.api.new_material("ward", "nodes")
+    assert described(formulas(material, extension)) == made
+    assert [p.stat().st_size > 1000 for p in kept._folder().iterdir()] == [True]
+
+
+def test_files_of_other_versions_go(extension, kept):
+    older = kept._folder() / "4.5.0-0123456789ab-0123456789abcdef.blend"
+    older.write_bytes(b"")
+    extension.api.new_material("ward", "nodes")
+    (path,) = kept._folder().iterdir()
+    assert path != older
+
+
+def test_a_folder_that_can_not_be_made_matters_to_nobody(extension, kept, monkeypatch):
+    def fail(*_, **__):
+        raise ValueError("no such extension")
+
+    monkeypatch.setattr(bpy.utils, "extension_path_user", fail)
+    assert formulas(extension.api.new_material("ward", "nodes"), extension).nodes
+
+
+def test_nothing_of_the_scene_is_kept(extension, kept):
+    """Lamps of the file that a group was made in are no part of it."""
+    light = bpy.data.lights.new("Lamp", "POINT")
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Lamp", light))
+    extension.api.new_material("ward", "nodes")
+    (path,) = kept._folder().iterdir()
+    with bpy.data.libraries.load(str(path)) as (there, _):
+        assert there.node_groups and not there.objects and not there.scenes
+        assert not [name for name in there.node_groups if name == "brdfc Lamps"]
