@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The scalar types that models are instantiated for, and the functions that formulas may use.
 //
-//   double  truth            float  what OSL computes
+//   double  reference        float  what OSL computes
 //   Wide    113-bit mantissa Expr   records the formula (trace/expr.h)
 //   Pack    eight doubles at once (core/pack.h)
 //

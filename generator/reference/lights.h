@@ -60,7 +60,7 @@ class EnvironmentSampler {
   double mean() const { return mean_; }
 
  private:
-  /// What is read together lies together.
+  /// Data that are read together are stored together.
   struct Cell {
     double density = 0;  // per solid angle
     float keep = 1;      // probability to stay in this cell (Vose's alias table)

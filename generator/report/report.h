@@ -12,24 +12,24 @@
 //       "image": "reference.exr",            radiance, with its variance layer
 //       "spp": 1024, "wall_seconds": 3.1
 //     },
-//     "runs": [                              one element a form; "glossy", "principled", "metallic" are Blender's own
-//     nodes
+//     "runs": [                              one element per form; "glossy", "principled" and "metallic" are
+//                                            Blender's own nodes
 //       {
 //         "form": "exact",                   unique within the scene
-//         "images": ["exact-0.exr", ...],    equal samples, different seeds; their mean is shown
-//         "spp": 64,                         samples a pixel of each image
-//         "cpu_seconds": [1.9, ...],         one an image: rendering alone, all threads together
-//         "wall_seconds": [1.0, ...],        one an image
+//         "images": ["exact-0.exr", ...],    equal numbers of samples, different seeds; their mean is shown
+//         "spp": 64,                         samples per pixel of each image
+//         "cpu_seconds": [1.9, ...],         one per image: rendering only, sum of all threads
+//         "wall_seconds": [1.0, ...],        one per image
 //         "materials": [                     may be empty (Blender's own nodes)
 //           {"id": "ball", "model": "coupled", "representation": "exact", "closures": 3,
 //            "error": {"relative_l1": 0.0, "albedo": 1e-7, "note": "..."}}     error: null = not measured
 //         ]
 //       }
 //     ],
-//     "convergence": [                       optional: the same scene, smaller, with more and more samples
+//     "convergence": [                       optional: the same scene, smaller, with increasing numbers of samples
 //       {"form": "exact", "spp": 16, "images": ["convergence/exact-16-1.exr", ...], "cpu_seconds": [0.4, ...]}
 //     ],
-//     "provenance": {"Blender": "4.5.15", ...},   text by name, shown at the end of the page
+//     "provenance": {"Blender": "4.5.15", ...},   names and texts, shown at the end of the page
 //     "commands": ["build/brdfc render ...", ...]
 //   }
 //
