@@ -136,7 +136,7 @@ class PathTracer::Wave {
 
   std::vector<Path> paths;
   std::vector<double>
-      chances;  // for each path: probabilities of the lights on the viewer's side of the surface and on the other side
+      chances;  // of light sampling, for each path: on the viewer's side of the surface, then on the other
   std::vector<Path*> active, next;
   std::vector<Ray> rays, next_rays;  // rays of `active` and of `next`
   std::vector<Meeting> meetings;
