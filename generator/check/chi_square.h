@@ -11,9 +11,8 @@ namespace brdfc::check {
 struct ChiSquare {
   double p = 1;  ///< probability of a statistic at least as large
   double statistic = 0;
-  int degrees = 0;  ///< cells after pooling, less one
-  bool converged =
-      true;  ///< false if the expected counts are too uncertain; the other members keep their defaults then
+  int degrees = 0;        ///< cells after pooling, less one
+  bool converged = true;  ///< false: expected counts are too uncertain; other members keep their defaults
 };
 /// Compares a histogram of sample() with the integral of pdf() over the same cells. Lost samples are one more cell. The
 /// cells are placed around other samples, so that every lobe, however narrow, is divided into several. Cells with fewer

@@ -22,10 +22,9 @@ namespace brdfc::measure {
 
 /// A term of the polynomial in the colours.
 struct AlbedoTerm {
-  bool mirror = false;  ///< true: weight of ideal reflection; false: scattered light
-  std::vector<std::string>
-      colors;    ///< Color parameters that multiply the coefficient, twice for a square; empty for a constant
-  int grid = 0;  ///< index into AlbedoTable::grids
+  bool mirror = false;              ///< true: weight of ideal reflection; false: scattered light
+  std::vector<std::string> colors;  ///< Color parameters that multiply it, twice for a square; empty for a constant
+  int grid = 0;                     ///< index into AlbedoTable::grids
 };
 
 struct AlbedoTable {
@@ -41,9 +40,8 @@ struct AlbedoTable {
   std::vector<std::vector<AlbedoTerm>> terms;
   double error = 0;       ///< the same for the whole albedo at random points, with random colours
   double quadrature = 0;  ///< largest error estimate of the quadrature
-  double anisotropy =
-      0;            ///< largest |albedo at one azimuth - azimuthal average|; 0 if the albedo does not depend on azimuth
-  std::string doc;  ///< description of the table for people
+  double anisotropy = 0;  ///< largest |albedo at one azimuth - azimuthal average|; 0 if azimuth does not matter
+  std::string doc;        ///< description of the table for people
 
   /// The terms for complete or partial values. Missing values take their defaults.
   const std::vector<AlbedoTerm>& terms_for(const Model&, const ParamValues&) const;

@@ -21,9 +21,8 @@ KernelLobe<double, FreeKnots<double>> kernel_lobe(const KernelCurve&, double n);
 
 struct KernelFit {
   ParamValues values;  ///< parameters of `lossless`: n, kernel and heights, rounded to six digits
-  double kernel =
-      0;          ///< largest relative difference of the kernels over distances that occur, both scaled to at most 1
-  double l1 = 0;  ///< relative L1 of f cos over all pairs of directions
+  double kernel = 0;   ///< largest relative difference of the kernels, scaled to 1, at distances that occur
+  double l1 = 0;       ///< relative L1 of f cos over all pairs of directions
   double l1_view = 0;  ///< the same over light directions only, for the worst of the views tried
 };
 /// Minimises the L1 error of the kernel over the square of x' and y'. The errors are those of the rounded values. `n`

@@ -135,8 +135,7 @@ class PathTracer::Wave {
   explicit Wave(const std::vector<Surface>& surfaces) : scratch(surfaces) {}
 
   std::vector<Path> paths;
-  std::vector<double>
-      chances;  // of light sampling, for each path: on the viewer's side of the surface, then on the other
+  std::vector<double> chances;  // for each path: of lights on the viewer's side, then on the other side
   std::vector<Path*> active, next;
   std::vector<Ray> rays, next_rays;  // rays of `active` and of `next`
   std::vector<Meeting> meetings;

@@ -40,8 +40,7 @@ struct RenderOptions {
   /// Limit for triangles in copies of meshes, which make rays faster. Beyond it, equal meshes are stored once
   /// (reference/tracer.h).
   std::size_t most_copies = kMostCopies;
-  std::size_t most_weighed =
-      kMostWeighed;  ///< up to this number each lamp gets a weight; with more lamps a light tree chooses
+  std::size_t most_weighed = kMostWeighed;        ///< up to this number each lamp gets a weight, else a tree chooses
   const std::atomic<bool>* cancel = nullptr;      ///< set by any thread: stop soon and keep the result so far
   std::function<void(const Progress&)> progress;  ///< called from time to time, by the calling thread
 };

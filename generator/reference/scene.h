@@ -142,9 +142,8 @@ Scene load_scene(const std::filesystem::path& path);
 /// The models and lamps that a .blend uses.
 struct UsedMaterials {
   std::vector<Material> materials;
-  std::vector<std::string>
-      sizeless_lamps;        ///< names of point lamps and spots without a radius, and of suns without an angle
-  std::optional<int> lamps;  ///< number of lamps to aim at, if the file gives it
+  std::vector<std::string> sizeless_lamps;  ///< points and spots without a radius, suns without an angle
+  std::optional<int> lamps;                 ///< number of lamps to aim at, if the file gives it
 };
 /// Reads a file of materials alone: "materials" as in the schema, with {"varies": true} as the value of a parameter
 /// that is not constant; "sizeless_lamps", a list of names, if there are any; and "lamps", the number of lamps to aim
