@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How numbers are stepped through and interpolated: by differences, or by factors.
+// Scales of table axes and sliders: linear or logarithmic steps, and interpolation on them.
 #pragma once
 
 #include <algorithm>
@@ -7,14 +7,14 @@
 
 namespace brdfc::inline core {
 
-/// How a value is mapped before a grid is interpolated linearly between two neighbouring knots.
+/// The mapping that is applied to a value before a grid is interpolated linearly between two neighbouring knots.
 enum class AxisScale {
   Linear,  ///< x
   Log,     ///< log(x), all values > 0
   Log1p,   ///< log(1 + x), all values >= 0
 };
 
-/// From a value to its place on the scale, and back. Over double, float and Expr.
+/// Maps a value to the scale, and back. T is double, float or Expr.
 template <class T> T to_scale(AxisScale scale, const T& x) {
   using std::log;
   return scale == AxisScale::Log ? log(x) : scale == AxisScale::Log1p ? log(T(1) + x) : x;
@@ -28,12 +28,12 @@ inline const char* name_of(AxisScale scale) {
   return scale == AxisScale::Linear ? "linear" : scale == AxisScale::Log ? "log" : "log1p";
 }
 
-/// Values from `low` to `high`, both included, that are stepped through evenly on a scale.
+/// A range of values, both ends included, with steps that are even on a scale.
 struct ScaledRange {
   AxisScale scale = AxisScale::Linear;
   double low = 0, high = 1;
 
-  /// The value at t in [0, 1]; beyond them that of the end.
+  /// The value at t in [0, 1]. A t outside that interval gives the value of the nearest end.
   double at(double t) const {
     if (t <= 0) return low;
     if (t >= 1) return high;

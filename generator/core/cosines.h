@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How obliquely something is seen.
+// Ranges of view angles.
 #pragma once
 
 #include <algorithm>
 
 namespace brdfc::inline core {
 
-/// Cosines of the angles between shading normal and viewer; of all views unless told otherwise.
+/// A range of cosines of the angle between shading normal and viewer. By default it contains all views.
 struct Cosines {
   double low = 0, high = 1;
 

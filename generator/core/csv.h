@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CSV with a header, in and out.
+// Reads and writes CSV files with a header line.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,25 +13,26 @@
 
 namespace brdfc::inline core {
 
-/// Without spaces, tabs and carriage returns at both ends.
+/// The text without leading and trailing spaces, tabs and carriage returns.
 std::string trim(const std::string&);
-/// What stands between commas, trimmed.
+/// The fields of a line, which commas separate, each trimmed.
 std::vector<std::string> split_fields(const std::string& line);
 
-/// Numbers in named columns. Columns may come in any order; others than those asked for are ignored, so that the
-/// output of one command can be the input of the next. Every error is an InputError naming line, column and what
+/// Reads numbers from named columns. The columns may come in any order, and other columns are ignored, so that the
+/// output of one command can be the input of the next. Every error is an InputError that names line, column and what
 /// was expected. Numbers must be finite.
 class CsvReader {
  public:
-  /// Reads the header. An input without any line is empty(), which only the caller can judge.
+  /// Reads the header. For an input without any line empty() is true; only the caller can tell whether that is an
+  /// error.
   CsvReader(std::istream&, std::string source, std::vector<std::string> columns);
   bool empty() const { return line_ == 0; }
-  /// The next line's numbers in the order asked for; false at the end. Blank lines are skipped.
+  /// Reads the next line's numbers, in the order of `columns`. Returns false at the end. Blank lines are skipped.
   bool next(std::vector<double>& row);
-  /// "stdin line 7", for messages about the row read last.
+  /// The place of the row read last, for messages: "stdin line 7".
   std::string where() const;
-  /// The unit vector in three columns starting at `first`. Throws unless its length is 1 within 1e-6;
-  /// then it is normalised in double precision.
+  /// The unit vector in three columns starting at `first`. Throws unless its length is 1 within 1e-6; the result is
+  /// normalised in double precision.
   Vec3<double> unit_vector(const std::vector<double>& row, std::size_t first) const;
 
  private:
@@ -40,18 +41,18 @@ class CsvReader {
   std::istream& in_;
   std::string source_;
   std::vector<std::string> columns_;
-  std::vector<std::size_t> where_;  // field of each column
+  std::vector<std::size_t> where_;  // index of each column's field in a line
   std::size_t fields_ = 0;
   int line_ = 0;
 };
 
-/// Gathers output and writes it to stdout in large pieces; throws InputError if stdout can't take it.
+/// Collects output and writes it to stdout in large pieces. Throws InputError if stdout can't be written.
 class CsvWriter {
  public:
   explicit CsvWriter(const std::string& header) { text_ = header + "\n"; }
-  /// Numbers with 17 significant digits.
+  /// Adds a row of numbers with 17 significant digits.
   void row(const std::vector<double>& values);
-  /// Call at the end: writes what is left.
+  /// Writes the remaining output; to be called at the end.
   void finish();
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the files lie that the tool reads beside its input: stored fits and albedos, the extension's Python; and where
-// it keeps what it has made.
+// Locations of the tool's data (stored fits and albedos, the extension's Python) and of the user's cache.
 #pragma once
 
 #include <filesystem>
@@ -8,14 +7,16 @@
 
 namespace brdfc::inline core {
 
-/// The first of these that holds the extension's Python: the folder that the environment variable BRDFC_DATA names,
-/// and if it is set no other; share/brdfc beside the folder of the program, as `cmake --install` lays it out; the
-/// nearest folder above the program, as are the sources that it is built in. Stored fits and albedos are in its folder
-/// data, the Python in blender_addon. Throws InputError that names what was looked for and where.
+/// The folder with the tool's data: stored fits and albedos in its subfolder data, the extension's Python in
+/// blender_addon. If the environment variable BRDFC_DATA is set, it names the folder. Otherwise it is the first of
+/// these that contains the extension's Python: share/brdfc beside the program's folder, as `cmake --install` lays it
+/// out; then the nearest folder above the program, as in a build inside the source tree. Throws InputError that names
+/// what was looked for and where.
 std::filesystem::path data_dir();
 
-/// The user's folder for what takes long to make and can be made again: the one that the environment variable
-/// BRDFC_CACHE names, none if that is empty; without it brdfc in XDG_CACHE_HOME or ~/.cache. It may not exist yet.
+/// The user's cache, for results that take long to compute and can be computed again. The environment variable
+/// BRDFC_CACHE names it; if that is empty there is no cache. Without the variable it is brdfc in XDG_CACHE_HOME or in
+/// ~/.cache. The folder may not exist yet.
 std::optional<std::filesystem::path> cache_dir();
 
 }  // namespace brdfc::inline core

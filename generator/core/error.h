@@ -8,12 +8,12 @@
 
 namespace brdfc::inline core {
 
-/// Bad usage or input: the message names the file, the key and what was expected. Exit status 2.
+/// Wrong usage or input. The message names the file, the key and what was expected. Exit status 2.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A value the models may never produce (NaN, infinite, negative): names where. Exit status 1.
+/// A value that no model may return: NaN, infinite or negative. The message names the place. Exit status 1.
 struct ValueError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

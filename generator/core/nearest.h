@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a word that is not known was meant to be.
+// Suggestions for misspelt names.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace brdfc::inline core {
 
-/// "did you mean ward? ", the known word that fewest letters have to be inserted in, left out of, changed in or swapped
-/// with their neighbours; "" if those are more than a third of them.
+/// "did you mean ward? ", with the known word at the smallest edit distance from `word`. Edits insert, remove or change
+/// a letter, or swap two neighbouring letters. Returns "" if more than a third of the letters would have to be edited.
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace brdfc::inline core

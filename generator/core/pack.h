@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Eight numbers at once: a scalar whose every operation is a loop that compilers turn into one vector instruction.
+// Eight numbers at once: a scalar type in which every operation is a loop that the compiler turns into one vector
+// instruction.
 //
-// A formula over it gives the values of double, but for the last digits of exp(), sin() and the like, which are those
-// of glibc's vector library (4 units in the last place) where there is one. A lane's value depends on that lane alone.
-// Comparisons give a Mask, which converts to nothing: what a formula may do is what it may do with Expr.
+// A formula over Pack gives the same values as over double, except for the last digits of exp(), sin() and the like,
+// which come from glibc's vector library if there is one (4 units in the last place). The value of a lane depends on
+// that lane alone. Comparisons return a Mask, which does not convert to bool: formulas are limited to the operations
+// that Expr has.
 //
-// Functions that compute with it are to be BRDFC_VECTORISED or in a source that is compiled for each instruction set
-// (core/vectorised.h).
+// Functions that compute with Pack must be BRDFC_VECTORISED, or be in a source that is compiled for each instruction
+// set (core/vectorised.h).
 #pragma once
 
 #include <concepts>
@@ -24,7 +26,7 @@ inline namespace BRDFC_INSTRUCTION_SET {
 
 #define BRDFC_LANES BRDFC_INDEPENDENT for (std::size_t k = 0; k < kLanes; ++k)
 
-/// Which lanes something holds for.
+/// One truth value for each lane.
 class Mask {
  public:
   Mask() = default;
@@ -55,7 +57,7 @@ class Mask {
   }
 
  private:
-  alignas(sizeof(long long) * kLanes) long long lanes_[kLanes]{};  // as wide as what it chooses; 0 or -1
+  alignas(sizeof(long long) * kLanes) long long lanes_[kLanes]{};  // 0 or -1, as wide as the numbers that it selects
 };
 
 class Pack {
@@ -65,7 +67,7 @@ class Pack {
   requires(std::integral<N> || std::floating_point<N>) Pack(N v) {  // NOLINT: formulas mix literals and scalars
     BRDFC_LANES lanes_[k] = double(v);
   }
-  /// The next numbers of an array.
+  /// Loads kLanes consecutive numbers of an array.
   static Pack from(const double* numbers) {
     Pack out;
     BRDFC_LANES out.lanes_[k] = numbers[k];
@@ -78,7 +80,7 @@ class Pack {
   alignas(sizeof(double) * kLanes) double lanes_[kLanes]{};
 };
 
-/// f in each lane.
+/// Applies f to each lane.
 template <class F> Pack lane_by_lane(const Pack& a, const F& f) {
   Pack out;
   BRDFC_LANES out[k] = f(a[k]);
@@ -140,7 +142,7 @@ inline Pack sqrt(const Pack& a) {
   return lane_by_lane(a, [](double x) { return std::sqrt(x); });
 }
 
-/// One lane of a vector or colour.
+/// The vector or colour in one lane.
 inline Vec3<double> lane(const Vec3<Pack>& v, std::size_t k) { return {v.x[k], v.y[k], v.z[k]}; }
 inline Rgb<double> lane(const Rgb<Pack>& c, std::size_t k) { return {c.r[k], c.g[k], c.b[k]}; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers in texts.
+// Parses numbers.
 #pragma once
 
 #include <charconv>
@@ -8,7 +8,7 @@
 
 namespace brdfc::inline core {
 
-/// The number that all of the text is, which may be infinite or none; nothing if it is no number.
+/// The number that the whole text represents, which may be infinite or NaN; nullopt if the text is not a number.
 template <class T = double> std::optional<T> parse(std::string_view text) {
   T value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

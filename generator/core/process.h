@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the operating system knows of processes, terminals and names: all that is not the same on Linux, macOS and
-// Windows.
+// Processes, terminals and files: everything that differs between Linux, macOS and Windows.
 #pragma once
 
 #include <cstddef>
@@ -8,23 +7,23 @@
 
 namespace brdfc::inline core {
 
-/// The number of this process.
+/// The id of this process.
 long process_id();
-/// Whether a process of this number is surely over: false where the system does not tell.
+/// True if the process with this id has certainly ended; false if the system does not tell.
 bool process_is_over(long id);
-/// The file of the running program, links followed; empty where the system does not tell.
+/// The running program's file, with links resolved; empty if the system does not tell.
 std::filesystem::path program_file();
 
-/// Bytes that a program may still take before the system ends one to get more: what is free or can be freed, and within
-/// the limit of a container. The largest number where the system does not tell.
+/// Bytes that a program may still allocate before the system ends a program for lack of memory: memory that is free or
+/// can be freed, within the limit of a container. The largest number if the system does not tell.
 std::size_t available_memory();
 
 enum class Stream { In, Err };
-/// Whether a person sits at it.
+/// Whether the stream is a terminal.
 bool is_terminal(Stream);
 
-/// While it lives nothing that is written to the standard error stream is seen, for libraries that write there by
-/// themselves. Without effect on Windows.
+/// Hides everything that is written to the standard error stream during its lifetime, for libraries that print there by
+/// themselves. It has no effect on Windows.
 class QuietErrors {
  public:
   QuietErrors();
@@ -36,7 +35,8 @@ class QuietErrors {
   int kept_ = -1;
 };
 
-/// Exchanges two names in one step. False, and nothing is changed, where the file system or the system can't.
+/// Exchanges two file names atomically. Returns false, and changes nothing, if the file system or the operating system
+/// can't do that.
 bool exchange(const std::filesystem::path&, const std::filesystem::path&);
 
 }  // namespace brdfc::inline core

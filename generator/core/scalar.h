@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The scalar types a model is instantiated for, and the vocabulary its formulas are written in.
+// The scalar types that models are instantiated for, and the functions that formulas may use.
 //
-//   double  truth            float  what OSL computes
+//   double  reference        float  what OSL computes
 //   Wide    113-bit mantissa Expr   records the formula (trace/expr.h)
 //   Pack    eight doubles at once (core/pack.h)
 //
-// A model formula is a template over the scalar T and uses only the functions named here, so that one
-// text serves all five. There are no data-dependent branches: select() evaluates both arms, hence guard
-// the arguments of an arm, not its result.
+// A model formula is a template over the scalar T and uses only the functions of this file, so that one text serves all
+// five types. There are no data-dependent branches: select() evaluates both arms, so guard the arguments of an arm, not
+// its result.
 #pragma once
 
 #include <array>
@@ -20,14 +20,14 @@
 
 namespace brdfc::inline core {
 
-/// float, double, Wide: types whose comparisons are decided at once.
+/// float, double and Wide: types whose comparisons give a bool.
 template <class T>
 concept Numeric = std::floating_point<T> || std::same_as<T, Wide>;
 
 inline namespace BRDFC_INSTRUCTION_SET {
 class Pack;
 }
-/// Those and Pack: types that hold values and record nothing.
+/// Numeric types and Pack: types that hold values, as opposed to Expr, which records.
 template <class T>
 concept Arithmetic = Numeric<T> || std::same_as<T, Pack>;
 
@@ -58,10 +58,10 @@ template <class T> T pi() {
 template <Numeric T> T minimum(const T& a, const T& b) { return b < a ? b : a; }
 template <Numeric T> T maximum(const T& a, const T& b) { return a < b ? b : a; }
 
-/// a where the condition holds, else b. Both arms are evaluated.
+/// Returns a if the condition holds, else b. Both arms are evaluated.
 template <Numeric T> T select(bool condition, const T& a, const T& b) { return condition ? a : b; }
 
-/// Smallest positive argument that a guard may hand to log() or a division: normal in float.
+/// Smallest positive argument that a guard may pass to log() or to a division. It is a normal number in float.
 template <class T> T tiny() { return T(1e-30); }
 
 template <class T> T sqr(const T& x) { return x * x; }
@@ -71,18 +71,18 @@ template <class T> T pow5(const T& x) {
 }
 template <class T> T clamp01(const T& x) { return minimum(maximum(x, T(0)), T(1)); }
 
-/// Runs state = step(state) `count` times. The recorded form is an OSL loop, never unrolled.
+/// Repeats state = step(state) `count` times. Recorded, it becomes an OSL loop, which is never unrolled.
 template <Arithmetic T, std::size_t N, class Step>
 std::array<T, N> iterate(int count, std::array<T, N> state, Step step) {
   for (int i = 0; i < count; ++i) state = step(state);
   return state;
 }
 
-/// Steps that a safeguarded Newton iteration takes: to 2e-7 of the target in float, to 1e-15 otherwise. A recording
-/// takes those of the precision that it is made for.
+/// Number of steps of a safeguarded Newton iteration. It reaches the target to 2e-7 in float and to 1e-15 otherwise. A
+/// recording uses the number for the precision that it is made for.
 template <class T> int newton_steps() { return std::same_as<T, float> ? 10 : 24; }
 
-/// Gives a subexpression the name it has in the paper; only the recorded form keeps it.
+/// Gives a subexpression the name that it has in the paper. Only the recorded form keeps the name.
 template <Arithmetic T> const T& named(const char*, const T& x) { return x; }
 
 }  // namespace brdfc::inline core

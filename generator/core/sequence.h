@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Low-discrepancy sequences: points that fill a square or a cube more evenly than random ones.
+// Low-discrepancy sequences: points that cover a square or a cube more evenly than random ones.
 #pragma once
 
 #include <cmath>
@@ -13,11 +13,11 @@ struct Point2 {
   double x = 0, y = 0;
 };
 
-/// What is left of a number without its integer part.
+/// The fractional part of a number.
 inline double wrap(double u) { return u - std::floor(u); }
 
-/// In [0, 1)^3: additive recurrence on the powers of the plastic number's sister in three
-/// dimensions (root of x^4 = x + 1), shifted by numbers drawn from the seed.
+/// Points in [0, 1)^3: an additive recurrence on powers of 1 / x, where x > 1 is the root of x^4 = x + 1 (the analogue
+/// of the plastic number in three dimensions), with an offset drawn from the seed.
 class Sequence3 {
  public:
   explicit Sequence3(std::uint64_t seed);
@@ -27,7 +27,7 @@ class Sequence3 {
   Vec3<double> state_;
 };
 
-/// The same in [0, 1)^2, on the plastic number.
+/// The same in [0, 1)^2, with the plastic number.
 class Sequence2 {
  public:
   explicit Sequence2(std::uint64_t seed);

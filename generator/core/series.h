@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// expm1 and log1p from exp and log, where a language has no others: series where those lose digits.
+// expm1 and log1p by exp and log, for languages that lack them. A series replaces the cancelling difference near 0.
 #pragma once
 
 #include "core/scalar.h"
 
 namespace brdfc::inline core {
 
-/// e^x - 1 to 1e-7; exp_x: e^x.
+/// e^x - 1 to 1e-7. exp_x is e^x.
 template <class T> T series_expm1(const T& x, const T& exp_x) {
   const T sum =
       x * (T(1) +
@@ -14,7 +14,7 @@ template <class T> T series_expm1(const T& x, const T& exp_x) {
   return select(abs(x) < T(0.4), sum, exp_x - T(1));
 }
 
-/// log(1 + x) to 1e-7; log_1_x: the logarithm of 1 + x. log1p(x) = 2 artanh(z), z = x / (2 + x).
+/// log(1 + x) to 1e-7. log_1_x is the logarithm of 1 + x. The series is log1p(x) = 2 artanh(z), z = x / (2 + x).
 template <class T> T series_log1p(const T& x, const T& log_1_x) {
   const T z = x / (T(2) + x), z2 = z * z;
   const T sum =

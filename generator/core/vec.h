@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Directions and colours over any scalar type.
+// Vectors and colours over any scalar type.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ template <class T> Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
 template <class T> T length(const Vec3<T>& a) { return sqrt(dot(a, a)); }
 template <class T> Vec3<T> normalize(const Vec3<T>& a) { return a / length(a); }
 
-/// Squared sine of the angle to the normal: from x and y, because 1 - z^2 cancels near the normal.
+/// Squared sine of the angle to the normal. It is computed from x and y, because 1 - z^2 loses digits near the normal.
 template <class T> T sin2_theta(const Vec3<T>& w) { return w.x * w.x + w.y * w.y; }
 
 /// Rotates the frame by -angle about the normal, so that a lobe turned by +angle is axis-aligned.
@@ -68,16 +68,16 @@ template <Arithmetic T> T max_component(const Rgb<T>& c) { return maximum(c.r, m
 
 template <Arithmetic T> Rgb<T> magnitude(const Rgb<T>& c) { return {abs(c.r), abs(c.g), abs(c.b)}; }
 
-/// Luminance of linear Rec.709 primaries (ITU-R BT.709), used only to choose between lobes.
+/// Luminance of linear Rec.709 primaries (ITU-R BT.709). Used only to choose between lobes.
 template <Arithmetic T> T luminance(const Rgb<T>& c) { return T(0.2126) * c.r + T(0.7152) * c.g + T(0.0722) * c.b; }
 template <Arithmetic T> const Rgb<T>& named(const char*, const Rgb<T>& c) { return c; }
 
-/// u and v of an orthonormal frame (u, v, w) that varies smoothly with w, for w.z >= 0.
+/// The first two axes of an orthonormal frame (u, v, w) that varies smoothly with w, for w.z >= 0.
 template <class T> std::array<Vec3<T>, 2> across_axis(const Vec3<T>& w) {
   const T a = T(1) / (T(1) + w.z), b = -w.x * w.y * a;
   return {{{T(1) - w.x * w.x * a, b, -w.x}, {b, T(1) - w.y * w.y * a, -w.y}}};
 }
-/// s.x u + s.y v + s.z w in that frame.
+/// s.x u + s.y v + s.z w, with u and v of across_axis().
 template <class T> Vec3<T> about_axis(const Vec3<T>& w, const Vec3<T>& s) {
   const auto [u, v] = across_axis(w);
   return u * s.x + v * s.y + w * s.z;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A floating-point number with a 113-bit significand: the reference for rounding errors.
 //
-// The compiler's binary128 behind the operators and functions that formulas use. Ten to twenty times as quick as
-// Boost's portable type of the same precision, which is what makes a wide reference affordable for every model.
+// Wraps the compiler's binary128 in the operators and functions that formulas use. It is ten to twenty times as fast as
+// Boost's portable type of the same precision, which makes a wide reference affordable for every model.
 #pragma once
 
 #include <concepts>
 #include <limits>
 
-// glibc's, declared here because not every compiler's headers show them.
+// glibc's functions, declared here because not every compiler's headers show them.
 extern "C" {
 __float128 atanf128(__float128) noexcept;
 __float128 cbrtf128(__float128) noexcept;
@@ -74,7 +74,7 @@ inline Wide sin(const Wide& x) { return Wide::of(sinf128(x.value())); }
 inline Wide sqrt(const Wide& x) { return Wide::of(sqrtf128(x.value())); }
 inline bool isfinite(const Wide& x) { return x.value() - x.value() == 0; }
 
-/// Smallest positive normal number.
+/// Exponent of two of the smallest positive normal number.
 inline constexpr int kWideMinExponent = -16382;
 
 }  // namespace brdfc::inline core

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of albedos as EXR files.
+// Albedo tables as EXR files.
 #pragma once
 
 #include <filesystem>
@@ -8,11 +8,12 @@
 
 namespace brdfc::measure {
 
-/// Writes a float EXR: one row of pixels per grid, padded with zeros to the longest, and as JSON in the
-/// attribute "brdfc:table" the axes, scales, sizes, terms, errors and layout. Written beside and renamed.
-/// Throws InputError naming the path if it can't be written.
+/// Writes a float EXR with one row of pixels for each grid, padded with zeros to the length of the longest. The
+/// attribute "brdfc:table" contains axes, scales, sizes, terms, errors and layout as JSON. The file is written under a
+/// temporary name and renamed. Throws InputError that names the path if it can't be written.
 void write_albedo_exr(const AlbedoTable&, const std::filesystem::path&);
-/// What write_albedo_exr() wrote, number for number. Throws InputError naming the path if it can't be read.
+/// Reads a table that write_albedo_exr() wrote; all numbers are restored exactly. Throws InputError that names the path
+/// if it can't be read.
 AlbedoTable read_albedo_exr(const std::filesystem::path&);
 
 }  // namespace brdfc::measure

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the knots of a grid of albedos stand.
+// Placement of the knots of an albedo grid.
 #pragma once
 
 #include <vector>
@@ -8,9 +8,10 @@
 
 namespace brdfc::measure {
 
-/// Knots on these axes, indices of coordinates, so that linear interpolation of the monomials errs about equally
-/// everywhere: their density follows the square root of the second derivative met on lines through the probes. The
-/// first probe is at the defaults, the next AlbedoTableSettings::corners are near the ends of ranges.
+/// Places knots on these axes (indices of coordinates) so that linear interpolation of the monomials has about the same
+/// error everywhere. The density of knots is proportional to the square root of the second derivative along lines
+/// through the probes. The first probe is at the defaults, and the next AlbedoTableSettings::corners probes are near
+/// the ends of ranges.
 std::vector<TableAxis> place_knots(const AlbedoPolynomial&, const ParamValues& combination,
                                    const std::vector<std::size_t>& axes, const std::vector<Monomial>&,
                                    const std::vector<Position>& probes);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model with its parameters, and what is asked of the values that it gives.
+// A model bound to parameters, and checks of the values that it returns.
 #pragma once
 
 #include <memory>
@@ -9,17 +9,17 @@
 
 namespace brdfc::measure {
 
-/// A model bound to parameters in double precision, with the text that names both in messages.
+/// A model, its parameters in double precision, and a label for messages.
 struct BoundModel {
-  const Model* model = nullptr;        ///< registered, so that it outlives this
+  const Model* model = nullptr;        ///< registered, so it outlives this object
   ParamValues values;                  ///< a value for every parameter
   std::unique_ptr<Brdf<double>> brdf;  ///< the model at these values
   std::string label;                   ///< name and values, "coupled r0=0.05 ...", for messages
 };
-/// The model at `values`, defaults in the place of those that are missing. Throws InputError for inadmissible ones.
+/// Binds a model to `values`. Missing values take their defaults. Throws InputError for inadmissible values.
 BoundModel bind_model(const Model&, const ParamValues&);
 
-/// "(x, y, z)" with so many digits, for messages.
+/// "(x, y, z)" with this number of digits, for messages.
 std::string text(const Vec3<double>&, int digits = 9);
 
 /// Throws ValueError unless every component is finite and >= 0. `what` is "f", "pdf", ...

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of albedos cut down to the parameters that a pack leaves open.
+// Albedo tables, reduced to the parameters that a pack leaves open.
 #pragma once
 
 #include "core/cosines.h"
@@ -7,9 +7,9 @@
 
 namespace brdfc::measure {
 
-/// The table of a model some of whose parameters are fixed: interpolated at their values, without their axes and
-/// colours, terms over the same axes added up, and without terms for combinations of choices that are ruled out. Of the
-/// knots over the view's cosine those that `views` lie between. `fixed` holds admissible values of the model's
+/// The table of a model with some parameters fixed. It is interpolated at their values and no longer has their axes and
+/// colours. Terms over the same axes are added, and terms for excluded combinations of choices are removed. On the axis
+/// of the view cosine the knots remain that enclose `views`. `fixed` contains admissible values of the model's
 /// parameters, in their units.
 AlbedoTable fold(const AlbedoTable&, const Model&, const ParamValues& fixed, const Cosines& views = {});
 

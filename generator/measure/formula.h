@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model's formulas as one thing: to tell whether two are the same, and what is kept of one belongs to it.
+// An identifier for a model's formulas, which tells whether stored results belong to the current ones.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace brdfc::measure {
 
-/// fingerprint() of all that a model computes, recorded with these parameters fixed and the others open: f, the
-/// probability density and samples, ideal reflection and refraction.
+/// fingerprint() of everything that a model computes, recorded with these parameters fixed and the others open: f, the
+/// pdf, samples, ideal reflection and ideal refraction.
 std::string formula_of(const Model&, const ParamValues& fixed);
 
 }  // namespace brdfc::measure

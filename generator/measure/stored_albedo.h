@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of albedos that are kept, so that packs are built in seconds.
+// Stored albedo tables, with which packs are built in seconds.
 #pragma once
 
 #include "measure/albedo_table.h"
@@ -8,13 +8,14 @@
 
 namespace brdfc::measure {
 
-/// Does a pack have the table? Delta terms alone need none: the shader adds up their weights. With few parameters they
-/// still get one, for the panel, which can't run the formula.
+/// True if packs contain an albedo table for the model. A model with delta terms only does not need one, because the
+/// shader adds their weights. If it has few parameters it gets one nevertheless, for the panel, which can't run the
+/// formula.
 bool has_albedo_table(const Model&);
-/// The key of a model's table: what the model computes, its parameters and all settings.
+/// The key of a model's table: the model's formulas, its parameters and all settings.
 StoreKey stored_albedo(const Model&);
-/// What is kept of tabulate_albedo(); without it the table is made, and a line on stderr says so. Throws InputError
-/// naming the file if that is damaged.
+/// The stored result of tabulate_albedo(). If there is none, the table is computed, and a line on stderr says so.
+/// Throws InputError that names the file if it is damaged.
 AlbedoTable albedo_table_of(const Model&);
 
 }  // namespace brdfc::measure

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Making a table of albedos: which grids it needs, what they hold, and the proof that they tell the truth.
+// Computes an albedo table: which grids it needs, their values, and the validation against quadrature.
 #pragma once
 
 #include "measure/albedo_table.h"
@@ -7,9 +7,9 @@
 
 namespace brdfc::measure {
 
-/// Tabulates the whole admissible range of every parameter; takes up to a minute. Throws ValueError (naming model,
-/// parameters, directions and value) for a value that is NaN, infinite or negative, or when the albedo is not of the
-/// form in albedo_table.h.
+/// Tabulates the whole admissible range of every parameter, which takes up to a minute. Throws ValueError that names
+/// model, parameters, directions and value for a value that is NaN, infinite or negative, or if the albedo does not
+/// have the form described in albedo_table.h.
 AlbedoTable tabulate_albedo(const Model&);
 
 }  // namespace brdfc::measure

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Structures of arrays: loops over paths of which compilers make vector instructions (core/vectorised.h).
+// Structures of arrays, for loops over paths that compilers turn into vector instructions (core/vectorised.h).
 #pragma once
 
 #include <array>
@@ -9,19 +9,20 @@
 
 namespace brdfc::reference {
 
-/// Lanes of a block, of which the first are in use. Others may hold anything: what is computed of it is not read.
+/// Number of lanes of a block. The first ones are in use. Others may contain anything: they are computed with, but
+/// their results are not read.
 inline constexpr std::size_t kBlock = 64;
 
 template <class T> using Lanes = std::array<T, kBlock>;
 using Numbers = Lanes<double>;
 
-/// Vectors that are kept as T.
+/// Vectors whose components are stored as T.
 template <class T> struct VectorsOf {
   Lanes<T> x, y, z;
   Vec3<double> operator[](std::size_t k) const { return {x[k], y[k], z[k]}; }
   template <class A> void set(std::size_t k, const A& v) { x[k] = T(v[0]), y[k] = T(v[1]), z[k] = T(v[2]); }
   void set(std::size_t k, const Vec3<double>& v) { x[k] = T(v.x), y[k] = T(v.y), z[k] = T(v.z); }
-  /// The lanes from `first` on.
+  /// kLanes vectors, beginning with lane `first`.
   Vec3<Pack> pack(std::size_t first) const {
     return {Pack::from(&x[first]), Pack::from(&y[first]), Pack::from(&z[first])};
   }
@@ -39,15 +40,15 @@ struct Rays {
   Vectors origin, direction;
 };
 
-/// `count` rounded up to whole vectors.
+/// `count`, rounded up to whole vectors.
 inline std::size_t lanes_for(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
-/// Calls body(k) for the lanes from `begin` to before `end`, which do not depend on each other.
+/// Calls body(k) for the lanes in [begin, end), which must not depend on each other.
 template <class Body> void for_lanes(std::size_t begin, std::size_t end, const Body& body) {
   BRDFC_INDEPENDENT
   for (std::size_t k = begin; k < end; ++k) body(k);
 }
-/// For whole vectors, the first `count` lanes among them.
+/// Calls body(k) for whole vectors that contain the first `count` lanes.
 template <class Body> void for_lanes(std::size_t count, const Body& body) { for_lanes(0, lanes_for(count), body); }
 
 }  // namespace brdfc::reference

@@ -13,67 +13,68 @@
 
 namespace brdfc::reference {
 
-/// x and y of red, green, blue and white, as EXR files have them.
+/// The x and y of red, green, blue and white, in the order of EXR files.
 using Chromaticities = std::array<float, 8>;
 
-/// A linear space that a file can say its colours are in.
+/// A linear space that a file can state for its colours.
 struct LinearSpace {
-  const char* interop_id;  ///< of the Color Interop Forum
+  const char* interop_id;  ///< identifier of the Color Interop Forum
   Chromaticities chromaticities;
 };
 const std::vector<LinearSpace>& linear_spaces();
 
-/// A space that a scene can name as the one it is computed in.
+/// A working space that a scene can ask for by name.
 struct WorkingSpace {
-  const char* name;        ///< as Blender and its configurations call it
-  const char* interop_id;  ///< as EXR files say it, which Blender writes from 5.0 on
+  const char* name;        ///< name in Blender and its configurations
+  const char* interop_id;  ///< identifier in EXR files, which Blender writes from 5.0 on
   Chromaticities chromaticities;
 };
 const std::array<WorkingSpace, 3>& working_spaces();
 
-/// An OpenColorIO configuration. Renderers compute in its role "scene_linear", the working space.
+/// An OpenColorIO configuration. Its role "scene_linear" is the working space, in which renderers compute.
 class ColorConfig {
  public:
-  /// Throws InputError that names the file, and its version where that is later than this OpenColorIO reads.
+  /// Throws InputError that names the file, and also its version if this OpenColorIO can't read such a late one.
   explicit ColorConfig(const std::filesystem::path& file);
   ColorConfig(ColorConfig&&) noexcept;
   ~ColorConfig();
 
-  /// The one that the environment variable OCIO names, as for every program that uses OpenColorIO, Blender's own among
-  /// them, "ocio://NAME" for those that OpenColorIO 2.2 and later bring; data/color/config.ocio without it, and, said
-  /// on stderr, in place of one of a later version. Loaded once.
+  /// The configuration that the environment variable OCIO names, as for every program that uses OpenColorIO, including
+  /// Blender; "ocio://NAME" names one that OpenColorIO 2.2 and later contain. Without the variable it is
+  /// data/color/config.ocio. That file also replaces a configuration of a later version, with a message on stderr.
+  /// Loaded once.
   /// Throws as the constructor.
   static const ColorConfig& current();
 
-  /// The same with one of its spaces as the working space: one of working_spaces(), under the names that ACES
-  /// configurations have for it as well, or any by name, alias or role. Throws InputError that lists them.
+  /// The same configuration with another working space: one of working_spaces(), also by the names that ACES
+  /// configurations have for it, or any space by name, alias or role. Throws InputError that lists them.
   ColorConfig with_working_space(const std::string&) const;
-  /// Its name.
+  /// The name of the working space.
   std::string working_space() const;
 
   const std::filesystem::path& file() const { return file_; }
-  /// Names of colour spaces, and of the default display's view transforms.
+  /// Names of the colour spaces, and of the view transforms of the default display.
   std::vector<std::string> spaces() const;
   std::vector<std::string> views() const;
-  /// The view "Standard" where there is one, else the default view of the default display.
+  /// The view "Standard" if it exists, else the default view of the default display.
   std::string standard_view() const;
-  /// Whether there is a space of that name, alias or role.
+  /// True if there is a space with that name, alias or role.
   bool has_space(const std::string&) const;
 
-  /// Pixels of that colour space, by name, alias or role, become scene-linear. Spaces that hold data stay as they are.
-  /// Throws InputError that lists the spaces if there is none of that name.
+  /// Converts pixels from a colour space, given by name, alias or role, to scene-linear. Spaces for data are left
+  /// unchanged. Throws InputError that lists the spaces if none has that name.
   void to_scene_linear(Image& image, const std::string& space) const;
-  /// Pixels of sRGB become scene-linear, in configurations that have no space of that name as well.
+  /// Converts pixels from sRGB to scene-linear, also in configurations without a space of that name.
   void srgb_to_scene_linear(Image& image) const;
-  /// Linear pixels with these primaries become scene-linear, adapted to the working space's white (Bradford); those
-  /// that are in the working space already stay as they are. CIE XYZ, whose white is that of equal energy, is not
-  /// adapted. Throws InputError as from_xyz().
+  /// Converts linear pixels with these primaries to scene-linear, adapted to the white of the working space (Bradford).
+  /// Pixels that are in the working space already are left unchanged. CIE XYZ, whose white is the equal-energy white,
+  /// is not adapted. Throws InputError as from_xyz().
   void to_scene_linear(Image& image, const Chromaticities&) const;
-  /// Scene-linear colour of X, Y and Z over those of a perfect reflector, which becomes 1, 1, 1. Throws InputError if
-  /// the configuration has no role aces_interchange, which relates its spaces to what can be measured.
+  /// The scene-linear colour for X, Y and Z relative to a perfect reflector, whose colour is 1, 1, 1. Throws InputError
+  /// if the configuration has no role aces_interchange, which relates its spaces to measurable quantities.
   std::array<double, 3> from_xyz(const Xyz&) const;
-  /// Scene-linear pixels as the default display shows them, in [0, 1]; without the name of a view through
-  /// standard_view(). Throws InputError that lists the views.
+  /// Converts scene-linear pixels to those of the default display, in [0, 1], through `view`, or through
+  /// standard_view() if that is empty. Throws InputError that lists the views.
   void to_display(Image& image, const std::string& view) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What pictures have in common, whichever way light was followed: rays through pixels, sums over samples, metadata.
+// Shared by all tracers: camera rays, sums over samples, timing and metadata.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@
 
 namespace brdfc::reference {
 
-/// The ray through a point of the film, in pixels from the upper left corner.
+/// The camera ray through a point of the film, in pixels from the upper left corner.
 inline void camera_ray(const Camera& c, int width, int height, double x, double y, Vec3<double>& origin,
                        Vec3<double>& direction) {
   const double scale = 2 * c.half_height / height;
@@ -22,7 +22,8 @@ inline void camera_ray(const Camera& c, int width, int height, double x, double 
   direction = select(c.orthographic, c.forward, unit(c.forward + offset));
 }
 
-/// Mean and sum of squared deviations of a pixel's samples (Welford): exact for constants, stable otherwise.
+/// Mean and sum of squared deviations of a pixel's samples (Welford). Exact for constants, numerically stable
+/// otherwise.
 class PixelMoments {
  public:
   void add(const Rgb<double>& c) {
@@ -33,7 +34,7 @@ class PixelMoments {
     channels_[2].add(c.b, share);
   }
   int count() const { return count_; }
-  /// Adds the mean and its variance to pixel `i`; the variance of less than two samples is left as it is.
+  /// Adds the mean and its variance to pixel `i`. The variance of less than two samples is not added.
   void write(std::size_t i, Image& mean, Image& variance) const;
 
  private:
@@ -49,17 +50,17 @@ class PixelMoments {
   int count_ = 0;
 };
 
-/// How long a picture takes: from its making on, and of that what followed light.
+/// Measures the time of a picture: in total, and of tracing alone.
 class RenderClock {
  public:
   explicit RenderClock(const RenderOptions& options) : options_(options) {}
-  /// All is ready: light is followed from now on.
+  /// Call when preparation is done and tracing begins.
   void begin_tracing() { traced_ = Clock::now(); }
-  /// Seconds from the start, and from begin_tracing().
+  /// Seconds since construction, and since begin_tracing().
   double seconds() const { return since(start_); }
   double tracing() const { return since(traced_); }
   bool cancelled() const { return options_.cancel && options_.cancel->load(std::memory_order_relaxed); }
-  /// Whether the picture is cancelled, or its time is over.
+  /// True if the picture is cancelled or its time limit is reached.
   bool stop() const { return cancelled() || (options_.max_seconds > 0 && seconds() > options_.max_seconds); }
 
  private:
@@ -70,12 +71,12 @@ class RenderClock {
   Clock::time_point traced_ = start_;
 };
 
-/// Threads that the options ask for: all cores where they do not say.
+/// Number of threads that the options ask for; by default all cores.
 int threads_of(const RenderOptions&);
-/// Runs f with that many threads for TBB's loops, be they more than cores.
+/// Runs f with this number of threads for TBB's loops, even if it exceeds the number of cores.
 void in_arena(int threads, const std::function<void()>& f);
 
-/// RenderResult::rendering's.
+/// Metadata of RenderResult::rendering.
 nlohmann::json render_metadata(const Scene& scene, const RenderSettings& settings, int least, int most, int threads,
                                const RenderClock& clock);
 

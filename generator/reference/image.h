@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures: float EXR in and out with layers and metadata, error measures, previews.
+// Pictures: float EXR files with layers and metadata, error measures, previews.
 #pragma once
 
 #include <filesystem>
@@ -29,43 +29,44 @@ struct Image {
   }
 };
 
-/// What a renderer leaves: radiance and, if it is known, the variance of each pixel's mean.
+/// The output of a renderer: radiance and, if known, the variance of each pixel's mean.
 struct Rendering {
   Image mean;
   std::optional<Image> variance;
-  /// Of working_spaces(), by name; empty: that of ColorConfig::current().
+  /// Name of one of working_spaces(); empty for that of ColorConfig::current().
   std::string working_space;
-  /// Flat object of strings and numbers, stored as EXR attributes "brdfc:<key>".
+  /// A flat object of strings and numbers, stored as EXR attributes "brdfc:<key>".
   nlohmann::json metadata = nlohmann::json::object();
 };
 
-/// The file's extension in small letters, with its dot.
+/// The file's extension in lower case, with its dot.
 std::string ending(const std::filesystem::path& path);
 
-/// Runs write(temporary) with a name beside `path` that keeps its extension, then renames it to `path`, so
-/// that nobody sees half a file. Creates missing folders. Throws InputError if `path` can't be written.
+/// Calls write() with a temporary name beside `path` that has the same extension, then renames the file to `path`, so
+/// that no half-written file is visible. Creates missing folders. Throws InputError if `path` can't be written.
 void write_beside(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);
 
-/// Reads a rendering: channels R, G, B (plain, or of the first layer that has them, such as Blender's
-/// "Combined") and "variance.R/G/B" if present; the working space, if the attribute colorInteropID or, without it,
-/// chromaticities says it. Throws InputError naming the file, also for an attribute of a space that is not among
-/// working_spaces().
+/// Reads a rendering: the channels R, G, B, without a layer or of the first layer that has them, such as Blender's
+/// "Combined"; the channels "variance.R/G/B" if present; and the working space, if the attribute colorInteropID or,
+/// without it, the attribute chromaticities gives it. Throws InputError that names the file, also if the attribute
+/// gives a space that is not among working_spaces().
 Rendering read_rendering(const std::filesystem::path& path);
-/// Writes float EXR with the variance as layer "variance" and, as attributes, the metadata and the working space if it
-/// is said.
+/// Writes a float EXR with the variance as layer "variance". The metadata and, if set, the working space are
+/// attributes.
 void write_rendering(const std::filesystem::path& path, const Rendering& rendering);
 
-/// Converts a rendering to the working space of another one, if they differ. Variances don't tell how channels vary
-/// together: there they are lost. Throws InputError if the configuration has no such space.
+/// Converts a rendering to the working space of another one, if they differ. The variance is dropped then, because it
+/// does not include the covariances of the channels. Throws InputError if the configuration has no such space.
 void to_working_space_of(Rendering& rendering, const Rendering& other);
 
-/// Reads an image for use as texture or environment, as scene-linear colours; grey is repeated. `space`: "linear", as
-/// stored; "srgb"; a colour space of the configuration, by name, alias or role; "auto", sRGB for integer pixels and,
-/// for floating point, the primaries that the file states, or linear where it states none. A pixel with a value that is
-/// not finite becomes black, as in Cycles, which is added to `notes` as a line. Throws InputError naming the file.
+/// Reads an image for use as texture or environment, as scene-linear colours. Grey images get three equal channels.
+/// `space` is "linear" (as stored), "srgb", a colour space of the configuration by name, alias or role, or "auto".
+/// "auto" means sRGB for integer pixels; for floating-point pixels it means the primaries that the file states, or
+/// linear if it states none. A pixel that is not finite becomes black, as in Cycles, and a line about it is added to
+/// `notes`. Throws InputError that names the file.
 Image read_image(const std::filesystem::path& path, const ColorConfig&, const std::string& space = "auto",
                  std::vector<std::string>* notes = nullptr);
-/// Writes float EXR without metadata: equal pixels give equal files.
+/// Writes a float EXR without metadata, so that equal pixels give equal files.
 void write_image(const std::filesystem::path& path, const Image& image);
 
 /// Error of `a` against the reference `b`, over all pixels and the three channels.
@@ -76,28 +77,29 @@ struct Comparison {
   double bias = 0;  ///< mean_a - mean_b
   double max = 0;   ///< largest |a - b|
   int max_x = 0, max_y = 0;
-  std::optional<double> noise_mse;  ///< part of mse explained by the variance layers; only if both have one
+  std::optional<double> noise_mse;  ///< part of mse that the variance layers explain; only if both have one
 };
 
-/// Throws InputError if the sizes differ or a pixel is not finite; `name_a` and `name_b` are for the message.
+/// Throws InputError if the sizes differ or a pixel is not finite. `name_a` and `name_b` are for the message.
 Comparison compare(const Rendering& a, const Rendering& b, const std::string& name_a = "A",
                    const std::string& name_b = "B");
 nlohmann::json to_json(const Comparison& c);
 
-/// Display-referred picture of (a - b) in luminance relative to `b`: red where a is brighter, blue where it is
-/// darker, full colour at a difference of `scale` times the mean of b.
+/// A display-referred picture of the difference a - b in luminance, relative to `b`: red where a is brighter and blue
+/// where it is darker. The colour is saturated at a difference of `scale` times the mean of b.
 Image difference_image(const Image& a, const Image& b, double scale = 0.25);
 
-/// Writes 8 bits: colours are multiplied by 2^exposure and shown through a view transform of ColorConfig::current(),
-/// or its standard_view() where none is named.
+/// Writes an 8-bit picture. Colours are multiplied by 2^exposure and converted by a view transform of
+/// ColorConfig::current(), or by its standard_view() if `view` is empty.
 void write_preview(const std::filesystem::path& path, const Rendering& rendering, double exposure = 0,
                    const std::string& view = "");
-/// Writes 8 bits from values that are already display-referred, in [0, 1].
+/// Writes an 8-bit picture of values that are already display-referred, in [0, 1].
 void write_display(const std::filesystem::path& path, const Image& display);
 
 enum class Wrap { Repeat, Clamp };
 
-/// Bilinear value at (u, v), v upwards from the bottom edge, texel centres at (i + 1/2) / size, as in Blender.
+/// Bilinear interpolation at (u, v). v points upwards from the bottom edge, and texel centres are at (i + 1/2) / size,
+/// as in Blender.
 Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical);
 
 }  // namespace brdfc::reference

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strict reading of JSON: every error names the file, the key and what was expected.
+// Strict reading of JSON. Every error names the file, the key and what was expected.
 #pragma once
 
 #include <array>
@@ -14,13 +14,13 @@
 
 namespace brdfc::reference {
 
-/// Reads a whole file. Throws InputError for a missing file, bad syntax (with line and column), a key given
-/// twice in one object, a number that double can't hold, and nesting deeper than 32 levels.
+/// Reads a file. Throws InputError for a missing file, bad syntax (with line and column), a key that occurs twice in an
+/// object, a number that does not fit into double, and nesting deeper than 32 levels.
 nlohmann::json read_json(const std::filesystem::path& path);
-/// The same of a text, which messages call `name`.
+/// Parses a text in the same way. Messages call it `name`.
 nlohmann::json parse_json(std::string_view text, const std::string& name);
 
-/// One value inside a JSON file, with its place. The view must not outlive the JSON.
+/// A value in a JSON file, with its place in the file. The view must not outlive the JSON.
 class JsonView {
  public:
   JsonView(const nlohmann::json& value, std::string file, std::string key = "")
@@ -34,10 +34,10 @@ class JsonView {
   /// Throws InputError "<file>: <key>: <message>".
   [[noreturn]] void error(const std::string& message) const;
 
-  /// Requires an object that has no other keys than these.
+  /// Throws unless the value is an object without other keys than these.
   void only(const std::vector<std::string>& keys) const;
   bool has(const std::string& key) const { return value_->is_object() && value_->contains(key); }
-  /// Requires the key.
+  /// The member with this key, which is required.
   JsonView at(const std::string& key) const;
   std::optional<JsonView> find(const std::string& key) const;
   /// Elements of an array.
@@ -50,11 +50,11 @@ class JsonView {
   /// A whole number in [min, max].
   int integer(int min, int max) const;
   bool boolean() const;
-  /// A text that is not empty.
+  /// A string that is not empty.
   std::string text() const;
-  /// One of these texts.
+  /// A string that is one of `choices`.
   std::string choice(const std::vector<std::string>& choices) const;
-  /// N numbers in [min, max].
+  /// An array of N numbers in [min, max].
   template <std::size_t N> std::array<double, N> numbers(double min, double max) const {
     if (!value_->is_array() || value_->size() != N) fail(std::to_string(N) + " numbers");
     std::array<double, N> out;

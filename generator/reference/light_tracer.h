@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Particles from the lamps, each scattering joined to the camera: the same picture as the path tracer's, found from the
-// other end. J. Arvo, Backward Ray Tracing, 1986; P. Dutre, E. Lafortune, Y. Willems, Monte Carlo Light Tracing with
-// Direct Computation of Pixel Intensities, 1993.
+// Light tracing: particles start at the lamps, and each scattering event is connected to the camera. The picture is
+// that of the path tracer. J. Arvo, Backward Ray Tracing, 1986; P. Dutre, E. Lafortune, Y. Willems, Monte Carlo Light
+// Tracing with Direct Computation of Pixel Intensities, 1993.
 //
-// The directions of a BRDF have roles, wi to the light and wo to the viewer. A method that goes from the lamps knows wi
-// and draws wo. Models can only draw wi, and a program that trusts reciprocity takes that for granted and swaps the
-// two; of a model that is not reciprocal it then renders another surface, which is what the papers on reflection argue
-// with. Both ways are here.
+// The two directions of a BRDF have roles: wi points to the light, wo to the viewer. A light tracer knows wi and has to
+// sample wo, but models can only sample wi. Renderers that rely on reciprocity swap the two. For a model that is not
+// reciprocal they then render another surface, a point that papers on reflection models argue with. Both variants are
+// implemented here.
 //
-// Interpolated normals: light arrives on the triangle and reflects about the normal, which multiplies what arrives by
-// the ratio of both cosines (E. Veach, Robust Monte Carlo Methods for Light Transport Simulation, 1997, section 5.3).
-// They are not bent as the path tracer bends them, which depends on the viewer: of meshes of few faces that are shaded
-// smooth its pictures of polished models are others.
+// Interpolated normals: light arrives at the triangle and is reflected about the interpolated normal, so the incident
+// light is multiplied by the ratio of the two cosines (E. Veach, Robust Monte Carlo Methods for Light Transport
+// Simulation, 1997, section 5.3). The normals are not bent as in the path tracer, because bending depends on the
+// viewer. For smooth-shaded meshes of few faces, pictures of polished models therefore differ.
 #pragma once
 
 #include "reference/render.h"
 
 namespace brdfc::reference {
 
-/// As render() with Origin::Lamps or LampsSwapped. A sample a pixel is here as many particles as there are pixels; what
-/// the camera sees of lamps and the environment themselves is found with as many rays from the camera. Throws
-/// InputError that names a material or object which no particle shows to a camera, a mirror or one that lets light
-/// through, or which none reaches, one for the camera alone.
+/// Implements render() for Origin::Lamps and Origin::LampsSwapped. One sample per pixel means as many particles as
+/// there are pixels. Lamps and the environment, as seen directly by the camera, are found with the same number of
+/// camera rays. Throws InputError that names a material that can't be connected to the camera (a mirror, or one that
+/// lets light through), or an object that particles can't reach (one that is for the camera only).
 RenderResult render_from_lamps(const Scene& scene, const RenderOptions& options);
 
 }  // namespace brdfc::reference

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A tree of lamps, so that one of many is chosen, or met by a ray, in a time that grows with the logarithm of their
-// number.
+// A light tree. The time to choose one of many lamps, or to find those that a ray meets, grows with the logarithm of
+// their number.
 //
-// A lamp is chosen on the way from the root down, at each node with chances in proportion to what the lamps below each
-// child can contribute (A. Conty Estevez, C. Kulla: Importance Sampling of Many Lights with Adaptive Tree Splitting,
-// PACM CGIT 1(2), 2018). Nodes have eight children, which are weighed together in vector instructions. The chance of a
-// lamp is the product of the chances along the way to it, which can be computed again, to the last bit, for a lamp that
-// was met by a ray.
+// Choosing a lamp descends from the root. At each node a child is chosen with a probability proportional to the
+// possible contribution of the lamps below it (A. Conty Estevez, C. Kulla: Importance Sampling of Many Lights with
+// Adaptive Tree Splitting, PACM CGIT 1(2), 2018). Nodes have eight children, whose weights are computed together in
+// vector instructions. The probability of a lamp is the product of the probabilities on the path to it. It can be
+// computed again, identical to the last bit, for a lamp that a ray has met.
 #pragma once
 
 #include <array>
@@ -21,34 +21,34 @@
 
 namespace brdfc::reference {
 
-/// A lamp, or a set of lamps, as the tree sees it.
+/// Bounds of a lamp or of a set of lamps.
 struct LampBounds {
-  Vec3<double> centre;      ///< far: the unit vector towards it
-  double radius = 0;        ///< of a sphere about the centre that holds all of it
-  Vec3<double> direction;   ///< unit vector; the axis of the cone that holds the normals of what shines
-  double cos_cone = -1;     ///< cosine of the cone's half angle; -1: shines in all directions
-  double power = 0;         ///< irradiance that faces it at distance 1; far: at any
-  bool far = false;         ///< the same direction from everywhere
-  bool can_be_met = false;  ///< by a ray
+  Vec3<double> centre;      ///< for a distant lamp: the unit vector towards it
+  double radius = 0;        ///< radius of a sphere about the centre that contains all of it
+  Vec3<double> direction;   ///< unit vector: axis of the cone that contains the normals of the emitting surfaces
+  double cos_cone = -1;     ///< cosine of the cone's half angle; -1: emits in all directions
+  double power = 0;         ///< irradiance at distance 1 on a surface facing it; for a distant lamp at any distance
+  bool far = false;         ///< a distant lamp, in the same direction from everywhere
+  bool can_be_met = false;  ///< whether rays can meet it
 };
 
 class LightTree {
  public:
   static constexpr std::size_t kWidth = 8;
-  /// At least one lamp.
+  /// Builds a tree of at least one lamp.
   explicit LightTree(std::span<const LampBounds> lamps);
 
-  /// Weighs the root's children, kWidth of them, for a point on a surface with this normal; returns the sum, which is 0
-  /// if no lamp can contribute, and else about the irradiance there.
+  /// Computes the weights of the root's kWidth children for a surface point with this normal. Returns their sum, which
+  /// is approximately the irradiance there; it is 0 if no lamp can contribute.
   double weigh_root(const Vec3<double>& p, const Vec3<double>& normal, double* root) const {
     return weigh(nodes_[0], p, normal, root);
   }
 
   struct Choice {
     std::size_t lamp = 0;
-    double chance = 0;  ///< 0: none
+    double chance = 0;  ///< 0: no lamp was chosen
   };
-  /// Chooses a lamp by u in [0, 1), where weigh_root() gave `root` and a sum that is not 0.
+  /// Chooses a lamp with u in [0, 1). `root` are the weights of weigh_root(), whose sum must not be 0.
   Choice choose(const Vec3<double>& p, const Vec3<double>& normal, const double* root, double u) const {
     double below[kWidth];
     const double* weights = root;
@@ -56,7 +56,7 @@ class LightTree {
     for (std::size_t node = 0;;) {
       double sum = 0;
       for (std::size_t k = 0; k < kWidth; ++k) sum += weights[k];
-      // Children with weights may hold lamps that have none: bounds are wider than what they hold.
+      // A child with a weight may contain only lamps without weight, since bounds are wider than their contents.
       if (!(sum > 0)) return {};
       double left = u * sum;
       std::size_t k = 0, last = 0;
@@ -66,7 +66,7 @@ class LightTree {
         if (left < weights[k]) break;
         left -= weights[k];
       }
-      if (k == kWidth) k = last;  // by rounding
+      if (k == kWidth) k = last;  // because of rounding
       out.chance *= weights[k] / sum;
       const int next = nodes_[node].next[k];
       if (next < 0) {
@@ -80,7 +80,7 @@ class LightTree {
       weights = below;
     }
   }
-  /// The chance with which choose() gives the lamp.
+  /// The probability that choose() returns the lamp.
   double chance(std::size_t lamp, const Vec3<double>& p, const Vec3<double>& normal, const double* root) const {
     double below[kWidth];
     double out = 1;
@@ -95,8 +95,8 @@ class LightTree {
     }
   }
 
-  /// Adds to `lamps` all that a ray may meet before this distance, and some more; in an order that depends on the ray
-  /// alone. `direction` is a unit vector.
+  /// Adds to `lamps` all lamps that a ray may meet before this distance, and possibly some more. Their order depends
+  /// only on the ray. `direction` is a unit vector.
   void meet(const Vec3<double>& origin, const Vec3<double>& direction, double distance,
             std::vector<std::size_t>& lamps) const {
     if (!can_be_met_) return;
@@ -119,36 +119,36 @@ class LightTree {
   }
 
  private:
-  /// What the builder ensures.
+  /// Largest depth, which the builder ensures.
   static constexpr std::size_t kMostDeep = 64;
 
   template <class T> using Children = std::array<T, kWidth>;
   struct alignas(64) Node {
-    Children<double> x{}, y{}, z{}, radius{};  // of the bounds
+    Children<double> x{}, y{}, z{}, radius{};  // bounds
     Children<double> to_x{}, to_y{}, to_z{}, cos_cone{}, sin_cone{};
-    Children<double> power{};       // 0: no such child
-    Children<double> near{};        // 1, or 0 for what is far
-    Children<double> met_radius{};  // as radius, with room for rounding; below 0: can't be met
+    Children<double> power{};       // 0: there is no such child
+    Children<double> near{};        // 1, or 0 for distant lamps
+    Children<double> met_radius{};  // radius with a margin for rounding; below 0: can't be met
     Children<int> next{};           // node, or ~lamp
   };
   struct Place {
     std::size_t node = 0, child = 0;
   };
 
-  /// Weight of each child; returns their sum. Not 0 for what can contribute.
+  /// Computes the weight of each child and returns their sum. A child that can contribute has a weight above 0.
   static double weigh(const Node& n, const Vec3<double>& p, const Vec3<double>& normal, double* weights) {
     BRDFC_INDEPENDENT
     for (std::size_t k = 0; k < kWidth; ++k) {
       const double dx = n.x[k] - n.near[k] * p.x, dy = n.y[k] - n.near[k] * p.y, dz = n.z[k] - n.near[k] * p.z;
       const double r = n.radius[k];
       const double inverse = 1 / std::sqrt(maximum(maximum(dx * dx + dy * dy + dz * dz, r * r), kTiny));
-      // For the sine s of the angle under which the bounds are seen about their centre, x + s is above the cosine of
-      // what the angle of cosine x becomes when it shrinks by that angle, and is 0 where this is.
+      // Let s be the sine of the angular radius of the bounds, and x a cosine. Then x + s is an upper bound for the
+      // cosine of x's angle reduced by the angular radius, and is 0 where that cosine is.
       const double s = r * inverse;
       const double cos_i = (dx * normal.x + dy * normal.y + dz * normal.z) * inverse;
-      // The shading normal may be another one, so that lamps near the horizon keep some weight.
+      // The shading normal may differ from this normal, so lamps near the horizon keep some weight.
       const double receives = cos_i + s > 0 ? minimum(maximum(cos_i + s, kLeastCosine), 1.0) : 0.0;
-      // Between the nearest normal of what shines and the direction to the point.
+      // The angle between the direction to the point and the nearest normal of the emitting surfaces.
       const double cos_w = -(dx * n.to_x[k] + dy * n.to_y[k] + dz * n.to_z[k]) * inverse,
                    sin_w = std::sqrt(maximum(1 - cos_w * cos_w, 0.0));
       const double cos_e = cos_w >= n.cos_cone[k] ? 1 : cos_w * n.cos_cone[k] + sin_w * n.sin_cone[k];
@@ -160,9 +160,9 @@ class LightTree {
     return sum;
   }
 
-  /// 1 for each child whose bounds a ray meets, else 0.
+  /// Sets `passes` to 1 for each child whose bounds the ray meets, and to 0 for the others.
   static void pass(const Node& n, const Vec3<double>& o, const Vec3<double>& w, double distance, double* passes) {
-    // What is far counts as a distance of 1, and only where nothing is in the way.
+    // Distant lamps count as lamps at distance 1, and are met only by rays without a limit.
     const double far_limit = distance >= kNever ? kNever : -kNever;
     BRDFC_INDEPENDENT
     for (std::size_t k = 0; k < kWidth; ++k) {
@@ -182,9 +182,9 @@ class LightTree {
 
   struct Builder;
 
-  std::vector<Node> nodes_;     // the root first
-  std::vector<Place> parents_;  // of nodes; the root's is not used
-  std::vector<Place> places_;   // of lamps
+  std::vector<Node> nodes_;     // the first one is the root
+  std::vector<Place> parents_;  // by node; that of the root is not used
+  std::vector<Place> places_;   // by lamp
   bool can_be_met_ = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sampling of everything that shines: lamps and the environment.
+// Light sampling: lamps and the environment.
 #pragma once
 
 #include <algorithm>
@@ -18,26 +18,27 @@ namespace brdfc::reference {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Directions towards lights. pdf == 0: none.
+/// Sampled directions towards lights. pdf == 0 means that there is no direction.
 struct LightSamples {
   Vectors wi;
   Numbers distance;
-  Colors radiance;    ///< or for a point without extent its irradiance facing it
-  Numbers pdf;        ///< per solid angle, times the chance to choose this light; for a delta light the chance alone
+  Colors radiance;    ///< or, for a delta light, irradiance on a surface facing it
+  Numbers pdf;        ///< per solid angle, times the probability of this light; for a delta light the probability alone
   Lanes<bool> delta;  ///< can't be met by a ray
 };
 
-/// Random numbers for them: which light, where, and where else.
+/// Random numbers for light samples: one for the choice of the light, and three for the place on it.
 struct LightNumbers {
   Numbers choice, u1, u2, u3;
 };
 
-/// Importance-sampled equirectangular image: a cell a texel, with the integral of its bilinear reconstruction.
+/// Importance sampling of an equirectangular image. There is one cell for each texel, weighted by the integral of its
+/// bilinear reconstruction.
 class EnvironmentSampler {
  public:
   explicit EnvironmentSampler(const Environment& environment);
   struct Choice {
-    double u = 0;    ///< place along the image, as direction_to_equirectangular() gives it
+    double u = 0;    ///< horizontal place in the image, as in direction_to_equirectangular()
     double z = 0;    ///< sine of the latitude
     double pdf = 0;  ///< per solid angle; 0 if the image is black
 
@@ -48,10 +49,10 @@ class EnvironmentSampler {
     }
   };
   Choice choose(double u1, double u2, double u3) const;
-  /// Density of the direction at that place.
+  /// The pdf of the direction at that place.
   double pdf(double u, double v) const;
-  /// Images are larger than caches. These fetch what will be read soon: pdf() and the colour at a place; and, in two
-  /// steps, each some time after the other, choose() with this u1.
+  /// Prefetching, because images are larger than caches: for pdf() and the colour at a place; and for choose() with
+  /// this u1, in two steps that should be some time apart.
   void fetch(double u, double v) const;
   void fetch_slot(double u1) const { __builtin_prefetch(&cells_[slot(u1 * double(cells_.size()))]); }
   void fetch_cell(double u1) const;
@@ -59,15 +60,15 @@ class EnvironmentSampler {
   double mean() const { return mean_; }
 
  private:
-  /// What is read together lies together.
+  /// Data that are read together are stored together.
   struct Cell {
     double density = 0;  // per solid angle
-    float keep = 1;      // chance to stay, of Vose's alias table
-    int other = 0;       // cell to go to otherwise
+    float keep = 1;      // probability to stay in this cell (Vose's alias table)
+    int other = 0;       // the cell to go to otherwise
   };
   void fetch_texels(int x, int y) const;
   std::size_t slot(double scaled) const { return std::min(std::size_t(scaled), cells_.size() - 1); }
-  /// The cell that u1 chooses.
+  /// The cell that u1 selects.
   unsigned cell(double u1) const {
     const double scaled = u1 * double(cells_.size());
     const std::size_t s = slot(scaled);
@@ -77,42 +78,43 @@ class EnvironmentSampler {
   const Image& image_;
   int width_, height_;
   std::vector<Cell> cells_;  // empty if the image is black
-  std::vector<double> z_;    // sine of latitude at the lower edge of each row, row 0 on top
+  std::vector<double> z_;    // sine of latitude at the lower edge of each row; row 0 is the top row
   double mean_ = 0;
 };
 
 class Lights {
  public:
-  /// `sample_constant`: take directions also from an environment of one colour, which is otherwise left to the
-  /// BRDF's own sampling.
+  /// `sample_constant`: also sample an environment of constant colour. Otherwise only BRDF sampling finds it.
   Lights(const Scene& scene, bool sample_constant, std::size_t most_weighed = kMostWeighed);
 
   bool empty() const { return count_ == 0; }
-  /// Numbers that chances() keeps for a point.
+  /// How many numbers chances() stores for each point.
   std::size_t kept() const { return tree_ ? std::size_t(kKept) : count_; }
 
-  /// Finds with which chances lights are chosen at points with these geometric normals: about in proportion to what
-  /// each can contribute; 0 only for a light that is wholly below the surface or shows its back. `lit` is false where
-  /// no light can contribute. At each `chance` there is room for kept() numbers.
+  /// Computes the probabilities of choosing each light at points with these geometric normals. They are approximately
+  /// proportional to the possible contributions, and 0 only for a light that is entirely below the surface or faces
+  /// away. `lit` is false where no light can contribute. Each element of `chance` has room for kept() numbers.
   void chances(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& chance,
                Lanes<bool>& lit) const;
 
-  /// The chance of light i, the environment being the last one, by what chances() keeps.
+  /// The probability of light i, from the numbers that chances() stored. The environment is the last light.
   double chance(std::size_t i, const double* kept) const;
 
-  /// Where `lit` holds. Of `numbers` those are read that choose() and choose_more() ask for, and where.
+  /// Samples lights for the lanes where `lit` is true. `numbers` need values only where choose() and choose_more() say
+  /// so.
   void sample(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& chance,
               const Lanes<bool>& lit, const LightNumbers& numbers, LightSamples& out) const;
-  /// Does sample() choose among lights, and is there one with more to choose than a place on it?
+  /// Which random numbers sample() needs. choose(): there is more than one light to choose from. choose_more(): for one
+  /// light it takes more than a place on it.
   bool choose() const { return count_ > 1; }
   bool choose_more() const { return image_ && sampled_environment_; }
-  /// What sample() will read of that more with this u1, in two steps as EnvironmentSampler's.
+  /// Prefetches what sample() will read for that light with this u1, in two steps as EnvironmentSampler.
   void fetch_slot(double u1) const { image_->fetch_slot(u1); }
   void fetch_cell(double u1) const { image_->fetch_cell(u1); }
 
-  /// Calls found(k, radiance, pdf) for every light that ray k meets before its distance; `chance` as chances() made it
-  /// at its origin, nullptr for the camera or after a mirror (pdf is 0 then), where the surface has that normal. Lamps
-  /// do not hide each other.
+  /// Calls found(k, radiance, pdf) for every light that ray k meets before its distance. Lamps do not hide each other.
+  /// `normal` is the surface normal at the ray's origin, and `chance` the probabilities that chances() stored there.
+  /// `chance` is nullptr for camera rays and after a mirror; pdf is 0 then.
   template <class Found> void meet(const Rays& rays, const Numbers& distance, std::size_t count, const Vectors& normal,
                                    const Lanes<const double*>& chance, bool from_camera, const Found& found) const {
     if (tree_ && (!from_camera || camera_sees_)) {
@@ -148,65 +150,65 @@ class Lights {
   }
 
  private:
-  /// What sampling needs again and again, as loops over lanes keep it in registers.
+  /// Precomputed data of a lamp, in a form that loops over lanes keep in registers.
   struct Lamp {
-    Vec3<double> position, direction, u, v;  // as Light's
+    Vec3<double> position, direction, u, v;  // as in Light
     double radius;
     Rgb<double> shine;              // radiance, or a delta light's intensity
-    double luminance = 0;           // of radiance x area, or of the intensity
-    double area = 0;                // of a flat lamp
+    double luminance = 0;           // luminance of radiance x area, or of the intensity
+    double area = 0;                // flat lamps only
     double per_u2 = 0, per_v2 = 0;  // 1 / |half axis|^2
-    double cone_pdf = 0;            // of a sun with an angle
+    double cone_pdf = 0;            // suns with an angle only
     double one_minus_cos = 0;
-    bool delta = false;  // no ray can meet it
+    bool delta = false;  // rays can't meet it
   };
 
   /// A direction towards a light.
   struct Sample {
     Vec3<double> wi;
     double distance = kInfinity, pdf = 0;
-    double brightness = 1;  // of what the light shines with
+    double brightness = 1;  // factor on the light's radiance
   };
 
-  /// Calls body with a light's kind as a constant.
+  /// Calls body with the kind of a light as a compile-time constant.
   template <class Body> static void of_kind(Light::Kind kind, const Body& body);
   template <Light::Kind kKind>
   static double weight(const Lamp& lamp, const Vec3<double>& p, const Vec3<double>& normal);
   template <Light::Kind kKind>
   static Sample sample_light(const Lamp& lamp, const Vec3<double>& p, double u1, double u2);
-  /// Density of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
+  /// The pdf of sampling this direction towards the light; 0 if the ray does not meet it before `distance`.
   template <Light::Kind kKind>
   static double pdf_of_hit(const Lamp& lamp, const Vec3<double>& p, const Vec3<double>& direction, double distance);
   void pdfs_of_hit(std::size_t i, const Rays& rays, const Numbers& distance, std::size_t count, Numbers& pdf) const;
   double pdf_of_hit(std::size_t i, const Vec3<double>& p, const Vec3<double>& direction, double distance) const;
 
-  /// What is kept for a point where a tree chooses: the point and its normal, the chance of the environment, and the
-  /// weights of the tree's root.
+  /// Layout of the numbers stored for a point if a tree chooses: the point and its normal, the probability of the
+  /// environment, and the weights of the tree's root.
   enum Kept { kPoint = 0, kNormal = 3, kEnvironment = 6, kRoot = 8, kKept = kRoot + LightTree::kWidth };
   static Vec3<double> vector_at(const double* v) { return {v[0], v[1], v[2]}; }
-  /// Where the chance of the environment is kept.
+  /// Index of the probability of the environment.
   std::size_t environment_place() const { return tree_ ? std::size_t(kEnvironment) : scene_.lights.size(); }
   void weigh_in_tree(const Vectors& p, const Vectors& normal, std::size_t count, const Lanes<double*>& kept,
                      Lanes<bool>& lit) const;
   void choose_in_tree(std::size_t count, const Lanes<double*>& kept, const Lanes<bool>& lit, const Numbers& choice,
                       Lanes<std::size_t>& chosen, Numbers& chance) const;
-  /// Lamps that rays may meet, ray by ray, and how many there are up to each ray.
+  /// The lamps that rays may meet, ray by ray, and for each ray the end of its lamps in the list.
   void meet_in_tree(const Rays& rays, const Numbers& distance, std::size_t count, std::vector<std::size_t>& lamps,
                     Lanes<std::size_t>& ends) const;
   static LampBounds bounds_of(const Light& light, const Lamp& lamp);
 
-  /// Where in the environment's image rays end that leave the scene, as direction_to_equirectangular() gives it; what
-  /// is there will be read soon.
+  /// Places in the environment's image for rays that leave the scene, as in direction_to_equirectangular(). Prefetches
+  /// the image there.
   void places(const Vectors& direction, const Numbers& distance, std::size_t count, Numbers& u, Numbers& v) const;
-  /// Radiance from the environment, which for an image is at this place, and where asked for the density of sampling
-  /// that direction.
+  /// Radiance from the environment; for an image, at place (u, v). If `pdf` is not null, also the pdf of sampling that
+  /// direction.
   Rgb<double> environment(const Vec3<double>& direction, double u, double v, const Vec3<double>& normal,
                           double* pdf) const;
 
   const Scene& scene_;
   std::vector<Lamp> lamps_;
-  std::optional<LightTree> tree_;  // of many lamps
-  bool camera_sees_ = false;       // any lamp
+  std::optional<LightTree> tree_;  // only with many lamps
+  bool camera_sees_ = false;       // at least one lamp
   std::unique_ptr<EnvironmentSampler> image_;
   bool sampled_environment_ = false;
   double environment_weight_ = 0;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sampling patterns: where the samples of a pixel lie in the unit square.
+// Sampling patterns: positions of a pixel's samples in the unit square.
 //
-// K. Suffern, Ray Tracing from the Ground Up, 2007, chapter 5; multi-jittered points: K. Chiu, P. Shirley, C. Wang,
-// Multi-Jittered Sampling, Graphics Gems IV, 1994. The square is cut into columns x rows = count cells, columns the
-// largest divisor of count that is not above its root, so that there are as many points as cells for any count.
+// K. Suffern, Ray Tracing from the Ground Up, 2007, chapter 5. Multi-jittered points: K. Chiu, P. Shirley, C. Wang,
+// Multi-Jittered Sampling, Graphics Gems IV, 1994. The square is divided into columns x rows = count cells, where
+// columns is the largest divisor of count that is not above its square root. Any count therefore has as many points as
+// cells.
 #pragma once
 
 #include <array>
@@ -17,21 +18,21 @@ namespace brdfc::reference {
 
 enum class Pattern {
   Random,         ///< independent points
-  Regular,        ///< the middles of the cells
-  Jittered,       ///< one anywhere in each cell
-  MultiJittered,  ///< one in each cell, and also one in each of `count` columns and of `count` rows
+  Regular,        ///< the centres of the cells
+  Jittered,       ///< one random point in each cell
+  MultiJittered,  ///< one point in each cell, and also one in each of `count` columns and `count` rows
   Hammersley,     ///< (i / count, radical inverse of i); the same points everywhere
 };
 
-/// As scene files and the command line spell them, in the order of Pattern.
+/// The names in scene files and on the command line, in the order of Pattern.
 const std::vector<std::string>& pattern_names();
-/// The pattern of one of pattern_names(); for another name throws std::out_of_range.
+/// The pattern with one of pattern_names(). Throws std::out_of_range for another name.
 Pattern pattern_named(const std::string& name);
 
-/// Van der Corput's sequence: the binary digits of i mirrored at the point, in [0, 1).
+/// Van der Corput's sequence: the binary digits of i, mirrored at the binary point, in [0, 1).
 double radical_inverse(std::uint32_t i);
 
-/// Place of i in a permutation of 0 .. n - 1 that depends on the key. 0 <= i < n.
+/// The place of i in a permutation of 0 .. n - 1 that depends on the key. 0 <= i < n.
 std::uint32_t permuted(std::uint32_t i, std::uint32_t n, std::uint64_t key);
 
 /// The points of a pattern.
@@ -44,8 +45,8 @@ class PatternPoints {
   int count() const { return int(count_); }
   int columns() const { return int(columns_); }
   int rows() const { return int(rows_); }
-  /// Point `index` of count(), in [0, 1)^2. The key chooses one pattern of the kind; Regular and Hammersley have but
-  /// one.
+  /// Point `index` of count(), in [0, 1)^2. The key selects one of many patterns of the kind; there is only one Regular
+  /// and one Hammersley pattern.
   std::array<double, 2> point(int index, std::uint64_t key) const;
 
  private:
@@ -53,12 +54,12 @@ class PatternPoints {
   std::uint32_t count_, columns_, rows_;
 };
 
-/// The random numbers of one path, by dimension; each is to be used once. Under Pattern::Random they are those of
-/// Random. Otherwise the samples of a pixel share a pattern for each dimension, in an order of its own, so that the
-/// dimensions know nothing of each other.
+/// The random numbers of one path, by dimension. Each is to be used once. Under Pattern::Random they are those of
+/// Random. Otherwise the samples of a pixel share a pattern for each dimension, in an order that differs between
+/// dimensions, so that the dimensions are independent.
 class PathSampler {
  public:
-  /// Sample `sample` of points.count() of a pixel; later ones are random.
+  /// For sample number `sample` of the points.count() samples of a pixel. Later samples are random.
   PathSampler(const PatternPoints& points, std::uint64_t seed, std::uint64_t pixel, int sample)
       : points_(points),
         random_key_(Random(seed, pixel, std::uint64_t(sample)).key()),
@@ -68,11 +69,11 @@ class PathSampler {
   }
 
   bool in_pattern() const { return in_pattern_; }
-  /// Of Random, with first() for the first number of a dimension and the next one for the second.
+  /// The key for Random::at(). The first number of a dimension has index first(), the second the next index.
   std::uint64_t random_key() const { return random_key_; }
   static constexpr std::uint64_t first(std::uint64_t dimension) { return 2 * dimension; }
 
-  /// Of no pattern.
+  /// A random number that is not from the pattern.
   double random(std::uint64_t dimension) const { return Random::at(random_key_, first(dimension)); }
   double one(std::uint64_t dimension) const { return in_pattern_ ? point(dimension)[0] : random(dimension); }
   std::array<double, 2> two(std::uint64_t dimension) const {

@@ -8,21 +8,22 @@
 
 namespace brdfc::reference {
 
-/// SplitMix64 (G. Steele, D. Lea, C. Flood, 2014), begun at a hash of seed, pixel and sample: numbers of its own for
-/// each path, so that a picture does not depend on the order or number of threads.
+/// SplitMix64 (G. Steele, D. Lea, C. Flood, 2014), started at a hash of seed, pixel and sample. Each path has its own
+/// numbers, so a picture does not depend on the order or number of threads.
 class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t pixel, std::uint64_t sample) : key_(mix(mix(mix(seed) + pixel) + sample)) {}
 
-  /// Chooses the numbers.
+  /// The key that determines the numbers.
   std::uint64_t key() const { return key_; }
-  /// Number `index` of a key, uniform in [0, 1), a multiple of 2^-52.
+  /// Number `index` for a key: uniform in [0, 1), a multiple of 2^-52.
   static double at(std::uint64_t key, std::uint64_t index) {
-    // As the significand of a number in [1, 2): more instruction sets have vectors of that than of a conversion.
+    // The bits become the significand of a number in [1, 2): more instruction sets have vector instructions for that
+    // than for a conversion.
     const std::uint64_t significand = mix(key + index * 0x9e3779b97f4a7c15ULL) >> 12;
     return std::bit_cast<double>(0x3ff0000000000000ULL | significand) - 1;
   }
-  /// One after the other.
+  /// The next number.
   double uniform() { return at(key_, ++last_); }
   Vec3<double> uniform3() {
     const double a = uniform(), b = uniform();

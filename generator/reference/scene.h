@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scenes as both renderers see them. The file format is described in scenes/schema.json.
+// Scenes, as both renderers read them. scenes/schema.json describes the file format.
 //
 // Lengths are in scene units, z is up, angles in degrees. Lights have Blender's units and conventions, measured
 // with a white Lambert plane in Cycles:
@@ -25,29 +25,29 @@
 
 namespace brdfc::reference {
 
-/// Which samples are taken of light that does not come from a mirror; all give the same mean.
+/// Sampling techniques for light that does not come from a mirror. All give the same mean.
 enum class Strategy {
-  Mis,    ///< both, weighted by the power heuristic
-  Brdf,   ///< the BRDF's directions alone (and lamps that no ray can meet)
-  Light,  ///< the lights' directions alone
+  Mis,    ///< both techniques, combined by the power heuristic
+  Brdf,   ///< BRDF sampling alone (and lamps that rays can't meet)
+  Light,  ///< light sampling alone
 };
 
-/// As scene files and the command line spell them, in the order of Strategy.
+/// The names in scene files and on the command line, in the order of Strategy.
 const std::vector<std::string>& strategy_names();
-/// The strategy of one of them.
+/// The strategy with one of strategy_names().
 Strategy strategy_named(const std::string& name);
 
 struct RenderSettings {
   int width = 256, height = 256;
   int spp = 64;
   int seed = 0;
-  /// Scatterings after the first: 0 is direct light alone, as in Cycles.
+  /// Scattering events after the first: 0 is direct light only, as in Cycles.
   int max_bounces = 8;
-  /// Radiance changes with the squared index where it is refracted, as in nature; Cycles leaves it as it is.
+  /// Scale radiance by the squared index at refraction, as is physically correct. Cycles does not scale it.
   bool scale_radiance = false;
-  /// Of the samples of a pixel; the variance layer then states more noise than there is.
+  /// Pattern of a pixel's samples. With a pattern other than Random, the variance layer overestimates the noise.
   Pattern pattern = Pattern::Random;
-  Strategy strategy = Strategy::Mis;  ///< of paths from the camera
+  Strategy strategy = Strategy::Mis;  ///< for paths from the camera
 };
 
 struct Camera {
@@ -59,9 +59,9 @@ struct Camera {
 struct Material {
   std::string id;
   const Model* model = nullptr;
-  ParamValues values;  ///< complete; for a textured parameter the mean of its texture
+  ParamValues values;  ///< a value for every parameter; for a textured one the mean of its texture
   std::map<std::string, std::shared_ptr<const Image>> textures;
-  std::set<std::string> varying;  ///< parameters that something not known here sets; only from load_materials()
+  std::set<std::string> varying;  ///< parameters whose values vary and are not known here; only from load_materials()
   std::string representation = "auto";
 };
 
@@ -72,7 +72,7 @@ struct Transform {
 
   Vec3<double> vector(const Vec3<double>& v) const;
   Vec3<double> point(const Vec3<double>& p) const { return vector(p) + translation; }
-  /// Direction of a normal: by the inverse transpose.
+  /// Transforms the direction of a normal, by the inverse transpose.
   Vec3<double> normal(const Vec3<double>& n) const;
 };
 
@@ -81,7 +81,7 @@ struct Object {
   std::shared_ptr<const Mesh> mesh;
   Transform transform;
   int material = 0;
-  bool camera_only = false;  ///< unseen by all rays but those from the camera; casts no shadow
+  bool camera_only = false;  ///< visible to camera rays only; casts no shadow
 };
 
 struct Light {
@@ -89,10 +89,10 @@ struct Light {
   Kind kind = Kind::Point;
   std::string key;         ///< place in the file, for messages
   Vec3<double> position;   ///< centre
-  Vec3<double> direction;  ///< in which it shines; unit length
+  Vec3<double> direction;  ///< in which it emits; unit length
   Vec3<double> u, v;       ///< area: half axes
-  double radius = 0;       ///< point: of the sphere; sun: sine of half the angular diameter
-  Rgb<double> radiance;    ///< of what has an extent
+  double radius = 0;       ///< point: radius of the sphere; sun: sine of half the angular diameter
+  Rgb<double> radiance;    ///< for lights with a size
   Rgb<double> intensity;   ///< point of radius 0: W/sr; sun of angle 0: W/m^2 facing it
   bool camera_visible = false;
 };
@@ -103,7 +103,7 @@ struct Environment {
   double strength = 1;                 ///< factor on the image
 
   Rgb<double> radiance(const Vec3<double>& direction) const;
-  /// At a place of the image, as direction_to_equirectangular() gives it.
+  /// Radiance at a place of the image, as in direction_to_equirectangular().
   Rgb<double> radiance(double u, double v) const {
     return bilinear(*image, u, v, Wrap::Repeat, Wrap::Clamp) * strength;
   }
@@ -111,7 +111,7 @@ struct Environment {
 
 struct Scene {
   std::string name, description;
-  std::string working_space;  ///< of working_spaces(), by name, if the file asks for one
+  std::string working_space;  ///< name of one of working_spaces(), if the file asks for one
   RenderSettings settings;
   Camera camera;
   std::vector<Material> materials;
@@ -119,38 +119,38 @@ struct Scene {
   std::vector<Light> lights;
   Environment environment;
 
-  /// What was assumed or left out of its files, and how many triangles each mesh file has: lines for people.
+  /// Lines for people: what was assumed or left out of files, and the number of triangles in each mesh file.
   std::vector<std::string> notes;
 
-  /// The same scene with every default written out and meshes and images named by their content.
+  /// The scene with every default written out, and with meshes and images named by their content.
   nlohmann::json resolved;
-  std::map<std::string, std::shared_ptr<const Mesh>> mesh_files;    ///< by the stem of their names
+  std::map<std::string, std::shared_ptr<const Mesh>> mesh_files;    ///< by the stem of the file name
   std::map<std::string, std::shared_ptr<const Image>> image_files;  ///< by file name
-  /// 16 hexadecimal digits: equal for scenes that look the same at equal settings.
+  /// 16 hexadecimal digits. Equal for scenes that look the same at equal settings.
   std::string hash;
 };
 
-/// Triangles that renderers may copy because objects share a mesh: a quarter of a gigabyte.
+/// Limit for triangles that renderers may copy if objects share a mesh: a quarter of a gigabyte.
 inline constexpr std::size_t kMostCopies = std::size_t(1) << 21;
 
-/// Lamps up to which each of them is weighed wherever one is chosen; of more a tree chooses.
+/// Number of lamps up to which each gets a weight whenever a lamp is chosen. With more lamps a light tree chooses.
 inline constexpr std::size_t kMostWeighed = 8;
 
-/// Throws InputError naming the file, the key and what was expected.
+/// Reads a scene. Throws InputError that names the file, the key and what was expected.
 Scene load_scene(const std::filesystem::path& path);
 
-/// What a .blend uses.
+/// The models and lamps that a .blend uses.
 struct UsedMaterials {
   std::vector<Material> materials;
-  std::vector<std::string> sizeless_lamps;  ///< names of lamps that are points, or suns without an angle
-  std::optional<int> lamps;                 ///< how many there are to aim at, if the file says so
+  std::vector<std::string> sizeless_lamps;  ///< points and spots without a radius, suns without an angle
+  std::optional<int> lamps;                 ///< number of lamps to aim at, if the file gives it
 };
-/// A file that has nothing but the schema's "materials", with {"varies": true} in place of the value of a parameter
-/// that is not constant, "sizeless_lamps", a list of names, if there are any, and "lamps", how many there are. Throws
-/// as load_scene().
+/// Reads a file of materials alone: "materials" as in the schema, with {"varies": true} as the value of a parameter
+/// that is not constant; "sizeless_lamps", a list of names, if there are any; and "lamps", the number of lamps to aim
+/// at. Throws as load_scene().
 UsedMaterials load_materials(const std::filesystem::path& path);
 
-/// Writes scene.json, the meshes as .npy and the images as .exr into the folder, scene.json last.
+/// Writes the resolved scene into a folder: the meshes as .npy, the images as .exr, and scene.json last.
 void write_resolved(const Scene& scene, const std::filesystem::path& folder);
 
 }  // namespace brdfc::reference

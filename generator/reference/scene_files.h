@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the parts of a scene file are read with: the scene that they fill, the files that they name, and what is said of
-// these.
+// Context for the readers of a scene file's parts: the scene that they fill, the files that the scene names, and notes
+// about these.
 #pragma once
 
 #include <filesystem>
@@ -18,10 +18,10 @@ inline constexpr double kBright = 1e9;  ///< largest power, irradiance or radian
 
 inline Vec3<double> vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
-/// A scene while its file is read.
+/// A scene that is being read.
 class SceneFiles {
  public:
-  /// `path`: of the scene file, beside which the others are.
+  /// `path` is the scene file. The other files are relative to its folder.
   explicit SceneFiles(const std::filesystem::path& path) : path_(path) {}
 
   Scene scene;
@@ -29,7 +29,7 @@ class SceneFiles {
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path beside(const std::string& name) const;
 
-  /// What read(path) gives of the file that a key names. One that can't be used is reported with the key.
+  /// Calls read(path) for the file that a key names. If the file can't be used, the error names the key.
   template <class Read> auto read_file(const JsonView& where, Read read) const
       -> decltype(read(std::filesystem::path())) {
     const std::filesystem::path file = beside(where.text());
@@ -40,18 +40,18 @@ class SceneFiles {
     }
   }
 
-  /// Takes the working space that the scene asks for.
+  /// Sets the working space that the scene asks for.
   void read_working_space(const JsonView&);
   const ColorConfig& colors() const { return with_working_space_ ? *with_working_space_ : ColorConfig::current(); }
 
-  /// Says something once.
+  /// Adds a note, unless it was added before.
   void note(const std::string& text);
 
-  /// An image in the working space, of a file in this space.
+  /// Reads an image, whose file has the colour space `space`, and converts it to the working space.
   Image read_picture(const JsonView&, const std::string& space);
-  /// What an image's "colorspace" says, "auto" without it.
+  /// The value of an image's "colorspace"; "auto" if it has none.
   std::string read_colorspace(const JsonView&) const;
-  /// One copy of each image and mesh; `name`, and the stem of the mesh's files, are by their content.
+  /// Stores one copy of each image and mesh. `name`, and the stem of the mesh's files, are derived from the content.
   std::shared_ptr<const Image> keep(Image image, std::string& name);
   std::shared_ptr<const Mesh> keep(Mesh mesh, std::string& stem);
 
@@ -60,16 +60,16 @@ class SceneFiles {
   std::optional<ColorConfig> with_working_space_;
 };
 
-/// Sixteen hexadecimal digits of a text.
+/// A hash of a text, as 16 hexadecimal digits.
 std::string short_hash(const std::string& text);
 
-/// What the key "materials" says. `alone`: in a file as load_materials() reads it.
+/// Reads the key "materials". `alone`: in a file for load_materials().
 void read_materials(const JsonView&, SceneFiles&, bool alone);
-/// The same of "objects", of a scene that has its materials.
+/// Reads "objects". The scene's materials must have been read.
 void read_objects(const JsonView&, SceneFiles&);
-/// One of "lights".
+/// Reads one of "lights".
 void read_light(const JsonView&, SceneFiles&);
-/// "environment", which a scene may lack.
+/// Reads "environment", which is optional.
 void read_environment(const std::optional<JsonView>&, SceneFiles&);
 
 }  // namespace brdfc::reference

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Materials as tracers evaluate them.
+// Materials, in the form that tracers evaluate.
 #pragma once
 
 #include <array>
@@ -14,14 +14,15 @@
 
 namespace brdfc::reference {
 
-inline constexpr int kRouletteStart = 3;  ///< scatterings before a path may be ended by chance
+inline constexpr int kRouletteStart = 3;  ///< scattering events before Russian roulette may end a path
 
-/// Where ideal refraction goes, and with what.
+/// The index of refraction that a path follows, and its throughput.
 struct Bent {
   double ior;
   Rgb<double> throughput;
 };
-/// Where channels are bent apart one of them is followed, as often as it carries light. u in [0, 1).
+/// Chooses the index for a path. If the channels have different indices, one channel is chosen, with a probability
+/// proportional to its throughput. u is in [0, 1).
 inline Bent bend(const std::array<double, 3>& iors, const Rgb<double>& throughput, double u) {
   if (iors[0] == iors[1] && iors[1] == iors[2]) return {iors[1], throughput};
   const auto& [r, g, b] = throughput;
@@ -31,7 +32,7 @@ inline Bent bend(const std::array<double, 3>& iors, const Rgb<double>& throughpu
   return {iors[2], {0, 0, b > 0 ? all : 0}};
 }
 
-/// A material ready to be evaluated, with what is known about it beforehand.
+/// A material ready for evaluation, with precomputed properties.
 class Surface {
  public:
   explicit Surface(const Material& material)
@@ -43,7 +44,7 @@ class Surface {
         has_transmit_(material.model->has_transmit()),
         has_medium_(material.model->has_medium()),
         through_(brdf_->scatters_through()) {
-    if (!has_scatter_ || !(has_mirror_ || has_transmit_)) return;  // nothing to choose between
+    if (!has_scatter_ || !(has_mirror_ || has_transmit_)) return;  // no choice between lobe and delta terms
     Random random(0, 0, 0);
     for (int i = 0; i < kCosines; ++i) {
       double sum = 0;
@@ -62,12 +63,12 @@ class Surface {
   bool has_transmit() const { return has_transmit_; }
   bool has_medium() const { return has_medium_; }
   bool scatters_through() const { return through_; }
-  /// Whether shading normals are bent (model/horizon.h): those of matte models, which have no mirror direction, are
+  /// Whether shading normals are bent (model/horizon.h). Those of matte models, which have no mirror direction, are
   /// not.
   bool bends_normals() const { return material_.model->info().look != Look::Matte; }
 
-  /// Chance to follow one of the delta terms, whose weights add up to `delta`, rather than to sample the rest. Any
-  /// number strictly between 0 and 1 is unbiased where both exist; the estimate of the rest's albedo only keeps the
+  /// Probability of following one of the delta terms, whose weights add up to `delta`, instead of sampling the rest.
+  /// Any number strictly between 0 and 1 is unbiased if both exist. The estimated albedo of the rest only keeps the
   /// weights even.
   double delta_chance(const Rgb<double>& delta, double cosine) const {
     const double m = luminance(delta);
@@ -77,7 +78,7 @@ class Surface {
     return std::min(std::max(m / (m + rest), 0.05), 0.95);
   }
 
-  /// BRDFs to bind anew at each place, for a thread; nullptr if they are the same everywhere.
+  /// BRDFs that a thread binds anew at each place; nullptr if they are the same everywhere.
   struct Scratch {
     std::unique_ptr<Brdf<double>> brdf;
     std::unique_ptr<PackedBrdf> packed;
@@ -86,7 +87,7 @@ class Surface {
     if (material_.textures.empty()) return {};
     return {material_.model->make_double(material_.values), material_.model->make_packed(material_.values)};
   }
-  /// The BRDF at texture coordinates, until `scratch` is bound to other ones.
+  /// The BRDF at texture coordinates, valid until `scratch` is bound to others.
   const Brdf<double>& at(double u, double v, Scratch& scratch) const {
     if (!scratch.brdf) return *brdf_;
     for (const auto& [name, image] : material_.textures) {
@@ -95,7 +96,7 @@ class Surface {
     }
     return *scratch.brdf;
   }
-  /// The same for as many places as there are lanes; place(k) gives texture coordinates.
+  /// The same for kLanes places. place(k) returns texture coordinates.
   template <class Place> const PackedBrdf& at(const Place& place, Scratch& scratch) const {
     if (!scratch.packed) return *packed_;
     for (const auto& [name, image] : material_.textures) {
@@ -119,7 +120,7 @@ class Surface {
   }
 
   void check(const char* what, const Vec3<double>& wi, const Vec3<double>& wo, const Rgb<double>& value) const {
-    // Written so that NaN fails.
+    // Written so that NaN fails the test.
     const auto good = [](double x) { return x >= 0 && x < kInfinity; };
     if (!(good(value.r) && good(value.g) && good(value.b))) bad_value(what, wi, wo, value);
   }
@@ -133,13 +134,13 @@ class Surface {
   std::array<double, kCosines> albedo_{};
 };
 
-/// What a thread needs beside the surfaces, which are shared.
+/// Per-thread data for the surfaces, which threads share.
 class SurfaceScratch {
  public:
   explicit SurfaceScratch(const std::vector<Surface>& surfaces) {
     for (const Surface& s : surfaces) brdfs_.push_back(s.make_scratch());
   }
-  /// What Surface::at() asks for.
+  /// The scratch that Surface::at() asks for.
   Surface::Scratch& of(int material) { return brdfs_[std::size_t(material)]; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From how far aside the materials of a scene can be seen.
+// View angles at which the materials of a scene can be seen.
 #pragma once
 
 #include <vector>
@@ -9,9 +9,10 @@
 
 namespace brdfc::reference {
 
-/// For each material bounds on what it is shaded at, certain but for rounding. Less than all only where camera rays
-/// alone are shaded: with max_bounces 0, or where the whole scene is convex, so that what was scattered meets nothing;
-/// and where no material lets light through, for such rays Cycles does not count.
+/// For each material, bounds for the cosine at which it is shaded. They are certain up to rounding. They are narrower
+/// than all views only if two conditions hold. Only camera rays are shaded: max_bounces is 0, or the whole scene is
+/// convex, so that scattered light meets nothing. And no material lets light through, because Cycles does not count
+/// such rays.
 std::vector<Cosines> seen_cosines(const Scene&);
 
 }  // namespace brdfc::reference

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Error over run time, as SVG.
+// Charts of error over run time, as SVG.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace brdfc::report {
 
-/// Appends a chart of all scenes at once: error (logarithmic) over cost (logarithmic), a colour a form. Pointing at a
-/// dot says what it is. Nothing for less than two dots.
+/// Appends a chart of all scenes: error over cost, both on logarithmic axes, with one colour for each form. A tooltip
+/// describes each dot. With less than two dots nothing is appended.
 void put_overview(std::string& out, const std::vector<SceneReport>&);
-/// Appends one of a scene: error (logarithmic) over cost, one point a form, the expected noise as a dashed line each.
-/// Nothing for less than two forms.
+/// Appends a chart of one scene: error (logarithmic) over cost, with one point for each form and its expected noise as
+/// a dashed line. With less than two forms nothing is appended.
 void put_chart(std::string& out, const SceneReport&);
 
 }  // namespace brdfc::report

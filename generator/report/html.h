@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the report page writes text and numbers.
+// Formatting of text and numbers for the report page.
 #pragma once
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the page calls forms and scenes, and what it marks them with.
+// Labels of forms and scenes on the report page.
 #pragma once
 
 #include <set>
@@ -10,17 +10,18 @@
 
 namespace brdfc::report {
 
-/// Is the form one of Blender's own nodes?
+/// True if the form is one of Blender's own nodes.
 bool is_native(const FormReport&);
-/// What people call it.
+/// The form's name for people.
 std::string label(const FormReport&);
-/// Names of all forms of some scenes: Blender's own nodes first, else as they come.
+/// Names of all forms in these scenes: Blender's own nodes first, then the others in order of appearance.
 std::vector<std::string> all_forms(const std::vector<SceneReport>&);
-/// Pareto: no form of the scene is better in error and not worse in time, or the other way round.
+/// True if the form is on the Pareto front of the scene: no other form is better in error or time without being worse
+/// in the other.
 bool on_front(const SceneReport&, const FormReport&);
-/// Models of all forms of a scene, as words for the filter.
+/// Models of all forms of a scene, as words for the page's filter.
 std::set<std::string> models_of(const SceneReport&);
-/// The attribute that the filter looks at.
+/// The HTML attribute that the page's filter reads.
 std::string marked(const SceneReport&);
 
 }  // namespace brdfc::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The style sheet of the report page. Inlined into the page, which loads nothing but its images.
+// The style sheet of the report page. It is inlined into the page, which loads nothing but its images.
 #pragma once
 
 namespace brdfc::report {

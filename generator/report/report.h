@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Error against run time for every scene and form: a page to look at, JSON and CSV to compute with.
+// The report: error against run time for every scene and form, as a page, as JSON and as CSV.
 //
-// Input: a folder with one folder a scene, each holding `runs.json` and the images it names:
+// Input: a folder with one folder for each scene, which contains `runs.json` and the images that it names:
 //
 //   {
 //     "format": 1,
@@ -12,36 +12,36 @@
 //       "image": "reference.exr",            radiance, with its variance layer
 //       "spp": 1024, "wall_seconds": 3.1
 //     },
-//     "runs": [                              one element a form; "glossy", "principled", "metallic" are Blender's own
-//     nodes
+//     "runs": [                              one element per form; "glossy", "principled" and "metallic" are
+//                                            Blender's own nodes
 //       {
 //         "form": "exact",                   unique within the scene
-//         "images": ["exact-0.exr", ...],    equal samples, different seeds; their mean is shown
-//         "spp": 64,                         samples a pixel of each image
-//         "cpu_seconds": [1.9, ...],         one an image: rendering alone, all threads together
-//         "wall_seconds": [1.0, ...],        one an image
+//         "images": ["exact-0.exr", ...],    equal numbers of samples, different seeds; their mean is shown
+//         "spp": 64,                         samples per pixel of each image
+//         "cpu_seconds": [1.9, ...],         one per image: rendering only, sum of all threads
+//         "wall_seconds": [1.0, ...],        one per image
 //         "materials": [                     may be empty (Blender's own nodes)
 //           {"id": "ball", "model": "coupled", "representation": "exact", "closures": 3,
 //            "error": {"relative_l1": 0.0, "albedo": 1e-7, "note": "..."}}     error: null = not measured
 //         ]
 //       }
 //     ],
-//     "convergence": [                       optional: the same scene, smaller, with more and more samples
+//     "convergence": [                       optional: the same scene, smaller, with increasing numbers of samples
 //       {"form": "exact", "spp": 16, "images": ["convergence/exact-16-1.exr", ...], "cpu_seconds": [0.4, ...]}
 //     ],
-//     "provenance": {"Blender": "4.5.15", ...},   text by name, shown at the end of the page
+//     "provenance": {"Blender": "4.5.15", ...},   names and texts, shown at the end of the page
 //     "commands": ["build/brdfc render ...", ...]
 //   }
 //
-// A file flip.json beside it, if there is one, holds {"FORM": mean FLIP of its picture against the reference, ...}.
+// An optional file flip.json beside it contains {"FORM": mean FLIP of its picture against the reference, ...}.
 //
-// A file links.json in the folder itself, if there is one, holds {"TEXT": "../demo-5.0/index.html", ...}: pages of the
-// same scenes in other versions of Blender, which the page links on its top.
+// An optional file links.json in the report's folder contains {"TEXT": "../demo-5.0/index.html", ...}: pages of the
+// same scenes in other versions of Blender, which are linked at the top of the page.
 //
-// CPU times of different forms are comparable when images with the same index were rendered in turns in one
-// process; the cost of a form is the median over the images of its time divided by the time of "glossy": of the images
-// for "convergence" with one number of samples where those took longer, and of none where "glossy" took less than
-// kShortestTime.
+// CPU times of different forms are comparable if images with the same index were rendered in turns in one process. The
+// cost of a form is its CPU time divided by that of "glossy", as the median over the images. If the images for
+// "convergence" with one number of samples took longer, the cost is computed from those. If "glossy" took less than
+// kShortestTime, there is no cost.
 #pragma once
 
 #include <filesystem>
@@ -55,50 +55,52 @@
 
 namespace brdfc::report {
 
-/// The form that is Blender's own Glossy node.
+/// The name of the form that is Blender's own Glossy node.
 inline constexpr const char* kNativeForm = "glossy";
 
-/// CPU seconds. Of shorter times, differences of two renders, a good part is chance.
+/// CPU seconds. Shorter times are too uncertain, because they are differences of two renders.
 inline constexpr double kShortestTime = 0.5;
 
 struct MaterialForm {
   std::string id, model, representation;
   int closures = 0;
-  std::optional<double> relative_l1, albedo_error;  ///< of the form, as measured when it was compiled
+  std::optional<double> relative_l1, albedo_error;  ///< errors of the form, as measured when it was compiled
 };
 
-/// Noise of one picture with so many samples a pixel, and what it cost.
+/// Noise and time of one picture with `spp` samples per pixel.
 struct ConvergencePoint {
   int spp = 0;
-  double noise = 0;                 ///< relMSE of one picture against its own expectation
+  double noise = 0;                 ///< relMSE of a picture against its own expectation
   std::vector<double> cpu_seconds;  ///< of each picture
 };
 
-/// Samples a pixel at which forms are compared at equal error.
+/// Numbers of samples of the Glossy node at which forms are compared at equal error.
 inline constexpr int kEqualErrorAt[] = {16, 256, 1024};
 
 struct FormReport {
   std::string form;
   std::vector<std::string> images;
-  int spp = 0;  ///< of all images together
+  int spp = 0;  ///< samples per pixel of all images together
   std::vector<double> cpu_seconds, wall_seconds;
   std::vector<MaterialForm> materials;
   Difference difference;
-  std::optional<WelchTest> test;              ///< of several images against the reference
+  std::optional<WelchTest> test;              ///< several images against the reference
   std::optional<double> flip;                 ///< mean FLIP, if flip.json has it
-  std::vector<ConvergencePoint> convergence;  ///< by increasing samples
-  /// CPU time to the noise that Blender's Glossy node has with kEqualErrorAt samples, in units of the time that takes.
+  std::vector<ConvergencePoint> convergence;  ///< in order of increasing samples
+  /// CPU time to reach the noise that Blender's Glossy node has with kEqualErrorAt samples, in units of the node's
+  /// time.
   std::vector<std::optional<double>> equal_error;
-  /// What the time that Blender's Glossy node takes for all its images is enough for: this many of them, their mean
-  /// and its difference from the reference. 0 if the cost is not known.
+  /// Equal-time comparison: the number of images that fit into the time of all images of Blender's Glossy node, their
+  /// mean, and the difference from the reference. The number is 0 if the cost is not known.
   int equal_time_images = 0;
   reference::Rendering equal_time_picture;
   Difference equal_time;
-  /// CPU time / CPU time of Blender's Glossy node; nothing if that was not rendered, or in less than kShortestTime.
+  /// CPU time divided by that of Blender's Glossy node; nullopt if the node was not rendered, or in less than
+  /// kShortestTime.
   std::optional<double> cost;
   reference::Rendering picture;  ///< mean of the images
 
-  /// Largest over the materials; nothing if there is none.
+  /// The largest over the materials; nullopt if there are none.
   std::optional<int> closures() const;
   std::optional<double> relative_l1() const;
 };
@@ -115,59 +117,59 @@ struct SceneReport {
   std::vector<std::string> commands;
 };
 
-/// Reads every scene under `folder`, in alphabetical order. Throws InputError naming the file and the key where
-/// something is missing, malformed or, in an image, not finite.
+/// Reads every scene under `folder`, in alphabetical order. Throws InputError that names the file and the key if
+/// something is missing or malformed, or if an image is not finite.
 std::vector<SceneReport> load_report(const std::filesystem::path& folder);
 
-/// What the closure conformance tests measured of one closure.
+/// Results of the closure conformance tests for one closure.
 struct ConformanceRow {
   std::string closure;
-  std::string verdict;                  ///< ok, fault, or mended: a known fault that is gone
-  std::optional<double> evaluation_l1;  ///< of its evaluation against our definition; none for deltas
-  double sampling_share = 0;            ///< light found by its own sampling against its evaluation, -1; 0 within noise
-  double sampling_resolution = 0;       ///< the smallest share that would have been noticed
-  std::string fault;                    ///< in words
+  std::string verdict;                  ///< "ok", "fault", or "mended" for a known fault that no longer occurs
+  std::optional<double> evaluation_l1;  ///< evaluation against this project's definition; nullopt for deltas
+  double sampling_share = 0;            ///< light by its own sampling / light by evaluation - 1; 0 if within noise
+  double sampling_resolution = 0;       ///< smallest difference that would have been detected
+  std::string fault;                    ///< description of the fault
 };
 struct ConformanceTable {
   std::string blender;  ///< version
   std::vector<ConformanceRow> rows;
 };
 
-/// The tables that tests/blender/test_conformance.py writes, VERSION.json each; none without such a folder. Throws
-/// InputError naming file and key.
+/// Reads the tables that tests/blender/test_conformance.py writes, one VERSION.json each; empty if there is no such
+/// folder. Throws InputError that names file and key.
 std::vector<ConformanceTable> load_conformance(const std::filesystem::path& folder);
-/// Appends the page's section about closures, nothing without tables.
+/// Appends the page's section about closures; nothing if there are no tables.
 void put_conformance(std::string& page, const std::vector<ConformanceTable>&);
 
-/// Previews made for the page; names are relative to the report's folder.
+/// Preview images for the page. Names are relative to the report's folder.
 struct Previews {
   struct Form {
     std::string picture, difference;
     std::string p_values;    ///< empty if there was no test
-    std::string equal_time;  ///< empty if that is not known
+    std::string equal_time;  ///< empty if it is not known
   };
   std::string reference;
-  std::vector<Form> forms;   ///< in the order of the scene's forms
-  double exposure = 1;       ///< factor before the sRGB curve, common to all pictures of the scene
-  double difference_at = 0;  ///< radiance difference at the ends of the colour map
+  std::vector<Form> forms;   ///< in the same order as the scene's forms
+  double exposure = 1;       ///< factor before the sRGB curve, the same for all pictures of the scene
+  double difference_at = 0;  ///< difference in radiance at the ends of the colour map
 };
 
-/// Writes the PNG files of one scene into folder/scene.
+/// Writes the PNG files of one scene to folder/scene.
 Previews write_previews(const std::filesystem::path& folder, const SceneReport&);
 
-/// Addresses of other pages by what they are called; none without links.json in the folder. Throws InputError naming
+/// Links to other pages, by their text; empty if there is no links.json in the folder. Throws InputError that names
 /// file and key.
 std::map<std::string, std::string> load_links(const std::filesystem::path& folder);
 
-/// The page's text; `previews` in the order of `scenes`.
+/// The HTML of the page. `previews` are in the order of `scenes`.
 std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews,
                         const std::vector<ConformanceTable>& closures, const std::map<std::string, std::string>& links);
 std::string report_json(const std::vector<SceneReport>& scenes);
 std::string report_csv(const std::vector<SceneReport>& scenes);
 
-/// Writes index.html, report.json, report.csv and the previews; what the conformance tests found is taken from the
-/// folder `conformance` beside this one, if there is one. Throws as load_report, and InputError when the
-/// folder can't be written. Returns what it measured.
+/// Writes index.html, report.json, report.csv and the previews. Results of the conformance tests are read from the
+/// folder `conformance` beside this one, if it exists. Throws as load_report(), and InputError if the folder can't be
+/// written. Returns the measured scenes.
 std::vector<SceneReport> write_report(const std::filesystem::path& folder);
 
 }  // namespace brdfc::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers on a grid with named axes: what a table is, and how it is looked up.
+// Tables: numbers on a grid with named axes, and how to look them up.
 #pragma once
 
 #include <algorithm>
@@ -16,39 +16,40 @@
 
 namespace brdfc::inline tables {
 
-/// What a table runs over.
+/// An axis of a table.
 struct TableAxis {
-  std::string name;                     ///< a parameter's, "cos_theta_o" or another quantity's
-  AxisScale scale = AxisScale::Linear;  ///< on which values between two knots are interpolated linearly
-  std::vector<double> values;  ///< knots in units of the quantity, increasing, at least 2; beyond the ends those serve
-  bool even = false;           ///< the knots are evenly spaced from 0 to 1 on a linear scale: see even_axis()
+  std::string name;                     ///< name of a parameter, "cos_theta_o" or another quantity
+  AxisScale scale = AxisScale::Linear;  ///< scale of the linear interpolation between two knots
+  std::vector<double> values;           ///< at least 2 increasing knots, in units of the quantity; clamped at the ends
+  bool even = false;                    ///< knots are evenly spaced from 0 to 1 on a linear scale: see even_axis()
 
   int size() const { return int(values.size()); }
   bool operator==(const TableAxis&) const = default;
 };
-/// `size` knots, evenly spaced from 0 to 1.
+/// An axis with `size` knots, evenly spaced from 0 to 1.
 TableAxis even_axis(std::string name, int size);
 
 struct Table {
-  std::string name;             ///< an identifier, that of its array in OSL; may be empty if formulas don't look it up
-  std::vector<TableAxis> axes;  ///< none for a constant
-  int channels = 1;             ///< 1, the same in red, green and blue; or 3
+  std::string name;             ///< identifier of the array in OSL; may be empty if no formula looks the table up
+  std::vector<TableAxis> axes;  ///< empty for a constant
+  int channels = 1;             ///< 1, if red, green and blue are the same; otherwise 3
   std::vector<double> values;   ///< row-major, first axis slowest, channel innermost; may be negative
-  double error = 0;             ///< largest known difference from what it stands for, in units of the values
+  double error = 0;             ///< largest known difference from the tabulated quantity, in units of the values
 
-  /// Values of a channel.
+  /// Number of values in one channel.
   std::size_t points() const { return values.size() / std::size_t(channels); }
 };
 
-/// Checks that axes and values fit together and that every value is finite. Throws std::logic_error for a malformed
-/// table and ValueError naming table, index and value for one that is not finite.
+/// Makes a table, after checking that axes and values match and that every value is finite. Throws std::logic_error for
+/// a malformed table, and ValueError that names table, index and value for a value that is not finite.
 std::shared_ptr<const Table> make_table(std::string name, std::vector<TableAxis> axes, std::vector<double> values);
 
-/// Any table at one coordinate per axis, in units of the axis: linear on the axes' scales, constant beyond the ends.
+/// Looks up any table at one coordinate per axis, in units of the axis. Interpolation is linear on the scales of the
+/// axes; coordinates beyond the ends are clamped.
 Rgb<double> interpolate(const Table&, const std::vector<double>& coordinates);
 
-/// A table of one channel and 1 to 4 even axes, over any scalar: what formulas look up. Multilinear; coordinates
-/// outside [0, 1] take the nearest end.
+/// The look-up that formulas use, over any scalar: multilinear, in a table of one channel and 1 to 4 even axes.
+/// Coordinates are clamped to [0, 1].
 template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>& table, const std::array<T, D>& x) {
   std::array<T, D> fraction;
   std::array<std::size_t, D> index;
@@ -71,7 +72,7 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
   return sum;
 }
 
-// Compiled in table.cpp alone, not in every source for each of its instruction sets.
+// Compiled in table.cpp only, not in every source for each of its instruction sets.
 extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 1>&);
 extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 2>&);
 extern template double lookup(const std::shared_ptr<const Table>&, const std::array<double, 3>&);
@@ -87,10 +88,10 @@ template <std::size_t D> Pack lookup(const std::shared_ptr<const Table>& table, 
   return out;
 }
 
-/// Throws std::logic_error unless formulas can look this table up at so many coordinates.
+/// Throws std::logic_error unless formulas can look this table up at this number of coordinates.
 void require_lookup(const Table&, std::size_t coordinates);
 
-/// The same where only the table says how many coordinates there are.
+/// The same look-up for a number of coordinates that is known only at run time.
 template <Arithmetic T> T lookup(const std::shared_ptr<const Table>& table, const std::vector<T>& x) {
   const auto of = [&]<std::size_t D>(std::array<T, D> at) {
     std::copy_n(x.begin(), D, at.begin());
