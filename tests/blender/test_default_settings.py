@@ -100,7 +100,7 @@ def test_every_model_in_a_new_file(extension, new_file):
         # A standard error of four pictures may be half of what it should be.
         assert abs(relative) < 6 * error + 5e-3, f"{model}: {relative:+.2%} \u00b1 {error:.2%}"
         noise = (off.var(0, ddof=1) + on.var(0, ddof=1)) / count
-        # The block in which a mirror shows the small lamp by chance is not known from four pictures.
+        # Of the block in which a mirror shows the small lamp by chance four pictures say little.
         lit = (on.mean(0) > 0.02 * on.mean(0).max()) & (noise < noise.max())
         apart = (off.mean(0) - on.mean(0))[lit] ** 2
         # Beside noise half a percent of the ball's light a block: twins are 1 to 26 % off.
