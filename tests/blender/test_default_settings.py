@@ -7,7 +7,14 @@ import math
 import bpy
 import numpy as np
 import pytest
-from helpers import add_camera, add_sphere, add_world, render, render_without_the_extension
+from helpers import (
+    add_camera,
+    add_sphere,
+    add_world,
+    node_material,
+    render,
+    render_without_the_extension,
+)
 
 BLOCK = 8
 #: Pixels of a model in the picture of all, in each direction.
@@ -53,6 +60,8 @@ def gallery(scene, materials):
     for index, material in enumerate(materials):
         ball = add_sphere(scene, material, segments=64)
         ball.location = (2.2 * (index % COLUMNS), 0, 2.2 * (index // COLUMNS))
+        # Filter Glossy makes another one of a closure in a mirror, of each kind in its own way.
+        ball.visible_diffuse = ball.visible_glossy = False
     width, height = 2.2 * COLUMNS, 2.2 * rows
     where = (width / 2 - 1.1, -20, height / 2 - 1.1)
     add_camera(scene, where, (math.pi / 2, 0, 0), orthographic=max(width, height))
@@ -324,3 +333,16 @@ def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_pat
     np.testing.assert_allclose(
         render_without_the_extension(path, 1, tmp_path), here, rtol=1e-5, atol=1e-6
     )
+
+
+def test_convert(extension, new_file):
+    """Nodes become models that follow the scene, with values that both forms have."""
+    material = node_material("ShaderNodeBsdfDiffuse", Color=(0.5, 0.4, 0.3, 1), Roughness=0.6)
+    (plan,) = extension.api.plan_conversion([material])
+    assert extension.api.convert_materials([plan]) == 1
+    for osl in (False, True):
+        new_file.cycles.shading_system = osl
+        update(new_file)
+        wanted = "nodes" if not osl else extension.pack.automatic(plan.model, plan.values)
+        assert form_of(extension, material) == wanted
+        assert extension.api.warnings(material, new_file) == []
