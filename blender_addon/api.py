@@ -4,7 +4,6 @@
     from bl_ext.user_default.brdfc_shaders import api
     material = api.new_material("coupled", r0=0.05, rm=(0.8, 0.1, 0.1))
     bpy.data.objects["Cube"].active_material = material
-    api.enable_osl(bpy.context.scene)
 
 Names and values are those of the models' schema: numbers, colours as (r, g, b) or one grey
 number, choices by identifier.
@@ -62,6 +61,7 @@ __all__ = [
     "convert_materials",
     "enable_osl",
     "enlarge_lamps",
+    "follow_settings",
     "get_parameters",
     "make_local",
     "models",
@@ -444,6 +444,13 @@ def scene_warnings(scene):
     """What keeps any material of this extension from rendering in a scene, and what of a scene Open
     Shading Language spoils."""
     return checks.scene_warnings(expected.scene(scene))
+
+
+def follow_settings(scene):
+    """Has materials of "auto" follow the settings of a scene. The extension does so by itself when
+    a user changes them, and before pictures; scripts that change settings and then ask warnings()
+    have nothing else that tells it. Raises CompileError."""
+    automatic.follow(expected.scene(scene))
 
 
 def enable_osl(scene):

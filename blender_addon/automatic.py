@@ -31,13 +31,10 @@ def follow(scene=None):
         return
     _busy = True
     try:
-        lacks_osl, changed = device.lacks_osl(scene), False
+        lacks_osl = device.lacks_osl(scene)
         for group in groups:
             if nodes.suit(group, lacks_osl):
                 _filled.add(group.session_uid)
-                changed = True
-        if changed:
-            nodes.remove_unused_groups()
     finally:
         _busy = False
 

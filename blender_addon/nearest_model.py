@@ -309,16 +309,17 @@ class Fit:
 
 
 @functools.lru_cache(maxsize=256)
-def nearest(natives, colors, colored, models):
-    """The Fit to nodes that differ in roughness alone, a tuple, among these models; with its error
-    at nodes of other colours. `colored`: whether something is linked to the colour, which a model
-    without a parameter for it would lose. None where no model is near."""
+def nearest(natives, colors, colored, has):
+    """The Fit to nodes that differ in roughness alone, a tuple, among the models and values that
+    has(model, values) is true of; with its error at nodes of other colours. `colored`: whether
+    something is linked to the colour, which a model without a parameter for it would lose. None
+    where no model is near."""
     native, targets, found = natives[0], [Target(n) for n in natives], []
     # With another base the width of a model is about the same: it is sought once.
     roughly, closely = {}, {}
     for candidate in candidates(native):
-        if candidate.model not in models:
-            continue  # a pack that is cut to a scene
+        if not has(candidate.model, candidate.values(native)):
+            continue
         if native.stretch != 1 and not (candidate.width and candidate.width.across):
             continue
         lost = colored and "Color" not in candidate.links.values()

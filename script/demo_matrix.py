@@ -27,6 +27,7 @@ class Form(NamedTuple):
     name: str
     representation: str
     pack: str | None = None  #: folder, beside the scene, of a pack cut to it
+    osl: bool = True  #: whether Open Shading Language is on
 
 
 def resolved_files(folder):
@@ -53,12 +54,17 @@ def forms_of(scene, models, native, wanted="all"):
     """Forms to render: what `auto` makes of the scene, by the name of the one form that it is or,
     where materials differ, as auto; drawn directions where every material has them; what the scene
     itself asks for; Blender's own node as the unit of cost, and others of its nodes where they were
-    fitted to every material. Wanted: all of them, that of `auto`, or that and the unit."""
+    fitted to every material. Wanted: all of them, that of `auto`, or that, what it is without Open
+    Shading Language, and the unit."""
     used = [models[m["model"]] for m in scene["materials"].values()]
     chosen = {u["auto"] for u in used}
     auto = chosen.pop() if len(chosen) == 1 else "auto"
-    if wanted != "all":
-        return [Form(name, name) for name in (["glossy", auto] if wanted == "unit" else [auto])]
+    if wanted == "auto":
+        return [Form(auto, auto)]
+    if wanted == "unit":
+        without = all("nodes" in u["representations"] for u in used)
+        nodes = [Form("nodes", "auto", osl=False)] if without else []
+        return [Form("glossy", "glossy"), Form(auto, auto), *nodes]
     forms = ["glossy"]
     fitted = [native.get(name, {}) for name in scene["materials"]]
     forms += [node for node in ("principled", "metallic") if all(node in f for f in fitted)]
@@ -257,6 +263,7 @@ class Scene:
                 "seed": seed,
                 "native": str(self.folder / "native.json"),
                 "pack": form.pack and str(self.folder / form.pack),
+                "osl": form.osl,
             }
             for name, scene, picture, form, spp in jobs
         ]

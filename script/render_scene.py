@@ -10,11 +10,11 @@ whose repetitions take turns so that their run times can be compared:
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
 "repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ..., "osl": ...},
-...]; all but scene and out are optional and default to the options of the command line. "native" names a file
-with a scene's materials of script/native_nodes.py; "pack" a folder that `brdfc build` wrote, whose
-models the extension takes instead of its own; "timed" false leaves out the render with one sample
-that tells sampling from compiling. "out" may also be a .png or .jpg, as "view", a view transform of
-Blender's, shows it.
+...]; all but scene and out are optional and default to the options of the command line. "native"
+names a file with a scene's materials of script/native_nodes.py; "pack" a folder that `brdfc build`
+wrote, whose models the extension takes instead of its own; "timed" false leaves out the render with
+one sample that tells sampling from compiling; "osl" false turns Open Shading Language off. "out"
+may also be a .png or .jpg, as "view", a view transform of Blender's, shows it.
 Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
 usage or input.
 """

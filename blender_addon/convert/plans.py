@@ -4,7 +4,7 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from .. import editable, nodes, pack, shader_trees
+from .. import device, editable, lamps, nodes, pack, shader_trees
 from ..i18n import Sentence, say
 from ..native_bsdf import Native
 from ..nearest_model import nearest, with_width
@@ -116,6 +116,17 @@ def _plan_glass(material, node):
     return Plan("fresnel_dielectric", values, links, (), material, node, error, error)
 
 
+def _is_shown(model, values):
+    """Whether a model with these values is what a scene shows: a pack that is cut to a scene may
+    lack it, and without Open Shading Language a twin stands in for some choices."""
+    if model not in pack.model_names():
+        return False
+    form = pack.native_form(model)
+    if form is None or not device.lacks_osl(lamps.current_scene()):
+        return True
+    return pack.refusal(model, form, pack.canonical(values)) is None
+
+
 def _part(inputs, native, fit):
     """The Part that a Fit to a node is; `native`: the first of those that it was fitted to."""
     color = color_of(native.kind)
@@ -137,12 +148,10 @@ def _plan_node(material, node):
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
 
-    models = tuple(pack.model_names())
-
     def near(**other):
         """The Part for what of the node has these values, and its Fit."""
         looked = tuple(Native(**given | other, roughness=r) for r in roughnesses)
-        fit = nearest(looked, colors, inputs.reaches(color), models)
+        fit = nearest(looked, colors, inputs.reaches(color), _is_shown)
         if fit is None:
             raise Refused(say("this extension has no model that is near"))
         return _part(inputs, looked[0], fit), fit

@@ -28,11 +28,11 @@ def apply(plans):
     wanted = [replace(p, node=p.seen.now()) for p in plans if not p.refusal]
     editable.check(*(p.material for p in wanted))
     # What is linked may have any value.
-    made = [[_Made(part, *_resolved(part)) for part in p.parts] for p in wanted]
+    made = [[_Made(part, _values(part)) for part in p.parts] for p in wanted]
     known = set(bpy.data.node_groups)
     try:
         for one in (one for each in made for one in each):
-            nodes.ensure_group(one.part.model, one.form)
+            nodes.ensure_group(one.part.model, values=one.known)
     except BaseException:
         nodes.remove_unused_groups(known)
         raise
@@ -43,16 +43,19 @@ def apply(plans):
 
 @dataclass(frozen=True)
 class _Made:
-    """A Part, its form, and its values as sockets take them."""
+    """A Part, and its values as sockets take them."""
 
     part: Part
-    form: str
     values: dict
 
+    @property
+    def known(self):
+        """The same, and None for what is linked."""
+        return self.values | dict.fromkeys(self.part.links)
 
-def _resolved(part):
-    values = {k: pack.check_value(part.model, k, v) for k, v in part.values.items()}
-    return pack.resolve(part.model, "auto", values | dict.fromkeys(part.links)), values
+
+def _values(part):
+    return {k: pack.check_value(part.model, k, v) for k, v in part.values.items()}
 
 
 def _source(socket):
@@ -81,7 +84,7 @@ def _replace(p, parts):
 def _add(p, made):
     """The group node of a model, with the links of the node that it stands in for."""
     tree, node = p.material.node_tree, p.node
-    group = nodes.add_group_node(tree, made.part.model, made.form)
+    group = nodes.add_group_node(tree, made.part.model, values=made.known)
     group.location = node.location
     group[CORRECTED] = bump_correction.recorded(p.material)
     for name, value in made.values.items():

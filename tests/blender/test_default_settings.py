@@ -7,7 +7,14 @@ import math
 import bpy
 import numpy as np
 import pytest
-from helpers import add_camera, add_sphere, add_world, render, render_without_the_extension
+from helpers import (
+    add_camera,
+    add_sphere,
+    add_world,
+    node_material,
+    render,
+    render_without_the_extension,
+)
 
 BLOCK = 8
 #: Pixels of a model in the picture of all, in each direction.
@@ -53,20 +60,13 @@ def gallery(scene, materials):
     for index, material in enumerate(materials):
         ball = add_sphere(scene, material, segments=64)
         ball.location = (2.2 * (index % COLUMNS), 0, 2.2 * (index // COLUMNS))
+        # Filter Glossy makes another one of a closure in a mirror, of each kind in its own way.
+        ball.visible_diffuse = ball.visible_glossy = False
     width, height = 2.2 * COLUMNS, 2.2 * rows
     where = (width / 2 - 1.1, -20, height / 2 - 1.1)
     add_camera(scene, where, (math.pi / 2, 0, 0), orthographic=max(width, height))
     scene.render.resolution_x, scene.render.resolution_y = PLACE * COLUMNS, PLACE * rows
     bpy.data.objects["Light"].location = (width / 2, -7, height / 2 + 4)
-
-
-def test_no_warning_and_no_setting_to_change(extension, new_file):
-    """Every model: what *Add > Shader > brdfc* gives has nothing to say in a new file."""
-    for model in extension.api.models():
-        material = extension.api.new_material(model)
-        add_sphere(new_file, material, segments=8)
-        assert form_of(extension, material) == native(extension, model) == "nodes", model
-        assert extension.api.warnings(material, new_file) == [], model
 
 
 def blocks(picture, index):
@@ -78,15 +78,19 @@ def blocks(picture, index):
 
 
 @pytest.mark.slow
-def test_pictures_of_a_new_file(extension, new_file):
-    """Every model under a new file's lamp, world and settings, with Open Shading Language off and
-    on, where its form draws or aims and has been held against the reference renderer: means of
-    balls, and blocks of pixels as far as noise tells."""
+def test_every_model_in_a_new_file(extension, new_file):
+    """What *Add > Shader > brdfc* gives has nothing to say, and is right: under a new file's lamp,
+    world and settings, with Open Shading Language off and on, where forms draw or aim and have been
+    held against the reference renderer. Means of balls, and blocks of pixels as far as noise
+    tells."""
     models = list(extension.api.models())
-    gallery(new_file, [extension.api.new_material(model) for model in models])
-    few_samples(new_file, 32, PLACE)
-    new_file.render.resolution_x = PLACE * COLUMNS
-    new_file.render.resolution_y = PLACE * math.ceil(len(models) / COLUMNS)
+    materials = [extension.api.new_material(model) for model in models]
+    few_samples(new_file, 24)
+    gallery(new_file, materials)
+    update(new_file)
+    for model, material in zip(models, materials, strict=True):
+        assert form_of(extension, material) == native(extension, model) == "nodes", model
+        assert extension.api.warnings(material, new_file) == [], model
     found = {}
     for osl in (False, True):
         new_file.cycles.shading_system = osl
@@ -94,7 +98,7 @@ def test_pictures_of_a_new_file(extension, new_file):
         for seed in range(4):
             new_file.cycles.seed = seed
             pictures.append(render(new_file)[..., 1])
-        forms = {form_of(extension, material) for material in bpy.data.materials}
+        forms = {form_of(extension, material) for material in materials}
         assert forms == ({"exact", "aimed"} if osl else {"nodes"})
         found[osl] = np.array([[blocks(p, i) for p in pictures] for i in range(len(models))])
     for model, off, on in zip(models, found[False], found[True], strict=True):
@@ -105,9 +109,10 @@ def test_pictures_of_a_new_file(extension, new_file):
         # A standard error of four pictures may be half of what it should be.
         assert abs(relative) < 6 * error + 5e-3, f"{model}: {relative:+.2%} \u00b1 {error:.2%}"
         noise = (off.var(0, ddof=1) + on.var(0, ddof=1)) / count
-        lit = on.mean(0) > 0.02 * on.mean(0).max()
+        # Of the block in which a mirror shows the small lamp by chance four pictures say little.
+        lit = (on.mean(0) > 0.02 * on.mean(0).max()) & (noise < noise.max())
         apart = (off.mean(0) - on.mean(0))[lit] ** 2
-        # Half a percent of a block is a white lie of the twin's size: they are 1 to 26 % off.
+        # Beside noise half a percent of the ball's light a block: twins are 1 to 26 % off.
         allowed = noise[lit].sum() + lit.sum() * (5e-3 * on.mean()) ** 2
         assert apart.sum() / allowed < 3.5, f"{model}: blocks {apart.sum() / allowed:.2f}"
 
@@ -328,3 +333,16 @@ def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_pat
     np.testing.assert_allclose(
         render_without_the_extension(path, 1, tmp_path), here, rtol=1e-5, atol=1e-6
     )
+
+
+def test_convert(extension, new_file):
+    """Nodes become models that follow the scene, with values that both forms have."""
+    material = node_material("ShaderNodeBsdfDiffuse", Color=(0.5, 0.4, 0.3, 1), Roughness=0.6)
+    (plan,) = extension.api.plan_conversion([material])
+    assert extension.api.convert_materials([plan]) == 1
+    for osl in (False, True):
+        new_file.cycles.shading_system = osl
+        update(new_file)
+        wanted = "nodes" if not osl else extension.pack.automatic(plan.model, plan.values)
+        assert form_of(extension, material) == wanted
+        assert extension.api.warnings(material, new_file) == []

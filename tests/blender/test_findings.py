@@ -80,7 +80,7 @@ def test_documented_code_shows_the_material_in_a_new_file(extension, page):
 def test_documented_code_of_the_module_is_that_of_the_readme(extension):
     code = [line.strip() for line in extension.api.__doc__.splitlines() if line.startswith("    ")]
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert len(code) == 4 and all(f"    {line}\n" in readme for line in code)
+    assert len(code) == 3 and all(f"    {line}\n" in readme for line in code)
 
 
 def test_every_function_for_scripts_is_exported_and_in_the_table(extension):
