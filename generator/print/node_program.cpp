@@ -110,6 +110,7 @@ class Lowering {
       case Op::Log:
         return log(real(0));
       case Op::Log1p:
+        if (is_random(n.args[0])) return log(Expr(1.0) + real(0));
         return series_log1p(real(0), log(Expr(1.0) + real(0)));
       case Op::Expm1:
         return series_expm1(real(0), exp(real(0)));
@@ -154,6 +155,14 @@ class Lowering {
     }
   }
 
+  /// Whether a value is made of random numbers alone: it has the digits of those, so that a series would win none.
+  bool is_random(int id) const {
+    const ExprNode& n = p_.node(id);
+    if (n.op == Op::Input) return n.name == "u_0" || n.name == "u_1" || n.name == "u_2";
+    const bool plain = n.op == Op::Neg || n.op == Op::Add || n.op == Op::Sub || n.op == Op::Mul;
+    return n.op == Op::Const || (plain && std::ranges::all_of(n.args, [&](int a) { return is_random(a); }));
+  }
+
   const Program& p_;
   std::vector<NodeValue> values_;
   std::map<int, std::vector<NodeValue>> loops_;
@@ -173,6 +182,14 @@ class Writer {
 
   NodeProgram write(const std::vector<std::pair<std::string, int>>& outputs) {
     for (const auto& [name, id] : outputs) count_uses(id);
+    // A vector that is put together for an output serves other nodes as well.
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      if (base_of(outputs[i].first, 'x').empty()) continue;
+      const Triple triple = {outputs[i].second, outputs.at(i + 1).second, outputs.at(i + 2).second};
+      if (same(triple) || plan(triple)) continue;
+      planned_[triple] = Joined{};
+      combined_.insert(triple);
+    }
     for (int id = 0; id < p_.size(); ++id)
       if (uses_[std::size_t(id)] > 0) find_dot(id);
     for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -278,6 +295,7 @@ class Writer {
     if (all(t, Op::Const))
       return {-1, "", {p_.node(t[0]).value[0], p_.node(t[1]).value[0], p_.node(t[2]).value[0]}, true};
     if (const auto it = made_.find(t); it != made_.end()) return it->second;
+    if (combined_.count(t)) return made_[t] = combined(t);
     return made_[t] = make_vector(t, planned_.at(t)->operands);
   }
   NodeOperand make_vector(const Triple& t, const std::vector<Triple>& of) {
@@ -331,7 +349,7 @@ class Writer {
   }
   /// Parts of a vector that is computed are taken from it.
   void take_parts(const Triple& t) {
-    if (all(t, Op::Const) || !input_of(t).empty() || !taken_.insert(t).second) return;
+    if (all(t, Op::Const) || !input_of(t).empty() || combined_.count(t) || !taken_.insert(t).second) return;
     for (std::size_t c = 0; c < 3; ++c)
       if (p_.node(t[c]).op != Op::Const) part_of_.try_emplace(t[c], t, c);
     for (const Triple& of : planned_.at(t)->operands)
@@ -575,7 +593,7 @@ class Writer {
   std::map<Triple, std::optional<Joined>> planned_;
   std::map<Triple, NodeOperand> made_;
   std::map<int, std::array<Triple, 2>> dots_;
-  std::set<Triple> taken_;
+  std::set<Triple> taken_, combined_;
   std::map<int, std::pair<Triple, std::size_t>> part_of_;
   std::vector<int> uses_, need_;
   std::map<int, NodeOperand> known_;
