@@ -213,6 +213,7 @@ class _Surface:
     """What the shading point looks like: frame, viewer, random numbers."""
 
     def __init__(self, w, parts, geometry, normal, tangent):
+        """`tangent`: an output that is 0 where that of the object is meant; None: any will do."""
         self.w = w
         self.place, self.view = geometry.outputs["Position"], geometry.outputs["Incoming"]
         self.true_normal = geometry.outputs["True Normal"]
@@ -225,7 +226,14 @@ class _Surface:
         if parts.has("bend"):
             vectors = {"true": self.true_normal, "view": self.view, "normal": self.normal}
             self.normal = parts.add("bend", strand=self.strand, **vectors)["normal"]
-        self._frame(tangent)
+        self.drawn = _random(w, self, 0.0)
+        self.anywhere = _direction(w, *_random(w, self, 1.0)[:2])
+        if tangent is None:
+            across = w.vector("CROSS_PRODUCT", self.anywhere, self.normal)
+            self.tangent = w.vector("NORMALIZE", across)
+            self.bitangent = w.vector("CROSS_PRODUCT", self.normal, self.tangent)
+        else:
+            self._frame(tangent)
         self.wo = parts.add("raise", wo=self.local(self.view))
 
     def _frame(self, tangent):
@@ -271,9 +279,8 @@ def _local(w, vector, axes):
     return w.combine(*(w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes))
 
 
-def _random(w, place, view, path_length):
-    """Three numbers in [0, 1), as those of index 0 of brdfc_random() in OSL. All that a shading
-    point draws is made of these: its closures add up, so none has to be independent of another."""
+def _random(w, surface, index):
+    """Three numbers in [0, 1), as brdfc_random() in OSL."""
 
     def noise(vector, number):
         node = w.node("ShaderNodeTexWhiteNoise", noise_dimensions="4D")
@@ -281,8 +288,18 @@ def _random(w, place, view, path_length):
         w.give(node.inputs["W"], number)
         return node.outputs["Color"]
 
-    total = w.vector("ADD", noise(place, 0.0), noise(view, path_length))
-    return w.vector("FRACTION", total)
+    far = w.math("ADD", surface.path_length, 17.0 * index)
+    total = w.vector("ADD", noise(surface.place, index), noise(surface.view, far))
+    return w.separate(w.vector("FRACTION", total))
+
+
+def _direction(w, u, v):
+    """One of all directions, each as likely as the others."""
+    height = w.math("MULTIPLY_ADD", u, 2.0, -1.0)
+    turn = w.math("MULTIPLY", v, 2 * math.pi)
+    across = w.math("SQRT", w.math("SUBTRACT", 1.0, w.math("MULTIPLY", height, height)))
+    x, y = (w.math("MULTIPLY", across, w.math(part, turn)) for part in ("COSINE", "SINE"))
+    return w.combine(x, y, height)
 
 
 #: What a shading point sees of a slot, and what it makes of it.
@@ -306,9 +323,6 @@ _AXES = [
 ]
 #: Farther than two directions are apart.
 _FAR = 4.0
-#: What is added to the random numbers of one lamp to make those of the next: R. Roberts' sequence,
-#: by which any few are spread evenly.
-_SHIFT = (0.8191725, 0.6710436, 0.5497005)
 
 
 def _seen_group(parts):
@@ -325,22 +339,21 @@ def _seen_group(parts):
     return _group("lamp seen", content, inputs, _SEEN + _AXES, fill)
 
 
-def _point_of(w, towards, drop, view, u, v):
-    """A direction within the cone, each as likely as the others."""
-    beside = w.vector("NORMALIZE", w.vector("CROSS_PRODUCT", towards, view))
+def _point_of(w, towards, drop, anywhere, u):
+    """A direction within the cone, each as likely as the others. `anywhere`: a random direction,
+    to whose side it is tilted."""
+    beside = w.vector("NORMALIZE", w.vector("CROSS_PRODUCT", towards, anywhere))
     fallen = w.math("MULTIPLY", u, drop)
     cosine = w.math("SUBTRACT", 1.0, fallen)
     sine = w.math("SQRT", w.math("MULTIPLY", fallen, w.math("ADD", 1.0, cosine)))
-    rim = w.scaled(beside, sine)
-    tilted = w.vector("ADD", w.scaled(towards, cosine), rim)
-    return w.turned(tilted, towards, w.math("MULTIPLY", v, 2 * math.pi))
+    return w.vector("ADD", w.scaled(towards, cosine), w.scaled(beside, sine))
 
 
 def _lamp_group(parts):
     """The group that makes of a cone the closure that carries what the model gives there. Nothing
     of it is computed where the factor `lit` is 0."""
-    vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "random")
-    numbers = ("drop", "chord", "flat", "lit", "room")
+    vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
+    numbers = ("drop", "chord", "flat", "lit", "room", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
     inputs += _AXES
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
@@ -349,15 +362,14 @@ def _lamp_group(parts):
 
     def fill(w, found):
         here = parts.on(w, found)
-        u = w.separate(w.vector("FRACTION", found["random"]))
-        point = _point_of(w, found["towards"], found["drop"], found["view"], u[0], u[1])
-        on_flat = here.add("flat", **found, u_0=u[0], u_1=u[1])
+        point = _point_of(w, found["towards"], found["drop"], found["anywhere"], found["u_0"])
+        on_flat = here.add("flat", **found)
         point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
         value = here.add("value", **(found | {"wi": _local(w, point, frame)}))["value"]
         value = w.scaled(value, w.mix(found["flat"], 1.0, on_flat["emphasis"]))
         cone = {name: found[name] for name in ("chord", "flat", "room")}
-        lobe = here.add("lobe", value=value, u_2=u[2], **cone)
+        lobe = here.add("lobe", value=value, u_2=found["u_2"], **cone)
         toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
         return {"BSDF": w.shown(found["lit"], toon)}
 
@@ -434,7 +446,7 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
     for name, (low, high) in data["bounds"].items():
         inside = w.math("MAXIMUM", parameters[name], low)
         parameters[name] = w.math("MINIMUM", inside, high)
-    surface = _Surface(w, parts, geometry, normal, tangent)
+    surface = _Surface(w, parts, geometry, normal, None if data["isotropic"] else tangent)
     side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
     given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}
     shaders = []
@@ -457,9 +469,12 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
             total = colour if total is None else w.vector("ADD", total, colour)
         return {"BSDF": w.sum(shaders), "Albedo": total}
     lamps = []
-    u = _random(w, surface.place, surface.view, surface.path_length)
+    # All that a shading point draws is made of the same numbers: its closures add up, so none has
+    # to be independent of another.
+    given |= {f"u_{i}": number for i, number in enumerate(surface.drawn)}
     if slots:
         given |= parts.add("once", **given)
+        given["anywhere"] = surface.anywhere
         frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
         here = {"at": surface.place, "view": surface.view, **dict(frame)}
         given |= here | constants
@@ -468,19 +483,15 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
             values = dict(zip(_SLOT, slot, strict=True))
             lamps.append(values | _instance(w, seen, here | values, "lamp seen"))
         _keep_apart(w, lamps, data["widest"])
-    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"], u))
-    for index, lamp in enumerate(lamps, 1):
-        shift = tuple(math.fmod(index * step, 1.0) for step in _SHIFT)
-        values = given | lamp | {"random": w.vector("ADD", u, shift)}
-        shaders.append(_instance(w, lit, values, "lamp")["BSDF"])
+    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
+    for lamp in lamps:
+        shaders.append(_instance(w, lit, given | lamp, "lamp")["BSDF"])
     return {"BSDF": w.sum(shaders)}
 
 
-def _rest(w, parts, surface, given, lamps, narrow, random):
+def _rest(w, parts, surface, given, lamps, narrow):
     """The closure of the drawn direction, which carries all light that lamps' closures do not."""
-    u = w.separate(random)
-    numbers = {f"u_{i}": number for i, number in enumerate(u)}
-    drawn = parts.add("draw", **given, **numbers)
+    drawn = parts.add("draw", **given)
     ray = surface.world(drawn["wi"])
     height = w.vector("DOT_PRODUCT", ray, surface.true_normal, output="Value")
     # Rays leave hairs on all sides.
@@ -493,7 +504,7 @@ def _rest(w, parts, surface, given, lamps, narrow, random):
         inside = parts.add("met", **{"at": surface.place, "ray": ray} | lamp)["met"]
         met = w.math("MAXIMUM", met, w.math("MULTIPLY", inside, lamp["shown"]))
     lost = w.math("MAXIMUM", hidden, met)
-    chance = w.math("FRACT", w.math("MULTIPLY", u[0], 4096.0))
+    chance = w.math("FRACT", w.math("MULTIPLY", given["u_0"], 4096.0))
     colour = parts.add("rest", weight=drawn["weight"], u=chance, lost=lost)["color"]
     size = narrow * 2 / math.pi
     return w.toon(colour, size, w.half(ray, surface.view))

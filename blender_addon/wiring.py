@@ -117,13 +117,6 @@ class Wiring:
         self.give(node.inputs[0], vector)
         return list(node.outputs)
 
-    def turned(self, vector, axis, angle):
-        """A vector turned about an axis."""
-        node = self.node("ShaderNodeVectorRotate", rotation_type="AXIS_ANGLE")
-        for name, value in (("Vector", vector), ("Axis", axis), ("Angle", angle)):
-            self.give(node.inputs[name], value)
-        return node.outputs[0]
-
     def half(self, a, b):
         """The direction halfway between two."""
         return self.vector("NORMALIZE", self.mix(0.5, a, b, True))

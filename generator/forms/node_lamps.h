@@ -89,10 +89,11 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
   cone.reach = select(flat, diagonal * nearness + T(2 * kNarrow), cone.chord);
   cone.flat = select(flat, T(1), T(0));
-  // Cosine between the closure's normal and its axis; all of the cone has to be above that normal's horizon.
-  const T rise = length(cone.towards + wo);
+  // Twice the cosine between the closure's normal and its axis, squared; all of the cone has to be above that normal's
+  // horizon.
+  const T rise2 = T(2) * dot(cone.towards, wo) + T(2), least = T(2) * sine + T(2 * kLeastRise);
   const auto used = kind > T(0.5);
-  const auto usable = used && sine2 < T(kWidest) && rise > T(2) * sine + T(2 * kLeastRise);
+  const auto usable = used && sine2 < T(kWidest) && rise2 > least * least;
   const auto shines_here = select(flat, facing, T(1)) > T(0.01);
   cone.used = select(used, T(1), T(0));
   cone.active = select(usable && shines_here, T(1), T(0));

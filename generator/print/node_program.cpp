@@ -7,160 +7,12 @@
 #include <map>
 #include <optional>
 
-#include "core/series.h"
+#include "print/node_lowering.h"
 
 namespace brdfc::print {
 namespace {
 
-/// A value of the program as it is recorded anew.
-struct NodeValue {
-  ExprType type = ExprType::Real;
-  Expr real{};
-  Rgb<Expr> color{};
-  Condition flag{false};
-
-  NodeValue() = default;
-  NodeValue(const Expr& x) : real(x) {}                               // NOLINT: one of three
-  NodeValue(const Rgb<Expr>& c) : type(ExprType::Color), color(c) {}  // NOLINT
-  NodeValue(const Condition& c) : type(ExprType::Bool), flag(c) {}    // NOLINT
-  Rgb<Expr> as_color() const { return type == ExprType::Color ? color : Rgb<Expr>(real); }
-};
-
-/// Records a program anew with the operations alone that nodes have.
-class Lowering {
- public:
-  /// With the current recorder.
-  explicit Lowering(const Program& program) : p_(program), values_(std::size_t(program.size())) {
-    for (int id = 0; id < p_.size(); ++id)
-      if (p_.reachable()[std::size_t(id)] && p_.node(id).scope < 0) step(id);
-    for (const auto& [name, id] : program.outputs()) {
-      const NodeValue& v = values_[std::size_t(id)];
-      if (v.type == ExprType::Color)
-        out_.output(name, v.color);
-      else
-        out_.output(name, v.real);
-    }
-  }
-  const Program& program() const { return out_; }
-
- private:
-  void step(int id) {
-    const ExprNode& n = p_.node(id);
-    if (n.op == Op::Loop)
-      unroll(id, n);
-    else if (n.op == Op::LoopOut)
-      values_[std::size_t(id)] = loops_.at(n.args[0])[std::size_t(n.index)];
-    else if (n.op != Op::LoopVar)
-      values_[std::size_t(id)] = compute(n);
-  }
-
-  void unroll(int id, const ExprNode& n) {
-    const std::size_t size = n.args.size() / 2;
-    const int serial = int(n.value[0]);
-    std::vector<NodeValue> state;
-    for (std::size_t k = 0; k < size; ++k) state.push_back(arg(n, k));
-    for (int i = 0; i < n.index; ++i) {
-      for (int body = 0; body < id; ++body) {
-        const ExprNode& b = p_.node(body);
-        if (b.scope != serial || !p_.reachable()[std::size_t(body)]) continue;
-        if (b.op == Op::LoopVar)
-          values_[std::size_t(body)] = state[std::size_t(b.index)];
-        else
-          step(body);
-      }
-      for (std::size_t k = 0; k < size; ++k) state[k] = arg(n, size + k);
-    }
-    loops_[id] = std::move(state);
-  }
-
-  const NodeValue& arg(const ExprNode& n, std::size_t i) const { return values_[std::size_t(n.args[i])]; }
-
-  NodeValue compute(const ExprNode& n) const {
-    const auto real = [&](std::size_t i) -> const Expr& { return arg(n, i).real; };
-    const bool color = n.type == ExprType::Color;
-    const auto binary = [&](const auto& apply) -> NodeValue {
-      if (color) return apply(arg(n, 0).as_color(), arg(n, 1).as_color());
-      return apply(real(0), real(1));
-    };
-    switch (n.op) {
-      case Op::Const:
-        if (n.type == ExprType::Bool) return Condition(n.value[0] != 0);
-        if (color) return Rgb<Expr>(Expr(n.value[0]), Expr(n.value[1]), Expr(n.value[2]));
-        return Expr(n.value[0]);
-      case Op::Input:
-        if (color) return Rgb<Expr>::input(n.name);
-        return Expr::input(n.name);
-      case Op::Add:
-        return binary([](const auto& a, const auto& b) { return a + b; });
-      case Op::Sub:
-        return binary([](const auto& a, const auto& b) { return a - b; });
-      case Op::Mul:
-        return binary([](const auto& a, const auto& b) { return a * b; });
-      case Op::Div:
-        return binary([](const auto& a, const auto& b) { return a / b; });
-      case Op::Neg:
-        if (color) return arg(n, 0).color * Expr(-1.0);
-        return -real(0);
-      case Op::Sqrt:
-        return sqrt(real(0));
-      case Op::Cbrt:
-        return select(real(0) < Expr(0.0), Expr(-1.0), Expr(1.0)) * pow(abs(real(0)), Expr(1 / 3.));
-      case Op::Exp:
-        return exp(real(0));
-      case Op::Log:
-        return log(real(0));
-      case Op::Log1p:
-        return series_log1p(real(0), log(Expr(1.0) + real(0)));
-      case Op::Expm1:
-        return series_expm1(real(0), exp(real(0)));
-      case Op::Sin:
-        return sin(real(0));
-      case Op::Cos:
-        return cos(real(0));
-      case Op::Atan:
-        return atan(real(0));
-      case Op::Pow:
-        return pow(real(0), real(1));
-      case Op::Abs:
-        return abs(real(0));
-      case Op::Min:
-        return minimum(real(0), real(1));
-      case Op::Max:
-        return maximum(real(0), real(1));
-      case Op::Less:
-        return real(0) < real(1);
-      case Op::LessEqual:
-        return real(0) <= real(1);
-      case Op::And:
-        return arg(n, 0).flag && arg(n, 1).flag;
-      case Op::Or:
-        return arg(n, 0).flag || arg(n, 1).flag;
-      case Op::Not:
-        return !arg(n, 0).flag;
-      case Op::Select:
-        if (color) return select(arg(n, 0).flag, arg(n, 1).as_color(), arg(n, 2).as_color());
-        return select(arg(n, 0).flag, real(1), real(2));
-      case Op::MaxComponent:
-        return max_component(arg(n, 0).as_color());
-      case Op::MakeColor:
-        return Rgb<Expr>(real(0), real(1), real(2));
-      case Op::Lookup: {
-        std::vector<Expr> at;
-        for (std::size_t i = 0; i < n.args.size(); ++i) at.push_back(real(i));
-        return record_lookup(n.table, at);
-      }
-      default:
-        throw ExprError(std::string("no node for ") + name_of(n.op));
-    }
-  }
-
-  const Program& p_;
-  std::vector<NodeValue> values_;
-  std::map<int, std::vector<NodeValue>> loops_;
-  Program out_;
-};
-
-/// Writes what Lowering left, depth first, so that few values live at once.
+/// Writes what lowered_to_nodes() left, depth first, so that few values live at once.
 class Writer {
  public:
   /// `cuts`: values that come from elsewhere, by node; `vectors`: see node_program().
@@ -173,6 +25,14 @@ class Writer {
 
   NodeProgram write(const std::vector<std::pair<std::string, int>>& outputs) {
     for (const auto& [name, id] : outputs) count_uses(id);
+    // A vector that is put together for an output serves other nodes as well.
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      if (base_of(outputs[i].first, 'x').empty()) continue;
+      const Triple triple = {outputs[i].second, outputs.at(i + 1).second, outputs.at(i + 2).second};
+      if (same(triple) || plan(triple)) continue;
+      planned_[triple] = Joined{};
+      combined_.insert(triple);
+    }
     for (int id = 0; id < p_.size(); ++id)
       if (uses_[std::size_t(id)] > 0) find_dot(id);
     for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -278,6 +138,7 @@ class Writer {
     if (all(t, Op::Const))
       return {-1, "", {p_.node(t[0]).value[0], p_.node(t[1]).value[0], p_.node(t[2]).value[0]}, true};
     if (const auto it = made_.find(t); it != made_.end()) return it->second;
+    if (combined_.count(t)) return made_[t] = combined(t);
     return made_[t] = make_vector(t, planned_.at(t)->operands);
   }
   NodeOperand make_vector(const Triple& t, const std::vector<Triple>& of) {
@@ -331,7 +192,7 @@ class Writer {
   }
   /// Parts of a vector that is computed are taken from it.
   void take_parts(const Triple& t) {
-    if (all(t, Op::Const) || !input_of(t).empty() || !taken_.insert(t).second) return;
+    if (all(t, Op::Const) || !input_of(t).empty() || combined_.count(t) || !taken_.insert(t).second) return;
     for (std::size_t c = 0; c < 3; ++c)
       if (p_.node(t[c]).op != Op::Const) part_of_.try_emplace(t[c], t, c);
     for (const Triple& of : planned_.at(t)->operands)
@@ -575,7 +436,7 @@ class Writer {
   std::map<Triple, std::optional<Joined>> planned_;
   std::map<Triple, NodeOperand> made_;
   std::map<int, std::array<Triple, 2>> dots_;
-  std::set<Triple> taken_;
+  std::set<Triple> taken_, combined_;
   std::map<int, std::pair<Triple, std::size_t>> part_of_;
   std::vector<int> uses_, need_;
   std::map<int, NodeOperand> known_;
@@ -583,22 +444,16 @@ class Writer {
   NodeProgram out_;
 };
 
-/// The program with the operations alone that nodes have.
-Program lowered(const Program& program) {
-  Recorder recorder(Recorder::current().precision());
-  return Lowering(program).program();
-}
-
 }  // namespace
 
 NodeProgram node_program(const Program& program, const std::set<std::string>& vectors) {
-  const Program p = lowered(program);
+  const Program p = lowered_to_nodes(program);
   return Writer(p, {}, vectors).write(p.outputs());
 }
 
 NodePrograms node_programs(const Program& program, const std::set<std::string>& varying, const std::string& prefix,
                            const std::set<std::string>& vectors) {
-  const Program p = lowered(program);
+  const Program p = lowered_to_nodes(program);
   const std::vector<bool>& reachable = p.reachable();
   std::vector<bool> varies(reachable.size());
   std::map<int, std::string> cuts;

@@ -69,6 +69,19 @@ def lamps(scene):
     add_lamp(scene, "POINT", "Point", (1, -4, 4), energy=300, shadow_soft_size=0.0)
 
 
+def flat_lamps(scene):
+    """A strip and an ellipse, seen from the side, which their cones fill to a small part."""
+    add_world(scene, 0.3)
+    add_lamp(
+        scene, "AREA", "Strip", (2.5, -3, 1), (math.pi / 2, 0, 0.3), energy=200, shape="RECTANGLE",
+        size=0.5, size_y=3.0,
+    )  # fmt: skip
+    add_lamp(
+        scene, "AREA", "Ellipse", (-2, -3, 2), (0.9, -0.3, 0), energy=200, shape="ELLIPSE",
+        size=2.0, size_y=1.0,
+    )  # fmt: skip
+
+
 def one_before_the_other(scene):
     """Cones of lamps that overlap, as seen from the ball."""
     add_lamp(scene, "POINT", "Near", (-2, -4, 3), energy=300, shadow_soft_size=0.6)
@@ -125,7 +138,9 @@ def test_a_white_world(extension, model, values):
 
 @pytest.mark.full
 @pytest.mark.sample(3)
-@pytest.mark.parametrize("light", [lamps, one_before_the_other], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "light", [lamps, flat_lamps, one_before_the_other], ids=lambda f: f.__name__
+)
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_lamps(extension, model, values, light):
     """Blocks of a ball are those of the form that aims at lamps, which has been held against the
@@ -136,6 +151,21 @@ def test_lamps(extension, model, values, light):
     print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
     assert abs(off) < 4.5 * error + 5e-3
     assert noise < 2.0
+
+
+def test_noise_under_a_rectangle(extension):
+    """What its cone does not cover is not left to random rays, of which few meet it."""
+
+    def rectangle(scene):
+        add_lamp(
+            scene, "AREA", "Area", (2, -4, 1), (math.pi / 2, 0, 0.4), energy=300,
+            shape="RECTANGLE", size=1.5, size_y=1.0,
+        )  # fmt: skip
+
+    found = blocks_of(extension, "cook_torrance", {}, "nodes", rectangle, 16)
+    noise = found.var(0, ddof=1).sum() / (found.mean(0) ** 2).sum()
+    # Half of the samples of the lamp are in the cone: 0.23 of the square of a pixel's light each.
+    assert noise < 2 * 0.23 / (16 * BLOCK**2), noise
 
 
 @pytest.mark.parametrize(
