@@ -14,8 +14,8 @@ namespace {
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
 
-/// Sample dimensions of a bounce: the term (delta or lobe), the lobe, its direction, Russian roulette; and for each side
-/// of the surface three for light samples: the light, the place on it, and one more for an environment image.
+/// Sample dimensions of a bounce: the term (delta or lobe), the lobe, its direction, Russian roulette; and for each
+/// side of the surface three for light samples: the light, the place on it, and one more for an environment image.
 constexpr std::uint64_t kDimensions = 10;
 constexpr std::uint64_t dimension_of(int bounce) { return 1 + kDimensions * std::uint64_t(bounce); }
 constexpr std::uint64_t light_dimension(int bounce, bool far) {
