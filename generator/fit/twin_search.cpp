@@ -79,7 +79,7 @@ Found search(const TwinDictionary& dictionary, const std::vector<View>& views, c
                  {dictionary.lean[j], std::clamp(roughness_of(e / widths[j]), kTwinSettings.least_roughness, 1.0),
                   dictionary.spread});
   for (const View& v : views) {
-    // A second search from the point where the first one ended, with large steps again, leaves many poor local minima.
+    // A second search from the point where the first one ended, with large steps again, escapes many poor minima.
     for (std::size_t round = 0; round < kTwinSettings.rounds; ++round) shape = improved(dictionary, shape, v, mixtures);
     found.shapes.push_back(shape);
     found.error += error_of(dictionary, shape, v, mixtures) / double(views.size());
