@@ -17,13 +17,13 @@ from pathlib import Path
 
 import render_scene
 
-#: The scene's own version: another number, and all pictures are rendered anew.
+#: Version of the scene; raising it renders all pictures again.
 SCENE = 1
 SIZE, SAMPLES = 160, 32
 
 
 def lambert(bpy, name):
-    """A tree with a Diffuse node; the node."""
+    """Makes a node tree with a Diffuse node. Returns the node."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
@@ -45,7 +45,8 @@ def add_floor(bpy, scene):
     tree.links.new(tiles.outputs["Color"], diffuse.inputs["Color"])
     mesh = bpy.data.meshes.new("Floor")
     far = 60.0
-    # A checker is of no colour on its own planes: the floor is a little off them.
+    # The pattern is ambiguous on the planes of the checker itself, so the floor is slightly off
+    # them.
     corners = [(-far, -far, 0.01), (far, -far, 0.01), (far, far, 0.01), (-far, far, 0.01)]
     mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
@@ -55,7 +56,7 @@ def add_floor(bpy, scene):
 
 
 def add_ball(bpy, scene):
-    """A ball of radius 1; the tangent of materials runs along its meridians."""
+    """Adds a ball of radius 1. The tangent of materials runs along its meridians."""
     import bmesh
 
     mesh = bpy.data.meshes.new("Ball")
@@ -87,7 +88,7 @@ def add_lamp(bpy, scene, kind, location, power, **settings):
 
 
 def add_sky(bpy, scene):
-    """Bright over the horizon, darker above, dark below."""
+    """Adds a sky: bright above the horizon, darker at the zenith, dark below."""
     world = bpy.data.worlds.new("Sky")
     scene.world = world
     if world.node_tree is None:
@@ -142,7 +143,7 @@ def make_scene(bpy, api, size, samples):
 
 
 def fingerprint(entry, size, samples):
-    """Changes with what the picture shows."""
+    """A text that changes with everything that affects the picture."""
     what = [SCENE, size, samples, entry.model, entry.values]
     what += [entry.substance] if entry.substance else []
     return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:16]

@@ -54,12 +54,12 @@ def scene(model, options, lit):
 
 
 def fits(options, model, forms, folder):
-    """A pack with every form made of a fit that the model has with its default parameters: its
-    folder, and these forms."""
+    """Builds a pack with every form made of a fit that the model has with its default parameters.
+    Returns its folder and these forms."""
     material = {"model": model, "representation": "sampled" if "sampled" in forms else "auto"}
     file = folder / "materials.json"
     file.write_text(json.dumps({"materials": {"m": material}}), encoding="utf-8")
-    # Any error will do: the fit comes beside the sampled form.
+    # Any error limit will do: the fit is built beside the sampled form.
     command = [options.tool, "build", "--materials", file, "--error", "100", "--twin"]
     command += ["--out", folder]
     subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
@@ -70,8 +70,8 @@ def fits(options, model, forms, folder):
 
 
 def measure(options, model, forms, folder):
-    """Sampling times of each form and of the Glossy node in its scene, by the form's name; those of
-    the node itself first."""
+    """Sampling times of each form, and of the Glossy node in its scene, by the form's name. The
+    node itself comes first."""
     pack, fitted = None, []
     if not options.form or set(options.form) - set(forms):
         pack, fitted = fits(options, model, forms, folder)
@@ -105,7 +105,7 @@ def measure(options, model, forms, folder):
         done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
         for key, record in zip(rendered, json.loads(done.stdout), strict=True):
             times[key] += [r["sampling_cpu_seconds"] for r in record["repeats"]]
-    # A node's own row is that under the sky alone, where that was rendered.
+    # The node's own row shows its time under the sky alone, if that was rendered.
     shown = [rendered[0], *(key for key in rendered if key[0] != "glossy")]
     return {form: (times[form, lit], times["glossy", lit]) for form, lit in shown}
 

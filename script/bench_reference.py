@@ -69,7 +69,7 @@ SCENE = {
 
 
 def cpu_seconds(command):
-    """Of a program, until it ends."""
+    """CPU time of a program, until it ends."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([str(c) for c in command], check=True, stderr=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -77,7 +77,8 @@ def cpu_seconds(command):
 
 
 def run_brdfc(brdfc, folder, args):
-    """Seconds of tracing and picture mean; with Mitsuba, too, the scene is ready before."""
+    """Seconds of tracing, and the picture's mean. For Mitsuba, too, the time begins when the scene
+    is ready."""
     scene = {**SCENE, "settings": SCENE["settings"] | {"width": args.size, "height": args.size}}
     (folder / "scene.json").write_text(json.dumps(scene))
     resolve = [brdfc, "scene", folder / "scene.json", "--out", folder / "resolved"]
@@ -85,7 +86,7 @@ def run_brdfc(brdfc, folder, args):
     out = folder / "brdfc.exr"
     command = [brdfc, "render", folder / "scene.json", "--out", out]
     command += ["--threads", args.threads, "--spp"]
-    # Of CPU time the tracing is what further samples take.
+    # With CPU times, the tracing time is what further samples take.
     ready = cpu_seconds([*command, 1]) if args.cpu else 0
     seconds = cpu_seconds([*command, args.spp + 1 if args.cpu else args.spp]) - ready
     import mitsuba as mi
@@ -99,7 +100,7 @@ def run_brdfc(brdfc, folder, args):
 
 
 def mitsuba_scene(mi, folder, args):
-    """The resolved scene in Mitsuba's terms, with the same units."""
+    """The resolved scene for Mitsuba, in the same units."""
     resolved = json.loads((folder / "resolved" / "scene.json").read_text())
     camera, lamp = resolved["camera"], resolved["lights"][0]
     transform = mi.ScalarTransform4f
@@ -138,11 +139,11 @@ def mitsuba_scene(mi, folder, args):
         "rfilter": {"type": "box"},
         "pixel_format": "rgb",
     }
-    # Mitsuba's depth counts segments: one scattering is depth 2.
+    # Mitsuba's depth counts path segments: one scattering event is depth 2.
     depth = resolved["settings"]["max_bounces"] + 2
     scene = {
         "type": "scene",
-        # Neither lets rays through the edges between triangles.
+        # Neither renderer lets rays pass through the edges between triangles.
         "embree_use_robust_intersections": True,
         "integrator": {"type": "path", "max_depth": depth, "rr_depth": 5, "hide_emitters": True},
         "sensor": {
@@ -170,7 +171,7 @@ def mitsuba_scene(mi, folder, args):
 
 
 def time_mitsuba(variant, folder, args):
-    """Runs inside a process of its own; prints seconds and mean."""
+    """Runs in its own process. Prints seconds and mean."""
     import drjit as dr
     import mitsuba as mi
 
@@ -188,7 +189,8 @@ def time_mitsuba(variant, folder, args):
 
 
 def run_mitsuba(variant, folder, args):
-    """(seconds, mean), or None: an LLVM that does not fit aborts the process, so it is another."""
+    """(seconds, mean), or None. It runs in another process, because an unsuitable LLVM aborts the
+    process."""
     command = [sys.executable, __file__, "--size", args.size, "--spp", args.spp]
     command += ["--runs", args.runs, "--threads", args.threads, *["--cpu"] * args.cpu]
     command += ["--in-process", variant, folder]

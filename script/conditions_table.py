@@ -36,7 +36,7 @@ leaves out exact forms with a mirror, which by its nature does not show it.
 
 
 def cell(row):
-    """Bias with its error, and what the panel does about it."""
+    """The bias with its error, and the panel's reaction."""
     if "degrees" in row["condition"]:
         text = f"{row['bias']:.0f}°"
     elif row["error"]:
@@ -51,7 +51,7 @@ def cell(row):
 
 
 def sections_of(page):
-    """Text below each heading of an older page, by the heading."""
+    """The text below each heading of an older page, by heading."""
     found = {}
     for part in page.split("\n## ")[1:]:
         form, text = part.split("\n", 1)
@@ -60,12 +60,12 @@ def sections_of(page):
 
 
 def in_order(forms):
-    """Blender's own nodes, which are there to compare with, come last."""
+    """Puts Blender's own nodes, which are there for comparison, last."""
     return sorted(forms, key=lambda form: form.endswith("(node)"))
 
 
 def markdown(versions, page=""):
-    """The page; of `page` it takes what was not measured."""
+    """The page. Sections that were not measured are taken from `page`."""
     kept = sections_of(page)
     measured = forms_of(versions)
     lines = [INTRODUCTION]

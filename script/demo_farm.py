@@ -13,14 +13,14 @@ from collections import defaultdict
 import demo_tasks
 from demo_tasks import TaskError, run_task
 
-#: What a worker offers once: it runs one task at a time.
+#: The Dask resource that each worker offers once, so that it runs one task at a time.
 RESOURCE = "render"
-#: Seconds: for a scheduler to answer; between looks at who works.
+#: Seconds: to wait for a scheduler's answer; between two checks of the workers.
 ANSWER, LOOK = 10, 10
 
 
 class Here:
-    """Tasks one after the other, each with all cores."""
+    """Runs tasks on this machine, one after the other, each with all cores."""
 
     workers = 1
 
@@ -38,7 +38,7 @@ class Here:
 
 
 def run_on_worker(task):
-    """Runs on a worker, with the cores that it states."""
+    """Runs on a worker, with the number of cores that it offers."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -47,17 +47,17 @@ def run_on_worker(task):
 
 
 class Farm:
-    """Tasks on the workers that offer RESOURCE. Dask runs a task of a worker that is lost again
+    """Runs tasks on the workers that offer RESOURCE. If a worker is lost, Dask runs its task again
     elsewhere, and gives up at the fourth loss."""
 
     def __init__(self, address, say):
         import cloudpickle
         from distributed import Client
 
-        # Workers know nothing of these files: their code is sent along.
+        # Workers don't have these files, so their code is sent along.
         for module in (demo_tasks, sys.modules[__name__]):
             cloudpickle.register_pickle_by_value(module)
-        # What it would print where a scheduler is gone is said below, in a line.
+        # If the scheduler is lost, one line below reports it instead of Dask's messages.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self.address, self.say, self.alone = address, say, False
         self.count = itertools.count()
@@ -71,7 +71,7 @@ class Farm:
         self.look()
 
     def look(self):
-        """Counts the workers that take tasks, and says so when there is none."""
+        """Counts the workers that take tasks, and prints a message if there are none."""
         known = self.client.scheduler_info(n_workers=-1)["workers"].values()
         self.workers = sum(w["resources"].get(RESOURCE, 0) >= 1 for w in known)
         if not self.workers and not self.alone:
@@ -89,12 +89,13 @@ class Farm:
     def add(self, tasks):
         for task in tasks:
             future = self.client.submit(
-                # Dask sends code along for what has no name to import it by, as a lambda.
+                # Dask sends code along for functions that can't be imported by name, such as a
+                # lambda.
                 lambda task=task: run_on_worker(task),
                 key=f"{task.name}-{uuid.uuid4().hex}",
                 pure=False,
                 resources={RESOURCE: 1},
-                # Scenes in their order, and what was added first of each.
+                # By scene in their order; within a scene, tasks that were added first come first.
                 priority=-(task.order[0] * 10**6 + next(self.count)),
             )
             self.running[future] = task
@@ -128,7 +129,8 @@ class Farm:
 
 
 class Progress:
-    """A line a task, with the time left: that of tasks of the same kind so far, by their work."""
+    """Prints a line per task with the estimated time left, from tasks of the same kind so far and
+    their work."""
 
     def __init__(self, say):
         self.say, self.total, self.done = say, 0, 0

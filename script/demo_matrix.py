@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 from demo_tasks import ROOT, Task, TaskError, digest, read_json, shown, write_json
 
-#: Samples a pixel, pictures of each, pixels along the longer side.
+#: Samples per pixel, number of pictures for each, pixels along the longer side.
 CONVERGENCE_SPP, CONVERGENCE_SEEDS, CONVERGENCE_SIZE = (16, 256, 1024), 4, 64
 RENDER_SCENE = ROOT / "script" / "render_scene.py"
-#: The one whose folder has no version in its name.
+#: The version whose folder has no version in its name.
 USUAL_BLENDER = "4.5"
 
 
 class Form(NamedTuple):
-    """What a scene is rendered with."""
+    """A form with which a scene is rendered."""
 
     name: str
     representation: str
@@ -31,7 +31,7 @@ class Form(NamedTuple):
 
 
 def resolved_files(folder):
-    """scene.json of a resolved scene and every file it names, in a stable order."""
+    """scene.json of a resolved scene and every file that it names, in a stable order."""
     scene = folder / "scene.json"
     found = set()
 
@@ -42,7 +42,7 @@ def resolved_files(folder):
         elif isinstance(value, list):
             for item in value:
                 walk(item)
-        # Not Path.is_file: a description may be too long for a name.
+        # Not Path.is_file: a description may be too long for a file name.
         elif isinstance(value, str) and value and os.path.isfile(folder / value):
             found.add(folder / value)
 
@@ -51,11 +51,11 @@ def resolved_files(folder):
 
 
 def forms_of(scene, models, native, wanted="all"):
-    """Forms to render: what `auto` makes of the scene, by the name of the one form that it is or,
-    where materials differ, as auto; drawn directions where every material has them; what the scene
-    itself asks for; Blender's own node as the unit of cost, and others of its nodes where they were
-    fitted to every material. Wanted: all of them, that of `auto`, or that, what it is without Open
-    Shading Language, and the unit."""
+    """The forms to render: the one that `auto` selects, under its own name, or as auto if materials
+    differ; sampled directions if every material has them; the representation that the scene asks
+    for; Blender's Glossy node as the unit of cost; and others of its nodes if they were fitted to
+    every material. `wanted` selects all of them, only that of `auto`, or that, what `auto` is
+    without Open Shading Language, and the unit."""
     used = [models[m["model"]] for m in scene["materials"].values()]
     chosen = {u["auto"] for u in used}
     auto = chosen.pop() if len(chosen) == 1 else "auto"
@@ -77,8 +77,8 @@ def forms_of(scene, models, native, wanted="all"):
 
 
 def planned_forms(folder, scene):
-    """Forms of the pack cut to the scene that the whole extension does not have: what it chooses,
-    and those that every material can have."""
+    """Forms that the pack cut to the scene has and the whole extension lacks: the one that it
+    chooses, and those that every material can have."""
     pack = "plan/brdfc_shaders"
     models = read_json(folder / pack / "manifest.json")["models"]
     used = [models[m["model"]]["representations"] for m in scene["materials"].values()]
@@ -91,7 +91,8 @@ def planned_forms(folder, scene):
 
 
 def smaller(scene, longest, spp=None):
-    """The scene with at most so many pixels along its longer side, and so many samples a pixel."""
+    """The scene with at most this many pixels along its longer side, and this number of samples per
+    pixel."""
     settings = scene["settings"]
     factor = min(1, longest / max(settings["width"], settings["height"]))
     fewer = {k: max(1, round(settings[k] * factor)) for k in ("width", "height")}
@@ -108,14 +109,14 @@ def python_of(version):
 
 
 def folder_of(out, version):
-    """Where the report of a version is: each has its page."""
+    """The folder of the report for a version; each version has its own page."""
     return out if version == USUAL_BLENDER else out.with_name(f"{out.name}-{version}")
 
 
 @dataclass
 class Scene:
-    """A scene, resolved, and the tasks that it takes. What all versions of Blender share lies in
-    the folder of the first."""
+    """A resolved scene, and its tasks. Files that all versions of Blender share are in the folder
+    of the first version."""
 
     source: Path
     options: object  #: of the command line
@@ -150,7 +151,7 @@ class Scene:
         return folder_of(self.options.out, version) / self.name
 
     def first_tasks(self):
-        """Those that wait for nothing."""
+        """The tasks that depend on no other."""
         options = self.options
         reference = [options.tool, "render", self.folder / "scene.json"]
         reference += ["--out", self.folder / "reference.exr", "--spp", self.reference_spp]
@@ -173,7 +174,7 @@ class Scene:
         return [*tasks, *self.blender_tasks()]
 
     def blender_tasks(self):
-        """Those in Blender, once the pack cut to the scene is there."""
+        """The tasks in Blender, once the pack cut to the scene exists."""
         key = [self.inputs, self.folder / "native.json"]
         if self.options.forms == "all":
             key.append(self._plan().key)
@@ -192,8 +193,8 @@ class Scene:
         return tasks
 
     def expected(self):
-        """How many tasks there will be in Blender, and the work of one, by kind: before the pack
-        cut to the scene is there, with the two forms that it mostly adds."""
+        """The expected number of tasks in Blender, and the work of one, by kind. Before the pack
+        cut to the scene exists, it assumes the two forms that the pack usually adds."""
         forms = len(self.forms) + 2 * (self.options.forms == "all")
         versions = len(self.options.blender)
         out = {"blender": (versions * self.options.seeds, forms * samples(self.settings, self.spp))}
@@ -230,7 +231,7 @@ class Scene:
         return self._jobs("blender", version, seed, jobs, key, self.settings)
 
     def _convergence(self, version, seed, key):
-        """A smaller picture in every form with more and more samples."""
+        """A smaller picture in every form, with increasing numbers of samples."""
         jobs = [
             (
                 f"{form.name}, {spp} samples, {seed}",
@@ -249,9 +250,9 @@ class Scene:
         return smaller(self.scene, CONVERGENCE_SIZE)["settings"]
 
     def _jobs(self, kind, version, seed, jobs, key, settings):
-        """A process of Blender for jobs in their order. Each is (name, scene, picture, form,
-        samples), the picture's file in the folder of that version. `settings`: those of the
-        scene."""
+        """A Blender process that renders jobs in their order. Each job is (name, scene, picture,
+        form, samples), where picture is the file in the folder of that version. `settings` are
+        those of the scene."""
         options, out = self.options, self.folder_of(version)
         listed = [
             {

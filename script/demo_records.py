@@ -9,7 +9,7 @@ from demo_tasks import write_json
 
 
 def materials_of(record, native):
-    """The materials of a record; of Blender's own nodes those that were fitted."""
+    """The materials of a record; for Blender's own nodes, those to which they were fitted."""
     out = []
     node = record["form"]
     for name, nodes in native.items():
@@ -67,8 +67,8 @@ def pictures(scene, tasks):
 
 
 def write_runs(scene, version, tasks, about):
-    """runs.json of a scene in one version of Blender. `tasks`: all of the scene, in their order;
-    `about`: provenance that scenes share."""
+    """Writes runs.json of a scene in one version of Blender. `tasks` are all tasks of the scene, in
+    their order; `about` is the provenance that scenes share."""
     folder, settings = scene.folder_of(version), scene.settings
     here = [t for t in tasks if t.folder.parent == folder and t.prints_records]
     rendered = pictures(scene, [t for t in here if t.kind == "blender"])
@@ -77,7 +77,7 @@ def write_runs(scene, version, tasks, about):
     if folder != scene.folder:
         shutil.copyfile(scene.folder / "reference.exr", folder / "reference.exr")
 
-    # What attempts that were stopped had begun.
+    # Unfinished files of attempts that were stopped.
     for begun in (*folder.glob(".*.exr"), *folder.glob("*/.*")):
         begun.unlink(missing_ok=True)
 

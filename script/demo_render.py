@@ -93,7 +93,8 @@ def parse():
 
 
 def render(options, pool):
-    """Runs what is not there yet, and writes runs.json of each scene as soon as it is whole."""
+    """Runs the tasks that have no results yet, and writes runs.json of each scene as soon as it is
+    complete."""
     with zipfile.ZipFile(options.extension) as archive:
         models = json.loads(archive.read("manifest.json"))["models"]
     version = subprocess.run([options.tool, "--version"], stdout=subprocess.PIPE, text=True)
@@ -143,7 +144,7 @@ def render(options, pool):
 
 
 def leave_out_what_is_gone(out, sources):
-    """A scene that is gone would stay in the report for ever."""
+    """Removes scenes that no longer exist, which would otherwise stay in the report."""
     known = {s.stem for s in (ROOT / "scenes").glob("*.json")} | {s.stem for s in sources}
     for folder in out.iterdir():
         if folder.is_dir() and (folder / "runs.json").exists() and folder.name not in known:
@@ -153,7 +154,7 @@ def leave_out_what_is_gone(out, sources):
 
 
 def link_versions(out):
-    """links.json of every version's report: the pages of the others."""
+    """Writes links.json for every version's report: links to the pages of the others."""
     folders = {USUAL_BLENDER: out} | {
         p.name.removeprefix(f"{out.name}-"): p for p in sorted(out.parent.glob(f"{out.name}-*.*"))
     }

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 class TaskError(Exception):
-    """What went wrong, and where to look; for the terminal."""
+    """A message for the terminal: what failed, and where to look."""
 
 
 @dataclass(frozen=True)
@@ -31,20 +31,21 @@ class Task:
     name: str  #: unique: scene, a slash, what is made of it
     kind: str  #: plan, reference, blender or convergence
     command: tuple
-    #: SHA-256 of all that the outputs depend on.
+    #: SHA-256 of everything that the outputs depend on.
     key: str
     #: Folder of record, log and job list.
     folder: Path
     outputs: tuple
-    #: Files that have to be the same where the task runs: SHA-256 by path.
+    #: Files that must be the same on the machine where the task runs: SHA-256 by path.
     programs: tuple
-    #: Option of the command for a number of threads, if it has one.
+    #: The command's option for the number of threads, if it has one.
     threads: str = ""
-    #: The command prints a list of records as JSON.
+    #: True if the command prints a list of records as JSON.
     prints_records: bool = False
-    #: Pixels times samples, or what else the time grows with, within a kind.
+    #: Work of the task relative to others of its kind: pixels times samples, or another measure of
+    #: its run time.
     work: float = 1
-    #: What comes first.
+    #: Sort key: tasks with smaller values run first.
     order: tuple = ()
 
     def file(self, suffix):
@@ -65,14 +66,14 @@ def read_json(path):
 
 
 def write_json(path, value):
-    # Of a name of its own: two machines may write the same file.
+    # A name of its own, because two machines may write the same file.
     beside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     beside.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
     beside.replace(path)
 
 
 def shown(command):
-    """A command as a person would type it in the root of the repository."""
+    """A command as a user would type it in the root of the repository."""
     short = []
     for word in command:
         path = Path(str(word))
@@ -82,7 +83,7 @@ def shown(command):
 
 
 def kept(task):
-    """The record of a task that was done before, if its outputs are still there."""
+    """The record of a task that was done before, if its outputs still exist."""
     try:
         record = read_json(task.file(".json"))
     except (OSError, ValueError):
@@ -103,7 +104,7 @@ def processor(cores):
 
 
 def check_programs(task, where):
-    """Raises TaskError unless this machine has what the task needs."""
+    """Raises TaskError unless this machine has the files that the task needs."""
     for path, expected in task.programs:
         if not Path(path).exists():
             raise TaskError(
@@ -115,7 +116,8 @@ def check_programs(task, where):
 
 
 def run_task(task, cores=None, where=None):
-    """Runs the task's command unless that was done, with so many threads; returns its record."""
+    """Runs the task's command with this number of threads, unless it was done before. Returns its
+    record."""
     if record := kept(task):
         return record
     where = where or socket.gethostname()
@@ -123,7 +125,7 @@ def run_task(task, cores=None, where=None):
     command = [str(word) for word in task.command]
     if cores and task.threads:
         command += [task.threads, str(cores)]
-    # Where a worker is killed, what it started must not go on beside the next attempt.
+    # If a worker is killed, its command must end too, and not run beside the next attempt.
     tied = ["setpriv", "--pdeathsig", "KILL"] if shutil.which("setpriv") else []
     log = task.file(".log")
     start = time.perf_counter()

@@ -14,15 +14,15 @@ from pathlib import Path
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Name in the site by name in the repository.
+#: Names of pages in the site, by names in the repository.
 PAGES = {
     "README.md": "index.md",
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
 }
-#: Where script/gallery writes a page a model.
+#: Folder in which script/gallery writes one page per model.
 MODELS = "gallery/models"
-#: [text](target) and ![text](target), with what follows a #.
+#: Matches [text](target) and ![text](target), with an optional # part.
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
 
 log = logging.getLogger("mkdocs.hooks.brdfc")  # a warning fails a strict build
@@ -33,7 +33,7 @@ def _in_the_site(target):
 
 
 def on_config(config):
-    """The pages of models, which no list names, after the gallery's others."""
+    """Adds the pages of models, which no list names, after the other pages of the gallery."""
     pages = sorted((ROOT / "docs" / MODELS).glob("*.md"))
     names = [f"{MODELS}/{p.name}" for p in pages if p.name != "overview.md"]
     for section in config["nav"]:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from markdown_table import heading, line
 
-# Options that show most: many materials of one model, a form that is too dear, forms that change.
+# Options that show most: many materials of one model, a form that is too expensive, forms that
+# change.
 SCENES = {
     "as-fig2": [],
     "room-radziszewski_alda": ["--error", "5", "--time", "1.3x"],
@@ -66,7 +67,7 @@ def cost(value):
 
 
 def error(value):
-    """Relative L1 in percent; 0 where only rounding is left."""
+    """Relative L1 in percent; 0 if only rounding errors are left."""
     if value is None:
         return "-"
     if value == "expectation":
@@ -75,7 +76,7 @@ def error(value):
 
 
 def material_rows(model):
-    """Materials that one row holds for, together."""
+    """Combines materials that have the same row."""
     errors = {choice["form"]: choice["error"] for choice in model["choices"]}
 
     def cells(material):

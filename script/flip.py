@@ -18,7 +18,8 @@ from pictures import read_rgb
 
 
 def read(path):
-    """R, G, B of an EXR. FLIP knows no negative radiance: what rounding left below 0 becomes 0."""
+    """R, G, B of an EXR. Negative values, which rounding leaves, become 0, because FLIP has no
+    negative radiance."""
     try:
         return np.maximum(read_rgb(path), 0)
     except OSError as error:

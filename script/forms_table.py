@@ -16,7 +16,7 @@ from markdown_table import heading, line, percent
 
 FORMS = ("exact", "aimed", "sampled", "fitted", "twin")
 
-#: What f is a polynomial of, for models that have such parameters.
+#: The parameters in which f is a polynomial, for models that have such parameters.
 ANY = {
     "ashikhmin_shirley": ("rs", "rd"),
     "cook_torrance": ("f0",),
@@ -26,7 +26,7 @@ ANY = {
     "schlick": ("r",),
     "schlick_double": ("r0",),
 }
-#: Beside the default parameters.
+#: Parameter values that are measured in addition to the defaults.
 ELSEWHERE = {"ashikhmin_shirley": [("nu=10", "nv=10")]}
 
 
@@ -48,8 +48,8 @@ def built(tool, folder):
         if form in ("exact", "aimed", "sampled")
     }
     file.write_text(json.dumps({"materials": materials}), encoding="utf-8")
-    # Any error will do: the fit comes beside the sampled form. Any time does, too; with one, aimed
-    # forms keep the bases that models declare.
+    # Any error limit will do: the fit is built beside the sampled form. Any time limit will do,
+    # too; with one, aimed forms keep the bases that models declare.
     command = [tool, "build", "--materials", file, "--error", "100", "--time", "100", "--twin"]
     run([*command, "--out", folder])
     text = (folder / "brdfc_shaders" / "manifest.json").read_text(encoding="utf-8")
@@ -57,7 +57,7 @@ def built(tool, folder):
 
 
 def error(form):
-    """Relative L1; 0 where the mean is right."""
+    """Relative L1; 0 for a form that is right in the mean."""
     return percent(form["error"]["relative_l1"] or 0)
 
 
@@ -79,7 +79,7 @@ def forms(tool):
 
 
 def by_view(tool, *arguments):
-    """Of the light off, a number a view; None where the tool says that the model has no fit."""
+    """Relative error, one number per view; None if the tool reports that the model has no fit."""
     command = [str(tool), "fit", *arguments]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode == 2 and "has no fitted form" in done.stderr:
@@ -90,14 +90,14 @@ def by_view(tool, *arguments):
 
 
 def spread(off):
-    """Half of the views do not exceed the first, 95 % the second, none the third."""
+    """Median, 95th percentile and maximum over views."""
     off = sorted(off)
     parts = (off[math.ceil(q * len(off)) - 1] for q in (0.5, 0.95, 1))
     return [percent(part) for part in parts]
 
 
 def errors(columns, found):
-    """`found`: the first cells of a row, and what each view is off by."""
+    """A table of errors. `found` has the first cells of a row, and the errors of its views."""
     lines = heading(*columns, "half of the views below", "95 % of the views below", "worst view")
     for first, off in sorted(found, key=lambda row: sorted(row[1])[len(row[1]) // 2]):
         lines.append(line(*first, *spread(off)))
@@ -105,8 +105,8 @@ def errors(columns, found):
 
 
 def at_defaults(tool, *options):
-    """Of each model without a mirror alone: its entry in `brdfc list`, the cell that names the
-    parameters, what each view is off by."""
+    """For each model that is not just a mirror: its entry in `brdfc list`, the cell that names the
+    parameters, and the error of each view."""
     for model in listed(tool):
         for values in [(), *ELSEWHERE.get(model["name"], [])]:
             named = (model["name"], *values)
@@ -136,7 +136,7 @@ def fits_any(tool):
 
 
 def fits_over(tool):
-    """Those that the extension holds."""
+    """The fits that the extension contains."""
     found = []
     for model in listed(tool):
         if over := model["properties"]["fit_axis"]:
@@ -151,7 +151,7 @@ over that of f cos: half of all views are below the first figure, 95 % below the
 above the third. Most models have their worst view within two degrees of the surface, where lobes
 are flat and wide and little of the light is."""
 
-#: What makes each table, its page's title, and what the page says of it.
+#: How each table is made, the title of its page, and the text above it.
 PAGES = {
     "forms": (
         forms,

@@ -23,10 +23,10 @@ from demo_matrix import RENDER_SCENE, smaller
 from demo_tasks import read_json, shown, write_json
 from pictures import read_rgb
 
-#: Pixels along the longer side; samples of both pictures. Most of the time goes into compiling
-#: shaders: fewer would save little.
+#: Pixels along the longer side; samples of both pictures. Most of the time is spent on compiling
+#: shaders, so fewer would save little.
 SIZE, BLENDER_SPP, REFERENCE_SPP = 40, 64, 128
-#: Scenes of models and shapes that others have too; a fourth of the time goes into them.
+#: Scenes with models and shapes that other scenes have, too; they take a fourth of the time.
 LIKE_OTHERS = {
     "all-models",  # as-fig8
     "as-fig3",
@@ -38,12 +38,13 @@ LIKE_OTHERS = {
     "ra-fig5-grazing",
     "sh-fig4-low",
 }
-#: Standard errors. Pictures do not change from run to run; new ones may be a little unlucky.
+#: Limit in standard errors. Pictures do not change from run to run; new ones may deviate a little
+#: by chance.
 FAR = 5
 
 
 class CheckError(Exception):
-    """What is wrong with a scene, in a line."""
+    """What is wrong with a scene, in one line."""
 
 
 def checked_run(command, **options):
@@ -54,7 +55,7 @@ def checked_run(command, **options):
 
 
 def resolve(tool, source, out):
-    """The scene as both renderers read it, small; its folder."""
+    """Resolves the scene at a small size, as both renderers read it. Returns its folder."""
     folder = out / source.stem
     checked_run([tool, "scene", source, "--out", folder])
     small = smaller(read_json(folder / "scene.json"), SIZE)
@@ -64,7 +65,7 @@ def resolve(tool, source, out):
 
 
 def render_in_blender(options, folders):
-    """One picture a scene, all in one process; records by scene."""
+    """Renders one picture per scene, all in one process. Returns records by scene."""
     jobs = [
         {
             "name": f.name,
@@ -87,14 +88,14 @@ def render_reference(tool, folder):
 
 
 def stated_error(record):
-    """The largest of a scene's forms, as a part of the light."""
+    """The largest stated error of a scene's forms, as a share of the light."""
     groups = [g for of_material in record["materials"].values() for g in of_material]
     return max(((g.get("error") or {}).get("relative_l1") or 0 for g in groups), default=0)
 
 
 def judge(picture, reference, error):
-    """(how much brighter than the reference, its standard error), of the channel where that is
-    most; raises CheckError where it is too much, or where a picture can't be right."""
+    """Returns (difference from the reference, its standard error) for the channel with the largest
+    difference. Raises CheckError if it is too large, or if a picture can't be right."""
     for name, pixels in (("Blender's picture", picture), ("the reference", reference)):
         if not np.isfinite(pixels).all():
             raise CheckError(f"{name} has {np.count_nonzero(~np.isfinite(pixels))} bad values")
@@ -104,7 +105,7 @@ def judge(picture, reference, error):
         raise CheckError(f"{picture.shape} and {reference.shape} pixels")
     difference = (picture - reference).reshape(-1, 3)
     mean = reference.mean()
-    # What single precision rounds is in no spread.
+    # The spread does not include rounding in single precision.
     noise = difference.std(0, ddof=1) / math.sqrt(len(difference)) / mean + 1e-6
     off = difference.mean(0) / mean
     worst = np.argmax(np.abs(off) / noise)

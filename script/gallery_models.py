@@ -19,20 +19,20 @@ from pathlib import Path
 from gallery_pages import measured, page_of, strip
 
 ROOT = Path(__file__).resolve().parent.parent
-#: What a scene of a model is called.
+#: Prefix of the names of models' scenes.
 PREFIX = "ball-"
-#: Pixels and samples of the picture; radius of a ball, and its room.
+#: Pixels and samples of the picture; radius of a ball, and distance between two.
 SIZE, SPP, RADIUS, STEP = (231, 84), 48, 0.5, 1.12
-#: Degrees from the normal: of the views whose lobes are drawn in the plane of incidence, and over
-#: the half sphere.
+#: Views in degrees from the normal: for lobes in the plane of incidence, and for lobes over the
+#: hemisphere.
 VIEWS, DISKS = (0, 30, 60, 80), (10, 45, 75)
-#: Panels of albedo, each over values of one parameter.
+#: Number of panels for the albedo, each for one value of a parameter.
 PANELS = 3
 
 
 def scaled(number, t):
-    """The value at t of the slider, in [0, 1]: by factors where the schema says that the number
-    goes by factors, as generator/model/model.cpp does."""
+    """The value at t on the slider, in [0, 1]. The scale is logarithmic if the schema declares
+    `by_factors`, as in generator/core/axis_scale.h."""
     low, high = number["soft_min"], number["soft_max"]
     if not number["by_factors"]:
         return low + t * (high - low)
@@ -42,7 +42,7 @@ def scaled(number, t):
 
 
 def place(number, value):
-    """Where on the slider a value is: the inverse of scaled()."""
+    """The position of a value on the slider: the inverse of scaled()."""
     low, high = number["soft_min"], number["soft_max"]
     if not number["by_factors"]:
         return (value - low) / (high - low)
@@ -66,8 +66,9 @@ def values_of(parameter):
 
 
 def axis_of(model):
-    """The parameter that pictures are drawn over: that of the kept fit, else a choice that stands
-    before all numbers, else the first that goes by factors, else the first that is no colour."""
+    """The parameter that varies between pictures: that of the stored fit; else a choice that comes
+    before all numbers; else the first with a logarithmic slider; else the first that is not a
+    colour."""
     parameters = model["parameters"]
     fit = model["properties"]["fit_axis"]
     numbers = [p for p in parameters if p["kind"] != "color"]
@@ -84,7 +85,7 @@ def axis_of(model):
 
 
 def shown(model):
-    """What the three balls have: assignments by name."""
+    """The parameter values of the three balls, by name."""
     axis = axis_of(model)
     return [{axis["name"]: value} for value in values_of(axis)[:3]]
 
@@ -94,7 +95,7 @@ def assigned(values):
 
 
 def ball_scene(model):
-    """Three balls on a floor under one small lamp, in a dim room for what mirrors."""
+    """Three balls on a floor under one small lamp, in a dim room, which mirrors reflect."""
     balls = shown(model)
     kinds = {p["name"]: p["kind"] for p in model["parameters"]}
 
@@ -148,7 +149,7 @@ def ball_scene(model):
 
 
 def claims(model):
-    """What the schema claims of the model, as a sentence."""
+    """The claims of the schema about the model, as a sentence."""
     q = model["properties"]
     parts = [
         "light and view may be exchanged" if q["reciprocal"] else "it is not reciprocal",
@@ -170,7 +171,8 @@ def in_plane(np, theta):
 
 
 def draw_weights(np, figure, grid, formulas, model):
-    """What ideal reflection and refraction carry, by view: of models that are nothing else."""
+    """Draws the weights of ideal reflection and refraction by view, for models that have only
+    these."""
     angle = np.linspace(0, 90, 181)[:-1]
     wo = in_plane(np, np.radians(-angle))
     for i, values in enumerate(shown(model)):
@@ -187,7 +189,7 @@ def draw_weights(np, figure, grid, formulas, model):
 
 
 def draw_slices(np, figure, grid, model, formulas):
-    """f cos in the plane of incidence, a panel a value."""
+    """Draws f cos in the plane of incidence, with one panel per value."""
     theta = np.radians(np.linspace(-90, 90, 1441))
     for i, values in enumerate(shown(model)):
         axes = figure.add_subplot(grid[0, i], projection="polar")
@@ -203,7 +205,7 @@ def draw_slices(np, figure, grid, model, formulas):
         top = math.sqrt(most) * 1.04
         axes.set_rmax(top)
         if model["mirror"]:
-            # The delta terms on a scale of their own: the rim is a weight of 1.
+            # Delta terms have their own scale: the rim is a weight of 1.
             for k, view in enumerate(VIEWS):
                 wo = in_plane(np, np.radians(-view))
                 length = math.sqrt(float(formulas.mirror(wo, **values).mean())) * top
@@ -223,7 +225,7 @@ def draw_slices(np, figure, grid, model, formulas):
 
 
 def draw_disks(np, figure, grid, model, formulas):
-    """f cos over the half sphere seen from above, equal areas for equal solid angles."""
+    """Draws f cos over the hemisphere seen from above; equal areas are equal solid angles."""
     from matplotlib.colors import LogNorm
 
     values = shown(model)[1 if len(shown(model)) > 2 else 0]
@@ -231,7 +233,7 @@ def draw_disks(np, figure, grid, model, formulas):
     x, y = np.meshgrid(side, side)
     square = x * x + y * y
     inside = square < 1
-    # Lambert's azimuthal projection: 1 - z is the square of the radius.
+    # Lambert's azimuthal equal-area projection: 1 - z is the squared radius.
     z = np.where(inside, 1 - square, 1.0)
     spread = np.where(inside, np.sqrt(np.maximum(2 - square, 0)), 0)
     wi = np.stack([x * spread, y * spread, z], axis=-1)
@@ -306,7 +308,7 @@ def save(figure, plt, out):
 
 
 def draw(model, formulas, pages):
-    """Both drawings of a model; what is in the first."""
+    """Makes both drawings of a model. Returns what the first one shows."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -326,7 +328,7 @@ def draw(model, formulas, pages):
 
 
 def scenes_with(name):
-    """Links to sections of the gallery's pages whose scenes use the model."""
+    """Links to the sections of gallery pages whose scenes use the model."""
     links = []
     for file in sorted((ROOT / "scenes").glob("*.json")):
         materials = json.loads(file.read_text(encoding="utf-8")).get("materials", {})
@@ -336,7 +338,7 @@ def scenes_with(name):
 
 
 def page(model, scene, folder, pages):
-    """The page of a model, and its pictures. `scene`: its part of report.json."""
+    """The page of a model, and its pictures. `scene` is its part of report.json."""
     name = model["name"]
     strip(folder, scene, pages / f"{name}.jpg")
     axis = axis_of(model)

@@ -16,7 +16,7 @@ from pathlib import Path
 import OpenImageIO as oiio
 from markdown_table import heading, line
 
-#: Pages: file, title, prefixes of scenes.
+#: Pages: file, title, prefixes of the scenes' names.
 PAGES = (
     ("radziszewski-alda", "Radziszewski and Alda 2008: reflection that loses no light", ("ra-",)),
     ("suffern", "Suffern 2007: glossy reflection", ("gl-",)),
@@ -24,10 +24,10 @@ PAGES = (
     ("ashikhmin-shirley", "Ashikhmin and Shirley 2000: an anisotropic Phong model", ("as-",)),
     ("more", "More scenes", ("",)),
 )
-#: Pixels between pictures, quality of JPEG.
+#: Pixels between pictures; JPEG quality.
 GAP, QUALITY = 6, 90
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
-#: What the pixel test says of two pictures that it can't tell apart.
+#: The pixel test's result for two pictures that it can't distinguish.
 SAME = "the same within noise"
 
 
@@ -55,7 +55,7 @@ def strip(folder, scene, out):
 
 
 def verdict(form):
-    """What the pixel test says, as a cell."""
+    """The result of the pixel test, as a table cell."""
     test = form["test"]
     passed = SAME if test["passed"] else "**differs**"
     tiles = f"{test['rejected_tiles']} of {test['tiles']} tiles rejected"
@@ -63,7 +63,7 @@ def verdict(form):
 
 
 def measured(scene):
-    """A scene's figures as a table."""
+    """The measurements of a scene, as a table."""
     form = scene["forms"][0]
     names = sorted({m["representation"] for m in form["materials"]})
     cpu = sum(form["cpu_seconds"])
@@ -93,7 +93,7 @@ def section(folder, pages, scene):
 
 
 def kept(page):
-    """Sections of a page that was made before, by scene, without scenes that are gone."""
+    """The sections of an existing page, by scene, without scenes that no longer exist."""
     if not page.is_file():
         return {}
     parts = page.read_text(encoding="utf-8").rsplit("\n*", 1)[0].split("\n## ")[1:]

@@ -20,7 +20,7 @@ from importlib import import_module
 from pathlib import Path
 
 PACKAGE = "bl_ext.user_default.brdfc_shaders"
-#: Device, and whether Open Shading Language runs there.
+#: The device, and whether Open Shading Language runs there.
 MODES = {
     "cpu": ("CPU", False),
     "cpu-osl": ("CPU", True),
@@ -28,10 +28,10 @@ MODES = {
     "optix": ("OPTIX", False),
     "optix-osl": ("OPTIX", True),
 }
-#: Towards the sun of the facets; the camera is above.
+#: Direction towards the sun for the facets; the camera is above them.
 SUN = (0.5, 0.2, 0.8)
 FACETS = 100
-#: Values far from the defaults, in which single precision shows.
+#: Values far from the defaults, at which single precision becomes visible.
 STIFF = {
     "ashikhmin_shirley": {"nu": 100.0, "nv": 1e4, "rs": 0.9, "rd": 0.0},
     "blinn": {"e": 2000.0},
@@ -43,7 +43,7 @@ STIFF = {
     "schlick": {"rough": 0.01, "p": 0.5},
     "ward": {"ax": 0.02, "ay": 0.3},
 }
-#: Models on the ball: every number of lamps for the first ones, four lamps for the others.
+#: Models on the ball: the first ones under every number of lamps, the others under four.
 BALLS = {"ashikhmin_shirley": {}, "ward": {}}
 OTHERS = {
     "cook_torrance": {},
@@ -61,7 +61,8 @@ def read(path):
 
 
 def install(folder):
-    """The extension of the folder, in user settings of this run's own; its modules by name."""
+    """Installs the extension from the folder, in separate user settings. Returns its modules by
+    name."""
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="brdfc-gpu-")
     import bpy
 
@@ -75,7 +76,7 @@ def install(folder):
 
 
 def use_device(kind):
-    """Has Blender render on the devices of a kind; their names."""
+    """Makes Blender render on the devices of a kind. Returns their names."""
     import bpy
 
     preferences = bpy.context.preferences.addons["cycles"].preferences
@@ -107,13 +108,13 @@ def set_device(scene, mode):
 
 
 def facet_cases(models, form):
-    """[(model, values)] of what has a form: defaults, and stiff ends."""
+    """[(model, values)] for models that have the form: at the defaults, and at extreme values."""
     cases = [(name, {}) for name in models if form in models[name]["representations"]]
     return cases + [(name, v) for name, v in STIFF.items() if (name, {}) in cases]
 
 
 def facets(modules, cases, forms, mode, samples):
-    """A Goniometer of cases under a sun of angle 0, and which case each facet is of."""
+    """A Goniometer for cases under a sun with angle 0, and the index of each facet's case."""
     import numpy as np
     from goniometer import Goniometer, tilted, unit
 
@@ -133,7 +134,7 @@ def facets(modules, cases, forms, mode, samples):
 
 
 def expect(folder, tool):
-    """Writes facets.json: f cos of every case, facet by facet, as the tool computes it."""
+    """Writes facets.json: f cos of every case at every facet, computed by the tool."""
     modules = install(folder)
     from helpers import evaluate
 
@@ -157,7 +158,7 @@ def expect(folder, tool):
 
 
 def measure_facets(folder, modules, mode, form):
-    """[{model, values, form, relative L1}] of a form, where a model has it, else of `auto`."""
+    """[{model, values, form, relative L1}] for a form if a model has it, otherwise for `auto`."""
     import numpy as np
 
     models = modules["pack"].manifest()["models"]
@@ -176,7 +177,8 @@ def measure_facets(folder, modules, mode, form):
         row = {"model": e["model"], "values": e["values"], "form": forms[i]}
         if f.sum() > 0:  # of mirrors a sun without an angle shows nothing
             error = np.sort(np.abs(picture[lit] - f).sum(1))
-            # A drawn direction's lobe may be met by chance, once in 1e5 samples: a facet in thirty.
+            # A sampled direction's lobe contains the sun by chance, once in 1e5 samples: one facet
+            # in thirty.
             row["off"] = float(error[: len(error) - len(error) // 30].sum() / f.sum())
             row["worst_facet"] = float(error[-1] / f.sum() * len(f))
         row["finite"] = bool(np.isfinite(picture[lit]).all())
@@ -188,7 +190,7 @@ def measure_facets(folder, modules, mode, form):
 
 
 def ball_scene(modules, model, values, form, lamps, size, mode):
-    """A ball of a material on a floor, under so many point lamps and a dim sky."""
+    """A ball with a material on a floor, under this number of point lamps and a dim sky."""
     import noise_scenes
     from mathutils import Vector
 
@@ -220,7 +222,7 @@ def ball_scene(modules, model, values, form, lamps, size, mode):
 
 
 def measure_ball(modules, mode, case, size, samples):
-    """Time, noise and means by blocks of one ball."""
+    """Time, noise and means by blocks for one ball."""
     import numpy as np
     from helpers import render
 
@@ -229,7 +231,7 @@ def measure_ball(modules, mode, case, size, samples):
     scene = ball_scene(modules, model, values, form, lamps, size, mode)
     made = time.perf_counter() - start
     times, pictures = {}, []
-    # GPUs take as many samples at once as fit: only a longer picture tells the time.
+    # GPUs render as many samples at once as fit, so only a longer picture shows the time.
     timed = samples * (16 if MODES[mode][0] != "CPU" else 1)
     for name, seed, count in (
         ("first", 1, 1),
@@ -270,7 +272,7 @@ def measure_ball(modules, mode, case, size, samples):
 
 
 def ball_cases(mode, tiny):
-    """[(model, values, form, lamps)], what matters most first."""
+    """[(model, values, form, lamps)], the most important first."""
     forms = ["nodes"] if not MODES[mode][1] else ["aimed"]
     lamps = (1, 4) if tiny else LAMPS
     cases = [("glossy", {}, "glossy", n) for n in lamps]
@@ -285,7 +287,7 @@ def ball_cases(mode, tiny):
 
 
 def driver():
-    """What nvidia-smi says of cards and driver."""
+    """What nvidia-smi reports about cards and driver."""
     command = [
         "nvidia-smi",
         "--query-gpu=name,driver_version,memory.total",
@@ -356,8 +358,8 @@ def measure(folder, mode, out, tiny):
 
 
 def compared(row, other):
-    """Relative difference of means with its standard error, and the mean square of differences of
-    blocks over what their noise explains: 1 where both are the same picture."""
+    """The relative difference of means with its standard error; and the mean squared difference of
+    blocks divided by what their noise explains, which is 1 if both are the same picture."""
     import numpy as np
 
     (a, b), (c, d) = (np.array(r["blocks"]) for r in (row, other))
@@ -381,7 +383,7 @@ def find(results, mode, row, form=None):
 
 
 def compare(files, out):
-    """One file of all, without blocks, and tables on the screen."""
+    """Writes one file with all results, without blocks, and prints tables."""
     results = {r["mode"]: r for r in map(read, files)}
     for mode, result in results.items():
         print(f"== {mode}: {', '.join(result['devices']) or 'no device'} {result['nvidia'] or ''}")

@@ -22,16 +22,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 from markdown_table import heading, line
 
-#: Normal reflectance of polish in the coupled paper.
+#: Reflectance at normal incidence of the polish in the coupled paper.
 R0 = 0.05
 SHARPNESS = (4, 12, 25, 100)
-#: Of Suffern's figure 25.6: patterns, views in degrees from the normal, rays of a disk; exponents.
+#: For Suffern's figure 25.6: patterns, views in degrees from the normal, rays of a disk; exponents.
 PATTERNS = ("random", "regular", "jittered", "multi_jittered", "hammersley")
 TURNED_VIEWS, RAYS = (45, 85), 256
 EXPONENTS = (1, 10, 100, 1000, 100000)
 SHARE_VIEWS = (45, 80, 85, 89, 89.9)
 ROOT = Path(__file__).resolve().parent.parent
-#: Pixels of the longer side of the crescents, and between the two pictures.
+#: Pixels of the longer side of the crescents; pixels between the two pictures.
 SIZE, GAP = 240, 6
 
 
@@ -41,14 +41,14 @@ def in_plane(theta):
 
 
 def reflectances(model, angle, **values):
-    """Directional-hemispherical reflectance by view: (matte part, mirror part)."""
+    """Directional albedo by view: (matte part, mirror part)."""
     wo = in_plane(np.radians(angle))
     mirror = model.mirror(wo, **values)[..., 0]
     return model.albedo(wo[:, 2], **values)[..., 0] - mirror, mirror
 
 
 def spdf(model, theta, view, **values):
-    """Density per solid angle of where matte light goes: f cos over its own reflectance."""
+    """Pdf per solid angle of the matte reflection: f cos divided by its albedo."""
     wo = in_plane(np.radians(np.array([view])))
     matte, _ = reflectances(model, np.array([view]), **values)
     f = model.eval(in_plane(theta), wo, **values)[..., 0]
@@ -56,8 +56,8 @@ def spdf(model, theta, view, **values):
 
 
 def anisotropy(model, view, samples=20000, **values):
-    """Spread of a lobe across the plane of incidence over that along it, both root mean squares
-    about the mirror direction in the plane that touches the sphere there."""
+    """The ratio of a lobe's widths across the plane of incidence and along it. Both are root mean
+    squares about the mirror direction, in the tangent plane of the sphere there."""
     wo = in_plane(np.radians(-view))
     u = np.random.default_rng(1).uniform(size=(samples, 3))
     drawn = model.sample(wo, u, **values)
@@ -72,8 +72,8 @@ def anisotropy(model, view, samples=20000, **values):
 
 
 def glossy_rays(tool, degrees, below, e=1, pattern="hammersley", count=65536):
-    """Directions that the glossy reflector draws, seen along the mirror direction r, the normal
-    above: (count, 2), of which (0, 0) is r; and which of them lie below the surface."""
+    """Directions sampled by the glossy reflector, seen along the mirror direction r with the normal
+    upwards: an array (count, 2) in which r is (0, 0); and which of them are below the surface."""
     theta = np.radians(degrees)
     sine, cosine = float(np.sin(theta)), float(np.cos(theta))
     command = [tool, "sample", "glossy_reflector", f"e={e}", f"below={below}"]
@@ -84,12 +84,12 @@ def glossy_rays(tool, degrees, below, e=1, pattern="hammersley", count=65536):
 
 
 def share_below(tool, degrees, e):
-    """Share of the rays that lie below the surface."""
+    """Share of the rays that are below the surface."""
     return glossy_rays(tool, degrees, "lose", e)[1].mean()
 
 
 def turned_rays(tool, degrees, pattern):
-    """Rays as drawn and as turned, on the disk, and which are turned."""
+    """Rays before and after they are turned, on the disk, and which ones are turned."""
     drawn, below = glossy_rays(tool, degrees, "lose", pattern=pattern, count=RAYS)
     turned, _ = glossy_rays(tool, degrees, "mirror", pattern=pattern, count=RAYS)
     return drawn, turned, below
@@ -103,8 +103,8 @@ def to_nearest(points, which):
 
 
 def draw_turned(tool, out):
-    """The disks; returns for the last view by pattern how many rays are turned, and the median of
-    their distances to the nearest one before and after."""
+    """Draws the disks. Returns, for the last view and by pattern, the number of rays that are
+    turned, and the median of their distances to the nearest other ray before and after."""
     size = (9, 3.75)
     figure, rows = plt.subplots(2, len(PATTERNS), figsize=size, dpi=90, layout="constrained")
     x = np.linspace(-1, 1, 401)
@@ -174,7 +174,7 @@ def draw_coupled(out):
 
 
 def draw_anisotropy(out):
-    """The curves; returns the ratios by sharpness at the views of the table."""
+    """Draws the curves. Returns the ratios by sharpness at the views of the table."""
     import brdfc
 
     model = brdfc.model("radziszewski_alda")
@@ -201,7 +201,8 @@ def share_cells(tool, e):
 
 
 def crescents(choice, file):
-    """The scene of the crescents, smaller, with that choice for what falls below the horizon."""
+    """The scene of the crescents at a smaller size, with this choice for light that would go below
+    the horizon."""
     scene = json.loads((ROOT / "scenes" / "gl-fig12.json").read_text(encoding="utf-8"))
     settings = scene["settings"]
     factor = SIZE / settings["width"]
@@ -212,7 +213,7 @@ def crescents(choice, file):
 
 
 def beside(files, out):
-    """Pictures of one size side by side."""
+    """Puts pictures of one size side by side."""
     from PIL import Image
 
     pictures = [Image.open(f).convert("RGB") for f in files]

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What the scripts share: messages, installs that are skipped when nothing is missing, builds. Sourced by bash.
+# Common functions of the scripts: messages, installs that are skipped when nothing is missing, builds. Sourced by bash.
 # shellcheck shell=bash disable=SC2034
 
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 BUILD=$ROOT/build
 ENVS=$ROOT/.env
 TOOL=$BUILD/brdfc
-# The one of the tools' environment: what stands first in PATH may be anything.
+# The one of the tools' environment, because the first in PATH may be any version.
 OIIOTOOL=$ENVS/tools/bin/oiiotool
 
 # An inherited PYTHONPATH or virtual environment would leak packages into ours (and break bpy's own).
@@ -64,7 +64,7 @@ setup_packages() {
 
 # ---- Python environments ---------------------------------------------------------------------------------
 
-# find_python 3.13: prints an interpreter of that version that really runs and can make environments. A pyenv
+# find_python 3.13: prints an interpreter of that version that runs and can make virtual environments. A pyenv
 # shim exists for versions that are not selected, and then only prints an error: so each candidate is tried.
 find_python() {
   local candidate pyenv_root=${PYENV_ROOT:-$HOME/.pyenv}
@@ -88,8 +88,8 @@ env_is_ready() { # env_is_ready FOLDER STAMP
   [ "$(cat "$1/.stamp" 2>/dev/null)" = "$2" ] && "$1/bin/python" -c '' 2>/dev/null
 }
 
-# setup_env NAME PYTHON-VERSION: .env/NAME from script/requirements/NAME.txt. Nothing is done, and no network
-# used, while the requirements are those of the stamp. Returns 1 when there is no such interpreter.
+# setup_env NAME PYTHON-VERSION: makes .env/NAME from script/requirements/NAME.txt. Does nothing, and uses no network,
+# if the requirements are those of the stamp. Returns 1 if there is no such interpreter.
 setup_env() {
   local name=$1 wanted=$2 env=$ENVS/$1 requirements=$ROOT/script/requirements/$1.txt python stamp
   stamp="$wanted $(sha256sum <"$requirements")"
@@ -97,7 +97,7 @@ setup_env() {
   python=$(find_python "$wanted") || return 1
   mkdir -p "$ENVS"
   (
-    # Two scripts at once would pull the environment from under each other's pip, which then installs elsewhere.
+    # Two scripts at once could delete the environment while the other's pip runs, which then installs elsewhere.
     flock 9
     ! env_is_ready "$env" "$stamp" || exit 0
     say "Making Python environment .env/$name ($python; $(grep -v '^#' "$requirements" | tr '\n' ' '))"
@@ -109,7 +109,7 @@ setup_env() {
   ) 9>"$ENVS/.lock" || exit
 }
 
-# setup_blender 4.5: an environment with that Blender. Returns 1, saying so, when its interpreter is missing.
+# setup_blender 4.5: makes an environment with that Blender. If its interpreter is missing, prints that and returns 1.
 setup_blender() {
   case $1 in
     4.5 | 5.0)
@@ -126,7 +126,7 @@ setup_blender() {
   esac
 }
 
-# blender_ext COMMAND...: Blender 4.5's own program for extensions, which its wheel has as a script.
+# blender_ext COMMAND...: runs Blender 4.5's own extension tool, a script in its wheel.
 blender_ext() {
   local scripts=("$ENVS"/blender-4.5/lib/python3*/site-packages/bpy/4.5/scripts)
   "$ENVS/blender-4.5/bin/python" "${scripts[0]}/addons_core/bl_pkg/cli/blender_ext.py" "$@"
@@ -137,7 +137,7 @@ setup_tools() {
   setup_env tools 3.11 || die "Python 3.11 was not found"
 }
 
-# setup_farm: Dask, for renders on several machines.
+# setup_farm: installs Dask, for renders on several machines.
 setup_farm() {
   find_python 3.11 >/dev/null || install_packages python3.11 python3.11-venv
   setup_env farm 3.11 || die "Python 3.11 was not found"
@@ -145,8 +145,8 @@ setup_farm() {
 
 # ---- build -----------------------------------------------------------------------------------------------
 
-# slowest_sources FOLDER: the five that took longest to compile, seconds by the clock, of all that the log of Ninja has in
-# FOLDER. Those that a compiler's cache had take next to nothing.
+# slowest_sources FOLDER: the five sources in FOLDER's Ninja log that took longest to compile, in seconds of wall time.
+# Sources that were in the compiler cache take almost no time.
 slowest_sources() {
   [ -f "$1/.ninja_log" ] || return 0
   note "The slowest sources of ${1#"$ROOT"/}, in seconds:"

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 NODES = ("glossy", "principled", "metallic")
-#: Narrower lobes are left to roughness 0.
+#: Narrower lobes get roughness 0.
 LEAST_ALPHA = 2e-3
 #: Largest ratio of the lobe's widths that a node's Anisotropic input reaches.
 STRETCH = {"glossy": 1e4, "principled": 10.0, "metallic": 10.0}
@@ -36,13 +36,13 @@ EDGE = 1 / 7
 
 
 class Tool:
-    """The program brdfc, asked for tables."""
+    """Runs the program brdfc and reads its tables."""
 
     def __init__(self, path):
         self.path = path
 
     def ask(self, *arguments, stdin):
-        """What it prints."""
+        """The table that brdfc prints for these arguments."""
         command = [str(self.path), *arguments]
         done = subprocess.run(command, input=stdin, capture_output=True, text=True)
         if done.returncode:
@@ -75,7 +75,7 @@ def arguments_of(values):
 
 
 class Fresnel:
-    """Reflectance of a dielectric boundary by cosine and index, interpolated in a table."""
+    """The reflectance of a dielectric boundary by cosine and index, interpolated in a table."""
 
     COSINES, INDICES = np.linspace(0, 1, 257) ** 2, 1 + 3 * np.linspace(0, 1, 33) ** 1.5
 
@@ -96,8 +96,8 @@ class Fresnel:
 
 
 class Lobe:
-    """The lobe that all three nodes share, for pairs of directions, and what its albedo with a
-    Fresnel term is made of. `alpha` (0, 0) is an ideal mirror."""
+    """The lobe that all three nodes share, for pairs of directions, and the terms of its albedo
+    with a Fresnel factor. `alpha` (0, 0) is an ideal mirror."""
 
     def __init__(self, tool, alpha, wi, wo):
         self.wi, self.wo, self.cosine = wi, wo, half_cosine(wi, wo)
@@ -112,7 +112,7 @@ class Lobe:
         t = np.sqrt(u / (1 - u))
         h = np.stack([alpha[0] * t * np.cos(phi), alpha[1] * t * np.sin(phi), np.ones_like(t)], -1)
         h /= np.linalg.norm(h, axis=-1, keepdims=True)
-        # Density of these half vectors per solid angle.
+        # The pdf of these half vectors, per solid angle.
         density = 1 / (math.pi * alpha[0] * alpha[1] * h[:, 2] ** 3 * (1 + t * t) ** 2)
         self.drawn = np.maximum(views @ h.T, 0)  # (views, samples)
         drawn_wi = 2 * self.drawn[..., None] * h - views[:, None]
@@ -127,14 +127,14 @@ class Lobe:
         self.share *= 4 * self.drawn / density / len(u)
 
     def albedo(self, fresnel, ior):
-        """Share of the light that the lobe reflects, for each pair's view."""
+        """The albedo of the lobe, for each pair's view."""
         if self.is_mirror:
             return fresnel(ior, self.wo[:, 2])
         return (self.share * fresnel(ior, self.drawn)).sum(1)[self.view]
 
 
 def conductor(color, edge, cosine):
-    """Schlick's reflectance with the Metallic node's tint at the edge, (n, 3)."""
+    """Schlick's reflectance with the Metallic node's edge tint, (n, 3)."""
     color, edge = np.asarray(color), np.asarray(edge)
     c = np.clip(cosine, 0, 1)[:, None]
 
@@ -151,7 +151,7 @@ def half_cosine(wi, wo):
 
 
 def f_cos(fresnel, node, p, lobe):
-    """What a node with these parameters reflects, without an ideal mirror's part, (n, 3)."""
+    """f cos of a node with these parameters, without an ideal mirror, (n, 3)."""
     color = np.asarray(p["color"])
     if node == "glossy":
         return color * lobe.f_cos[:, None]
@@ -164,7 +164,7 @@ def f_cos(fresnel, node, p, lobe):
 
 
 def mirror(fresnel, node, p, cosine):
-    """Weight of a node's ideal mirror, which it has at roughness 0, (n, 3)."""
+    """The weight of the ideal mirror that a node has at roughness 0, (n, 3)."""
     if p["alpha"][0] > 0:
         return np.zeros((len(cosine), 3))
     if node == "glossy":
@@ -179,7 +179,7 @@ def mirror(fresnel, node, p, cosine):
 
 
 class Target:
-    """f cos of a model at directions that see its lobes, and its mirror's weight by view."""
+    """f cos of a model at directions in its lobes, and the weight of its mirror by view."""
 
     def __init__(self, tool, info, values):
         self.tool, self.lobes, name = tool, {}, info["name"]
@@ -221,13 +221,14 @@ class Target:
             weight.append(1 / (density * len(pair)))
         self.wi, self.wo, self.f = (np.concatenate(x) for x in (wi, wo, f))
         self.weight = np.concatenate(weight)
-        # Each view counts alike.
+        # All views have the same weight.
         count = len(self.f) // len(views)
         norm = (self.f**2 * self.weight[:, None]).reshape(len(views), count, 3).sum((1, 2))
         self.scale = np.repeat(1 / np.sqrt(np.maximum(norm, 1e-12)), count)
 
     def _directions(self, arguments, w):
-        """Half drawn from the model, half in proportion to the cosine. None if some go through."""
+        """Samples half of the directions from the model and half with a cosine pdf. Returns None if
+        the model transmits light."""
         n = DIRECTIONS // 2
         i = np.arange(n)
         u = (0.5 + np.outer(i, (0.8191725134, 0.6710436067, 0.5497004779))) % 1
@@ -256,7 +257,7 @@ class Target:
         return np.concatenate([off, delta.ravel()])
 
     def relative_l1(self, fresnel, node, p):
-        """Sum of |f - g| cos over that of f cos; mirrors count with their weights."""
+        """The sum of |f - g| cos divided by that of f cos; mirrors count with their weights."""
         off = np.abs(f_cos(fresnel, node, p, self.lobe(p["alpha"])) - self.f)
         delta = np.abs(mirror(fresnel, node, p, self.views[:, 2]) - self.mirror).sum()
         weight = self.weight[:, None]
@@ -265,7 +266,7 @@ class Target:
 
 
 def fit_rest(fresnel, target, node, alpha):
-    """Cost and parameters of the best fit whose lobe is of this width."""
+    """Cost and parameters of the best fit with a lobe of this width."""
     from scipy.optimize import least_squares
 
     start, high = [0.5] * 3, [1.0] * 3
@@ -290,7 +291,7 @@ def fit_rest(fresnel, target, node, alpha):
 
 
 def fit(fresnel, target, node):
-    """Parameters of a node, with the relative L1 error that is left."""
+    """The parameters of a node, with the remaining relative L1 error."""
     from scipy.optimize import minimize, minimize_scalar
 
     tried = {}
@@ -299,7 +300,8 @@ def fit(fresnel, target, node):
         limit = math.log(STRETCH[node])
         half = math.exp(min(max(stretch, -limit), limit) / 2)
         size = math.exp(min(max(size, math.log(LEAST_ALPHA)), 0.0))
-        # As wide as the closure goes, and as narrow as Cycles does not call a mirror.
+        # Limited to what the closure accepts, and to lobes that Cycles does not replace by a
+        # mirror.
         alpha = tuple(float(min(max(a, LEAST_ALPHA), 1)) for a in (size * half, size / half))
         if alpha not in tried:
             tried[alpha] = fit_rest(fresnel, target, node, alpha)
@@ -329,7 +331,7 @@ def fit(fresnel, target, node):
 
 
 def fit_scene(tool, fresnel, models, scene):
-    """By material and node; without materials that these nodes can't be fitted to."""
+    """The fits by material and node, without materials to which these nodes can't be fitted."""
     out = {}
     for name, material in scene["materials"].items():
         values = material.get("parameters", {})

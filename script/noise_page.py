@@ -7,11 +7,12 @@ import statistics
 from markdown_table import heading, line
 
 UNIT, NODE = "Glossy", "node"
-#: Which form's picture noise is divided by, where a model has several: the one with least noise.
+#: The form whose picture is the divisor of noise: of those that a model has, the one with least
+#: noise.
 STEADY = ("exact", "aimed", "fitted", "twin")
-#: Which form is right on average without an assumption about lamps.
+#: Forms that are right on average without an assumption about lamps.
 RIGHT = ("exact", "sampled")
-#: Side of the squares of pixels whose means are compared.
+#: Side, in pixels, of the blocks whose means are compared.
 BLOCK = 6
 
 INTRODUCTION = """\
@@ -39,9 +40,9 @@ the same noise takes.
 """
 
 
-#: The noise of a form whose pictures lack light that comes as rare dots, of which there was none.
+#: The noise of a form whose pictures lack light that would appear as rare bright pixels.
 UNMET = math.inf
-#: A form that shows less than this share of the light has not met the lamps.
+#: If a form shows less than this share of the light, it missed the lamps.
 MET = 0.8
 
 
@@ -54,7 +55,7 @@ def number(x):
 
 
 def percentile_rows(columns):
-    """Median and worst of each column of numbers."""
+    """Rows with the median and the maximum of each column of numbers."""
     some = [[x for x in column if x is not None] for column in columns]
     yield line("**median**", *(number(statistics.median(c)) if c else "" for c in some))
     yield line("**worst**", *(number(max(c)) if c else "" for c in some))
@@ -89,7 +90,7 @@ class Page:
         return float(row["noise"]) if row else None
 
     def met(self, row):
-        """Whether the form shows the light that the steadiest form of the model shows."""
+        """True if the form shows the light that the model's form with least noise shows."""
         place = row["condition"], int(row["samples"])
         steady = self.noise.get(row["divided_by"], {}).get(case_key(row), {}).get(place, row)
         mean, of = float(row["mean"]), float(steady["mean"])
@@ -103,12 +104,13 @@ class Page:
         return float(row["noise"]) / unit if self.met(row) else UNMET
 
     def cost(self, form, case, place):
-        """That of the model's defaults, where lamps are as many."""
+        """The cost of the form at the model's defaults, with the same number of lamps."""
         timed = self.conditions[place[0]]["timed_as"]
         return self.costs.get((case[0], "", form, timed))
 
     def common(self):
-        """Places that tables of all models have: what few models are measured in is apart."""
+        """Places for the tables of all models; those measured for a few models have their own
+        table."""
         return [
             p for p in self.places if p in self.by_default and not self.conditions[p[0]]["picked"]
         ]
@@ -171,7 +173,7 @@ class Page:
         return [*lines, ""]
 
     def right(self, case, place):
-        """(form, row) of what is right on average there, of the most samples."""
+        """(form, row) of the form that is right on average there, with the most samples."""
         for form in RIGHT:
             found = self.noise.get(form, {}).get(case, {})
             of = [p for p in found if p[0] == place[0]]
@@ -181,7 +183,7 @@ class Page:
         return None, None
 
     def off(self, form, case, place):
-        """Relative difference of the means and its standard error."""
+        """The relative difference of the means, and its standard error."""
         row = self.noise[form].get(case, {}).get(place)
         name, right = self.right(case, place)
         if row is None or right is None or name == form or not self.met(right):

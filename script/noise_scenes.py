@@ -14,23 +14,23 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-#: Side of the picture in pixels; the ball takes 6 in 7 of it.
+#: Side of the picture in pixels; the ball takes 6/7 of it.
 SIZE = 42
-#: Irradiance of a surface that faces the lamps, W/m^2.
+#: Irradiance, in W/m^2, of a surface that faces the lamps.
 IRRADIANCE = 3.0
-#: From the ball's centre to lamps that stand alone, and how far off they are.
+#: Direction from the ball's centre to single lamps, and their distance.
 TOWARDS, FAR = Vector((0.5, -0.62, 0.6)).normalized(), 6.0
 CENTRE = Vector((0, 0, 1))
 CAMERA = Vector((0, -6.5, 2.2))
-#: Of the ball's disc in the picture: what the pixel filter mixes with the floor is left out.
+#: The part of the ball's disc that is measured; beyond it the pixel filter mixes in the floor.
 INSIDE = 0.95
 
 
 @dataclasses.dataclass(frozen=True)
 class Condition:
-    """`light` fills the scene with lamps; `samples` is what is measured unless asked otherwise;
-    `timed_as` names the condition whose run times stand for this one's; `picked` leaves it to the
-    cases of noise_table.PICKED unless others are named."""
+    """A light condition. `light` adds lamps to the scene. `samples` is the default list of sample
+    counts. `timed_as` names the condition whose run times are used for this one. `picked` restricts
+    it to the cases of noise_table.PICKED unless others are named."""
 
     title: str
     light: Callable
@@ -52,7 +52,7 @@ def empty_tree(owner):
 
 
 def node_material(name, kind, **inputs):
-    """A material of one of Blender's own nodes."""
+    """Makes a material of one of Blender's own nodes."""
     material = bpy.data.materials.new(name)
     tree = empty_tree(material)
     node = tree.nodes.new(kind)
@@ -73,7 +73,8 @@ def link(scene, name, data, location=(0, 0, 0)):
 
 
 def aim(item, direction):
-    """Turns -z, where lamps shine and cameras look, into the direction."""
+    """Rotates an object so that its -z axis, along which lamps shine and cameras look, has the
+    direction."""
     item.rotation_euler = Vector(direction).to_track_quat("-Z", "Y").to_euler()
 
 
@@ -93,7 +94,7 @@ def sphere(scene, name, material, radius, location, segments=128):
 
 
 def quads(scene, name, material, corners):
-    """One mesh of quads, each four corners."""
+    """Adds one mesh of quads with four corners each."""
     mesh = bpy.data.meshes.new(name)
     faces = [range(4 * i, 4 * i + 4) for i in range(len(corners))]
     mesh.from_pydata([c for quad in corners for c in quad], [], faces)
@@ -111,7 +112,7 @@ def grey(name, value):
 
 
 def world(scene, strength=0.05):
-    """The grey world of a new file; returns its tree and Background node."""
+    """Adds the grey world of a new file. Returns its tree and Background node."""
     made = bpy.data.worlds.new("World")
     scene.world = made
     tree = empty_tree(made)
@@ -127,7 +128,7 @@ def world(scene, strength=0.05):
 
 
 def lamp(scene, kind, name="Lamp", towards=TOWARDS, distance=FAR, share=1.0, **values):
-    """A lamp that makes `share` of IRRADIANCE at the ball's centre."""
+    """Adds a lamp that gives the ball's centre `share` of IRRADIANCE."""
     data = bpy.data.lights.new(name, kind)
     for key, value in values.items():
         setattr(data, key, value)
@@ -171,7 +172,7 @@ def emissive_ball(scene, _folder):
 
 
 def emissive_plane(scene, _folder):
-    """A softbox as many make it: a plane of 1.5 x 1 m with an Emission node."""
+    """Adds a softbox as users often make it: a plane of 1.5 x 1 m with an Emission node."""
     width, height, distance = 1.5, 1.0, 4.0
     strength = IRRADIANCE * distance**2 / (width * height)
     material = node_material("Lamp", "ShaderNodeEmission", Strength=strength)
@@ -186,7 +187,8 @@ def emissive_plane(scene, _folder):
 
 
 def sky_texture(scene, _folder):
-    """The node as it is when added, with its sun; only dimmed, and turned to shine on the ball."""
+    """Adds the Sky Texture node with its defaults and its sun, only dimmed and turned to light the
+    ball."""
     tree, background = world(scene, strength=0.05)
     sky = tree.nodes.new("ShaderNodeTexSky")
     sky.sun_elevation = math.radians(37)
@@ -195,7 +197,7 @@ def sky_texture(scene, _folder):
 
 
 def _gradient(direction):
-    """A smooth sky: bright upwards and to one side. (n, 3) to (n,)."""
+    """A smooth sky that is bright upwards and to one side. (n, 3) to (n,)."""
     return 0.35 + 0.3 * direction @ np.array(TOWARDS)
 
 
@@ -213,7 +215,8 @@ def smooth_sky(scene, _folder):
     tree.links.new(scaled.outputs[0], background.inputs["Strength"])
 
 
-#: Of the environment image: azimuth and height in degrees, radius of the blob in radians, radiance.
+#: For the environment image: azimuth and height in degrees, radius of the blob in radians,
+#: radiance.
 BLOBS = ((-51, 37, 0.06, 120.0), (-150, 20, 0.04, 150.0), (60, 50, 0.1, 20.0))
 
 
@@ -245,8 +248,8 @@ def environment_image(scene, folder):
 
 
 def interior(scene, _folder):
-    """A room about ball and camera; a sun shines through a hole in its ceiling on the floor behind
-    the ball, which itself sees no lamp."""
+    """Adds a room around ball and camera. A sun shines through a hole in its ceiling on the floor
+    behind the ball, which sees no lamp directly."""
     x0, x1, y0, y1, top = -4.0, 4.0, -7.5, 4.5, 4.0
     hole = (-3.5, -0.5, 0.8, 3.8)
     corners = [
@@ -290,14 +293,14 @@ CONDITIONS = {
 
 
 def settings(scene, size):
-    """What differs from a new file: equal samples, pictures of numbers, one thread."""
+    """Settings other than those of a new file: equal samples, raw pictures, one thread."""
     cycles, render = scene.cycles, scene.render
     render.engine = "CYCLES"
     cycles.device = "CPU"
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.use_animated_seed = False
-    # Shaders and importance maps are made once for all pictures of a scene.
+    # Shaders and importance maps are computed once for all pictures of a scene.
     render.use_persistent_data = True
     render.threads_mode, render.threads = "FIXED", 1
     render.use_compositing = render.use_sequencer = False
@@ -318,8 +321,8 @@ def camera(scene, location, target, angle):
 
 
 def build(name, folder, size=SIZE):
-    """The scene of a condition in an empty file: (scene, the object that gets the model's material,
-    mask of the pixels that count, row 0 at the bottom)."""
+    """Builds the scene of a condition in an empty file. Returns (scene, the object that gets the
+    model's material, mask of the measured pixels with row 0 at the bottom)."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene, condition = bpy.context.scene, CONDITIONS[name]
     settings(scene, size)
@@ -338,14 +341,14 @@ def build(name, folder, size=SIZE):
 
 
 def _screen(size):
-    """Places of the pixels in the picture, -1 to 1."""
+    """Coordinates of the pixels in the picture, from -1 to 1."""
     y, x = np.mgrid[0:size, 0:size]
     return (2 * x + 1) / size - 1, (2 * y + 1) / size - 1
 
 
 def _penumbra(scene, size):
-    """A floor that has the model, seen in the mirror direction of an area lamp where the edge of a
-    ball's shadow crosses it: there f and the lamp's visibility vary together over the lamp."""
+    """Adds a floor with the model, seen in the mirror direction of an area lamp where the edge of a
+    ball's shadow crosses it. There f and the lamp's visibility both vary over the lamp."""
     world(scene)
     floor = quads(scene, "Floor", None, [rectangle(-20, 20, -20, 20, 0)])
     towards = Vector((0, 0.75, 0.65)).normalized()
@@ -359,7 +362,7 @@ def _penumbra(scene, size):
     camera(scene, eye, Vector((0, 0, 0)), 2 * half)
     bpy.context.view_layer.update()
 
-    # Where each pixel's ray meets the floor, and how much of the lamp is seen from there.
+    # Where each pixel's ray meets the floor, and the part of the lamp that is visible from there.
     x, y = _screen(size)
     turn = np.array(scene.camera.matrix_world.to_3x3())
     rays = np.stack([x * math.tan(half), y * math.tan(half), -np.ones_like(x)], -1) @ turn.T

@@ -38,13 +38,14 @@ FIELDS = (
 KEY = FIELDS[:5]
 COST_FIELDS = ("model", "values", "form", "condition", "cost", "cost_min", "cost_max")
 
-#: Blender's own nodes, of the roughness that most models have by default. The first is the unit.
+#: Blender's own nodes, with the roughness that most models have by default. The first is the unit.
 NATIVE = {
     "Glossy": ("ShaderNodeBsdfAnisotropic", {"Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.4}),
     "Diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.8, 0.8, 1)}),
 }
 
-#: Beside the default values of every model: rough, stiff and stretched ones of some.
+#: Cases in addition to the default values of every model: rough, sharp and anisotropic ones of
+#: some.
 BESIDE = {
     "ashikhmin_shirley": [
         {"nu": 100, "nv": 1000},
@@ -58,7 +59,7 @@ BESIDE = {
     "ward": [{"ax": 0.05, "ay": 0.3}],
 }
 
-#: What conditions are for that are too dear for all.
+#: Cases for the conditions that take too long for all models.
 PICKED = (
     "Glossy",
     "ashikhmin_shirley",
@@ -70,13 +71,14 @@ PICKED = (
     "ward",
 )
 
-#: Mean of (f - f0)^2 / (f0^2 + this), as in docs/conventions.md.
+#: The constant in the denominator of the mean of (f - f0)^2 / (f0^2 + FLOOR), as in
+#: docs/conventions.md.
 FLOOR = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A model and what of its parameters differs from the defaults, or a node of Blender's."""
+    """A model with parameter values other than its defaults, or a node of Blender's."""
 
     model: str
     values: str = ""
@@ -100,8 +102,8 @@ _blender = {}
 
 
 def start(extension, cache):
-    """Of each process: Blender with the extension; what it prints goes to a file."""
-    # Imported here: this process may be one that never renders.
+    """Starts Blender with the extension in each process; its output goes to a file."""
+    # Imported here, because this process may never render.
     from render_scene import start_blender, take_even_block
 
     log = os.open(cache / "blender.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -129,8 +131,8 @@ def material_of(case, form):
 
 
 def set_up(condition, size, pack):
-    """(scene, object, mask) of a condition, lit by OSL. The last one serves again: importance maps
-    of skies, which take seconds, are then kept."""
+    """(scene, object, mask) of a condition, rendered with OSL. The last scene is reused, which
+    keeps the importance maps of skies; making them takes seconds."""
     wanted = condition, size, pack
     if _blender.pop("set_up", None) != wanted:
         loader = _blender["loader"]
@@ -142,7 +144,7 @@ def set_up(condition, size, pack):
 
 
 def dress(scene, ball, make):
-    """Gives the object the material that `make` returns in place of its last one."""
+    """Replaces the object's material by the one that `make` returns."""
     bpy = _blender["bpy"]
     last = list(ball.data.materials)
     ball.data.materials.clear()
@@ -150,14 +152,14 @@ def dress(scene, ball, make):
         bpy.data.materials.remove(material)
     ball.data.materials.append(make())
     bpy.context.view_layer.update()
-    # Forms that know where lamps are ask for it once these stand.
+    # Forms that use the list of lamps need it once the lamps exist.
     if see_lamps := getattr(_blender["loader"].api, "see_lamps", None):
         see_lamps(scene)
         bpy.context.view_layer.update()
 
 
 def render(scene, samples, seed, read=True):
-    """Seconds of CPU time, and pixels, (height, width, 3), row 0 at the bottom."""
+    """Seconds of CPU time, and pixels (height, width, 3) with row 0 at the bottom."""
     bpy, cycles = _blender["bpy"], scene.cycles
     cycles.seed = seed
     _blender["take_even_block"](cycles, samples)
@@ -184,8 +186,8 @@ def picture_file(case, form, condition, samples, size):
 
 
 def pictures(case, form, job):
-    """{mask, mean, variance of one picture, seeds} of the condition with this form. None where the
-    form refuses the values."""
+    """{mask, mean, variance of one picture, seeds} of the condition with this form; None if the
+    form rejects the values."""
     condition, samples, size, seeds = (job[k] for k in ("condition", "samples", "size", "seeds"))
     file = picture_file(case, form, condition, samples, size)
     if file.exists():
@@ -213,12 +215,12 @@ def pictures(case, form, job):
 
 
 def pack_of(case, form, job):
-    """The pack that has the form: None for the extension's own."""
+    """The pack that has the form; None for the extension itself."""
     return job["pack"] if form in job["from_pack"] else None
 
 
 def smoothed(mean, mask, radius=3):
-    """Means over squares, of pixels in the mask alone."""
+    """Means over squares, using only pixels in the mask."""
 
     def total(a):
         a = np.pad(a, ((radius + 1, radius), (radius + 1, radius), (0, 0))).cumsum(0).cumsum(1)
@@ -230,7 +232,7 @@ def smoothed(mean, mask, radius=3):
 
 
 def blocks(values, mask):
-    """Sums over squares of pixels of the mask, grey."""
+    """Sums over square blocks of the mask's pixels, in grey."""
     grey = np.where(mask, values.mean(-1), 0)
     side = -(-grey.shape[0] // BLOCK) * BLOCK
     grey = np.pad(grey, ((0, side - grey.shape[0]), (0, side - grey.shape[1])))
@@ -238,7 +240,7 @@ def blocks(values, mask):
 
 
 def measure(job):
-    """Rows of a case and condition: every form that is asked for."""
+    """Rows for a case and a condition: every form that is requested."""
     case, forms = Case(*job["case"]), job["forms"]
     steady = next((f for f in STEADY if f in forms), forms[0])
     right = next((f for f in RIGHT if f in forms), forms[0])
@@ -251,13 +253,13 @@ def measure(job):
     by = steady if steady in found else next(iter(found))
     mask, divide = found[by]["mask"], found[by]["mean"]
     if by not in STEADY and by != NODE:
-        # What is met now and then by chance tells where light is only with its neighbourhood.
+        # Light that is found only occasionally has to be averaged over neighbouring pixels.
         divide = smoothed(divide, mask)
     rows = []
     for form, made in found.items():
         variance, seeds = made["variance"], int(made["seeds"])
         relative = (variance / (divide**2 + FLOOR))[mask].mean(-1)
-        # Channels of a path are alike, so their errors add up.
+        # The channels of a path are correlated, so their errors add up.
         spread = np.sqrt(variance[mask]).mean(-1) ** 2 / seeds
         count = int(mask.sum())
         row = {"model": case.model, "values": case.values, "form": form}
@@ -276,7 +278,8 @@ def measure(job):
 
 
 def apart(made, right, mask):
-    """Relative L1 of the squares of two pictures, and what noise alone would make of it."""
+    """Relative L1 difference of the blocks of two pictures, and the value that noise alone would
+    give."""
     off = blocks(made["mean"] - right["mean"], mask)
     light = blocks(right["mean"], mask).sum()
     variance = sum(
@@ -288,7 +291,7 @@ def apart(made, right, mask):
 
 
 def time_forms(job):
-    """Rows of costs: forms of a case and the Glossy node take turns in one process."""
+    """Rows of costs: the forms of a case and the Glossy node take turns in one process."""
     case, condition = Case(*job["case"]), job["condition"]
     unit = (Case(UNIT), NODE)
     turns = [unit] + [(case, form) for form in job["forms"]]
@@ -315,7 +318,7 @@ def time_forms(job):
 
 
 def tried(work, job):
-    """What `work` returns, or raises as an exception that a process without Blender can read."""
+    """The result of `work`; or raises an exception that a process without Blender can unpickle."""
     try:
         return work(job)
     except Exception as error:
@@ -324,7 +327,7 @@ def tried(work, job):
 
 
 def titles():
-    """What the page says of conditions, without Blender in the process that asks."""
+    """The page's text about the conditions, for a process without Blender."""
     scenes = _blender["scenes"]
     return {
         name: {
@@ -370,7 +373,7 @@ def packs(options, cases, entries, cache):
             material["parameters"] = case.parameters
             file = folder / "materials.json"
             file.write_text(json.dumps({"materials": {"m": material}}), encoding="utf-8")
-            # Any error will do: the fit comes beside the sampled form.
+            # Any error limit will do: the fit is built beside the sampled form.
             command = [options.tool, "build", "--materials", file, "--error", "100"]
             command += ["--twin", "--out", folder]
             subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
@@ -379,12 +382,12 @@ def packs(options, cases, entries, cache):
     return made
 
 
-#: Forms that packs of a scene or a .blend have and the extension may lack.
+#: Forms that packs for a scene or a .blend have, and the extension may lack.
 MADE_OF_A_FIT = ("fitted", "twin")
 
 
 def jobs_of(cases, entries, conditions, fitted, options):
-    """A job a case, condition and number of samples, conditions first."""
+    """One job per case, condition and number of samples, in the order of conditions."""
     for condition, entry in conditions.items():
         if options.condition and condition not in options.condition:
             continue
@@ -398,7 +401,7 @@ def jobs_of(cases, entries, conditions, fitted, options):
                 else:
                     forms = list(entries[case.model]["representations"])
                     pack, made = fitted.get(case, (None, []))
-                    # A fit of these very values is better than one along a parameter.
+                    # A fit for these values is better than one along a parameter.
                     from_pack = made
                     forms += [f for f in made if f not in forms]
                 wanted = [f for f in forms if not options.form or f in options.form]
@@ -410,7 +413,7 @@ def jobs_of(cases, entries, conditions, fitted, options):
                     "case": (case.model, case.values),
                     "condition": condition,
                     "samples": samples,
-                    # Many samples take long, and their noise needs fewer pixels to be known.
+                    # Many samples take long, and fewer pixels suffice to measure their noise.
                     "size": options.size
                     if samples <= 256 or entry["picked"]
                     else options.size // 2,
@@ -423,7 +426,7 @@ def jobs_of(cases, entries, conditions, fitted, options):
 
 
 class Table:
-    """Rows of a CSV by key; added ones are in the file at once."""
+    """Rows of a CSV file by key; rows that are added are written at once."""
 
     def __init__(self, path, fields, key):
         self.path, self.fields, self.key, self.rows = path, fields, key, {}
@@ -450,8 +453,8 @@ class Table:
 
 
 def run(jobs, work, table, options, cache, processes):
-    """Does what the table lacks, several processes side by side. Returns how many jobs failed:
-    one condition that a form can't bear must not cost the others."""
+    """Does the jobs that the table lacks, in several processes. Returns how many failed: one
+    condition that fails with a form must not stop the others."""
     if not jobs:
         return 0
     pool = concurrent.futures.ProcessPoolExecutor(
@@ -487,7 +490,7 @@ def is_missing(job, table):
 
 
 def cost_jobs(jobs, table, options):
-    """Costs of all models with their defaults, where the lamps are none, one and four."""
+    """Jobs for the costs of all models with their defaults, with no lamp, one, and four."""
     for job in jobs:
         model, values = job["case"]
         if values or model == UNIT or job["condition"] not in options.timed:
@@ -536,12 +539,12 @@ def main():
             parser.error(f"{path}: no such file")
     options.extension = options.extension.resolve()
     if any(n < 2 or n & (n - 1) for n in options.samples or []):
-        # Cycles' sequence is even over blocks of that length.
+        # Cycles' sequence is evenly distributed over blocks of such a length.
         parser.error("--samples: expected powers of two from 2 on")
 
     with zipfile.ZipFile(options.extension) as archive:
         entries = json.loads(archive.read("manifest.json"))["models"]
-        # Names and checksums: the time stamps of an archive say nothing.
+        # Names and checksums, because the time stamps of an archive may differ.
         contents = sorted((i.filename, i.CRC) for i in archive.infolist())
     digest = hashlib.sha256(json.dumps(contents).encode()).hexdigest()[:12]
     cache = options.cache.resolve() / (digest + ("-quick" if options.quick else ""))
@@ -573,7 +576,7 @@ def main():
         missing = [job for job in jobs if is_missing(job, measured)]
         failed += run(missing, measure, measured, options, cache, options.processes)
         if not options.no_costs:
-            # One process: what runs beside it would be measured too.
+            # In one process, because others beside it would affect the times.
             timed = list(cost_jobs(jobs, costs, options))
             failed += run(timed, time_forms, costs, options, cache, 1)
 

@@ -45,7 +45,7 @@ PETER = (
     "Zeitschrift für Physik 15, 1923"
 )
 
-#: File: what it is, its source, and where the database has it.
+#: File: label, source, and path in the database.
 SUBSTANCES = {
     "aluminium": ("Aluminium", RAKIC_95, "main/Al/nk/Rakic"),
     "bk7": ("Crown glass N-BK7", SCHOTT, "specs/schott/optical/N-BK7"),
@@ -92,7 +92,7 @@ def sellmeier(kind, coefficients, micrometres):
 
 
 def blocks(text, file):
-    """n and k as rows; k is empty of what has none that is measured."""
+    """n and k as rows; k is empty if none was measured."""
     n, k = [], []
     for entry in re.split(r"(?m)^  - type: ", text)[1:]:
         what = entry.split("\n", 1)[0].strip()

@@ -12,8 +12,8 @@ CONFIG = Path(__file__).resolve().parents[1] / "data" / "color" / "config.ocio"
 
 def read_rgb(path):
     """R, G and B of a picture (height, width, 3), whatever the name of its layer and whether or not
-    there is one of the variance: as an EXR has them or, where it says that they are in another
-    space, in linear Rec.709. Raises OSError naming the file."""
+    it also has a variance. The colours are those of the EXR, converted to linear Rec.709 if it
+    states another space. Raises OSError naming the file."""
     picture = oiio.ImageBuf(str(path))
     pixels = picture.get_pixels(oiio.FLOAT)
     if picture.has_error or pixels is None:

@@ -23,7 +23,7 @@ def slice_(theta):
 
 
 def furnace(axes):
-    """White surfaces: 1 is all of the light."""
+    """Draws the albedo of white surfaces: 1 is all of the light."""
     angle = np.linspace(0, 89, 60)
     white = {
         "lossless": {"tint": 1, "n": 25},
@@ -41,7 +41,7 @@ def furnace(axes):
 
 
 def lobes(axes, angle=50):
-    """What is reflected towards each side of light from one."""
+    """Draws the light that is reflected in each direction, for one light direction."""
     theta = np.radians(np.linspace(-90, 90, 721))
     light = slice_(np.radians(-angle))
     shown = {
@@ -60,7 +60,7 @@ def lobes(axes, angle=50):
 
 
 def comparison(axes):
-    """Ward's lobe and Cook and Torrance's, of slopes of the same spread."""
+    """Compares Ward's lobe and Cook and Torrance's, with the same distribution of slopes."""
     ward, cook = brdfc.model("ward"), brdfc.model("cook_torrance")
     theta = np.radians(np.linspace(-89.5, 89.5, 1440))
     for angle, color in ((0, "C0"), (45, "C1"), (75, "C2")):

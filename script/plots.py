@@ -22,12 +22,12 @@ MATERIALS = {
     "coupled": "twin",
     "glass": "auto",
 }
-#: White pixels between two.
+#: White pixels between two plots.
 GAP = 8
 
 
 def drawing_time(draw):
-    """Seconds of a core for a plot, once what all share is there: the least of fifteen."""
+    """CPU seconds for a plot, once shared data exist: the minimum of fifteen runs."""
     draw()
     taken = []
     for _ in range(15):

@@ -34,17 +34,17 @@ import uuid
 import zipfile
 from pathlib import Path
 
-#: Files to look at, and what Blender calls their format.
+#: File types for viewing, and Blender's names of their formats.
 PICTURES = {".png": "PNG", ".jpg": "JPEG"}
 
 
 class UsageError(Exception):
-    """Something the user can mend; one line."""
+    """An error that the user can correct; its message is one line."""
 
 
 @contextlib.contextmanager
 def quiet():
-    """Sends what Blender prints, from Python or not, to a file that is shown when a step fails."""
+    """Redirects everything that Blender prints to a file, which is shown if a step fails."""
     sys.stdout.flush()
     with tempfile.TemporaryFile() as sink:
         saved = os.dup(1)
@@ -62,9 +62,10 @@ def quiet():
 
 
 def start_blender(extension, resources):
-    """Imports bpy with scratch user folders, installs the extension; returns bpy, scene_loader."""
+    """Imports bpy with temporary user folders and installs the extension. Returns bpy and
+    scene_loader."""
     os.environ["BLENDER_USER_RESOURCES"] = str(resources)
-    # Blender leaves the bytecode of each script that it compiles in the folder for temporary files.
+    # Blender leaves the bytecode of each compiled script in the folder for temporary files.
     tempfile.tempdir = str(resources)
     import bpy
 
@@ -74,7 +75,7 @@ def start_blender(extension, resources):
             filepath=str(extension), repo="user_default", enable_on_install=True
         )
     try:
-        # A pack cut to a scene has an id of its own.
+        # A pack cut to a scene has its own id.
         with zipfile.ZipFile(extension) as archive:
             about = tomllib.loads(archive.read("blender_manifest.toml").decode())
         loader = f"bl_ext.user_default.{about['id']}.scene_loader"
@@ -90,11 +91,10 @@ def cpu_seconds():
 
 
 def take_even_block(cycles, samples):
-    """Sets how many samples are taken, and which: a block of Cycles' sequence that is as even as
-    its first ones, without the very first. Cycles sends that through the centre of each pixel
-    whatever the seed, where a form that draws from where the path is would draw the same in every
-    picture.
-    """
+    """Sets the number of samples, and which ones: a block of Cycles' sequence that is as evenly
+    distributed as its first samples, but does not contain the very first one. Cycles sends the
+    first sample through the centre of each pixel whatever the seed, so a form whose random numbers
+    depend on the path's position would sample the same direction in every picture."""
     first = 1 << (samples - 1).bit_length()  # blocks of powers of two are even
     cycles.samples, cycles.sample_offset = first + samples, first
     cycles.use_sample_subset, cycles.sample_subset_length = True, samples
@@ -113,8 +113,8 @@ def timed_render(bpy, samples, path=None):
 
 
 def for_eyes(loader, scene, path, view):
-    """A picture to look at in place of an EXR to measure: bytes, through Blender's own view; of
-    None through Standard, or what the display has in its place."""
+    """Writes a picture for viewing instead of an EXR: 8 bits, with a view transform of Blender's.
+    If `view` is None, it is Standard, or the display's equivalent."""
     images = scene.render.image_settings
     images.file_format = PICTURES[path.suffix]
     images.color_mode, images.color_depth, images.quality = "RGB", "8", 92
@@ -147,7 +147,7 @@ def render_once(bpy, loader, job, repetition, threads=None):
         scene.render.threads_mode, scene.render.threads = "FIXED", threads
     one_cpu, one_wall = timed_render(bpy, 1) if job["timed"] else (None, None)
     out = Path(job["out"]).resolve()
-    # Of a name of its own: a farm may try the same twice at once.
+    # A name of its own, because a farm may try the same job twice at once.
     partial = out.with_name(f".{out.stem}.{uuid.uuid4().hex}{out.suffix}")
     scene.cycles.use_denoising = job["denoise"]
     if out.suffix in PICTURES:
@@ -175,7 +175,7 @@ def render_once(bpy, loader, job, repetition, threads=None):
 
 
 def describe(bpy, loader, scene, job, samples):
-    """What was rendered, and under which settings."""
+    """What was rendered, and with which settings."""
     api, nodes, pack = loader.api, loader.nodes, loader.pack
     materials, warnings = {}, []
     used = {s.material for o in scene.objects for s in o.material_slots if s.material}
@@ -214,7 +214,7 @@ def describe(bpy, loader, scene, job, samples):
 
 
 def read_jobs(options):
-    """List of complete jobs. Raises UsageError."""
+    """The list of complete jobs. Raises UsageError."""
     defaults = {
         "representation": options.representation,
         "spp": options.spp,
@@ -266,7 +266,7 @@ def read_jobs(options):
 
 
 def run(options):
-    """Renders every job, repetitions taking turns, and returns their records."""
+    """Renders every job, with repetitions taking turns, and returns their records."""
     jobs = read_jobs(options)
     if options.threads is not None and options.threads < 1:
         raise UsageError(f"--threads: expected a whole number from 1, got {options.threads}")

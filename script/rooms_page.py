@@ -14,7 +14,7 @@ PAGE, DRAWING = ROOT / "docs/tables/rooms.md", ROOT / "docs/tables/rooms.svg"
 
 
 def listed():
-    """By room, in the order of the file: what it is for, and which rooms it links."""
+    """By room, in the order of the file: its purpose, and the rooms that it links."""
     text = (ROOT / "generator/CMakeLists.txt").read_text(encoding="utf-8")
     found = re.findall(r'^brdfc_room\((\w+) "(.*?)"([^)]*)\)', text, re.M | re.S)
     links = re.compile(r"\bROOMS\b([\sa-z]*)")
@@ -30,7 +30,7 @@ def sources(room):
 
 
 def included(rooms):
-    """By room: the other ones that its files include, in the order of `rooms`."""
+    """By room: the other rooms that its files include, in the order of `rooms`."""
     out = {}
     for room in rooms:
         named = set(re.findall(r'^#include "(\w+)/', "\n".join(sources(room)), re.M))
@@ -39,7 +39,7 @@ def included(rooms):
 
 
 def reduced(below):
-    """Without what a longer way says, too."""
+    """The arrows without those that longer paths imply."""
 
     def reached(room):
         return set(below[room]).union(*(reached(b) for b in below[room]))
@@ -55,8 +55,8 @@ def bends(new, at, below):
 
 
 def places(below):
-    """By room: column and row of the drawing. The longest way leads straight down; others stand
-    beside it, near what they build on."""
+    """By room: column and row in the drawing. The longest path goes straight down; other rooms are
+    beside it, near those that they build on."""
 
     def way(room):
         return [*max((way(b) for b in below[room]), key=len, default=[]), room]
@@ -93,7 +93,7 @@ def drawing(below):
         x1, y1 = middle[room][0], middle[room][1] - tall / 2
         for other in others:
             x0, y0 = middle[other][0], middle[other][1] + tall / 2
-            # Down its own column, then over to the room.
+            # Down its own column, then across to the room.
             turn = y1 - high + tall
             lines.append(
                 f'<path d="M{x0:g} {y0:g}V{turn:g}C{x0:g} {y1:g} {x1:g} {turn:g} {x1:g} {y1:g}" '

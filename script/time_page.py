@@ -31,7 +31,7 @@ COLORS = {
     "twin": "tab:purple",
     "sampled": "tab:red",
 }
-#: Blender's own nodes: the unit, and what else was measured.
+#: Blender's own nodes: the unit, and others that were measured.
 UNIT = noise_page.UNIT
 DIFFUSE = "Diffuse"
 #: Title of the part with pictures.
@@ -44,15 +44,15 @@ def read(path):
 
 
 def measured_on(path):
-    """The day of the last change of a table, or None outside a git checkout."""
+    """The date of the last change of a table; None outside a git checkout."""
     command = ["git", "log", "-1", "--format=%cs", "--", path.name]
     done = subprocess.run(command, cwd=path.parent, capture_output=True, text=True)
     return done.stdout.strip() or None
 
 
 def times(rows, costs):
-    """{form: {condition: [CPU time to the noise of the Glossy node, one a case]}}, of 64 samples;
-    infinite where a form did not meet the lamp. Costs are those of a model's defaults."""
+    """{form: {condition: [CPU time to reach the noise of the Glossy node, one per case]}}, for 64
+    samples; infinite if a form missed the lamp. Costs are those of a model's defaults."""
     node = {r["condition"] for r in rows if (r["model"], r["form"]) == (UNIT, noise_page.NODE)}
     rows = [r for r in rows if int(r["samples"]) == 64 and r["condition"] in node]
     names = list(dict.fromkeys(r["condition"] for r in rows))
@@ -74,7 +74,7 @@ def times(rows, costs):
 
 
 def forms_table(text):
-    """[(model, form, error as a part of the light, cost)] of docs/tables/forms.md."""
+    """[(model, form, error as a share of the light, cost)] from docs/tables/forms.md."""
     rows = [re.split(r"\s*\|\s*", r.strip("| \n")) for r in text.splitlines() if r.startswith("|")]
     names = rows[0][1:]
     found = []

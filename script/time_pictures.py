@@ -22,7 +22,7 @@ from pictures import read_rgb
 from time_page import PICTURES
 
 CONFIG = Path(__file__).resolve().parents[1] / "data" / "color" / "config.ocio"
-#: The model: its kept fit gives it every drawn form. Samples of the Glossy node.
+#: The model: its stored fit gives it every sampled form. Samples of the Glossy node.
 MODEL, PARAMETERS, SPP = "cook_torrance", {"m": 0.3, "f0": [0.9, 0.6, 0.3]}, 64
 FORMS = ("glossy", "aimed", "fitted", "sampled")
 SIZE, GAP, EPSILON = 176, 6, 0.01

@@ -7,7 +7,7 @@
 
 namespace brdfc {
 
-/// Sets an environment variable until the test ends.
+/// Sets an environment variable for the rest of the test.
 class Environment {
  public:
   Environment(const char* name, const std::string& value) : name_(name) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Models that are wrong on purpose; they are not registered.
+// Models with deliberate errors; they are not registered.
 #pragma once
 
 #include "model/sampling.h"
 
 namespace brdfc::faulty {
 
-// Lambert's reflector with one thing wrong at a time.
+// Lambert's reflector with one error at a time.
 enum Defect {
   kNone,
   kPdf,
@@ -65,7 +65,7 @@ template <Defect D> struct Faulty {
       if (D == kColorCubed) f = f * rho * rho;
       if (D == kDark) f = f * sqr(maximum(wi.x * wo.x + wi.y * wo.y + T(0.5), T(0)));
       if (D == kEdge) f = f * (T(1) - T(0.05) * abs(wi.x + wo.x));
-      // Fades so quickly that it underflows, and smoothly.
+      // Decreases smoothly, and so fast that it underflows.
       if (D == kShadow) f = f * exp(-level * level * (sqr(wi.x) + sqr(wo.x)));
       if (D == kBelow) return f;
       return select(above(wi, wo), f, Rgb<T>(T(0)));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A rough boundary of two dielectrics, right as it stands; not registered.
+// A rough dielectric boundary without errors; not registered.
 //
 // B. Walter, S. Marschner, H. Li, K. Torrance: Microfacet Models for Refraction through Rough Surfaces, EGSR 2007, with
-// GGX. A half vector is drawn first and then reflection or refraction, with the probability that Fresnel's equations
-// give for that half vector: where the first random number chooses otherwise depends on the other two.
+// GGX. A half vector is sampled first, and then reflection or refraction, with the probabilities from the Fresnel
+// equations for that half vector. So the value of the first random number that separates the two depends on the other
+// two numbers.
 #pragma once
 
 #include "model/fresnel.h"
@@ -32,24 +33,24 @@ template <class T> struct RoughDielectric {
   T ior() const { return eta; }
   bool scatters_through() const { return true; }
 
-  /// D(h) (eq. 33).
+  /// D(h), eq. 33.
   T distribution(const Vec3<T>& h) const {
     return T(1) / (pi<T>() * sqr(alpha) * sqr((sqr(h.x) + sqr(h.y)) / sqr(alpha) + sqr(h.z)));
   }
-  /// G1(w) (eq. 34).
+  /// G1(w), eq. 34.
   T masking(const Vec3<T>& w) const {
     const T z = maximum(abs(w.z), tiny<T>());
     return T(2) * z / (z + sqrt(sqr(alpha) * (sqr(w.x) + sqr(w.y)) + sqr(z)));
   }
-  /// Index on the far side over that of wo's.
+  /// The index on the far side divided by that on wo's side.
   T relative_index(const Vec3<T>& wo) const { return select(wo.z > T(0), eta, T(1) / eta); }
   Dielectric<T> fresnel(const Vec3<T>& o, const Vec3<T>& h, const T& n) const {
-    // Of unit vectors: |o x h|^2.
+    // |o x h|^2 for unit vectors.
     const Vec3<T> c = cross(o, h);
     return fresnel_dielectric(maximum(dot(o, h), T(0)), dot(c, c), n);
   }
 
-  /// f and the density, which have all but one factor in common.
+  /// f and the pdf, which have all factors but one in common.
   struct Both {
     T f, pdf;
   };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What several tests need.
+// Helpers that several tests need.
 #pragma once
 
 #include <cerrno>
@@ -14,19 +14,19 @@
 
 namespace brdfc {
 
-/// All parameters of a model, those in `text` as name=value, the others as they are by default.
+/// All parameters of a model: those in `text` as name=value, the others at their defaults.
 inline ParamValues values_of(const Model& m, const std::vector<std::string>& text) {
   return complete(m.info(), parse_values(m.info(), text));
 }
 
-/// Of all that are registered.
+/// The names of all registered models.
 inline std::vector<std::string> model_names() {
   std::vector<std::string> names;
   for (const auto& [name, model] : models()) names.push_back(name);
   return names;
 }
 
-/// What the error says that f throws.
+/// The message of the exception that f throws.
 template <class F> std::string message(const F& f) {
   try {
     f();
@@ -36,7 +36,7 @@ template <class F> std::string message(const F& f) {
   return "no ValueError";
 }
 
-/// A new folder that goes with it.
+/// A new folder, which is deleted with this object.
 class TempFolder {
  public:
   TempFolder() {

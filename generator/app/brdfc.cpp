@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The command line. Exit status: 0, 1 (a check failed or a model gave a bad value), 2 (bad usage or input).
+// The command line. Exit status: 0; 1 if a check failed or a model returned an invalid value; 2 for wrong usage or
+// input.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -51,7 +52,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 2;
   } catch (const std::system_error& e) {
-    // A file or pipe that the system refuses to read or write: no fault of a model's.
+    // A file or pipe that the system can't read or write; models are not the cause.
     fmt::print(stderr, "brdfc: {}\n", e.what());
     return 2;
   } catch (const std::bad_alloc&) {

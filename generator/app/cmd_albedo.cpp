@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc albedo: directional-hemispherical reflectance against the view cosine.
+// brdfc albedo: the directional albedo as a function of the view cosine.
 #include <iostream>
 #include <optional>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc base: how much of a model its base carries, and what noise is left.
+// brdfc base: the share of a model that its base covers, and the noise that remains.
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "core/csv.h"

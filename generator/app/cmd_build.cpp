@@ -44,7 +44,7 @@ void print_table(const pack::Result& result) {
                l.table_floats, l.table_error, l.bytes, l.albedo_bytes);
 }
 
-/// How materials are used.
+/// How the materials of a scene use their models.
 std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>& materials) {
   std::vector<plan::MaterialNeed> needs;
   for (const reference::Material& m : materials) {
@@ -55,8 +55,8 @@ std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>&
   return needs;
 }
 
-/// Relative L1, or that a form equals the model in expectation. Nothing for a form that these materials can't have, nor
-/// for a fit that is neither in the pack nor asked for by a budget.
+/// The relative L1 error, or a statement that the form equals the model in expectation. Null for a form that these
+/// materials can't have, and for a fit that is neither in the pack nor asked for by a budget.
 nlohmann::ordered_json error_of(const plan::PlannedModel& plan, const plan::FormChoice& choice,
                                 const pack::Result& result) {
   constexpr const char* kExpectation = "expectation";
@@ -123,7 +123,7 @@ nlohmann::ordered_json explanation(const plan::PlannedModel& plan, const pack::R
           {"left_out", plan.reasons}};
 }
 
-/// What forms there are and which is taken, why each thing is left out, and what that saves.
+/// Prints which forms exist and which are taken, the reason for each thing left out, and what that saves.
 void explain(const Options& options, const std::vector<plan::PlannedModel>& plan, const pack::Result& result) {
   std::vector<std::string> unused;
   for (const auto& [name, model] : models())
@@ -160,7 +160,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
 }
 
-/// The models as OSL that needs no extension. All texts are made before the first is written.
+/// Writes the models as OSL that needs no extension. All texts are made before the first file is written.
 void write_osl(const Options& options) {
   if (!options.scene.empty() || !options.materials.empty() || !options.out.empty() || !options.addon.empty() ||
       options.error || options.time || options.json || options.twin || options.fit_bases || options.osl_only)
@@ -199,7 +199,7 @@ void run(const Options& options) {
   const std::filesystem::path addon =
       options.addon.empty() ? data_dir() / "blender_addon" : std::filesystem::path(options.addon);
   const std::filesystem::path costs = addon / "costs.csv";
-  // A .blend says what its nodes are, and not what they might be.
+  // A .blend file states which representation its nodes have, but not which others they could have.
   plan::Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, plan::Costs(costs)};
   budget.nodes = !options.osl_only;
   if (options.error) budget.error = *options.error / 100;
@@ -215,7 +215,7 @@ void run(const Options& options) {
     for (const reference::Light& l : scene.lights)
       if ((l.kind == reference::Light::Kind::Point || l.kind == reference::Light::Kind::Sun) && l.radius == 0)
         budget.sizeless.push_back(l.key);
-    // The extension finds bright spots of an image as well, and aims at them if there is room.
+    // The extension also finds bright spots in an image, and aims at them if there is room.
     budget.lamps = int(scene.lights.size()) + (scene.environment.image ? forms::kMaxLamps : 0);
     std::vector<plan::MaterialNeed> needs = needs_of(scene.materials);
     const std::vector<Cosines> views = reference::seen_cosines(scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc check: tries to prove what the models declare.
+// brdfc check: tests the properties that models declare.
 #include <chrono>
 #include <nlohmann/json.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc closure: what a closure of Cycles computes by our definition, for the tests that hold Cycles against it.
+// brdfc closure: evaluates our definition of a Cycles closure, for the tests that compare Cycles with it.
 #include "app/commands.h"
 #include "app/f_cos.h"
 #include "closures/lobe.h"
@@ -18,7 +18,7 @@ ParamInfo parameter(std::string name, double min, double max, std::array<double,
   return p;
 }
 
-/// The same checks and messages as for a model's parameters.
+/// A schema, for the same checks and messages as for a model's parameters.
 ModelInfo schema(const std::string& kind) {
   ModelInfo info;
   info.name = "closure " + kind;

@@ -11,12 +11,12 @@ namespace brdfc::app {
 
 namespace {
 
-/// Brighter or darker throughout: a known bias, to learn whether a test would find one.
+/// Makes a picture brighter or darker throughout. This known bias shows whether a test would detect one.
 void inject(reference::Rendering& r, double bias) {
   for (float& v : r.mean.rgb) v = float(v * (1 + bias));
 }
 
-/// What a person needs to see why two renderers disagree.
+/// Writes the images that show why two renderers disagree.
 void keep_evidence(const std::filesystem::path& folder, const reference::Rendering& picture,
                    const reference::Rendering& reference, const report::WelchTest& test) {
   reference::write_rendering(folder / "picture.exr", picture);

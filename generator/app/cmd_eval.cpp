@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc eval: the BRDF and its sampling density for pairs of directions.
+// brdfc eval: the BRDF and its pdf for pairs of directions.
 #include <iostream>
 
 #include "app/commands.h"

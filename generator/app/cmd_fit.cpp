@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc fit: how close a few closures of Cycles come to a model.
+// brdfc fit: how well a few Cycles closures approximate a model.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -17,12 +17,12 @@
 namespace brdfc::app {
 namespace {
 
-/// `axis`: the number that the fit runs over, or empty.
+/// `axis` is the number that the fit runs over, or empty.
 void print_errors(const std::vector<fit::ViewError>& errors, const std::string& axis, const std::string& label) {
   std::vector<double> l1;
   for (const fit::ViewError& e : errors) l1.push_back(e.relative_l1);
   std::sort(l1.begin(), l1.end());
-  // The least that so large a part of the views does not exceed.
+  // The q-quantile of the errors over views, in percent.
   const auto quantile = [&](double q) { return 100 * l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]; };
   fmt::print(stderr, "{}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
              label, quantile(0.5), quantile(0.95), quantile(1));
@@ -78,7 +78,7 @@ void add_fit_command(CLI::App& app) {
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
-    // Pairs are of one value.
+    // The pairs of directions are evaluated at one value of each parameter.
     const auto superfluous = [&](const std::string& name) {
       return !o->pairs &&
              std::ranges::any_of(o->values, [&](const std::string& value) { return value.starts_with(name + "="); });
@@ -119,7 +119,7 @@ void add_fit_command(CLI::App& app) {
                     o->model);
       values = roles.fitted();
     }
-    // What the fit is for, as it says of itself.
+    // The description of the fit for its messages.
     const auto label = [&] {
       return o->model + " " +
              format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values).values);

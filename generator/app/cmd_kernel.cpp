@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc kernel: a drawn curve as parameters of `lossless`.
+// brdfc kernel: converts a drawn curve to parameters of `lossless`.
 #include <fstream>
 
 #include "app/commands.h"

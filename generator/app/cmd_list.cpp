@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc list: the registered models.
+// brdfc list: lists the registered models.
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"

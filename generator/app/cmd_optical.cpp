@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc optical: what a metal or glass of measured n and k is in the working space.
+// brdfc optical: the colour and index of a metal or glass with measured n and k, in the working space.
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"
@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Distances over the thickness at which the power law is judged.
+/// Distances, as multiples of the thickness, at which the error of the power law is measured.
 constexpr double kDistances[] = {0.1, 0.5, 2, 10};
 
 Json absorption(const Substance& s, double thickness, const ToRgb& to_rgb) {
@@ -36,7 +36,7 @@ Json describe(const Substance& s, double thickness) {
   return j;
 }
 
-/// Says what was assumed of a file.
+/// Prints the assumptions that were made about a file.
 Substance with_notes(Substance s) {
   print_notes(s.notes);
   return s;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc probe: what generated code computes, step by step from the model to Cycles.
+// brdfc probe: the values that generated code computes, for each step from the model to Cycles.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -33,7 +33,7 @@ void run_points(const Model& model, const ParamValues& choices) {
         k += 3;
       }
     }
-    // Checked, but not normalised: all runs and Cycles must get the same numbers.
+    // Checked but not normalised, so that all runs and Cycles get the same numbers.
     in.unit_vector(row, 0);
     in.unit_vector(row, 3);
     points.push_back(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc python: the Python package of models.
+// brdfc python: writes the Python package of models.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -30,7 +30,7 @@ void run(const fs::path& out) {
   pack::require_package(package);
   pack::make_folder(out);
   const auto files = pack::python_package(models_named(""), data / "python" / "brdfc");
-  // Modules of models that are no longer there would be part of a wheel.
+  // Otherwise modules of models that no longer exist would become part of a wheel.
   fs::remove_all(package);
   for (const auto& [name, module] : files) write(package / name, module);
   const fs::path project = data / "python" / "pyproject.toml";

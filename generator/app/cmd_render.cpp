@@ -21,7 +21,7 @@ namespace {
 
 std::atomic<bool> interrupted{false};
 
-/// While it lives, the first Ctrl-C asks the renderer to stop; the second one ends the program as usual.
+/// During its lifetime the first Ctrl-C asks the renderer to stop; the second one ends the program as usual.
 class InterruptGuard {
  public:
   InterruptGuard() {
@@ -47,7 +47,7 @@ std::string clock_text(double seconds) {
                   : fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
 }
 
-/// One line that is rewritten on a terminal; elsewhere a line every ten seconds.
+/// Progress messages: one line that is rewritten on a terminal; otherwise a line every ten seconds.
 class ProgressLine {
  public:
   explicit ProgressLine(std::string name) : name_(std::move(name)), terminal_(is_terminal(Stream::Err)) {}

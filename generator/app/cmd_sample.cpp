@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc sample: directions drawn from a model.
+// brdfc sample: directions sampled from a model.
 #include <iostream>
 #include <limits>
 #include <random>

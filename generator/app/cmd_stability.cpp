@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc stability: rounding, bad values and sampling, as long as asked.
+// brdfc stability: tests rounding, invalid values and sampling for as long as asked.
 #include <algorithm>
 #include <chrono>
 #include <limits>

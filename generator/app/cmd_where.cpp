@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brdfc where: the folder of the tool's data.
+// brdfc where: prints the folder of the tool's data.
 #include <fmt/format.h>
 
 #include "app/commands.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One function a subcommand. Each adds itself to the application and sets its callback; the callback throws
-// InputError (exit 2) or ValueError / CheckFailed (exit 1). Tables go to stdout, messages to stderr.
+// One function per subcommand. Each adds its subcommand to the application and sets its callback. The callback throws
+// InputError (exit status 2) or ValueError / CheckFailed (exit status 1). Tables go to stdout, messages to stderr.
 #pragma once
 
 #include <fmt/format.h>
@@ -17,7 +17,7 @@ struct CheckFailed : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What was assumed of the input or left out of it: lines on stderr.
+/// Prints notes about the input, what was assumed and what was left out, to stderr.
 inline void print_notes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) fmt::print(stderr, "brdfc: {}\n", note);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The table of values that several commands print.
+// A table of values that several commands print.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@
 
 namespace brdfc::app {
 
-/// Reads direction pairs above the surface, wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, from stdin and prints
+/// Reads pairs of directions above the surface, wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, from stdin, and prints
 /// f_cos_r,f_cos_g,f_cos_b.
 void print_f_cos(const std::function<Rgb<double>(const Vec3<double>& wi, const Vec3<double>& wo)>& f_cos);
 

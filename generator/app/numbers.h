@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options that are numbers. Each is finite and within a range, or an error that names the option, what was expected and
-// what was given. All numbers of the command line go through here.
+// Command-line options that are numbers. Each must be finite and in a range; otherwise the error names the option, what
+// was expected and what was given. All numbers of the command line are read here.
 #pragma once
 
 #include <fmt/format.h>
@@ -21,12 +21,12 @@ namespace brdfc::app {
 template <class N>
 concept OptionNumber = std::integral<N> || std::floating_point<N>;
 
-/// The numbers that an option accepts: all finite ones unless told.
+/// The range of numbers that an option accepts; by default all finite ones.
 template <OptionNumber N> struct Accepted {
   N low = std::numeric_limits<N>::lowest(), high = std::numeric_limits<N>::max();
-  bool above_low = false;     ///< without `low` itself
-  char unit = 0;              ///< which may stand behind the number
-  std::string in_words = {};  ///< in place of the range in messages, as "a positive number"
+  bool above_low = false;     ///< `low` itself is excluded
+  char unit = 0;              ///< which may follow the number
+  std::string in_words = {};  ///< replaces the range in messages, for example "a positive number"
 
   std::string text() const {
     if (!in_words.empty()) return in_words;
@@ -37,7 +37,7 @@ template <OptionNumber N> struct Accepted {
   }
 };
 
-/// The number that all of the text is. Throws CLI::ValidationError, which names the option.
+/// Converts the whole text to a number. Throws CLI::ValidationError, which names the option.
 template <OptionNumber N>
 N accepted_number(const std::string& option, std::string_view text, const Accepted<N>& range) {
   const bool has_unit = range.unit != 0 && text.ends_with(range.unit);
@@ -56,7 +56,7 @@ template <OptionNumber N> CLI::Option* described(CLI::Option* option) {
 
 }  // namespace detail
 
-/// Adds an option of one number.
+/// Adds an option that takes one number.
 template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::string& name, N& value,
                                                   const Accepted<N>& range, const std::string& doc) {
   CLI::Option* option = command.add_option_function<std::string>(
@@ -65,14 +65,14 @@ template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::
   return detail::described<N>(option);
 }
 
-/// The same for one that tells whether it was given.
+/// The same for an optional number, which shows whether the option was given.
 template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::string& name, std::optional<N>& value,
                                                   const Accepted<N>& range, const std::string& doc) {
   return detail::described<N>(command.add_option_function<std::string>(
       name, [&value, name, range](const std::string& text) { value = accepted_number(name, text, range); }, doc));
 }
 
-/// Adds an option of several numbers with commas between them.
+/// Adds an option that takes several numbers, separated by commas.
 template <OptionNumber N> CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<N>& values,
                                                    const Accepted<N>& range, const std::string& doc) {
   CLI::Option* option = command.add_option_function<std::vector<std::string>>(

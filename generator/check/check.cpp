@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The harness: cases, verdicts, and rows out of both.
+// Runs the checks: makes the cases, collects verdicts, and returns them as rows.
 #include "check/check.h"
 
 #include <algorithm>
@@ -28,13 +28,15 @@ Trial::Trial(const Model& model, const Options& options) : model_(model), seed_(
 int Trial::scaled(int n) const { return std::max(1, int(std::lround(n * effort_))); }
 
 void Verdict::add(double value, const std::string& where, double uncertain) {
-  // The uncertainty favours what must be kept everywhere, and not what must show somewhere.
+  // The uncertainty makes limits that must hold everywhere less strict, and limits that must be reached somewhere
+  // stricter.
   const double slack = (limit_.at_most ? 1 : -1) * (limit_.everywhere ? 1 : -1) * uncertain;
   const double limit = limit_.value + slack, excess = limit_.at_most ? value - limit : limit - value;
   const bool passed = excess <= 0;  // a NaN fails
   const std::lock_guard lock(mutex_);
   const bool first = cases_++ == 0;
-  // The largest excess fails what must hold everywhere, the smallest passes what must show somewhere.
+  // Keeps the worst place: the largest excess for a property that must hold everywhere, the smallest for one that must
+  // show somewhere.
   const bool further = std::isnan(excess_) ? !limit_.everywhere
                        : limit_.everywhere ? !(excess <= excess_)
                                            : excess < excess_;
@@ -73,7 +75,7 @@ std::string without_upper_lobe(const Trial& t) {
 
 namespace {
 
-/// In the order of the output.
+/// All checks, in the order of the output.
 std::vector<Check> all_checks(const ModelProperties& claims) {
   std::vector<Check> all;
   for (std::vector<Check>& group :

@@ -20,7 +20,7 @@ ChiSquare chi_square(const measure::BoundModel& bound, const Vec3<double>& wo, i
     p = guides.angles(s.wi);
     return true;
   };
-  // A tree of medians of pilot samples: cells of about equal probability.
+  // A k-d tree of medians of pilot samples, so that its cells have about equal probability.
   constexpr int kPilots = 4096, kDepth = 6;
   measure::Random random(seed);
   std::vector<Point2> pilots;
@@ -64,11 +64,11 @@ ChiSquare chi_square(const measure::BoundModel& bound, const Vec3<double>& wo, i
   double total = 0, uncertain = 0;
   ChiSquare result;
   for (const Cell& c : cells) {
-    // Twice, because what one mesh misses another does not.
+    // The integral is computed with two meshes, because one may miss what the other finds.
     const auto probability = [&](std::size_t most) {
       return measure::integrate(density, 1, guides.cells(c.rect, most), {1e-7, 0, 1500});
     };
-    // An error of the expected counts must stay small beside their fluctuation. It only grows.
+    // The error of the expected counts must stay small beside their fluctuation. It only grows.
     const auto known = [&] { return uncertain * samples < 0.1 * std::sqrt(double(samples) / double(cells.size())); };
     const measure::CubatureResult r = probability(4);
     uncertain += r.error[0];
@@ -79,12 +79,12 @@ ChiSquare chi_square(const measure::BoundModel& bound, const Vec3<double>& wo, i
     total += r.value[0];
   }
   if (!result.converged) {
-    // Nothing to compare with, but bad values show.
+    // There is nothing to compare with, but invalid values are still found.
     Point2 p;
     for (int i = 0; i < samples; ++i) draw(random, p);
     return result;
   }
-  // Lost samples are the last cell.
+  // The last cell contains the lost samples.
   expected.push_back(std::max(0., 1 - total) * samples);
   std::vector<double> observed(expected.size(), 0.);
   for (int i = 0; i < samples; ++i) {
@@ -109,7 +109,7 @@ ChiSquare chi_square(const measure::BoundModel& bound, const Vec3<double>& wo, i
   for (std::size_t j = 0; j < order.size(); ++j) {
     pooled_expected += expected[order[j]];
     pooled_observed += observed[order[j]];
-    // A remainder too small for a cell of its own joins nothing: it is impossible or nearly so, and then must be empty.
+    // A remainder too small for a cell of its own is not merged: such cells are (nearly) impossible, and must be empty.
     if (pooled_expected < 5 && j + 1 < order.size()) continue;
     if (pooled_expected > 0) result.statistic += sqr(pooled_observed - pooled_expected) / pooled_expected;
     ++kept;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A sum of Cycles' closures that a model claims to equal.
+// Checks the sum of Cycles closures that a model claims to equal.
 #include "check/claim.h"
 #include "measure/probes.h"
 
 namespace brdfc::check {
 namespace {
 
-/// As published, closures are exact to rounding.
+/// Closures whose formulas are those of the published model are exact up to rounding.
 constexpr double kExact = 1e-12;
 
 std::string without_closures(const Trial& t) { return t.model().has_exact() ? "" : "no closures equal the model"; }
 
-/// Relative L1 of f cos, or the difference of the weights of delta terms if that is larger.
+/// The relative L1 difference of f cos, or the difference of the weights of delta terms if that is larger.
 double apart(const Brdf<double>& f, const ClosureSum<double>& sum, const Vec3<double>& wo, measure::Random& random) {
   double apart = 0, all = 0;
   for (int j = 0; j < 64; ++j) {
@@ -32,7 +32,7 @@ double apart(const Brdf<double>& f, const ClosureSum<double>& sum, const Vec3<do
 void exact(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
     const Brdf<double>& f = *c.bound.brdf;
-    // Closures may be known for some choices only, but then for every view direction.
+    // A model may have closures for some choices only; for these it must have them at every view direction.
     if (!f.exact({0, 0, 1})) return;
     measure::Random random = t.random(c, Purpose::Closures);
     for (int k = 0; k < 4; ++k) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much light leaves the surface.
+// Checks the albedo: the share of light that leaves the surface.
 #include <algorithm>
 
 #include "check/claim.h"
@@ -10,15 +10,15 @@
 namespace brdfc::check {
 namespace {
 
-/// Quadrature's own error is added to it.
+/// Tolerance of albedos; the quadrature's error estimate is added to it.
 constexpr double kAlbedo = 1e-6;
 constexpr measure::AlbedoOptions kAlbedoOptions{.absolute = 1e-7, .max_cells = 4000, .witnesses = 1 << 16};
-/// Standard errors that a mean of samples may be off: thousands of means are judged.
+/// Allowed deviation of a mean of samples, in standard errors. It is large because thousands of means are checked.
 constexpr double kStandardErrors = 7;
 
 double off_one(const Rgb<double>& t) { return std::max({std::abs(t.r - 1), std::abs(t.g - 1), std::abs(t.b - 1)}); }
 
-/// One view of a case, its azimuth being phi_o.
+/// One view of a case; phi is the azimuth of the view.
 AlbedoFound measure(const Trial& t, const Case& c, const measure::BoundModel& m, double cos_o, double phi, bool white) {
   const measure::Albedo a = measure::albedo(*m.brdf, cos_o, phi, m.label, kAlbedoOptions);
   const auto drawn = [&](int samples) { return measure::sampled_albedo(*m.brdf, cos_o, phi, m.label, samples); };
@@ -27,7 +27,8 @@ AlbedoFound measure(const Trial& t, const Case& c, const measure::BoundModel& m,
     const Rgb<double> d = a.scattered - s.scattered;
     return std::max({std::abs(d.r), std::abs(d.g), std::abs(d.b)});
   };
-  // What is rarer than one sample in those drawn shows only among more, and is not in their standard error.
+  // An event rarer than one in the samples drawn appears only in a larger set, and their standard error does not
+  // include it.
   if (difference() > kAlbedo + a.error + kStandardErrors * s.standard_error) s = drawn(1 << 20);
   return {max_component(a.total()),
           off_one(a.total()),
@@ -39,8 +40,8 @@ AlbedoFound measure(const Trial& t, const Case& c, const measure::BoundModel& m,
           fmt::format("{} cos_theta_o={:.6g} phi_o={:.6g}", m.label, cos_o, phi)};
 }
 
-/// Sampling, which is quick, finds the views that reflect most and least with colours at 1. Quadrature judges these,
-/// and for the thorough cases one more.
+/// Sampling is fast and finds, with all colours at 1, the views with the highest and the lowest albedo. Quadrature then
+/// measures these, and one more view for the thorough cases.
 std::vector<AlbedoFound> albedos_of(const Trial& t, const Case& c) {
   const Brdf<double>& f = *c.bound.brdf;
   ParamValues white = c.bound.values;

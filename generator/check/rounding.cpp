@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Errors of formulas in float and double.
+// Checks the rounding errors of formulas in float and double.
 #include "check/claim.h"
 #include "measure/stability.h"
 
 namespace brdfc::check {
 namespace {
 
-/// Rounding errors a good formula may add to those of its inputs, in units of them.
+/// The rounding error that a good formula may add to that of its inputs, in units of the latter.
 constexpr double kAmplified = 32;
 
 void add(const measure::Stability& s, Verdict& verdict) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drawn directions: their weights, their density, and that they follow it.
+// Checks sampled directions: their weights, their pdf, and that they are distributed according to it.
 #include "check/chi_square.h"
 #include "check/claim.h"
 #include "measure/albedo.h"
@@ -12,17 +12,17 @@
 namespace brdfc::check {
 namespace {
 
-/// The error of quadrature is added to it.
+/// Tolerance of the pdf's integral; the quadrature's error estimate is added to it.
 constexpr double kNormalisation = 1e-6;
-/// How far two meshes of quadrature may differ. More, and a thin curved ridge is missed by one of them: no judgement is
-/// possible over directions.
+/// Allowed difference between two quadrature meshes. If they differ more, one of them misses a thin curved ridge, and
+/// an integral over directions can't be judged.
 constexpr double kMeshes = 1e-5;
 constexpr double kSignificance = 0.01;
-/// A picture of 64 samples a pixel has then an error of half the light, about what it would be without a picture. The
-/// models here come to 5.3; a lobe that its sampler does not know comes to hundreds.
+/// With this variance a picture with 64 samples a pixel has an error of half the light, about as much as no picture at
+/// all. The models here reach at most 5.3; a lobe that sample() ignores gives hundreds.
 constexpr double kVariance = 16;
 
-/// f(weights, where) for three views of each case within the sliders' ranges.
+/// Calls f(weights, where) for three views of each case within the sliders' ranges.
 template <class F> void for_each_view(const Trial& t, const F& f) {
   t.for_each([&](const Case& c) {
     if (!c.within || c.bound.brdf->scatters_through()) return;
@@ -69,7 +69,7 @@ void normalised(const Trial& t, Verdict& verdict) {
     const double moved = std::abs(p.value[0] - q.value[0]);
     if (!p.converged || !q.converged || !(moved < kMeshes)) return verdict.skip();
     const double uncertain = q.error[0] + moved;
-    // A loss rarer than one sample in those drawn shows only among more.
+    // A loss rarer than one in the samples drawn appears only in a larger set.
     if (s.lost_error == 0 && std::abs(q.value[0] + s.lost - 1) > kNormalisation + uncertain) s = drawn(1 << 20);
     verdict.add(std::abs(q.value[0] + s.lost - 1), fmt::format("{} wo={}", label, measure::text(wo)),
                 uncertain + 7 * s.lost_error);
@@ -112,7 +112,7 @@ void histogram(const Trial& t, Verdict& verdict) {
     found.push_back({of, fmt::format("{} wo={} statistic={:.4g} degrees={}", c.bound.label, measure::text(wo),
                                      of.statistic, of.degrees)});
   });
-  // The smallest of m independent ones is below p with probability 1 - (1 - p)^m.
+  // The smallest of m independent p-values is below p with probability 1 - (1 - p)^m.
   for (const Found& one : found) verdict.add(-std::expm1(double(found.size()) * std::log1p(-one.of.p)), one.where);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The shape of the lobe above the surface, and what it becomes at the ends of its ranges.
+// Checks the shape of the lobe above the surface, and its limits at the ends of parameter ranges.
 #include <sstream>
 
 #include "check/claim.h"
@@ -10,13 +10,14 @@
 namespace brdfc::check {
 namespace {
 
-/// A jump of a derivative that is rounding or a curvature, and one that the eye sees as an edge.
+/// Jumps of a derivative: below kSmooth it may be rounding or curvature; above kEdge it is a visible edge.
 constexpr double kSmooth = 1e-3;
 constexpr double kEdge = 1e-2;
-/// Share of the light near ideal reflection that makes a mirror.
+/// If at least this share of the light is near ideal reflection, the lobe counts as a mirror.
 constexpr double kMirror = 0.99;
 
-/// f(case, random numbers) for the cases whose lobe ends at the surface: the others have no shape above it alone.
+/// Calls f(case, random numbers) for the cases whose lobe is entirely above the surface. Other lobes have no shape
+/// there to check.
 template <class F> void for_each_upper(const Trial& t, Purpose what, const F& f) {
   t.for_each([&](const Case& c) {
     if (c.bound.brdf->scatters_through()) return;
@@ -25,7 +26,7 @@ template <class F> void for_each_upper(const Trial& t, Purpose what, const F& f)
   });
 }
 
-/// With colours neither black nor full, which hide what f does.
+/// The case's values with colours between black and white; those extremes would hide the behaviour of f.
 ParamValues with_inner_colors(const Trial& t, const Case& c) {
   ParamValues inner = c.bound.values;
   for (const ParamInfo& p : t.info().params)
@@ -34,7 +35,8 @@ ParamValues with_inner_colors(const Trial& t, const Case& c) {
   return inner;
 }
 
-// Claims about the lobe hold where sliders lead; a failure that is declared may also show at the end of a range.
+// Claims about the lobe hold within the sliders' ranges. A declared failure may also appear at the end of a parameter's
+// range.
 
 void positive(const Trial& t, Verdict& verdict) {
   for_each_upper(t, Purpose::Positive, [&](const Case& c, measure::Random& random) {
@@ -66,7 +68,7 @@ void not_mirror(const Trial& t, Verdict& verdict) {
   });
 }
 
-/// "n=0 m=1" as values.
+/// The model with values from a text such as "n=0 m=1".
 measure::BoundModel at_limit(const Trial& t, const std::string& limit) {
   std::vector<std::string> assignments;
   std::istringstream in(limit);
@@ -100,7 +102,7 @@ std::vector<Check> shape_checks(const ModelProperties& claims) {
                    {"diffuse limit", "f constant at " + claims.diffuse_limit, at_most(kEven), matte, without_lobe},
                    {"no diffuse limit", "f not constant at any end of a range", at_least(kVisible), not_matte,
                     without_upper_lobe}),
-          // A place that is dark counts 1.
+          // The value is 1 at a place where f is 0.
           check_of(claims.positive, "positive",
                    {"positive", "f > 0 above the surface, underflow aside", at_most(0), positive, without_upper_lobe},
                    {"not positive", "f = 0 somewhere, not by underflow", somewhere_at_least(1), positive,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What f does when directions are swapped or turned.
+// Checks f when directions are swapped or rotated.
 #include "check/claim.h"
 #include "measure/probes.h"
 #include "model/sampling.h"
@@ -7,24 +7,24 @@
 namespace brdfc::check {
 namespace {
 
-/// Swapping only reorders operations.
+/// Tolerance of reciprocity: swapping only reorders operations.
 constexpr double kReciprocity = 1e-9;
 
-/// Of a lobe, up to the squared index where light goes through.
+/// The relative difference of a lobe with swapped directions. For transmission f is compared up to the squared index.
 double swapped(const Case& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   const Brdf<double>& f = *c.bound.brdf;
   const double n2i = wi.z > 0 ? 1 : sqr(f.ior()), n2o = wo.z > 0 ? 1 : sqr(f.ior());
   const double d = measure::relative(f.eval(wi, wo) * n2o, f.eval(wo, wi) * n2i);
   if (d <= kReciprocity) return d;
-  // High powers amplify the rounding of a half vector, and near a critical angle so do Fresnel's equations, for which
-  // the length of a rounded direction is already too far from 1. Then the formulas themselves are compared, for the
-  // unit vectors that the directions stand for.
+  // High powers amplify the rounding of a half vector. Near a critical angle so do the Fresnel equations, where the
+  // length of a rounded direction is already too far from 1. In these cases the formulas are compared in a wider type,
+  // for the unit vectors that the directions stand for.
   const Vec3<Wide> a = normalize(Vec3<Wide>::from(wi)), b = normalize(Vec3<Wide>::from(wo));
   return measure::relative(c.wide->eval(a, b) * Wide(n2o), c.wide->eval(b, a) * Wide(n2i));
 }
 
-/// Of delta terms, along the path of light towards wo, of each channel along its own. Nothing beyond the critical
-/// angle.
+/// The same for delta terms, along the path of light towards wo; each channel has its own path. Returns nullopt beyond
+/// the critical angle.
 std::optional<double> swapped_path(const Model& model, const Case& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   const Vec3<Wide> to = normalize(Vec3<Wide>::from(wo));
   const std::array<Wide, 3> iors = c.wide->channel_iors();

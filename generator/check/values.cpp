@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Nothing is NaN, infinite or negative, drawn directions are unit vectors, and nothing is scattered below the surface.
+// Checks that nothing is NaN, infinite or negative, that sampled directions are unit vectors, and that no light is
+// scattered below the surface.
 #include "check/claim.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
@@ -7,7 +8,7 @@
 namespace brdfc::check {
 namespace {
 
-/// All that a model gives for a pair of directions; throws ValueError at the first bad value.
+/// Evaluates every function of a model at a pair of directions. Throws ValueError at the first invalid value.
 void require_values(const Case& c, const Vec3<double>& wi, const Vec3<double>& wo, measure::Random& random) {
   const Brdf<double>& f = *c.bound.brdf;
   const Brdf<float>& single = *c.single;
@@ -69,7 +70,7 @@ void unit(const Trial& t, Verdict& verdict) {
   });
 }
 
-/// The largest of f, the density, and the density of a drawn direction, where one direction is below the surface.
+/// The largest of f, the pdf, and the pdf of a sampled direction, with one of the directions below the surface.
 void horizon(const Trial& t, Verdict& verdict) {
   t.for_each([&](const Case& c) {
     const Brdf<double>& f = *c.bound.brdf;
@@ -92,7 +93,8 @@ void horizon(const Trial& t, Verdict& verdict) {
   });
 }
 
-/// Rounding of a formula in double precision, which may draw a direction through several others.
+/// Tolerance of a direction's length: rounding in double precision, where a direction may be computed through several
+/// others.
 constexpr double kUnit = 1e-9;
 
 }  // namespace

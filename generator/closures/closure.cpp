@@ -4,7 +4,7 @@
 namespace brdfc::inline closures {
 namespace {
 
-/// Linear look-up of a ramp at a position in [0, 1]; positions outside take the end entries.
+/// Linear interpolation of a ramp at a position in [0, 1]; positions outside get the colours at the ends.
 Rgb<double> ramp_at(const std::array<Rgb<double>, kRampSize>& ramp, double position) {
   const double scaled = position * (kRampSize - 1);
   if (scaled <= 0) return ramp.front();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Cycles closures a form may use, as data over a scalar type. evaluate() is their definition (read off what Cycles
-// computes and proved against it by the closure conformance tests); the generator prints the same data as OSL.
-// Directions are unit vectors in the local frame of the model, the surface's normal along z.
+// The Cycles closures that a form may use, as data over a scalar type. evaluate() defines them. The definitions were
+// taken from Cycles' code, and the closure conformance tests compare them with what Cycles computes. The generator
+// prints the same data as OSL. Directions are unit vectors in the local frame of the model, with the surface's normal
+// along z.
 #pragma once
 
 #include <array>
@@ -17,58 +18,58 @@ enum class ClosureKind {
   Burley,     ///< burley_diffuse_bsdf(N, 1, roughness): (c/pi)(1 - k s_i)(1 - k s_o), s = (1 - c)^5,
               ///< k = 1/2 - 2 roughness (wi.h)^2
   OrenNayar,  ///< oren_nayar_diffuse_bsdf(N, albedo, roughness): Fujii's form of Oren and Nayar's model with facets of
-              ///< `albedo`, and the light that they reflect again
-  Velvet,     ///< ashikhmin_velvet(N, roughness): fibres that stand up, bright at grazing angles
+              ///< `albedo`, and interreflection between them
+  Velvet,     ///< ashikhmin_velvet(N, roughness): upright fibres, bright at grazing angles
   DiffuseToon,  ///< diffuse_toon(N, size, smooth): as GlossyToon, about the normal
-  DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, no cosine
+  DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, without a cosine
   PhongRamp,    ///< phong_ramp(N, e, colours): ramp8(cos^e a) (N.wi) (e+2)/(2 pi) cos^e a
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
-  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): without Fresnel term, Smith's height-correlated masking
-  Beckmann,     ///< microfacet("beckmann", ...): the same, with Walter's rational masking as Cycles has it
-  GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction, level within the angle `size` and
-                ///< falling to 0 over `smooth`, linear in the angle; no cosine
-  Refraction,   ///< refraction(N, ior): delta in the direction of ideal refraction, none beyond the critical angle
+  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): no Fresnel term, Smith's height-correlated masking
+  Beckmann,     ///< microfacet("beckmann", ...): the same, with Walter's rational masking as in Cycles
+  GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction, constant within `size` and
+                ///< decreasing to 0 over `smooth`, linearly in the angle; without a cosine
+  Refraction,   ///< refraction(N, ior): delta in the direction of ideal refraction, 0 beyond the critical angle
 };
 
-/// What the facets of a closure are stretched along, if they have two roughnesses.
+/// The direction along which the facets of an anisotropic closure are stretched.
 enum class Tangent {
-  None,    ///< nothing: they are round
-  View,    ///< the plane of incidence: Cycles is given the viewer's direction
+  None,    ///< none: isotropic
+  View,    ///< the plane of incidence: Cycles gets the view direction as tangent
   Surface  ///< a direction fixed to the surface
 };
 
-/// How many entries a ramp has.
+/// Number of colours in a ramp.
 inline constexpr int kRampSize = 8;
-/// Does it take the colours of a ramp?
+/// True if the closure takes the colours of a ramp.
 inline bool has_ramp(ClosureKind kind) { return kind == ClosureKind::DiffuseRamp || kind == ClosureKind::PhongRamp; }
 
-/// Does it take a roughness of facets, or two?
+/// True if the closure takes one or two microfacet roughnesses.
 inline bool has_facets(ClosureKind kind) { return kind == ClosureKind::Ggx || kind == ClosureKind::Beckmann; }
 
-/// Does it take the roughness of a matte surface?
+/// True if the closure takes the roughness of a matte surface.
 inline bool has_matte_roughness(ClosureKind kind) {
   return kind == ClosureKind::Burley || kind == ClosureKind::OrenNayar || kind == ClosureKind::Velvet;
 }
 
-/// Does it take an angle and the width of its edge?
+/// True if the closure takes an angle and the width of its edge.
 inline bool has_cone(ClosureKind kind) { return kind == ClosureKind::GlossyToon || kind == ClosureKind::DiffuseToon; }
 
-/// A closure with its settings; those that its kind does not take have no meaning.
+/// A closure with its settings. Settings that its kind does not take are ignored.
 template <class T> struct Closure {
   ClosureKind kind;
   Rgb<T> weight;                       ///< factor of all that it scatters; not negative in Cycles
   Vec3<T> normal;                      ///< unit
   std::array<Rgb<T>, kRampSize> ramp;  ///< DiffuseRamp, PhongRamp; entries may be negative
   T exponent;                          ///< PhongRamp: >= 0
-  T alpha;                             ///< Ggx, Beckmann: roughness in (0, 1], of stretched facets along `tangent`
-  T alpha_across;                      ///< of stretched facets: across it
-  Vec3<T> tangent;                     ///< of stretched facets: unit, perpendicular to the normal
+  T alpha;                             ///< Ggx, Beckmann: roughness in (0, 1]; if anisotropic, along `tangent`
+  T alpha_across;                      ///< if anisotropic: roughness across `tangent`
+  Vec3<T> tangent;                     ///< if anisotropic: unit, perpendicular to the normal
   T roughness;                         ///< Burley, OrenNayar, Velvet: from 0 to 1
-  Rgb<T> albedo;                       ///< OrenNayar: of the facets, from 0 to 1
+  Rgb<T> albedo;                       ///< OrenNayar: albedo of the facets, from 0 to 1
   T size, smooth;                      ///< toons: in units of 90 degrees, from 0 to 1
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
-  bool turned = false;                 ///< `normal` is not the surface's; it is not below it
-  Tangent stretched = Tangent::None;   ///< what `tangent` is
+  bool turned = false;                 ///< true if `normal` is not the surface's; it must not point below the surface
+  Tangent stretched = Tangent::None;   ///< the kind of `tangent`
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
       : kind(kind_),
@@ -85,19 +86,19 @@ template <class T> struct Closure {
         ior(1) {}
 };
 
-/// A shader's closures, added up.
+/// The closures of a shader; their sum is its BSDF.
 template <class T> using ClosureSum = std::vector<Closure<T>>;
 
-/// Smith's Lambda for the square of alpha times the tangent of the direction.
+/// Smith's Lambda, from the square of alpha times the tangent of the direction's angle.
 template <class T> T lambda(ClosureKind kind, const T& a2) {
   if (kind == ClosureKind::Ggx) return a2 / (T(2) * (sqrt(T(1) + a2) + T(1)));
-  // Walter's rational fit, which leaves out all shadowing below a2 = 0.39.
+  // Walter's rational approximation, which sets Lambda to 0 below a2 = 0.39.
   const T a = T(1) / sqrt(maximum(a2, tiny<T>()));
   return select(a2 < T(0.39), T(0), ((T(0.396) * a - T(1.259)) * a + T(1)) / ((T(2.181) * a + T(3.535)) * a));
 }
 
-/// f cos(theta_i) of facets without Fresnel term. Of the half vector, along the normal z2 and across it t2 in units of
-/// alpha, both squared; of the directions what lambda() takes.
+/// f cos(theta_i) of microfacets without a Fresnel term. `t2` and `z2` are the squared components of the half vector:
+/// across the normal, in units of alpha, and along it. The slopes are the arguments of lambda() for the two directions.
 template <class T> T microfacet(ClosureKind kind, const T& alpha2, const T& t2, const T& z2, const T& slope_i,
                                 const T& slope_o, const T& cosTheta_o) {
   const T density = kind == ClosureKind::Ggx ? T(1) / sqr(t2 + z2) : exp(-t2 / z2) / sqr(z2);
@@ -105,7 +106,7 @@ template <class T> T microfacet(ClosureKind kind, const T& alpha2, const T& t2, 
   return D / (T(4) * cosTheta_o * (T(1) + lambda(kind, slope_i) + lambda(kind, slope_o)));
 }
 
-/// For directions above the surface in the frame of the closure.
+/// For directions above the surface, in the frame of the closure.
 template <class T>
 T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& wi, const Vec3<T>& wo) {
   const Vec3<T> h = normalize(wi + wo);
@@ -116,10 +117,10 @@ T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>
                     slope(wi), slope(wo), wo.z);
 }
 
-/// The same about any normal, on the side of which both directions are.
+/// The same about any normal. Both directions must be on its side.
 template <class T>
 T microfacet(ClosureKind kind, const T& alpha, const Vec3<T>& normal, const Vec3<T>& wi, const Vec3<T>& wo) {
-  // The sine of the half vector needs all its digits: smooth facets make much of little.
+  // Computed from the sine of the half vector, which needs its full precision: smooth facets amplify small errors.
   const Vec3<T> across = cross(normal, normalize(wi + wo));
   const T alpha2 = sqr(alpha), sin2 = dot(across, across), cosTheta_o = dot(normal, wo);
   const auto slope = [&](const T& c) { return alpha2 * maximum(T(1) - sqr(c), T(0)) / maximum(sqr(c), tiny<T>()); };
@@ -127,7 +128,7 @@ T microfacet(ClosureKind kind, const T& alpha, const Vec3<T>& normal, const Vec3
                     slope(cosTheta_o), cosTheta_o);
 }
 
-/// The same of stretched facets, whose x axis is perpendicular to the normal. Cycles makes it so.
+/// The same for anisotropic facets. The x axis must be perpendicular to the normal; Cycles makes it so.
 template <class T> T microfacet(ClosureKind kind, const T& alpha_x, const T& alpha_y, const Vec3<T>& normal,
                                 const Vec3<T>& x, const Vec3<T>& wi, const Vec3<T>& wo) {
   const Vec3<T> y = cross(normal, x);
@@ -135,8 +136,8 @@ template <class T> T microfacet(ClosureKind kind, const T& alpha_x, const T& alp
   return microfacet(kind, alpha_x, alpha_y, in_frame(wi), in_frame(wo));
 }
 
-/// What a rough matte surface lacks of reflecting all light that comes from or goes to a direction of this cosine: see
-/// rough_matte(). Fujii's G, with (1 - sin^3) / cos rearranged so that it keeps its digits near the surface.
+/// The energy that a rough matte surface loses of light that comes from or goes to a direction with this cosine: see
+/// rough_matte(). It is Fujii's G, with (1 - sin^3) / cos rearranged to keep its precision near the horizon.
 template <class T> T matte_loss(const T& c) {
   const T s = sqrt(maximum(T(1) - sqr(c), T(0)));
   const T theta = T(2) * atan(s / (T(1) + c));
@@ -144,18 +145,19 @@ template <class T> T matte_loss(const T& c) {
   return T(kPi / 2 - 2.0 / 3) - grooves;
 }
 
-/// The mean of matte_loss() over all directions, by their cosines.
+/// The cosine-weighted mean of matte_loss() over all directions.
 inline constexpr double kMeanMatteLoss = kPi / 2 - 2.0 / 3 - (2 * kPi - 5.6) / 3;
 
 /// f of the closure OrenNayar without its weight. M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model,
-/// SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model, with light that facets
-/// reflect again as J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough Diffuse BRDF, JCGT 2025.
+/// SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model; with interreflection
+/// between facets as in J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough Diffuse BRDF, JCGT
+/// 2025.
 template <class T> Rgb<T> rough_matte(const T& roughness, const Rgb<T>& albedo, const T& cosTheta_i,
                                       const T& cosTheta_o, const T& cosine) {
   const T a = T(1) / (T(kPi) + roughness * T(kPi / 2 - 2.0 / 3)), b = roughness * a;
   const T s = cosine - cosTheta_i * cosTheta_o;
   const T t = select(s > T(0), s / maximum(maximum(cosTheta_i, cosTheta_o), tiny<T>()), s);
-  // 1 - E(c) = b matte_loss(c) and its mean b matte_loss_mean, so that smooth surfaces lose no digits.
+  // 1 - E(c) = b matte_loss(c), with the mean b kMeanMatteLoss. This form keeps its precision for smooth surfaces.
   const T again = b * matte_loss(cosTheta_i) * matte_loss(cosTheta_o) * T(kInvPi / kMeanMatteLoss);
   const T mean_loss = b * T(kMeanMatteLoss);
   const Rgb<T> twice = albedo * albedo * ((T(1) - mean_loss) * again) / (Rgb<T>(T(1)) - albedo * mean_loss);
@@ -163,20 +165,20 @@ template <class T> Rgb<T> rough_matte(const T& roughness, const Rgb<T>& albedo, 
 }
 
 /// f cos(theta_i) of the closure Velvet without its weight: M. Ashikhmin, S. Premoze: Distribution-based BRDFs, 2007.
-/// `sin2` is the square of the half vector's sine.
+/// `sin2` is the squared sine of the half vector.
 template <class T>
 T velvet(const T& roughness, const T& sin2, const T& cosTheta_i, const T& cosTheta_o, const T& cosine) {
   const T sigma2 = sqr(maximum(roughness, T(0.01)));
-  // Below, Cycles has 0, and the exponential is 0 as well.
+  // Below this limit Cycles returns 0, and the exponential is 0 as well.
   const T s2 = maximum(sin2, T(2e-5)), z2 = maximum(T(1) - sin2, T(0));
   const T D = exp(-z2 / (s2 * sigma2)) / (sigma2 * sqr(s2)) * T(kInvPi);
-  // (n.h) / (wi.h), whose square is (1 + wi.wo) / 2.
+  // (n.h) / (wi.h), where (wi.h)^2 is (1 + wi.wo) / 2.
   const T ratio = sqrt(z2 / maximum((T(1) + cosine) / T(2), tiny<T>()));
   const T G = minimum(T(1), T(2) * ratio * minimum(cosTheta_i, cosTheta_o));
   return D * G / (T(4) * maximum(cosTheta_o, tiny<T>()));
 }
 
-/// A cone about a direction at an angle of which wi has this cosine, without weight.
+/// A cone about a direction, without weight; `cosAngle` is the cosine of the angle between wi and that direction.
 template <class T> T toon(const T& size, const T& smooth, const T& cosAngle) {
   const T c = clamp01(cosAngle);
   const T angle = atan(sqrt((T(1) - c) / (T(1) + c))) * T(4 * kInvPi);
@@ -184,8 +186,8 @@ template <class T> T toon(const T& size, const T& smooth, const T& cosAngle) {
   return clamp01((outer - angle) / maximum(smooth, tiny<T>())) * T(kInvPi / 4) / sqr(half);
 }
 
-/// f cos(theta_i) of one closure with its weight; delta closures are 0. Directions above the surface. `ramp` is a
-/// function that gives the ramp's colour at a position, which may lie above 1.
+/// f cos(theta_i) of one closure with its weight; 0 for delta closures. Directions must be above the surface. `ramp` is
+/// a function that returns the ramp's colour at a position, which may be above 1.
 template <class T, class Ramp>
 Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const Ramp& ramp) {
   const T cosTheta_i = c.turned ? dot(c.normal, wi) : wi.z, cosTheta_o = c.turned ? dot(c.normal, wo) : wo.z;
@@ -212,7 +214,7 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
     case ClosureKind::DiffuseRamp:
       return select(lit, c.weight * ramp(cosTheta_i) * T(kInvPi), none);
     case ClosureKind::PhongRamp: {
-      // Between wi and the mirror direction about the closure's normal.
+      // The angle between wi and the mirror direction about the closure's normal.
       const T cosAlpha = T(2) * cosTheta_o * cosTheta_i - dot(wo, wi);
       const T lobe = pow(maximum(cosAlpha, tiny<T>()), c.exponent);
       const T height = cosTheta_i * ((c.exponent + T(2)) * T(kInvPi / 2)) * lobe;
@@ -239,8 +241,8 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
   throw std::logic_error("closure of unknown kind");
 }
 
-/// Linear look-up of a ramp at a position in [0, 1], outside which it keeps its ends: each piece begins where the one
-/// before ends, so that a recording needs no index. Pieces between equal constants cost nothing.
+/// Linear interpolation of a ramp at a position in [0, 1]; positions outside get the colours at the ends. Each piece
+/// adds to the one before it, so that a recording needs no index. Pieces between equal constants cost nothing.
 template <class T> Rgb<T> ramp8(const std::array<Rgb<T>, kRampSize>& ramp, const T& position) {
   const T scaled = position * T(kRampSize - 1);
   Rgb<T> colour = ramp[0];
@@ -249,7 +251,7 @@ template <class T> Rgb<T> ramp8(const std::array<Rgb<T>, kRampSize>& ramp, const
   return colour;
 }
 
-/// With the colours of its own ramp.
+/// The same with the closure's own ramp.
 template <class T> Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo) {
   return evaluate(c, wi, wo, [&](const T& position) { return ramp8(c.ramp, position); });
 }
@@ -258,14 +260,14 @@ template <class T> Rgb<T> evaluate(const ClosureSum<T>& sum, const Vec3<T>& wi, 
   for (const Closure<T>& c : sum) total += evaluate(c, wi, wo);
   return total;
 }
-/// The same with an index into the ramp, for the many evaluations of a fit.
+/// The same with an index into the ramp, which is faster for the many evaluations of a fit.
 Rgb<double> evaluate(const Closure<double>&, const Vec3<double>& wi, const Vec3<double>& wo);
 Rgb<double> evaluate(const ClosureSum<double>&, const Vec3<double>& wi, const Vec3<double>& wo);
 
-/// The most closures Cycles keeps of one shader (MAX_CLOSURE); a sum with more is refused.
+/// The largest number of closures that Cycles keeps per shader (MAX_CLOSURE). A sum with more is rejected.
 inline constexpr int kMaxClosures = 64;
 
-/// What a closure costs of those slots: a ramp needs extra storage for its colours. Measured.
+/// The number of those slots that a closure takes: a ramp needs additional storage for its colours. Measured.
 int slots(ClosureKind);
 
 }  // namespace brdfc::inline closures

@@ -4,8 +4,8 @@
 namespace brdfc::inline closures {
 
 int pool_bytes(ClosureKind kind) {
-  // OSLClosureComponent, which is an identifier and a weight; then a pointer to a label and the parameters, filled up
-  // to 8 bytes (kernel/osl/types.h, closures_setup.h, closures_template.h).
+  // An OSLClosureComponent consists of an identifier and a weight, then a pointer to a label and the parameters, padded
+  // to a multiple of 8 bytes (kernel/osl/types.h, closures_setup.h, closures_template.h).
   constexpr int kVector = 12, kNumber = 4, kComponent = kNumber + kVector, kPointer = 8;
   const auto with = [](int parameters) { return kComponent + (kPointer + parameters + 7) / 8 * 8; };
   switch (kind) {

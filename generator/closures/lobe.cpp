@@ -17,13 +17,13 @@ constexpr std::pair<LobeKind, const char*> kNames[] = {
     {LobeKind::Beckmann, "beckmann"},        {LobeKind::AshikhminShirley, "ashikhmin_shirley"},
     {LobeKind::DiffuseToon, "diffuse_toon"}, {LobeKind::GlossyToon, "glossy_toon"}};
 
-/// v in the frame that Cycles builds about normal and tangent.
+/// v in the frame that Cycles builds from normal and tangent.
 Vec3<double> in_frame(const Lobe& c, const Vec3<double>& v) {
   const Vec3<double> y = normalize(cross(c.normal, c.tangent)), x = cross(y, c.normal);
   return {dot(x, v), dot(y, v), dot(c.normal, v)};
 }
 
-/// f cos(theta_i) without weight; directions in the frame, above the surface.
+/// f cos(theta_i) without weight. Directions are in the frame, above the surface.
 double facets(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   if (c.kind == LobeKind::AshikhminShirley) {
     const Vec3<double> h = normalize(wi + wo);
@@ -37,7 +37,7 @@ double facets(const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   return microfacet(c.kind == LobeKind::Ggx ? ClosureKind::Ggx : ClosureKind::Beckmann, c.alpha_x, c.alpha_y, wi, wo);
 }
 
-/// A closure that forms use, by its definition in closure.h.
+/// Evaluates a closure that forms use, with its definition in closure.h.
 Rgb<double> used_by_forms(ClosureKind kind, const Lobe& c, const Vec3<double>& wi, const Vec3<double>& wo) {
   Closure<double> closure(kind, c.weight);
   closure.normal = c.normal;

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// No folder has a file of this name by chance.
+/// A file that marks the data folder. No other folder has a file of this name by accident.
 constexpr const char* kSign = "blender_addon/blender_manifest.toml";
 
 bool holds_data(const fs::path& folder) {

@@ -6,7 +6,7 @@
 namespace brdfc::inline core {
 namespace {
 
-/// The distance of Damerau and Levenshtein, of which no letter is edited twice.
+/// The Damerau-Levenshtein distance in its restricted form: no letter is edited more than once.
 std::size_t edits(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i)
@@ -28,7 +28,8 @@ std::string did_you_mean(const std::string& word, const std::vector<std::string>
   std::string nearest;
   std::size_t fewest = std::max<std::size_t>(1, word.size() / 3) + 1;
   for (const std::string& k : known) {
-    // So many at least, and it costs nothing to see of a word that fills a file.
+    // The difference in length is a lower bound of the distance. This test is cheap even if the word is as long as a
+    // file.
     if (std::max(word.size(), k.size()) - std::min(word.size(), k.size()) >= fewest) continue;
     if (const std::size_t n = edits(word, k); n < fewest) fewest = n, nearest = k;
   }

@@ -62,7 +62,7 @@ fs::path program_file() {
 
 std::size_t available_memory() {
   constexpr std::size_t unknown = std::numeric_limits<std::size_t>::max();
-  /// The numbers after these words, each at the start of a line.
+  /// The sum of the numbers that follow these keys, each key at the start of a line.
   const auto sum_of = [](const char* file, std::initializer_list<const char*> keys) {
     std::size_t sum = 0, number;
     std::ifstream in(file);
@@ -81,7 +81,7 @@ std::size_t available_memory() {
     available = kibibytes * 1024;
   const std::size_t limit = number_in("/sys/fs/cgroup/memory.max"), used = number_in("/sys/fs/cgroup/memory.current");
   if (limit != unknown && used != unknown) {
-    // Copies of files count as used, but give way.
+    // The file cache counts as used memory, but the kernel frees it on demand.
     const std::size_t free = limit > used ? limit - used : 0;
     available = std::min(available, free + sum_of("/sys/fs/cgroup/memory.stat", {"active_file", "inactive_file"}));
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model along a fit's axis: what is bound at a place, how its terms look from a view, and what errors closures leave
-// there. What fits (make.h) and twins (twin.h) have in common.
+// A model along a fit's axis: the model at a place on the axis, its terms seen from a view, and the errors that
+// closures leave there. Used by fits (make.h) and twins (twin.h).
 #pragma once
 
 #include <functional>
@@ -16,11 +16,11 @@
 
 namespace brdfc::fit {
 
-/// A model along an axis. Places run from 0 to 1; without an axis there is the place 0 alone. All arguments must
-/// outlive this.
+/// A model along an axis. Places run from 0 to 1; without an axis 0 is the only place. All arguments must outlive this
+/// object.
 class Along {
  public:
-  /// `values` lack the axis and what is mixed in `terms`.
+  /// `values` must lack the axis and the mixed parameters of `terms`.
   Along(const Model& model, const ParamValues& values, const std::optional<FitAxis>& axis, const Terms& terms)
       : model_(model), values_(values), axis_(axis), terms_(terms) {}
 
@@ -28,30 +28,31 @@ class Along {
   const Terms& terms() const { return terms_; }
   const ParamValues& values() const { return values_; }
 
-  /// The model at a place, with these values of mixed parameters.
+  /// The model at a place, with these values of the mixed parameters.
   measure::BoundModel bound(double place, const ParamValues& mixed) const;
-  /// All mixed parameters with one value.
+  /// All mixed parameters with the same value.
   ParamValues mixed(double value) const;
 
-  /// The model at a place with `some` for what is mixed, where directions are drawn, and each term over its scale.
+  /// The model at a place. Its mixed parameters have the value `some` where directions are sampled. Each term is
+  /// divided by its scale.
   class At {
    public:
     At(const Along&, double place, double some);
-    /// The view from `wo` at about so many points: the columns of one term after those of the other. The lobe is that
-    /// which is given, or sought, which takes long.
+    /// The view from `wo` with about this many points. The columns of f are those of the first term, then of the
+    /// second, and so on. `lobe` is the model's lobe; if it is null, it is computed, which is slow.
     View view(const Vec3<double>& wo, int points, const Moments* lobe = nullptr) const;
 
    private:
     struct Scaled {
       measure::BoundModel model;
-      double scale;  ///< what its f has to be divided by
+      double scale;  ///< divisor of its f
     };
     measure::BoundModel some_;
-    std::vector<Scaled> terms_;  ///< none where nothing is mixed
+    std::vector<Scaled> terms_;  ///< empty without mixed parameters
   };
 
-  /// The errors at these places of the closures that `closures` gives for a view and what they hang on, each of the
-  /// worst term; to six digits, as files keep them.
+  /// The errors at these places of the closures that `closures` returns for a view and what they depend on. Each error
+  /// is that of the worst term, rounded to six digits as in files.
   std::vector<ViewError> errors(
       const std::vector<double>& places,
       const std::function<ClosureSum<double>(const Vec3<double>& wo, const Varied<double>&)>& closures) const;
@@ -63,8 +64,8 @@ class Along {
   const Terms& terms_;
 };
 
-/// Where errors are measured of what is tabulated at these places, and linear between: with an axis at both its ends
-/// and in the middle between any two.
+/// The places at which errors are measured for tables that have knots at `places` and are linear between them. With an
+/// axis: both its ends, and the middle between any two places.
 std::vector<double> proof_places(const std::vector<double>& places);
 
 }  // namespace brdfc::fit

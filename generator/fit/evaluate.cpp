@@ -9,7 +9,7 @@
 namespace brdfc::fit {
 namespace {
 
-/// Coordinates of all tables that run over the view.
+/// Coordinates for all tables that run over the view.
 template <class T> std::vector<T> place(const FitTables& t, const Vec3<T>& wo, const T& number) {
   std::vector<T> at;
   if (t.axis) at.push_back(named("place_on_axis", lookup(t.position, std::vector<T>{t.axis->place(number)})));
@@ -17,7 +17,7 @@ template <class T> std::vector<T> place(const FitTables& t, const Vec3<T>& wo, c
   return at;
 }
 
-/// Closure j without weight and colours; `side` is mirror_side().
+/// Closure j without weight and colours. `side` is mirror_side().
 template <class T> Closure<T> shape(const FitTables& t, std::size_t j, const Vec3<T>& side, const std::vector<T>& at) {
   if (j < t.lobes.size()) {
     const T offset = lookup(t.lobes[j].offset, at), power = lookup(t.lobes[j].exponent, at);
@@ -36,8 +36,8 @@ template <class T> T amplitude_of(const FitTables& t, std::size_t term, const st
   return t.axis ? named("amplitude", T(t.scale) * exp(lookup(t.amplitude[term], at))) : T(1);
 }
 
-/// What each term counts, in the closures' units and with their tint. Empty without mixed parameters: then all but the
-/// amplitude is in the tables.
+/// The weight of each term, in the closures' units and with their tint. Empty without mixed parameters: then the tables
+/// contain everything except the amplitude.
 template <class T>
 std::vector<Rgb<T>> counts_of(const FitTables& t, const std::vector<T>& at, const std::vector<Rgb<T>>& weights) {
   std::vector<Rgb<T>> out;
@@ -53,7 +53,8 @@ template <class T> std::vector<Rgb<T>> weights_of(const FitTables& t, const Vari
   return t.terms.weights(varied.parameters);
 }
 
-/// Colour of closure j, without tint and amplitude unless there are counts; `at` is what its tables run over.
+/// Colour of closure j. If `counts` is empty, tint and amplitude are not included. `at` has the coordinates of its
+/// tables.
 template <class T>
 Rgb<T> colour(const FitTables& t, std::size_t j, const std::vector<T>& at, const std::vector<Rgb<T>>& counts) {
   const auto term = [&](std::size_t k) {
@@ -67,18 +68,18 @@ Rgb<T> colour(const FitTables& t, std::size_t j, const std::vector<T>& at, const
   return sum;
 }
 
-/// Coordinates of a ramp's table.
+/// Coordinates for a ramp's table.
 template <class T> std::vector<T> on_ramp(std::vector<T> at, const T& position) {
   at.push_back(position);
   return at;
 }
 
-/// closures() by the weights of terms.
+/// The same as closures(), for given weights of the terms.
 template <class T> ClosureSum<T> weighted(const FitTables& t, const Vec3<T>& wo, const T& number,
                                           const std::vector<Rgb<T>>& weights, const T& share, bool divided) {
   const std::vector<T> at = place(t, wo, number);
   const std::vector<Rgb<T>> counts = counts_of(t, at, weights);
-  // With terms both are in their counts.
+  // With terms, `counts` contains both.
   const T amplitude = counts.empty() ? amplitude_of(t, 0, at) : T(1);
   const Rgb<T> tint = counts.empty() ? tint_of<T>(t) : Rgb<T>(T(1));
   const Vec3<T> side = mirror_side(wo);
@@ -100,7 +101,7 @@ template <class T> ClosureSum<T> weighted(const FitTables& t, const Vec3<T>& wo,
     }
     Rgb<T> weight(T(0));
     for (std::size_t term = 0; term < counts.size(); ++term) weight += counts[term] * share_of(term);
-    // Of colours that may be black.
+    // The small constant is for colours that may be black.
     c.weight = weight * share + Rgb<T>(T(1e-20));
     for (std::size_t k = 0; k < kRampSize; ++k) {
       c.ramp[k] = colour(t, j, on(k), counts);
@@ -110,7 +111,7 @@ template <class T> ClosureSum<T> weighted(const FitTables& t, const Vec3<T>& wo,
   return sum;
 }
 
-/// The frame about a normal that is turned towards a viewer below kLowestView until it is as high.
+/// The local frame about a normal that is turned towards a viewer below kLowestView until the view is as high as that.
 class TurnedFrame {
  public:
   explicit TurnedFrame(const Vec3<double>& wo) : side_(mirror_side(wo)) {
@@ -163,12 +164,12 @@ template <class T> Rgb<T> f_cos(const FitTables& t, const Vec3<T>& wi, const Vec
     if (wo.z < kLowestView) {
       const TurnedFrame frame(wo);
       const Vec3<T> turned = frame.into(wo);
-      // No lower, or this would not end.
+      // The height is clamped; otherwise rounding could make this recursion endless.
       return f_cos(t, frame.into(wi), {turned.x, turned.y, std::max(turned.z, kLowestView)}, varied);
     }
   const std::vector<T> at = place(t, wo, varied.number);
   const std::vector<Rgb<T>> counts = counts_of(t, at, weights_of(t, varied));
-  // Turned into the plane of incidence, where normals have two components.
+  // In the coordinates of the plane of incidence, where normals have only two components that are not 0.
   const Vec3<T> side = mirror_side(wo), x = {T(1), T(0), T(0)}, o = {-sqrt(sin2_theta(wo)), T(0), wo.z},
                 i = {dot(side, wi), side.x * wi.y - side.y * wi.x, wi.z};
   Rgb<T> sum(T(0));

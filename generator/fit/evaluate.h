@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The closures that a fit's tables stand for, as numbers and as recorded formulas.
+// The closures that a fit's tables describe, as numbers and as recorded formulas.
 #pragma once
 
 #include <map>
@@ -14,7 +14,7 @@
 namespace brdfc::fit {
 
 /// What the closures of a fit depend on besides the view: the value of its axis, if it has one, in units of the
-/// parameter, and the values of its mixed parameters (terms.h), numbers as greys.
+/// parameter; and the values of its mixed parameters (terms.h), with numbers as greys.
 template <class T> struct Varied {
   T number = T(0);
   std::map<std::string, Rgb<T>> parameters = {};
@@ -22,21 +22,22 @@ template <class T> struct Varied {
   Varied(const T& n) : number(n) {}  // NOLINT: all that most fits need
 };
 
-/// From complete values. Throws std::out_of_range for a parameter that they lack.
+/// Takes the values from complete values. Throws std::out_of_range for a parameter that they lack.
 Varied<double> varied_of(const std::optional<FitAxis>&, const Terms&, const ParamValues&);
 
-/// The closures for a view above the surface. Their weights add up to the albedo. Those with ramps have `share` of
-/// theirs and colours that make up for it; not `divided`, the colours still have to be divided by the weight: by its
-/// largest channel, with mixed parameters by each. Of numbers, a lower view than kLowestView is taken as described
-/// there; a shader that records closures has to turn its normal itself. Over double and Expr.
+/// The closures for a view above the surface. Their weights add up to the albedo. The weight of closures with ramps is
+/// multiplied by `share`, and their colours are divided by it. If `divided` is false, the caller has to divide the
+/// colours by the weight: by its largest channel, or with mixed parameters by each channel. With T = double, a view
+/// below kLowestView is handled as described there; a shader that records closures has to turn its normal itself. T is
+/// double or Expr.
 template <class T> ClosureSum<T> closures(const FitTables&, const Vec3<T>& wo, const Varied<T>&, const T& share = T(1),
                                           bool divided = true);
 
-/// The same by the weights of terms, as Terms::weights() gives them, for a view not below kLowestView. Of numbers.
+/// The same for given weights of the terms, as Terms::weights() returns them, and a view that is not below kLowestView.
 ClosureSum<double> closures_by_weights(const FitTables&, const Vec3<double>& wo, double number,
                                        const std::vector<Rgb<double>>& weights);
 
-/// f cos(theta_i) of the sum of the closures; directions above the surface. Over double and Expr.
+/// f cos(theta_i) of the sum of the closures, for directions above the surface. T is double or Expr.
 template <class T> Rgb<T> f_cos(const FitTables&, const Vec3<T>& wi, const Vec3<T>& wo, const Varied<T>&);
 
 extern template ClosureSum<double> closures(const FitTables&, const Vec3<double>&, const Varied<double>&, const double&,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search for how a fit's facets lean, how rough they are and how they are stretched.
+// The search for the shape of a fit's facets: how far they lean, how rough they are and how far they are stretched.
 #pragma once
 
 #include <vector>
@@ -10,22 +10,22 @@
 
 namespace brdfc::fit {
 
-/// What facets are sought by, kNumbersOfFacet numbers for each of two: how far it leans, in units of the viewer's
-/// height (radians) times the sine of its angle; the root of its alpha in units of that of the one before, the first
-/// one's of that which gives the lobe at normal incidence its width; the logarithm of its stretch, by the square of
-/// that sine.
+/// The variables of the search: kNumbersOfFacet numbers for each of two facets. First, how far it leans, in units of
+/// the viewer's height (radians) times the sine of the view angle. Second, the square root of its alpha, relative to
+/// that of the previous facet, and for the first facet relative to the alpha that gives the width of the lobe at normal
+/// incidence. Third, the logarithm of its stretch, divided by the square of that sine.
 using FacetShape = std::vector<double>;
 inline constexpr std::size_t kNumbersOfFacet = 3;
-/// Where the first search begins.
+/// The starting point of the first search.
 inline const FacetShape kFirstShape{kSettings.first_shape.begin(), kSettings.first_shape.end()};
 
-/// The facets of a shape at a view; `at_normal` is the model's lobe at normal incidence.
+/// The facets with this shape at a view. `at_normal` is the model's lobe at normal incidence.
 std::vector<Facet> facets_of(const FacetShape&, const Moments& at_normal, const Vec3<double>& wo);
 
-/// Relative L1 of the best sum of these facets and a matte closure, mean over the columns of the view's f.
+/// Relative L1 error of the best sum of these facets and a matte closure; the mean over the columns of the view's f.
 double facet_error(const std::vector<Facet>&, const View&);
 
-/// The shape that a search from `shape` on finds best for a view, by few of its points.
+/// The best shape that a search starting at `shape` finds for a view, using a subset of its points.
 FacetShape improved(const FacetShape& shape, const Moments& at_normal, const View&);
 
 }  // namespace brdfc::fit

@@ -16,7 +16,7 @@
 namespace brdfc::fit {
 namespace {
 
-/// What the tables of a fit run over, `along` an axis or not: files have their sizes alone.
+/// The axes of a fit's tables, with or without a parameter as axis (`along`). Files store only their sizes.
 std::vector<TableAxis> fit_axes(const std::string& table, const std::vector<int>& sizes, bool along) {
   static const std::vector<std::string> position = {"place_on_axis"}, errors = {"place", "number"},
                                         by_view = {"place_of_view", "position_in_ramp"},
@@ -50,7 +50,7 @@ void write_fit(const FitTables& fit, const Model& model, const ParamValues& valu
     for (const TableAxis& a : table->axes) sizes.push_back(a.size());
     tables.push_back({{"row", tables.size()}, {"name", table->name}, {"sizes", sizes}});
   }
-  // Each by what its parameters are where f is this term over `scale`.
+  // Each term is stored as the parameters at which f equals this term times `scale`.
   Json terms = Json::array();
   for (const Terms::Term& term : fit.terms.terms)
     terms.push_back({{"values", format_values(model.info(), term.values)}, {"scale", term.scale}});
@@ -75,7 +75,7 @@ void write_fit(const FitTables& fit, const Model& model, const ParamValues& valu
                {"channels", fit.linear.front().colour.front().size()},
                {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
                {"tables", tables}};
-  // Other than 1 only where factors are not 1.
+  // The scale differs from 1 only for fits with factors other than 1.
   if (fit.scale != 1) meta["scale"] = fit.scale;
   TableImage image = image_of(pointers);
   image.meta = meta.dump();

@@ -14,14 +14,14 @@ namespace brdfc::fit {
 Fit::Fit(const Model& model, const ParamValues& given, From from) {
   const Roles& roles = roles_of(model, given);
   const ParamInfo* number = roles.axis();
-  // Along a number the same fit whether factors and mixed parameters are known or sockets.
+  // Along a number, the same fit serves known and open factors and mixed parameters.
   const auto [values, factor] = number ? along_axis(model, roles.fitted()) : Split{roles.fitted(), Rgb<double>(1.0)};
   const auto make = [&, &v = values] { return make_fit(model, v); };
   if (from == From::Scratch) {
     tables_ = make();
   } else {
     const StoreKey key = stored_fit(model, values);
-    // One without an axis is made in seconds, of which nothing is said.
+    // A fit without an axis takes only seconds, so there is no message.
     const std::string what = number ? fmt::format("stored fit of {} {} over {}", model.info().name,
                                                   format_values(model.info(), values), number->name)
                                     : std::string();
@@ -56,7 +56,7 @@ std::size_t Fit::size() const {
 }
 
 double Fit::mean_l1(const std::optional<double>& number) const {
-  std::map<double, std::pair<double, double>> sums;  // by place: of L1, of views
+  std::map<double, std::pair<double, double>> sums;  // by place: the sum of L1, the number of views
   for (const ViewError& e : tables_.errors) {
     sums[e.number].first += e.relative_l1;
     sums[e.number].second += 1;

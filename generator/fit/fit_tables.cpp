@@ -30,7 +30,8 @@ std::array<double*, 6> numbers_of(ViewError& e) {
 
 void FitTables::tabulate(const std::vector<double>& places, const std::vector<Solution>& solutions) {
   if (axis) {
-    // Knots lie at multiples of 1 / steps, so that the way from a place to the number of its knot bends there alone.
+    // Knots lie at multiples of 1 / steps, so that the map from a place to the index of its knot is linear between
+    // them.
     constexpr int kSteps = int(kSettings.steps);
     std::vector<double> positions;
     for (int i = 0; i <= kSteps; ++i) {
@@ -51,8 +52,8 @@ void FitTables::tabulate(const std::vector<double>& places, const std::vector<So
   const auto columns_of = [&](std::size_t term, const auto& m) {
     return m.middleCols(Eigen::Index(term) * channels, channels);
   };
-  // Mean over channels of what a term reflects. Along an axis it may change by factors: closures' colours are tabulated
-  // in units of it.
+  // The albedo of a term, as the mean over channels. Along an axis it may vary by orders of magnitude, so the colours
+  // of closures are tabulated relative to it.
   const auto albedo_of = [&](const ViewSolution& c, std::size_t term) {
     return std::max((columns_of(term, c.view->f).transpose() * weights_of(c.view->points)).mean(), 1e-30);
   };
@@ -91,8 +92,8 @@ void FitTables::tabulate(const std::vector<double>& places, const std::vector<So
     const int entries = ramp ? kRampSize : 1;
     LinearTables l;
     for (std::size_t t = 0; t < term_count; ++t) {
-      // What the facets leave of the albedo, by what each ramp's colours add up to without their signs: so the weights
-      // add up to the albedo, which is what passes and the denoiser see.
+      // The part of the albedo that facets leave is divided among the ramps in proportion to the sum of the absolute
+      // values of their colours. So the weights add up to the albedo, which render passes and the denoiser use.
       if (ramp)
         l.weight.push_back(table(name_of_term(fmt::format("share_of_{}", j), t), [&](const ViewSolution& c) {
           const Eigen::MatrixXd x = columns_of(t, c.x);
@@ -156,7 +157,7 @@ FitTables FitTables::cut_to(const Cosines& views) const {
     for (auto& term : l.colour)
       for (auto& channel : term) cut(channel);
   }
-  // At least one is left.
+  // At least one error is kept.
   const double apart = errors[0].cos_theta_o - errors[1].cos_theta_o;
   std::erase_if(out.errors, [&](const ViewError& e) {
     return e.cos_theta_o < views.low - apart || e.cos_theta_o > views.high + apart;

@@ -48,7 +48,7 @@ bool Knots::find_shapes() {
     return facet_error(facets_of(shape, seen[0].lobe, view.wo), view);
   };
   for (std::size_t v = 0; v < shapes_[middle].size(); ++v) {
-    // A search that begins again where it ended, with wide steps, leaves many a bad place.
+    // A second search from the point where the first one ended, with large steps again, escapes many poor minima.
     for (int round = 0; round < int(kSettings.rounds); ++round)
       search(middle, v, round > 0 || v == 0 ? shapes_[middle][v] : shapes_[middle][v - 1]);
     for (std::size_t stretch = kNumbersOfFacet - 1; v > 0 && stretch < kFirstShape.size(); stretch += kNumbersOfFacet) {

@@ -18,7 +18,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Relative L1 of one view at a value of the axis, of the mixture that is off by most.
+/// Relative L1 error of one view at a value of the axis, for the worst mixture.
 double l1_at(const FitTables& fit, const View& view, double number) {
   const VectorXd weight = weights_of(view.points);
   const MatrixXd mixtures = mixtures_of(fit.terms);
@@ -51,7 +51,8 @@ double mean_error(const std::vector<Solution>& knots) {
   return sum / double(knots.size());
 }
 
-/// Fills a fit whose axis and terms are set. False where `grey` and the channels do not differ by a factor alone.
+/// Fills a fit whose axis and terms are set. Returns false if `grey` is true but the channels differ by more than a
+/// factor.
 bool make(FitTables& fit, const Model& model, const ParamValues& values, bool grey) {
   const std::optional<FitAxis>& axis = fit.axis;
   const Along along(model, values, fit.axis, fit.terms);
@@ -60,7 +61,7 @@ bool make(FitTables& fit, const Model& model, const ParamValues& values, bool gr
   for (int i = 1; axis && i <= int(kSettings.first_steps); ++i)
     knots.push_back(double(i) / double(kSettings.first_steps));
   if (!at.see(knots) || !at.find_shapes()) return false;
-  // Few views tell which closures suit.
+  // A few views suffice to choose the family of closures.
   fit.tint = Rgb<double>(1.0);
   Family family = kFamilies[0];
   std::vector<Solution> trial;
@@ -68,7 +69,7 @@ bool make(FitTables& fit, const Model& model, const ParamValues& values, bool gr
     std::vector<Solution> found = at.fitted(knots, kSettings.trial_stride, f);
     if (trial.empty() || mean_error(found) < mean_error(trial)) trial = std::move(found), family = f;
   }
-  std::set<double> settled;  // middles between knots that need no knot
+  std::set<double> settled;  // middles between knots that need no further knot
   while (axis) {
     fit.tabulate(knots, trial);
     std::vector<double> needed;
@@ -110,7 +111,7 @@ FitTables make_fit(const Model& model, const ParamValues& values) {
   const Roles& roles = roles_of(model, values);
   fit.terms = roles.terms();
   if (const ParamInfo* p = roles.axis()) fit.axis = fit_axis(*p);
-  // Where the channels differ by a factor alone, one fit serves them all.
+  // If the channels differ only by a factor, one fit serves them all.
   if (!make(fit, model, values, true) && !make(fit, model, values, false))
     throw std::logic_error(model.info().name + ": a fit of colours that is not one");
   return fit;
@@ -127,7 +128,7 @@ FitTables make_knot(const FitTables& fit, const Model& model, const ParamValues&
   out.axis = fit.axis;
   out.terms = fit.terms;
   out.tint = fit.tint;
-  // Between two knots that are the same, views lie as they do in the whole.
+  // Two equal knots: the views are placed as in the whole fit.
   out.tabulate({0, 1}, {found, found});
   return out;
 }

@@ -13,15 +13,15 @@ std::vector<RampLobe> place_lobes(Family family, const Moments& here, const Mome
   const Moments& m = family == Family::Fixed ? at_normal : here;
   const double offset = family == Family::Fixed ? 0 : m.offset;
   const double e = std::max(m.narrow, 0.5), s = 1 / std::sqrt(std::max(m.wide, 0.5));
-  // Three widths on the axis, two pairs beside it; or, as what facets leave at grazing views lies on one side, wider
-  // ones there.
+  // Three widths on the axis and two pairs beside it. In the family with facets, what these leave at grazing views lies
+  // on one side of the axis, so wider lobes are placed there instead.
   std::vector<RampLobe> lobes = {{offset, e}, {offset + 0.7 * s, e}, {offset - 0.7 * s, e}};
   if (family == Family::Microfacet)
     lobes.insert(lobes.end(), {{offset + 1.4 * s, e / 4}, {offset + 2.8 * s, e / 16}});
   else
     lobes.insert(lobes.end(), {{offset, e / 4}, {offset, 2 * e}, {offset + 1.5 * s, e / 2}, {offset - 1.5 * s, e / 2}});
-  // At -2 times the height, opposite the viewer, a closure's normal would turn over. What would lie below the surface
-  // at low views lies in two places, so that two closures are not the same.
+  // With an offset of -2 times the height, opposite the viewer, a closure's normal would turn over. Lobes that would be
+  // below the surface at low views are moved to one of two positions, so that no two closures become equal.
   for (RampLobe& l : lobes)
     l.offset = std::clamp(l.offset, (l.offset < offset - s ? -kSettings.far_below : -kSettings.below) * height,
                           kSettings.most_back);
@@ -37,7 +37,7 @@ MatrixXd dictionary(const std::vector<RampLobe>& lobes, const std::vector<Facet>
   MatrixXd a(Eigen::Index(points.wi.size()), Eigen::Index(ramps.size() * kRampSize + facets.size()));
   Eigen::Index column = 0;
   for (Closure<double>& c : ramps) {
-    // Three entries at once, one in each channel.
+    // Three entries of the ramp at once, one in each channel.
     for (int k = 0; k < kRampSize; k += 3) {
       for (int i = 0; i < kRampSize; ++i)
         c.ramp[std::size_t(i)] = {double(i == k), double(i == k + 1), double(i == k + 2)};

@@ -80,7 +80,7 @@ Split along_axis(const Model& model, const ParamValues& values) {
   for (const ParamInfo& p : model.info().params)
     if (p.kind != ParamKind::Choice) choices.erase(p.name);
   for (const std::string& name : roles_of(model, choices).with(Role::Mixed)) out.erase(name);
-  // What is a factor only here, where others are known.
+  // A parameter may be a factor only for these values of the others.
   for (const std::string& name : roles_of(model, out).proportional())
     if (const auto it = values.find(name); it != values.end()) out.insert(*it);
   return without_factors(model, out);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What each parameter of a model is to closures that are fitted to the model.
+// The role of each parameter of a model when closures are fitted to it.
 #pragma once
 
 #include <map>
@@ -14,17 +14,18 @@
 namespace brdfc::fit {
 
 enum class Role {
-  Constant,  ///< its value is given, and the fit is for this value
-  Factor,    ///< f is proportional to it: closures are fitted for 1 and multiplied by it, so it may be anything
-  Mixed,     ///< f is a polynomial of it: closures are fitted to its terms and added up, so it may be anything
+  Constant,  ///< its value is given; the fit is for this value
+  Factor,    ///< f is proportional to it: the closures are fitted for 1 and multiplied by it, so it may vary
+  Mixed,     ///< f is a polynomial in it: closures are fitted to its terms and added up, so it may vary
   Axis,      ///< the one number that the fit's tables run over
-  Open       ///< none of these: there is no fit unless its value is given
+  Open       ///< none of these: a fit is possible only if its value is given
 };
 
-/// The roles of all parameters of a model of which some values are given. Decided by evaluating the model, once.
+/// The roles of all parameters of a model, given the values of some. They are found by evaluating the model, once.
 class Roles {
  public:
-  /// `given`: values by name; the parameters that it lacks may be anything. Throws InputError for values out of range.
+  /// `given` has values by name; parameters that it lacks may have any value. Throws InputError for values out of
+  /// range.
   Roles(const Model&, ParamValues given);
 
   /// Throws std::out_of_range for a name that the model does not have.
@@ -32,17 +33,17 @@ class Roles {
   /// Names of the parameters with this role.
   std::set<std::string> with(Role) const;
 
-  /// Parameters that f is proportional to, given or not.
+  /// Parameters that f is proportional to, whether given or not.
   const std::set<std::string>& proportional() const { return proportional_; }
-  /// f by the mixed parameters.
+  /// f as a sum of terms of the mixed parameters.
   const Terms& terms() const { return terms_; }
-  /// The parameter that is the axis; nullptr without one.
+  /// The parameter that is the axis; nullptr if there is none.
   const ParamInfo* axis() const;
 
-  /// The values that closures are fitted for: those given, and 1 for the factors. What it lacks is the axis and what is
-  /// mixed. Throws std::logic_error naming a parameter that is open.
+  /// The values that closures are fitted for: those given, and 1 for the factors. The axis and the mixed parameters are
+  /// not included. Throws std::logic_error naming a parameter that is open.
   ParamValues fitted() const;
-  /// fitted() with `number` for the axis, if there is one.
+  /// fitted() with the axis set to `number`, if there is an axis.
   ParamValues fitted_at(double number) const;
 
  private:
@@ -53,22 +54,22 @@ class Roles {
   std::map<std::string, Role> roles_;
 };
 
-/// Those of these values, decided at first use and kept while the program runs.
+/// The roles for these values, computed at first use and cached while the program runs.
 const Roles& roles_of(const Model&, const ParamValues& given);
 
-/// Why closures can't be fitted to a model with these parameters, as the rest of a sentence; nothing if they can.
-/// `given` as in Roles.
+/// Reason why closures can't be fitted to a model with these parameters, as a clause; nullopt if they can. `given` is
+/// as in Roles.
 std::optional<std::string> unfit(const Model&, const ParamValues& given);
 
-/// The values that a fit is made for, and what multiplies it then.
+/// The values that a fit is made for, and the factor that it is multiplied by.
 struct Split {
   ParamValues values;
-  Rgb<double> factor;  ///< product of what `values` have 1 for
+  Rgb<double> factor;  ///< product of the parameters that are set to 1 in `values`
 };
-/// `values`, in which all proportional parameters are, with 1 for each.
+/// `values` with all proportional parameters set to 1. `values` must contain them.
 Split without_factors(const Model&, const ParamValues& values);
-/// What a fit along an axis is kept by, so that one serves all colours of a model: without the parameters that are
-/// mixed where no number is given, with 1 for each factor.
+/// The values by which a fit along an axis is stored, so that one fit serves all colours of a model: each factor is 1,
+/// and the parameters that are mixed when only the choices are given are left out.
 Split along_axis(const Model&, const ParamValues& values);
 
 }  // namespace brdfc::fit

@@ -39,7 +39,7 @@ Solution solve_views(const std::vector<View>& views, std::size_t stride, Family 
     ViewSolution& c = out.views[i];
     c.lobes = place_lobes(family, c.view->lobe, at_normal, std::asin(c.view->wo.z));
     c.a = dictionary(c.lobes, c.facets, c.view->points, c.view->wo);
-    // About the integral of a column over all directions: that over those above the surface may vanish.
+    // An estimate of a column's integral over all directions; the integral over those above the surface may be 0.
     c.scale = VectorXd::Constant(c.a.cols(), 1.0 / kRampSize);
     for (std::size_t j = 0; j < c.lobes.size(); ++j) {
       const Closure<double> l = lobe_closure(mirror_side(c.view->wo), c.lobes[j].offset, c.lobes[j].exponent);
@@ -51,14 +51,15 @@ Solution solve_views(const std::vector<View>& views, std::size_t stride, Family 
 
   for (ViewSolution& c : out.views) c.x = MatrixXd::Zero(c.a.cols(), c.view->f.cols());
   const Eigen::Index channels = views[0].f.cols();
-  // Cycles draws diffuse_ramp in proportion to a cosine that its colours need not have: with a first colour other than
-  // 0 the variance would be infinite.
+  // Cycles samples diffuse_ramp with a cosine pdf, but its colours need not fall to 0 with the cosine. With a first
+  // colour other than 0 the variance would be infinite.
   const Eigen::Index first_of_diffuse = Eigen::Index(out.views[0].lobes.size() * kRampSize);
-  // Differences of columns and their light, by cell.
+  // Error and albedo of each column of f at each view.
   MatrixXd off(channels, Eigen::Index(out.views.size())), light = off;
   for_all(std::size_t(channels), [&](std::size_t index) {
     const auto channel = Eigen::Index(index);
-    // From one view to the next, so that neighbours are alike and what lies between them is a fit too.
+    // Goes from one view to the next, so that neighbouring views have similar solutions and interpolation between them
+    // is a good fit too.
     const auto facets_count = Eigen::Index(out.views[0].facets.size());
     VectorXd near = VectorXd::Zero(out.views[0].a.cols()), ridge = VectorXd::Constant(near.size(), kSettings.ridge);
     ridge.tail(facets_count).setConstant(kSettings.facet_ridge);

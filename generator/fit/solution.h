@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The linear part of a fit: colours of ramps and weights of facets, once it is settled which closures there are.
+// The linear part of a fit: the colours of ramps and the weights of facets, when the closures are known.
 //
-// Ramps take eight colours that may be negative, so each is a family that is linear in eight numbers, and a view is a
-// linear problem: see solve() in view.h.
+// A ramp has eight colours, which may be negative, so it is linear in eight numbers, and fitting a view is a linear
+// problem: see solve() in view.h.
 #pragma once
 
 #include <functional>
@@ -17,32 +17,33 @@
 
 namespace brdfc::fit {
 
-/// What was found for a view.
+/// The solution for a view.
 struct ViewSolution {
   const View* view;
   std::vector<RampLobe> lobes;
   std::vector<Facet> facets;
-  Eigen::MatrixXd a;      ///< dictionary() of both, each column divided by its scale; empty once it is solved
-  Eigen::VectorXd scale;  ///< of the columns
-  Eigen::MatrixXd x;      ///< coefficients of the columns, a column for each of the view's f
+  Eigen::MatrixXd a;      ///< dictionary() of lobes and facets, each column divided by its scale; cleared after solving
+  Eigen::VectorXd scale;  ///< scale of each column
+  Eigen::MatrixXd x;      ///< coefficients of the columns of a, one column for each column of the view's f
 };
 
-/// What was found for some parameters of the model.
+/// The solution for some parameters of the model.
 struct Solution {
   std::vector<ViewSolution> views;
-  double error = 0;  ///< relative L1, mean over the views, of the worst mixture and channel
+  double error = 0;  ///< relative L1, mean over the views, for the worst mixture and channel
 };
 
-/// Values of mixed parameters as the arguments of Terms::weights().
+/// Values of mixed parameters as arguments of Terms::weights().
 std::map<std::string, Rgb<double>> colours_of(const ParamValues&);
 
-/// The mixtures of terms that tell a fit's error: a row a mixture, a column the weight of a term. The error between
-/// them is nowhere larger than the largest of theirs. Without mixed parameters one row, of the number 1.
+/// The mixtures of terms at which a fit's error is measured: one row per mixture, one column per term with its weight.
+/// No mixture between them has a larger error than the worst of these. Without mixed parameters it is one row with the
+/// number 1.
 Eigen::MatrixXd mixtures_of(const Terms&);
 
-/// Fits every `stride`-th of the views, from that along the normal on, each drawn a little towards the one above. Their
-/// f has the columns of one term after those of the other. `shape` gives the shape of facets for a view's index; an
-/// empty one means a family without them.
+/// Fits every `stride`-th view, starting with the view along the normal; each is pulled slightly towards the view
+/// above. Their f has the columns of the first term, then those of the second, and so on. `shape` returns the shape of
+/// facets for the index of a view; an empty function selects a family without facets.
 Solution solve_views(const std::vector<View>&, std::size_t stride, Family, const Terms&,
                      const std::function<FacetShape(std::size_t view)>& shape);
 

@@ -11,7 +11,7 @@ namespace brdfc::fit {
 StoreKey stored_fit(const Model& model, const ParamValues& given) {
   const bool along = roles_of(model, given).axis() != nullptr;
   const ParamValues values = along ? along_axis(model, given).values : given;
-  // Apart, since of these there may be many, and others take a minute.
+  // A separate folder: there may be many fits of values, and fits along a number take a minute to make.
   StoreKey key(along ? "fits" : "fits_of_values", model.info().name);
   key.add("values", format_values(model.info(), values));
   key.add("axis", along ? text_of(fit_axis(*roles_of(model, values).axis())) : "none");

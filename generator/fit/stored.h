@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fit is kept by.
+// The key of a stored fit.
 #pragma once
 
 #include "model/model.h"
@@ -7,8 +7,8 @@
 
 namespace brdfc::fit {
 
-/// The key of the fit for these values, or along the number that they lack: the model's formula, the values, of a fit
-/// along a number by along_axis(), the slider, all settings.
+/// The key of the fit for these values, or along the number that they lack. It includes the model's formula, the values
+/// (for a fit along a number those of along_axis()), the slider, and all settings.
 StoreKey stored_fit(const Model&, const ParamValues& values);
 
 }  // namespace brdfc::fit

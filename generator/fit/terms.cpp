@@ -11,10 +11,10 @@
 namespace brdfc::fit {
 namespace {
 
-using Powers = std::vector<int>;  ///< of each parameter
+using Powers = std::vector<int>;  ///< the exponent of each parameter
 
 constexpr double kTolerance = 1e-9;
-/// In place of 0 for what is proportional to a colour there, where f would vanish.
+/// Replaces 0 for a term that is proportional to a colour there, where f would vanish.
 constexpr double kNearlyNone = 1e-6;
 constexpr double kLeastReflected = 0.02;
 constexpr std::size_t kMaxParameters = 8;
@@ -23,13 +23,13 @@ bool may_be_any_share(const ParamInfo& p) {
   return p.kind == ParamKind::Color || (p.kind == ParamKind::Number && p.min <= 0 && p.max >= 1);
 }
 
-/// Pairs of directions, some of them where the model with these parameters scatters to.
+/// Pairs of directions; in some of them the light direction is sampled from the model with these parameters.
 std::vector<std::array<Vec3<double>, 2>> pairs(const Model& model, const ParamValues& values, int count) {
   measure::Random random(12);
   return measure::direction_pairs(*model.make_double(values), count, random, model.two_sided());
 }
 
-/// The degree of f in a parameter, the other ones of `open` being anything: 0, 1 or 2, else 3.
+/// The degree of f in parameter p, for any values of the other open parameters: 0, 1 or 2; 3 if it is none of these.
 int degree(const Model& model, const std::vector<ParamValues>& places, const ParamInfo& p,
            const std::vector<const ParamInfo*>& open) {
   int degree = 0;
@@ -63,7 +63,7 @@ int degree(const Model& model, const std::vector<ParamValues>& places, const Par
   return degree;
 }
 
-/// All powers up to those of the degrees, first parameter slowest.
+/// All combinations of powers up to the given degrees; the first parameter varies slowest.
 std::vector<Powers> all_powers(const Powers& degrees) {
   std::vector<Powers> out = {{}};
   for (const int d : degrees) {
@@ -78,7 +78,7 @@ std::vector<Powers> all_powers(const Powers& degrees) {
   return out;
 }
 
-/// The products of powers that f has.
+/// The products of powers that occur in f.
 std::set<Powers> powers_in(const Model& model, const std::vector<ParamValues>& places,
                            const std::vector<const ParamInfo*>& open, const Powers& degrees) {
   const std::vector<Powers> all = all_powers(degrees);
@@ -98,7 +98,7 @@ std::set<Powers> powers_in(const Model& model, const std::vector<ParamValues>& p
       for (const auto& brdf : nodes) c.push_back(brdf->eval(wi, wo));
       double scale = 0;
       for (const Rgb<double>& v : c) scale = std::max(scale, max_component(magnitude(v)));
-      // From values to coefficients, one parameter after the other.
+      // Converts values to coefficients, one parameter after the other.
       std::size_t stride = c.size();
       for (const int d : degrees) {
         const std::size_t block = stride;
@@ -128,7 +128,7 @@ double product(const std::vector<double>& at, const Powers& powers) {
   return out;
 }
 
-/// Whether a product has all of these powers and some of parameter i besides.
+/// True if a product has all of these powers and also a power of parameter i.
 bool has_more(const std::set<Powers>& products, const Powers& powers, std::size_t i) {
   return std::ranges::any_of(products, [&](const Powers& other) {
     bool all = other[i] > powers[i];
@@ -137,9 +137,10 @@ bool has_more(const std::set<Powers>& products, const Powers& powers, std::size_
   });
 }
 
-/// A term for each product of powers: f where its parameters are 1 and the others 0, and nearly 0 where it has but the
-/// first power of one that others have the second of. Weights by undoing what f has there of the products. Nothing
-/// where nearly 0 is not little enough.
+/// Makes a term for each product of powers. The term is f with its parameters at 1 and the others at 0. A parameter of
+/// second degree that the term has in the first power only gets a value of nearly 0. The weights of the terms are found
+/// by inverting the matrix of the products' values at the terms. Returns nullopt if the value of nearly 0 is not small
+/// enough for that.
 std::optional<Terms> solved(const std::set<Powers>& products, const std::vector<const ParamInfo*>& open,
                             const Powers& degrees) {
   Terms out;
@@ -173,7 +174,7 @@ std::optional<Terms> solved(const std::set<Powers>& products, const std::vector<
   return out;
 }
 
-/// Without those where f is black, as if nothing were left for the matte base of a perfect mirror.
+/// Removes terms for which f is black, for example the matte base of a perfect mirror, for which no light is left.
 Terms without_black(const Model& model, const std::vector<ParamValues>& places, Terms terms) {
   std::erase_if(terms.terms, [&](const Terms::Term& term) {
     for (ParamValues values : places) {
@@ -201,7 +202,7 @@ bool positive(const Terms& terms, const Powers& degrees) {
   return true;
 }
 
-/// With the product of any two of them, each parameter to the higher of its powers.
+/// The closure of the set under the product of two elements, in which each parameter gets the higher of its two powers.
 std::set<Powers> closed(std::set<Powers> products) {
   for (std::size_t before = 0; before != products.size();) {
     before = products.size();
@@ -296,7 +297,7 @@ template <class T> std::vector<Rgb<T>> Terms::weights(const std::map<std::string
   for (const Term& term : terms) {
     Rgb<T> sum(T(0));
     for (const auto& [powers, coefficient] : term.polynomial) {
-      // What is taken away as often as it is added is shorter taken away than added with a factor.
+      // Subtracting a part takes less code than adding it with a negative factor.
       Rgb<T> part{T(std::abs(coefficient))};
       for (std::size_t i = 0; i < powers.size(); ++i)
         for (int k = 0; k < powers[i]; ++k) part = part * values.at(parameters[i]);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model as a sum of terms: what depends on some of its parameters, times f at a few values of them. Closures that are
-// fitted to each of these serve whatever the parameters are, be they textured.
+// A model as a sum of terms: each is f at fixed values of some parameters, with a weight that depends on these
+// parameters. Closures that are fitted to each term serve all values of the parameters, also textures.
 //
-// Cook and Torrance's f0, with Schlick's Fresnel term, makes two: (1 - f0) f(0) + f0 f(1). Phong's material has three,
-// each in proportion to a share and a colour; light that goes to and fro in Oren and Nayar's grooves makes one in
-// rho - rho^2 and one in rho^2.
+// Examples: Cook and Torrance's f0 with Schlick's Fresnel approximation gives two terms, (1 - f0) f(0) + f0 f(1).
+// Phong's material has three, each proportional to a share and a colour. Interreflection in Oren and Nayar's grooves
+// gives one in rho - rho^2 and one in rho^2.
 #pragma once
 
 #include <map>
@@ -17,42 +17,45 @@
 
 namespace brdfc::fit {
 
-/// Parameters that f is proportional to, the other parameters being as they are: colours, and numbers that may be 1.
-/// Closures are fitted without them, and take them as factors of their weights, so they need not be known. Those that
-/// `known` lacks have their defaults, and numbers the ends of their sliders, too. Who asks for more than this one set
-/// takes Roles (roles.h), which keeps it.
+/// The parameters that f is proportional to, for given values of the others: colours, and numbers that may be 1.
+/// Closures are fitted without them and take them as factors of their weights, so their values need not be known.
+/// Parameters that `known` lacks are tried at their defaults, and numbers also at the ends of their sliders. To ask for
+/// more than this one set use Roles (roles.h), which stores the result.
 std::set<std::string> factors(const Model&, const ParamValues& known);
 
-/// A colour, or a number as a grey one; and back.
+/// Converts a colour, or a number to grey; and back.
 Rgb<double> as_rgb(const ParamValue&);
 ParamValue as_value(const ParamInfo&, const Rgb<double>&);
 
-/// Places to ask about a model: what `known` lacks at its default, and numbers at both ends of their sliders.
+/// Parameter values at which to examine a model: parameters that `known` lacks at their defaults, and numbers at both
+/// ends of their sliders.
 std::vector<ParamValues> places(const Model&, const ParamValues& known);
 
 struct Terms {
   struct Term {
-    ParamValues values;  ///< of `parameters`: f is scale times this term there
+    ParamValues values;  ///< of `parameters`: with these values f is scale times this term
     double scale = 1;
-    /// Where closures that are fitted to the terms are judged: between all of these no mixture is further off than the
-    /// worst. As `values`, with 0.02 for 0 where more of a parameter adds to this term: no dielectric reflects less.
+    /// The values of `parameters` at which closures fitted to the terms are tested. No mixture between them has a
+    /// larger error than the worst of them. The same as `values`, except that 0 becomes 0.02 for a parameter that adds
+    /// to this term, because no dielectric reflects less.
     ParamValues judged;
-    /// The weight: coefficients by the powers of `parameters`. Not negative for parameters from 0 to 1.
+    /// The weight as a polynomial: coefficients by the powers of `parameters`. It is not negative for parameters from 0
+    /// to 1.
     std::map<std::vector<int>, double> polynomial;
   };
-  std::vector<std::string> parameters;  ///< none: f is one term of weight 1
+  std::vector<std::string> parameters;  ///< if empty, f is one term of weight 1
   std::vector<Term> terms = {{}};
 
   bool has(const std::string& parameter) const;
-  /// Of the terms, by channel. Throws std::out_of_range for a parameter that `values` lacks.
+  /// The weights of the terms, by channel. Throws std::out_of_range for a parameter that `values` lacks.
   template <class T> std::vector<Rgb<T>> weights(const std::map<std::string, Rgb<T>>& values) const;
 };
 
 inline constexpr std::size_t kMaxTerms = 4;
 
-/// By parameters that `known` lacks and that are not among the factors(): those in which f is a polynomial, colours of
-/// second degree and numbers of first. They are 0 or 1 in the terms' values, or nearly 0. One term of weight 1 where
-/// there are none, or where they would make more than kMaxTerms.
+/// The terms in the parameters that `known` lacks, that are not among `factors`, and in which f is a polynomial:
+/// colours up to the second degree, numbers up to the first. In the terms' values these parameters are 0, 1 or nearly
+/// 0. Returns one term of weight 1 if there are no such parameters, or if there would be more than kMaxTerms terms.
 Terms terms_of(const Model&, const ParamValues& known, const std::set<std::string>& factors);
 
 extern template std::vector<Rgb<double>> Terms::weights(const std::map<std::string, Rgb<double>>&) const;

@@ -23,16 +23,16 @@ Vec3<double> view_at(int knot) {
   return {std::sqrt(1 - z * z), 0, z};
 }
 
-/// One of three channels, or one for all.
+/// A colour from tables of three channels, or of one for all.
 Rgb<double> colour(const Channels& channels, const std::vector<double>& at) {
   if (channels.size() == 1) return Rgb<double>(lookup(channels[0], at));
   return {lookup(channels[0], at), lookup(channels[1], at), lookup(channels[2], at)};
 }
-/// One term of weight 1 without parameters.
+/// Without parameters: one term of weight 1.
 std::vector<Rgb<double>> weights_of_terms(const Terms& terms, const std::map<std::string, Rgb<double>>& values) {
   return terms.parameters.empty() ? std::vector<Rgb<double>>{Rgb<double>(1.0)} : terms.weights(values);
 }
-/// The sum over terms, by their weights.
+/// The sum of the terms, each times its weight.
 Rgb<double> colour(const std::vector<Channels>& terms, const std::vector<Rgb<double>>& weights,
                    const std::vector<double>& at) {
   Rgb<double> sum(0.0);
@@ -40,7 +40,7 @@ Rgb<double> colour(const std::vector<Channels>& terms, const std::vector<Rgb<dou
   return sum;
 }
 
-/// A number for each place of the axis, evenly spaced from 0 to 1; 0 without one.
+/// Places on the axis, evenly spaced from 0 to 1; {0} without an axis.
 std::vector<double> even_places(int count) {
   std::vector<double> out;
   for (int i = 0; i < count; ++i) out.push_back(count == 1 ? 0 : double(i) / double(count - 1));
@@ -53,7 +53,7 @@ Twin::Twin(const Model& model, const ParamValues& given, From from) {
   const Roles& roles = roles_of(model, given);
   if (const ParamInfo* number = roles.axis()) axis_ = fit_axis(*number);
   terms_ = roles.terms();
-  // Searched for without the factors, so that a material's twin is the same whether they are known or sockets.
+  // The search is done without the factors, so that a material's twin is the same whether they are known or sockets.
   const auto [values, factor] = without_factors(model, roles.fitted());
   const Along along(model, values, axis_, terms_);
   if (model.has_mirror()) make_mirror(model, along);
@@ -61,7 +61,7 @@ Twin::Twin(const Model& model, const ParamValues& given, From from) {
     make(model, along);
   } else {
     const StoreKey key = stored_twin(model, values);
-    // One without an axis is made in seconds, of which nothing is said.
+    // A twin without an axis takes only seconds, so there is no message.
     const std::string what =
         axis_ ? fmt::format("stored twin of {} over {}", model.info().name, axis_->parameter) : std::string();
     *this = kept_or_made(
@@ -95,17 +95,17 @@ void Twin::make(const Model& model, const Along& along) {
   const std::size_t terms = terms_.terms.size();
   std::vector<Along::At> models;
   for (const double place : at) models.emplace_back(along, place, kTwinSettings.some);
-  // All views in a row, place by place, to find out whether they have one tint.
+  // The views of all places in one vector, to find out whether they have one tint.
   std::vector<View> row(at.size() * kTwinKnots);
   for_all(row.size(), [&](std::size_t i) {
     row[i] = models[i / kTwinKnots].view(view_at(int(i % kTwinKnots)), int(kTwinSettings.points));
   });
-  // A mirror has a colour of its own.
+  // A mirror has its own colour.
   if (!model.has_mirror()) tint_ = make_grey(row);
   const Eigen::Index channels = row.front().f.cols() / Eigen::Index(terms);
   const auto view = [&](std::size_t place, std::size_t knot) -> const View& { return row[place * kTwinKnots + knot]; };
 
-  // From the normal down, for what is found of one view is where the next one starts.
+  // From the normal downwards, because the search at a view starts with the result of the view above.
   std::vector<std::vector<View>> few(at.size());
   for_all(at.size(), [&](std::size_t place) {
     for (int k = kTwinKnots - 1; k >= 0; k -= int(kTwinSettings.stride)) {
@@ -172,7 +172,7 @@ void Twin::make(const Model& model, const Along& along) {
 }
 
 void Twin::make_mirror(const Model& model, const Along& along) {
-  // A product of x or 1 - x of each mixed parameter: nothing negative.
+  // Each term is a product of x or 1 - x for each mixed parameter, so no weight is negative.
   const std::size_t count = terms_.parameters.size(), corners = std::size_t(1) << count;
   mirror_terms_ = {terms_.parameters, {}};
   for (std::size_t corner = 0; corner < corners; ++corner) {
@@ -180,7 +180,7 @@ void Twin::make_mirror(const Model& model, const Along& along) {
     for (std::size_t i = 0; i < count; ++i)
       term.values[terms_.parameters[i]] =
           as_value(*model.info().param(terms_.parameters[i]), Rgb<double>(double(corner >> i & 1)));
-    // (1 - x) of those that are 0 here, multiplied out.
+    // The factors (1 - x) of the parameters that are 0 in this term, expanded.
     for (std::size_t more = 0; more < corners; ++more) {
       if (more & corner) continue;
       std::vector<int> powers(count);
@@ -210,7 +210,7 @@ void Twin::make_mirror(const Model& model, const Along& along) {
       channels.push_back(make_table(fmt::format("weight_of_mirror_{}_{}", t, c), axes(), std::move(numbers[c])));
   }
   parts_.push_back(std::move(part));
-  // What the nodes take for granted: between the corners as the polynomial, and whatever the factors are.
+  // Tests what the nodes rely on: between the corners the mirror is this polynomial, for any values of the factors.
   const ParamValues mixed = along.mixed(0.3);
   ParamValues between = mixed;
   for (const std::string& name : roles_of(model, along.values()).proportional())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Twins as EXR files.
+// Reads and writes twins as EXR files.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -38,7 +38,7 @@ TablePtr errors_table(const std::vector<ViewError>& errors) {
 std::vector<TablePtr*> Twin::all() {
   std::vector<TablePtr*> out;
   for (TwinClosure& part : parts_) {
-    // A mirror's is made again, which takes no time.
+    // The tables of a mirror are computed again, which takes no time.
     if (part.kind == ClosureKind::Reflection) continue;
     if (part.lean) out.insert(out.end(), {&part.lean, &part.roughness, &part.spread});
     for (Channels& channels : part.weight)

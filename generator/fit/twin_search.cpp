@@ -19,10 +19,10 @@ constexpr TwinDictionary kDictionaries[] = {
     {{ClosureKind::Ggx, ClosureKind::Ggx, ClosureKind::Ggx}, {0, 0.3, 0.9}, 0.02},
 };
 
-/// A lean below which the facets turn away from the viewer, and a little more.
+/// The lowest lean that is allowed; a little below it the facets would turn away from the viewer.
 double least_lean(const Vec3<double>& wo) { return std::max(-0.9 * wo.z / std::max(1 - wo.z, 1e-3), -2.0); }
 
-/// Relative L1 over all channels, mean over the mixtures.
+/// Relative L1 error over all channels, the mean over the mixtures.
 double error_of(const TwinDictionary& dictionary, const TwinShape& shape, const View& view, const MatrixXd& mixtures) {
   const MatrixXd a = twin_columns(dictionary, shape, view);
   const VectorXd weight = weights_of(view.points);
@@ -50,13 +50,13 @@ double error_of(const TwinDictionary& dictionary, const TwinShape& shape, const 
 /// Roughness of facets whose lobe is as wide as cos^e about its axis, seen along the normal.
 double roughness_of(double e) { return std::pow(1 / (2 * std::max(e, 0.5) + 1), 0.25); }
 
-/// A better shape for a view than `shape`, which is moved into the view's bounds.
+/// A better shape for a view than `shape`, which is first clamped to the view's bounds.
 TwinShape improved(const TwinDictionary& dictionary, const TwinShape& shape, const View& view,
                    const MatrixXd& mixtures) {
   std::vector<Variable> variables;
   for (std::size_t j = 0; j < kTwinFacets; ++j) {
     const double* s = shape.data() + kTwinShape * j;
-    // In proportion to the lobe's width: wider steps leave a narrow one.
+    // The step is in proportion to the lobe's width: larger steps would leave a narrow lobe.
     const double step = std::min(0.02, 0.5 * sqr(s[1]));
     variables.push_back({s[0], least_lean(view.wo), 1, step});
     variables.push_back({s[1], kTwinSettings.least_roughness, 1, 0.1 * s[1]});
@@ -79,12 +79,12 @@ Found search(const TwinDictionary& dictionary, const std::vector<View>& views, c
                  {dictionary.lean[j], std::clamp(roughness_of(e / widths[j]), kTwinSettings.least_roughness, 1.0),
                   dictionary.spread});
   for (const View& v : views) {
-    // A search that begins again where it ended, with wide steps, leaves many a bad place.
+    // A second search from the point where the first one ended, with large steps again, escapes many poor minima.
     for (std::size_t round = 0; round < kTwinSettings.rounds; ++round) shape = improved(dictionary, shape, v, mixtures);
     found.shapes.push_back(shape);
     found.error += error_of(dictionary, shape, v, mixtures) / double(views.size());
   }
-  // Along the normal nothing leans, whatever the numbers: those of the next view go on.
+  // Along the normal nothing leans, whatever the numbers say, so those of the next view are used.
   found.shapes[0] = found.shapes[1];
   return found;
 }
@@ -142,7 +142,8 @@ TwinShapes find_twin_shapes(const std::vector<std::vector<View>>& views, const M
   TwinShapes out{&kDictionaries[best], std::vector<std::vector<TwinShape>>(places)};
   out.shapes[start] = std::move(found[closest * kCount + best].shapes);
   for (std::vector<TwinShape>& of_place : out.shapes) of_place.resize(out.shapes[start].size());
-  // From one place to the next, so that all lie in the same valley: between shapes that do not, no sum is close.
+  // Goes from one place to the next, so that all shapes belong to the same local minimum: interpolating between shapes
+  // of different minima gives a poor fit.
   for_all(out.shapes[start].size(), [&](std::size_t v) {
     const auto go_on = [&](std::size_t from, std::size_t to) {
       TwinShape shape = out.shapes[from][v];

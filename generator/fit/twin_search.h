@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search for the facets of a twin: how they lean, how rough and how far apart they are, from one view to the next.
+// The search for the facets of a twin: lean, roughness and spread, from one view to the next.
 #pragma once
 
 #include <Eigen/Dense>
@@ -12,7 +12,8 @@
 
 namespace brdfc::fit {
 
-/// Pairs of facet lobes, and where the search begins: how far each leans towards the viewer, and all to the sides.
+/// The kinds of the pairs of facet lobes, and the start of the search: the lean of each towards the viewer, and the
+/// spread of all to the sides.
 struct TwinDictionary {
   std::array<ClosureKind, kTwinFacets> kinds;
   std::array<double, kTwinFacets> lean;
@@ -23,24 +24,26 @@ struct TwinDictionary {
 using TwinShape = std::vector<double>;
 inline constexpr std::size_t kTwinShape = 3;
 
-/// One of a pair, on the side of the plane of incidence that the sign of `spread` says.
+/// One facet of a pair; the sign of `spread` selects the side of the plane of incidence.
 Closure<double> twin_facet(ClosureKind, double lean, double roughness, double spread, const Vec3<double>& wo);
 
-/// What each closure gives at the view's points, the matte one last; facets of which nothing is above the surface
-/// give 0.
+/// The values of each closure at the view's points; the last column is the matte one. Facets that are entirely below
+/// the surface give 0.
 Eigen::MatrixXd twin_columns(const TwinDictionary&, const TwinShape&, const View&);
 
-/// Weights of these columns for a column of the view's f, drawn to those of `near` by `ridge`, as solve() does.
+/// The weights of these columns that fit a column of the view's f. `ridge` pulls them towards those of `near`, as in
+/// solve().
 Eigen::VectorXd twin_weights(const Eigen::MatrixXd& columns, const View&, Eigen::Index column,
                              const Eigen::VectorXd& near, double ridge);
 
-/// Shapes of all views, which begin at the normal and go down.
+/// The shapes at all views, from the normal downwards.
 struct TwinShapes {
   const TwinDictionary* dictionary = nullptr;
   std::vector<std::vector<TwinShape>> shapes;  ///< by place and view
 };
-/// Those of the dictionary that comes closest at a few places, from the best of these on, by place and view: `views`
-/// have the columns of one term after those of the other; `mixtures` is mixtures_of() of the terms (solution.h).
+/// The shapes for the dictionary that fits best at a few places; the search starts from the best of these places.
+/// `views` are by place and view, and their f has the columns of the first term, then those of the second, and so on.
+/// `mixtures` is mixtures_of() of the terms (solution.h).
 TwinShapes find_twin_shapes(const std::vector<std::vector<View>>& views, const Eigen::MatrixXd& mixtures);
 
 }  // namespace brdfc::fit

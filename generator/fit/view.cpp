@@ -18,8 +18,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What is drawn about `axis`, which is not below the surface: the model's own samples, and lobes from exponent `e`
-/// down to the whole sphere, each direction counted by the density of all of them together.
+/// Directions sampled from the model, and from lobes about `axis` with exponents from `e` down to the whole sphere.
+/// Each is weighted by the mixture pdf of all of these techniques. `axis` must not be below the surface.
 Points spread_points(const Brdf<double>& brdf, const Vec3<double>& wo, const Vec3<double>& axis, double e, int count) {
   std::vector<double> exponents;
   for (double x = std::max(4 * e, 1.0); x > 0.5; x /= 5) exponents.push_back(x);
@@ -68,7 +68,7 @@ Moments moments(const measure::BoundModel& model, const Vec3<double>& wo) {
       total += q;
     }
     if (!(total > 0)) return {};
-    // What lies in the plane of incidence: x towards the mirror direction, z along the normal.
+    // The coordinates in the plane of incidence: x towards the mirror direction, z along the normal.
     const double sinTheta = std::sqrt(sin2_theta(wo));
     const Vec3<double> out =
         sinTheta > 1e-6 ? Vec3<double>{-wo.x / sinTheta, -wo.y / sinTheta, 0} : Vec3<double>{1, 0, 0};
@@ -153,7 +153,7 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
   std::vector<bool> out(std::size_t(n), false);
   if (none) out[std::size_t(*none)] = true;
   for (int step = 0; step < int(kViewSettings.solve_steps); ++step) {
-    // A fined point pulls towards 0 with its own weight, beside the pull towards f.
+    // At a point with a penalty, the penalty's weight pulls the sum towards 0, beside the pull towards f.
     const MatrixXd scaled = (r + fine).cwiseSqrt().asDiagonal() * a;
     MatrixXd normal = MatrixXd::Zero(n, n);
     normal.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
@@ -161,9 +161,10 @@ VectorXd solve(const MatrixXd& a, const VectorXd& weight, const VectorXd& f, con
     normal.diagonal() += pull;
     normal = MatrixXd(normal.selfadjointView<Eigen::Lower>());
     const VectorXd right_f = a.transpose() * r.cwiseProduct(f) + pull.cwiseProduct(near);
-    // What was negative is out until the sum would gain by more of it. Rounding may take the same ones in and out for
-    // ever: then what is left below 0 is none.
-    bool full = false;  // they add up to the most
+    // An active-set method: a coefficient that became negative is fixed at 0 until increasing it would reduce the
+    // error. Rounding may move the same coefficients in and out endlessly; in that case negative ones become 0 at the
+    // end.
+    bool full = false;  // their sum is at its limit
     for (Eigen::Index trial = 0, in = -1; trial < 4 * (positive + 1) && (trial == 0 || in >= 0); ++trial) {
       MatrixXd m = MatrixXd::Zero(n + 2, n + 2);
       m.topLeftCorner(n, n) = normal;
@@ -239,7 +240,7 @@ std::vector<double> argmin(const std::vector<Variable>& variables,
   try {
     search.optimize(x, value);
   } catch (const nlopt::roundoff_limited&) {
-    // The best so far is in `x`.
+    // The best solution so far is in `x`.
   }
   return x;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model as it looks from one view, least-squares problems and searches for closures that come close to it, and the
-// errors that these leave: what fits (fit.h) and twins (twin.h) have in common. Angles are in radians; directions are
-// unit vectors in the local frame, the normal along z.
+// A model as seen from one view, least-squares problems and searches for closures that approximate it, and the errors
+// that remain. Used by fits (fit.h) and twins (twin.h). Angles are in radians; directions are unit vectors in the local
+// frame, with the normal along z.
 #pragma once
 
 #include <Eigen/Dense>
@@ -18,16 +18,16 @@
 
 namespace brdfc::fit {
 
-/// Directions above the surface with the solid angle that each stands for: a sum over them, by weight, is an integral.
+/// Directions above the surface, each with the solid angle that it represents: a sum weighted by these is an integral.
 struct Points {
   std::vector<Vec3<double>> wi;
-  std::vector<double> weight;  ///< steradians, as many
+  std::vector<double> weight;  ///< steradians, one per direction
 };
 
 /// The weights as a column.
 Eigen::VectorXd weights_of(const Points&);
 
-/// Along the surface towards the mirror side; at normal incidence any direction will do.
+/// The direction along the surface towards the mirror side; at normal incidence any such direction.
 template <class T> Vec3<T> mirror_side(const Vec3<T>& wo) {
   const T sinTheta = sqrt(sin2_theta(wo));
   const auto oblique = sinTheta > T(1e-6);
@@ -35,7 +35,8 @@ template <class T> Vec3<T> mirror_side(const Vec3<T>& wo) {
   return {select(oblique, wo.x * scale, T(1)), select(oblique, wo.y * scale, T(0)), T(0)};
 }
 
-/// In the plane of incidence, `angle` from the mirror direction towards the normal and on.
+/// The direction in the plane of incidence that is `angle` from the mirror direction, in the sense towards the normal
+/// and past it.
 inline Vec3<double> beside_mirror(const Vec3<double>& wo, double angle) {
   const Vec3<double> out = mirror_side(wo);
   const double sinTheta = std::sqrt(sin2_theta(wo)), c = std::cos(angle), s = std::sin(angle);
@@ -43,80 +44,83 @@ inline Vec3<double> beside_mirror(const Vec3<double>& wo, double angle) {
   return {out.x * along, out.y * along, up};
 }
 
-/// The lobe that f^2 makes, of the brightest channel: squared, because a wide base would draw the axis to itself.
+/// The lobe of f^2, for the brightest channel. f is squared because otherwise a wide base would shift the axis.
 struct Moments {
   double offset = 0;  ///< radians from the mirror direction to its axis, positive towards the normal
-  /// Exponents e of lobes cos^e whose squares have the variances of its two widths: `narrow` is the larger.
+  /// Exponents e of lobes cos^e whose squares have the same variances as this lobe across its two axes; `narrow` is the
+  /// larger.
   double narrow = 1, wide = 1;
 };
 
-/// The model as it looks from one view.
+/// The model as seen from one view.
 struct View {
   Vec3<double> wo;  ///< towards the viewer
-  Moments lobe;     ///< the model's
-  Points points;    ///< directions of the light
-  /// f cos(theta_i), a row a point and a column a channel; of several models, the columns of one after the other's.
+  Moments lobe;     ///< the model's lobe
+  Points points;    ///< light directions
+  /// f cos(theta_i), one row per point and one column per channel; with several models, the columns of the first, then
+  /// those of the second, and so on.
   Eigen::MatrixXd f;
 };
-/// The view of a model from `wo`, at about so many points: some drawn from the model's own samples, some from lobes
-/// about that of the model, of its width and wider, down to the whole sphere. Throws ValueError where the model gives a
-/// value that is NaN, infinite or negative.
+/// The view of a model from `wo` with about this many points: some sampled from the model, others from lobes about the
+/// model's lobe, from its width up to the whole sphere. Throws ValueError if the model returns a value that is NaN,
+/// infinite or negative.
 View view_of(const measure::BoundModel&, const Vec3<double>& wo, int points);
-/// The same with the lobe given, which takes long to find.
+/// The same for a known lobe, because computing the lobe is slow.
 View view_of(const measure::BoundModel&, const Vec3<double>& wo, int points, const Moments& lobe);
 
-/// The largest channel of each point.
+/// The largest channel at each point.
 Eigen::VectorXd brightest(const Eigen::MatrixXd& f);
 
-/// The same of each model: a column for three.
+/// The same for each model: one column for each three.
 Eigen::MatrixXd brightest_of_each(const Eigen::MatrixXd& f);
 
-/// f cos(theta_i) at the points, a column a channel. Throws ValueError where the model gives a value that is NaN,
+/// f cos(theta_i) at the points, one column per channel. Throws ValueError if the model returns a value that is NaN,
 /// infinite or negative.
 Eigen::MatrixXd scattering(const measure::BoundModel&, const Points&, const Vec3<double>& wo);
 
-/// Where the channels of all views, and of all models in each, differ by a factor alone: replaces the three columns of
-/// each model by the largest, and returns the factors of the channels, the largest of which is 1. Otherwise changes
-/// nothing and returns nothing.
+/// If the channels of all views, and of all models in them, differ only by a factor: replaces the three columns of each
+/// model by one, the largest, and returns the factors of the channels, of which the largest is 1. Otherwise returns
+/// nullopt and changes nothing.
 std::optional<Rgb<double>> make_grey(std::vector<View>&);
 
-/// Coefficients x for which a x comes close to f, rows being points and `weight` their solid angles: least absolute
-/// differences, by iteratively reweighted least squares, with the integral of f kept exactly and sums below 0 fined.
-/// Columns of `a` have integrals of about 1. Each coefficient is drawn towards that of `near` by its `ridge`, in units
-/// of the mean square of a column. The last `positive` coefficients are not negative, and add up to at most `most`
-/// times the integral; the one at index `none`, if given, is 0. All are 0 where f is.
+/// Coefficients x for which a x approximates f; rows are points, and `weight` has their solid angles. Minimises the
+/// absolute differences by iteratively reweighted least squares. The integral of f is kept exactly, and sums below 0
+/// get a penalty. Columns of `a` must have integrals of about 1. Each coefficient is pulled towards that of `near` with
+/// the strength `ridge`, in units of the mean square of a column. The last `positive` coefficients are not negative,
+/// and their sum is at most `most` times the integral. The coefficient with index `none`, if given, is 0. If f is 0,
+/// all coefficients are 0.
 Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& weight, const Eigen::VectorXd& f,
                       const Eigen::VectorXd& near, const Eigen::VectorXd& ridge, Eigen::Index positive, double most,
                       std::optional<Eigen::Index> none);
 
-/// A number that a search varies.
+/// A variable of a search.
 struct Variable {
-  double start;      ///< where it begins
-  double low, high;  ///< how far it goes
-  double step;       ///< the size of its first steps
+  double start;      ///< the start of the search
+  double low, high;  ///< its range
+  double step;       ///< the size of the first steps
 };
-/// Values of the variables, in their order, for which `error` is least, as far as NLopt's BOBYQA finds it. M. Powell:
-/// The BOBYQA algorithm for bound constrained optimization without derivatives, Cambridge NA2009/06.
+/// The values of the variables, in their order, that minimise `error`, found with NLopt's BOBYQA. M. Powell: The BOBYQA
+/// algorithm for bound constrained optimization without derivatives, Cambridge NA2009/06.
 std::vector<double> argmin(const std::vector<Variable>&,
                            const std::function<double(const std::vector<double>&)>& error);
 
-/// How far a sum of closures is from the model, for one view.
+/// The error of a sum of closures, for one view.
 struct ViewError {
   double cos_theta_o = 1;  ///< of the view
-  double relative_l1 = 0;  ///< integral of |difference of f cos| over the albedo, largest channel
-  double relative_l2 = 0;  ///< root of the integral of its square over that of the model's, largest channel
-  double albedo = 0;       ///< difference of the integrals, absolute, largest channel
-  double negative = 0;     ///< integral of what lies below 0, over the albedo
+  double relative_l1 = 0;  ///< integral of |difference of f cos| divided by the albedo, largest channel
+  double relative_l2 = 0;  ///< root of the ratio of the integrals of (difference)^2 and (model)^2, largest channel
+  double albedo = 0;       ///< absolute difference of the albedos, largest channel
+  double negative = 0;     ///< integral of the part below 0, divided by the albedo
   double number = 0;       ///< for a fit along a number: its value, in units of the parameter
 };
-/// Of one view the larger of each, at the place of the first.
+/// The larger of each error of the two, for the same view; `number` is that of the first.
 ViewError worse(const ViewError&, const ViewError&);
-/// The errors of `closures`, which gives their sum for a view, at ViewSettings::error_views cosines evenly spaced from
-/// 1 to 0.
+/// The errors of `closures`, which returns their sum for a view, at ViewSettings::error_views cosines evenly spaced
+/// from 1 to 0.
 std::vector<ViewError> view_errors(const measure::BoundModel&,
                                    const std::function<ClosureSum<double>(const Vec3<double>& wo)>& closures);
 
-/// The Form(model, values) for these values, made at first use and kept while the program runs.
+/// The object Form(model, values) for these values, made at first use and cached while the program runs.
 template <class Form> const Form& made_once(const Model& model, const ParamValues& values) {
   static std::mutex mutex;
   static std::map<std::string, std::unique_ptr<Form>> made;
@@ -126,7 +130,7 @@ template <class Form> const Form& made_once(const Model& model, const ParamValue
   return *form;
 }
 
-/// Whether f changes when both directions turn about the normal.
+/// True if f changes when both directions are rotated about the normal.
 bool turns(const Brdf<double>&);
 
 }  // namespace brdfc::fit

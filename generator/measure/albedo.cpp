@@ -13,7 +13,8 @@
 namespace brdfc::measure {
 namespace {
 
-// Replicates of the sequence, for its error: enough that 7 standard errors are all but impossible (t, 15 d.o.f.).
+// Independent replicates of the sequence, for the error estimate. With 16 of them (t distribution with 15 degrees of
+// freedom) an error of more than 7 standard errors is practically impossible.
 constexpr int kReplicates = 16;
 
 class AlbedoIntegrator {
@@ -22,7 +23,7 @@ class AlbedoIntegrator {
                    const std::string& label)
       : guide_(guide), models_(models), wo_(wo), label_(label), n_(3 * models.size()) {}
 
-  /// f cos of every model.
+  /// Evaluates f cos of every model.
   void evaluate(const Vec3<double>& wi, double* out) const {
     for (const Brdf<double>* m : models_) {
       const Rgb<double> f = m->eval(wi, wo_);
@@ -39,8 +40,8 @@ class AlbedoIntegrator {
         guide_, wo_, n_, [&](const Vec3<double>& wi, double* out) { evaluate(wi, out); }, options, guides);
   }
 
-  /// How much of the guide's density the cells of over_directions() miss, up to the chance of the share of lost
-  /// samples.
+  /// The part of the guide's density that the cells of over_directions() miss; its accuracy is limited by the estimated
+  /// share of lost samples.
   double missed_density(const CubatureOptions& options, int guides) const {
     const auto density = [&](const Vec3<double>& wi, double* out) {
       out[0] = guide_.pdf(wi, wo_);
@@ -51,7 +52,7 @@ class AlbedoIntegrator {
     return std::max(std::abs(1 - drawn.lost - found) - 7 * drawn.lost_error, 0.);
   }
 
-  /// f cos / pdf at a sample of the guide.
+  /// Evaluates f cos / pdf at a sample of the guide.
   void evaluate_sample(const Vec3<double>& u, double* out) const {
     const Sample<double> s = guide_.sample(wo_, u);
     require_value(s.pdf, "pdf", label_, s.wi, wo_);
@@ -63,8 +64,8 @@ class AlbedoIntegrator {
     for (std::size_t k = 0; k < n_; ++k) out[k] /= s.pdf;
   }
 
-  /// Where in the unit square of one lobe the samples of the other lobes lie: there f cos / pdf has a bump or a hole as
-  /// narrow as they are. `u1` chooses the lobe.
+  /// The places in one lobe's unit square that map to the directions sampled by the other lobes. There f cos / pdf has
+  /// a bump or a hole as narrow as those lobes. `u1` selects the lobe.
   std::vector<Point2> preimages(double u1, const std::vector<Vec3<double>>& others, int grid) const {
     const auto at = [&](const Point2& p) { return guide_.sample(wo_, {u1, p.x, p.y}).wi; };
     std::vector<Point2> places;
@@ -80,7 +81,7 @@ class AlbedoIntegrator {
       double best = -2;
       for (std::size_t i = 0; i < directions.size(); ++i)
         if (const double c = dot(directions[i], target); c > best) best = c, nearest = i;
-      // Gauss-Newton with difference quotients.
+      // Gauss-Newton iteration with difference quotients.
       Point2 p = places[nearest];
       Vec3<double> r = target - directions[nearest];
       for (int step = 0; step < 8; ++step) {
@@ -100,10 +101,10 @@ class AlbedoIntegrator {
     return out;
   }
 
-  /// Whether the choice of lobe can be told apart from the direction: see lobe_borders().
+  /// True if the sampled direction does not depend on the first random number within a lobe: see lobe_borders().
   bool lobes_are_known() const { return !lobe_borders(guide_, wo_).empty(); }
 
-  /// Of a guide whose lobes are known.
+  /// Integrates over the random numbers of sample(). The guide's lobes must be known.
   CubatureResult over_samples(const CubatureOptions& options, int effort) const {
     CubatureResult sum;
     const std::vector<double> borders = lobe_borders(guide_, wo_);
@@ -124,7 +125,7 @@ class AlbedoIntegrator {
         }
       }
       const std::vector<Point2> seeds = preimages(u1, others, 16 << effort);
-      // At least four cells a side: sample() may map each quadrant of the unit square on its own.
+      // At least four cells on each side, because sample() may map each quadrant of the unit square separately.
       std::vector<Rect> cells;
       const int grid = 4 << effort;
       for (int i = 0; i < grid; ++i)
@@ -148,8 +149,8 @@ class AlbedoIntegrator {
     return sum;
   }
 
-  /// Mean and standard error over low-discrepancy samples, `count` a lobe where the lobes can be told apart: what is
-  /// left is a plain average of bounded weights, which no peak or ridge can escape.
+  /// Mean and standard error over low-discrepancy samples: `count` samples per lobe where the lobes are known. This is
+  /// a plain average of bounded weights, so no peak or ridge can escape it.
   CubatureResult witness(int count) const {
     CubatureResult out;
     std::vector<double> borders = lobe_borders(guide_, wo_);
@@ -206,8 +207,9 @@ struct Estimate {
   double error = 0;
 };
 
-/// Where sample() can't be integrated over its numbers: two meshes over directions that agree, if they meet what
-/// samples meet, or the mean of samples.
+/// The estimate for models whose sample() can't be integrated over its random numbers: the integral over directions if
+/// two meshes agree and contain all of the guide's density, or if it agrees with the mean of samples; otherwise that
+/// mean.
 Estimate estimate_over_directions(const AlbedoIntegrator& integrator, const AlbedoOptions& options,
                                   const CubatureOptions& cubature, double slack) {
   CubatureResult directions = integrator.over_directions(cubature, 512);
@@ -228,8 +230,8 @@ Estimate estimate_over_directions(const AlbedoIntegrator& integrator, const Albe
 
 Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& options) {
   const CubatureOptions cubature{options.absolute, 0, options.max_cells};
-  // The rule's estimates are far above its true error, unless it missed something. At a kink they may be passed by
-  // some hundred times the aim; what differs by more was missed.
+  // The rule overestimates its true error by far, unless it has missed a feature. At a kink the true error may be some
+  // hundred times `absolute`; a larger difference means that a feature was missed.
   const double slack = 200 * options.absolute;
   CubatureResult directions, samples;
   if (!integrator.lobes_are_known()) return estimate_over_directions(integrator, options, cubature, slack);
@@ -247,19 +249,19 @@ Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& optio
     const double apart = distance(directions, samples);
     const double d = largest(directions.error), s = largest(samples.error);
     if (apart <= d + s + slack && std::min(d, s) <= slack) {
-      // Kinks of the model are met by the cut cells of the first, and not by the squares of the second.
+      // The cells over directions are cut along the model's kinks; the squares over random numbers are not.
       if (d <= slack) return {directions.value, std::max(d, apart)};
       return {samples.value, std::max(s, apart)};
     }
-    // Two meshes that agree are right; the samples, which all trust the density, may then not be.
-    // Except for edges across the cells, which both may take for smooth, and for peaks that both missed: the density is
-    // then seen to miss them too.
+    // If two meshes over directions agree, they are trusted; the integrals over samples all rely on the pdf and may be
+    // wrong. There are two exceptions: edges across the cells, which both meshes may take for smooth, and peaks that
+    // both missed. A missed peak shows up as missed density.
     constexpr double kEdges = 3e-5;
     if (effort > 0 && d <= slack && directions_moved <= slack) {
       const bool missed = apart > kEdges && integrator.missed_density(cubature, 512 << effort) > kEdges;
       return {directions.value, std::max({d, directions_moved, missed ? apart : std::min(apart, kEdges)})};
     }
-    // One that is thin and curved never converges over directions, however many guides there are.
+    // A thin curved ridge never converges over directions, whatever the number of guides.
     ridge = effort > 0 && d > slack;
   }
   const CubatureResult witness = integrator.witness(options.witnesses);
@@ -292,10 +294,10 @@ Albedo albedo(const Brdf<double>& brdf, double cos_theta_o, double phi_o, const 
 MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<double>*>& models, double cos_theta_o,
                         std::optional<double> phi_o, const std::string& label, int count, std::uint64_t seed) {
   constexpr int kCopies = 4;
-  const std::size_t n = 6 * models.size();  // scattered, then mirror
+  const std::size_t n = 6 * models.size();  // scattered, then mirror terms
   std::vector<std::vector<double>> means(kCopies, std::vector<double>(n, 0.));
   std::vector<double> borders = lobe_borders(guide, direction(cos_theta_o, phi_o.value_or(0.3)));
-  // Over all azimuths only if they have the same intervals.
+  // For a mean over azimuths the lobes are sampled separately only if their intervals are the same at each azimuth.
   for (int k = 1; k < 8 && !phi_o && !borders.empty(); ++k) {
     const std::vector<double> there = lobe_borders(guide, direction(cos_theta_o, 0.3 + 2 * kPi * k / 8));
     const auto close = [](double a, double b) { return std::abs(a - b) < 1e-12; };
@@ -304,7 +306,7 @@ MeanAlbedo mean_albedos(const Brdf<double>& guide, const std::vector<const Brdf<
   const bool known = !borders.empty();
   if (!known) borders = {0, 1};
   const int each = std::max(1, count / kCopies);
-  // A tent makes the integrand periodic, which the sequence rewards.
+  // The tent map makes the integrand periodic, for which the sequence converges faster.
   const auto tent = [](double u) { return std::min(1 - std::abs(2 * u - 1), 1 - 1e-16); };
   std::vector<double> scratch(n);
   const auto mirrors = [&](const Vec3<double>& wo) {
@@ -390,7 +392,7 @@ SampledAlbedo sampled_albedo(const Brdf<double>& brdf, double cos_theta_o, doubl
   }
   const double scale = 1. / (kReplicates * (kReplicates - 1));
   out.standard_error = std::sqrt(max_component(variance) * scale);
-  // At least a sample's worth: losses so rare that none came up would seem certain not to happen.
+  // At least the weight of one sample: otherwise losses so rare that none occurred would have an error of 0.
   out.lost_error = std::max(std::sqrt(lost_variance * scale), 1. / count);
   return out;
 }

@@ -16,7 +16,7 @@ std::vector<TableAxis> place_knots(const AlbedoPolynomial& polynomial, const Par
   const std::size_t lines = std::min<std::size_t>(probes.size(), axes.size() > 1 ? 8 : 1);
   std::vector<std::vector<double>> density(axes.size(), std::vector<double>(kProfile, 0.));
   std::vector<std::vector<double>> s(axes.size(), std::vector<double>(kProfile));
-  std::vector<double> bend(axes.size(), 0.);  // error = bend / knots^2
+  std::vector<double> bend(axes.size(), 0.);  // interpolation error = bend / knots^2
   for (std::size_t a = 0; a < axes.size(); ++a) {
     const Coordinate& c = coordinates[axes[a]];
     for (int j = 0; j < kProfile; ++j) s[a][std::size_t(j)] = to_scale(c.range.scale, c.at(double(j) / (kProfile - 1)));
@@ -29,7 +29,8 @@ std::vector<TableAxis> place_knots(const AlbedoPolynomial& polynomial, const Par
                                   axes.size() > 1 ? kTableSettings.grid_samples : 4 * kTableSettings.proof_samples);
     });
     for (std::size_t line = 0; line < lines; ++line) {
-      // Of few axes the random places see the peaks as well, and the ends would take more knots than they need.
+      // With one or two axes the random places find the peaks as well; with full weight the ends would take more knots
+      // than they need.
       const double weight = line > 0 && line <= kTableSettings.corners && axes.size() <= 2 ? 0.5 : 1;
       for (int j = 1; j + 1 < kProfile; ++j) {
         const Coefficients* f = &profile[line * kProfile + std::size_t(j)];
@@ -51,11 +52,12 @@ std::vector<TableAxis> place_knots(const AlbedoPolynomial& polynomial, const Par
       total += 0.5 * (density[a][std::size_t(j)] + density[a][std::size_t(j) + 1]) *
                (s[a][std::size_t(j) + 1] - s[a][std::size_t(j)]);
     bend[a] = total * total / 8;
-    // A little density everywhere: the lines did not see all there is.
+    // A small density everywhere, because the lines don't show every feature.
     const double floor = 0.3 * total / (s[a].back() - s[a].front()) + 1e-9;
     for (double& d : density[a]) d += floor;
   }
-  // One knot more where it helps most against what it costs, until the aim is reached or the grid is full.
+  // Adds one knot at a time, on the axis where it reduces the error most for its cost, until the target error is
+  // reached or the grid is full.
   std::vector<int> count(axes.size(), 2);
   for (;;) {
     double error = 0, best = 0;

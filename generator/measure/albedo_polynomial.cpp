@@ -108,7 +108,7 @@ Coefficients AlbedoPolynomial::coefficients(const ParamValues& combination, cons
         (*v)[k] = Rgb<double>(k % 3 == 0 ? c.r : k % 3 == 1 ? c.g : c.b);
       }
     }
-  // From values at the colours 0, 1 or 0, 1/2, 1 to coefficients of the monomials.
+  // Converts values at the colours 0, 1 or 0, 1/2, 1 to coefficients of the monomials.
   for (std::size_t c = 0; c < colors_.size(); ++c)
     for (std::size_t k = 0; k < nodes; ++k) {
       if (power(k, c) != 0) continue;
@@ -158,8 +158,8 @@ Rgb<double> AlbedoPolynomial::combine(const Coefficients& c, const std::vector<d
   return sum;
 }
 
-/// Colours whose half does not give the mean of 0 and 1 enter squared; a proof of the table finds what is no polynomial
-/// at all. A quotient whose integral is linear leaves noise.
+/// A colour enters squared if its half does not give the mean of the values at 0 and 1. Dependence that is not
+/// polynomial is found when the table is verified. A quotient with a linear integral leaves only noise.
 void AlbedoPolynomial::study_degrees(const std::vector<ParamValues>& combinations) {
   degrees_.assign(colors_.size(), 1);
   std::mt19937_64 random(5);
@@ -179,7 +179,8 @@ void AlbedoPolynomial::study_degrees(const std::vector<ParamValues>& combination
           pointers.push_back(models.back().get());
         }
         const MeanAlbedo m = mean_albedos(*guide, pointers, x[0], 0, label(values), int(kTableSettings.grid_samples));
-        // The same samples for all three: what a straight line leaves is no noise, unless tables stand in a quotient.
+        // All three values use the same samples, so a deviation from a straight line is not noise, except where the
+        // model divides by tables.
         const double noise = table_error(model_.info(), values) > 0 ? kTableSettings.same + 7 * m.error : 0;
         for (const std::vector<Rgb<double>>& v : {m.scattered, m.mirror})
           if (max_abs(v[0] + v[2] - v[1] * 2.) > noise + 1e-9 * max_abs(v[0] + v[2])) degrees_[c] = 2;
@@ -187,9 +188,9 @@ void AlbedoPolynomial::study_degrees(const std::vector<ParamValues>& combination
     }
 }
 
-/// Do channels know nothing of each other, and are they alike? Then sharing gives the same numbers to the last bit. A
-/// proof of the table holds the polynomial that follows against the model at random colours, which differ in every
-/// channel.
+/// Tests whether channels are independent of each other and alike. If so, sharing one coefficient gives identical
+/// numbers, to the last bit. Verifying the table compares the resulting polynomial with the model at random colours
+/// that differ in every channel.
 void AlbedoPolynomial::study_channels(const std::vector<ParamValues>& combinations) {
   if (monomials() == 1) return;
   std::mt19937_64 random(29);
@@ -204,7 +205,7 @@ void AlbedoPolynomial::study_channels(const std::vector<ParamValues>& combinatio
   share_channels_ = true;
 }
 
-/// Finds out whether the albedo depends on the azimuth, and which numbers do nothing but turn it.
+/// Finds out whether the albedo depends on the azimuth, and which parameters only rotate it.
 void AlbedoPolynomial::study_azimuth(const std::vector<ParamValues>& combinations) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> angle(0, 2 * kPi);
@@ -235,7 +236,8 @@ void AlbedoPolynomial::study_azimuth(const std::vector<ParamValues>& combination
   turns_.assign(coordinates_.size(), false);
   for (std::size_t p = 1; p < coordinates_.size(); ++p) {
     if (coordinates_[p].range.high - coordinates_[p].range.low < 1) continue;
-    // The same samples in the turned frame: equal up to rounding, if it is a turn.
+    // The same samples in the rotated frame: the values are equal up to rounding if the parameter only rotates the
+    // lobe.
     turns_[p] = all_equal([&](const Case& c) {
       Position x = c.x;
       const double sign = x[p] + c.turn <= coordinates_[p].range.high ? 1 : -1;

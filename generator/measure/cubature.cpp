@@ -11,7 +11,7 @@ namespace {
 
 struct Cell {
   Rect rect;
-  std::size_t slot;  // where its value and error lie
+  std::size_t slot;  // index of its value and error
   double worst;      // largest component of the error
   bool split_x;
 };
@@ -25,7 +25,7 @@ class GenzMalik {
  public:
   GenzMalik(const Integrand2& f, std::size_t components) : f_(f), n_(components), values_(17 * components) {}
 
-  /// Appends the cell's integrals and errors, returns what the queue needs.
+  /// Appends the cell's integrals and errors. Returns the entry for the queue.
   Cell apply(const Rect& r, std::vector<double>& integrals, std::vector<double>& errors) {
     const double l2 = std::sqrt(9. / 70), l3 = std::sqrt(9. / 10), l5 = std::sqrt(9. / 19);
     const double w1 = (12824. - 9120 * 2 + 400 * 4) / 19683, w2 = 980. / 6561, w3 = (1820. - 400 * 2) / 19683;
@@ -53,7 +53,7 @@ class GenzMalik {
       diff_x += std::abs(v(1) + v(2) - 2 * v(0) - ratio * (v(5) + v(6) - 2 * v(0)));
       diff_y += std::abs(v(3) + v(4) - 2 * v(0) - ratio * (v(7) + v(8) - 2 * v(0)));
     }
-    // The second test is for functions that the differences see as equal: constants, and noise.
+    // If the differences are equal (constant functions, noise), the longer side is split.
     cell.split_x = std::abs(diff_x - diff_y) > 1e-12 * (diff_x + diff_y) ? diff_x > diff_y : hx > hy;
     return cell;
   }
@@ -100,7 +100,7 @@ CubatureResult integrate(const Integrand2& f, std::size_t components, const std:
     const Cell cell = queue.top();
     queue.pop();
     const Rect& r = cell.rect;
-    if (!splittable(r, cell.split_x)) continue;  // keeps its error
+    if (!splittable(r, cell.split_x)) continue;  // the cell keeps its error
     Rect a = r, b = r;
     if (cell.split_x)
       a.x1 = b.x0 = 0.5 * (r.x0 + r.x1);
@@ -125,7 +125,8 @@ CubatureResult integrate(const Integrand2& f, std::size_t components, const std:
     bool small = true;
     for (std::size_t k = 0; k < components; ++k)
       small = small && result.error[k] <= std::max(options.absolute, options.relative * std::abs(result.value[k]));
-    // The running sums gather rounding errors, so they are refreshed now and then, and before they are believed.
+    // The running sums accumulate rounding errors. They are recomputed now and then, and before they decide that the
+    // integral has converged.
     if (small || ++since == 1000) {
       sum_up();
       since = 0;
@@ -157,15 +158,15 @@ std::vector<Rect> partition(const Rect& whole, const std::vector<Point2>& points
       x0 = std::min(x0, p.x), x1 = std::max(x1, p.x);
       y0 = std::min(y0, p.y), y1 = std::max(y1, p.y);
     }
-    // Few points that fill their cell are enough, but not a few in a corner of it: they mark the flank of a peak.
+    // A cell with few points that are spread over it is done. A few points in one corner mark the flank of a peak.
     const bool filled = part.points.size() < 2 || (x1 - x0 > 0.25 * (r.x1 - r.x0) && y1 - y0 > 0.25 * (r.y1 - r.y0));
     if (part.points.size() <= most && filled) {
       out.push_back(r);
       continue;
     }
-    // Halve where the bulk of the points fills least of the cell: that closes in on a peak fastest. Halving the other
-    // way first would leave parts with a single point that still reach from the peak to far away. Quartiles, so that a
-    // point in the tail does not hide the crowd.
+    // Splits along the axis in which the bulk of the points covers the smaller part of the cell, which closes in on a
+    // peak fastest. Splitting along the other axis first would leave parts with a single point that still extend far
+    // from the peak. The spread is measured between quartiles, so that outliers don't hide the bulk.
     const auto spread = [&](double Point2::*axis) {
       std::vector<double> v;
       for (const Point2& p : part.points) v.push_back(p.*axis);
@@ -177,7 +178,8 @@ std::vector<Rect> partition(const Rect& whole, const std::vector<Point2>& points
     };
     const double fill_x = spread(&Point2::x) / (r.x1 - r.x0), fill_y = spread(&Point2::y) / (r.y1 - r.y0);
     bool split_x = fill_x < fill_y;
-    // Points that coincide (a mirror's, or those crowded against a border) can't be told apart by halving for ever.
+    // Points that coincide (those of a mirror, or those crowded at a border) can't be separated by halving, so halving
+    // stops.
     const auto thick = [&](bool x) {
       return splittable(r, x) &&
              (x ? r.x1 - r.x0 > 1e-12 * (whole.x1 - whole.x0) : r.y1 - r.y0 > 1e-12 * (whole.y1 - whole.y0));

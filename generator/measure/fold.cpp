@@ -12,7 +12,7 @@
 namespace brdfc::measure {
 namespace {
 
-/// The knots over the view that `views` lie between.
+/// Removes the knots of the view angle that interpolation within `views` does not need.
 Table cut_to(const Table& grid, const Cosines& views) {
   if (grid.axes.empty() || grid.axes[0].name != "cos_theta_o") return grid;
   const std::vector<double>& knots = grid.axes[0].values;
@@ -45,7 +45,7 @@ AlbedoTable fold(const AlbedoTable& table, const Model& model, const ParamValues
   for (std::size_t i = 0; i < combinations.size(); ++i) {
     std::vector<AlbedoTerm> terms;
     if (admits(model.info(), combinations[i], fixed)) {
-      // Terms with the same free colours over the same axes are one.
+      // Merges terms with the same free colours over the same axes.
       std::vector<std::pair<AlbedoTerm, Table>> parts;
       for (const AlbedoTerm& t : table.terms.at(i)) {
         AlbedoTerm term = t;

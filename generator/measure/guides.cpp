@@ -8,8 +8,9 @@
 namespace brdfc::measure {
 namespace {
 
-/// Directions on both sides of a jump of sample() as its third number goes round, of one lobe. Where a model folds rays
-/// back, its density jumps along the image of the fold: a curve that a cubature must be led to.
+/// Pairs of directions of one lobe on both sides of a jump of sample() as its third random number goes through [0, 1).
+/// Where a model folds rays back, its pdf jumps along the image of the fold: a curve that the cubature can't find by
+/// itself.
 std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo, double u1) {
   constexpr int kTrial = 8, kLines = 192, kSteps = 16;
   constexpr std::size_t kMost = 768;
@@ -25,7 +26,7 @@ std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo
     std::array<double, kSteps> sorted = steps;
     std::sort(sorted.begin(), sorted.end());
     for (int i = 0; i < kSteps; ++i) {
-      // A smooth map goes round in steps of about equal length.
+      // A smooth map moves in steps of about equal length.
       if (!(steps[std::size_t(i)] > 4 * sorted[kSteps / 4])) continue;
       double lo = p.y + double(i) / kSteps, hi = p.y + double(i + 1) / kSteps, halfway = 0;
       for (int k = 0; k < 40; ++k) {
@@ -35,7 +36,7 @@ std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo
         if (k == 20) halfway = std::max(left, right);
       }
       const Sample<double> a = at(lo), b = at(hi);
-      // A jump stays as large as it is, however near its two sides are looked at.
+      // A jump keeps its size as the interval around it shrinks.
       if (!(length(a.wi - b.wi) > 0.9 * halfway)) continue;
       for (const Sample<double>& s : {a, b})
         if (s.pdf > 0) out.push_back(s.wi);
@@ -48,7 +49,7 @@ std::vector<Vec3<double>> folds(const Brdf<double>& brdf, const Vec3<double>& wo
 
 namespace {
 
-/// Whether the direction is the same at two values of the first random number.
+/// Compares the sampled direction at two values of the first random number.
 class SameLobe {
  public:
   SameLobe(const Brdf<double>& brdf, const Vec3<double>& wo, const Point2& others)
@@ -75,7 +76,7 @@ std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& w
   for (int i = 0; i <= kProbes; ++i) {
     const double to = i < kProbes ? (i + 0.5) / kProbes : kLast;
     const Vec3<double> after = lobe.at(to);
-    // A lobe that is drawn rarely may lie between two probes: every border up to here, one by one.
+    // A lobe with a small probability may lie between two probes, so every border up to `to` is located, one by one.
     while (!SameLobe::same(before, after)) {
       double lo = from, hi = to;
       while (hi - lo > 1e-15) {
@@ -95,7 +96,7 @@ std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& w
 
 std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& wo) {
   const std::vector<double> borders = lobe_borders(brdf, wo, {0.37, 0.71});
-  // Beside a border the first number has this much room: a bisection ends within 1e-15.
+  // Margin of the first random number beside a border; a bisection ends within 1e-15.
   constexpr double kBeside = 1e-12;
   constexpr int kOthers = 16;
   Sequence2 sequence(4);
@@ -113,7 +114,7 @@ std::vector<double> lobe_borders(const Brdf<double>& brdf, const Vec3<double>& w
 Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brdf_(brdf), wo_(wo) {
   sin_o_ = std::hypot(wo.x, wo.y);
   theta_o_ = std::atan2(sin_o_, wo.z);
-  // Beyond the critical angle nothing comes through: f jumps there.
+  // Beyond the critical angle no light is transmitted, so f jumps there.
   if (brdf.scatters_through()) edge_ = kPi - std::asin(std::min(1 / brdf.ior(), 1.));
   cos_phi_ = sin_o_ > 0 ? wo.x / sin_o_ : 1;
   sin_phi_ = sin_o_ > 0 ? wo.y / sin_o_ : 0;
@@ -121,7 +122,7 @@ Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brd
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> octaves(1, 30);
   Sequence3 sequence(1);
-  // Half of them crowd towards the ends of the random numbers at all scales, which lead to the tails.
+  // Half of the random numbers crowd towards the ends of [0, 1] at all scales; these lead to the tails.
   const auto crowd = [&](double v) {
     const double near = 0.5 * std::exp2(-octaves(random));
     return v < 0.5 ? near : 1 - near;
@@ -136,8 +137,8 @@ Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brd
     const Sample<double> s = brdf.sample(wo, u);
     if (s.pdf > 0) points.push_back(angles(s.wi));
   };
-  // Around every cluster, points at distances of all scales: a narrow lobe's flank, where few samples fall but which
-  // still holds light, then lies in cells that grow with the distance from it.
+  // Adds points around every cluster at distances of all scales. The flank of a narrow lobe, which gets few samples but
+  // still reflects light, then lies in cells that grow with the distance from the peak.
   const auto surround = [&](std::vector<Point2>& points) {
     for (std::size_t i = 0, n = points.size(); i + 1 < n; ++i) {
       const double t = std::exp2(octaves(random));
@@ -146,7 +147,8 @@ Guides::Guides(const Brdf<double>& brdf, const Vec3<double>& wo, int each) : brd
     }
   };
   if (borders.empty()) {
-    // Each set of the other numbers has intervals of its own; the n-th of each is taken for one lobe.
+    // Each pair of the other random numbers has its own intervals; the n-th interval of each pair counts as the same
+    // lobe.
     lobes_.resize(1);
     for (int i = 0; i < each; ++i) {
       Vec3<double> u = numbers(i);
@@ -189,7 +191,7 @@ Vec3<double> Guides::direction_at(double theta, double phi) const {
 }
 
 std::vector<Rect> Guides::cells(std::size_t most) const {
-  // Cut at the mirror direction, where a lobe's peak or a kink of max(cos_i, cos_o) lies.
+  // Cuts at the mirror direction, where a lobe's peak or a kink of max(cos_i, cos_o) may be.
   std::vector<Rect> out;
   std::vector<double> cuts{0, std::min(theta_o_, kPi / 2), std::max(theta_o_, kPi / 2)};
   if (edge_ > 0) cuts.push_back(kPi);
@@ -199,8 +201,8 @@ std::vector<Rect> Guides::cells(std::size_t most) const {
         const std::vector<Rect> parts = cells(r, most);
         out.insert(out.end(), parts.begin(), parts.end());
       }
-  // Where a peak on that cone holds a hundredth of the light, too few samples fall to lead to it: cells there are
-  // halved towards it as long as that changes what is seen.
+  // A peak on that cone that reflects a hundredth of the light attracts too few samples to be found by them. So cells
+  // are halved towards the cone as long as that changes the values found.
   const auto value = [&](double theta, double phi) {
     const Vec3<double> wi = direction_at(theta, phi);
     return max_component(brdf_.eval(wi, wo_)) + brdf_.pdf(wi, wo_);
@@ -224,9 +226,9 @@ std::vector<Rect> Guides::cells(const Rect& whole, std::size_t most) const {
   std::vector<Rect> parts{whole};
   if (edge_ > whole.x0 && edge_ < whole.x1)
     parts = {{whole.x0, edge_, whole.y0, whole.y1}, {edge_, whole.x1, whole.y0, whole.y1}};
-  // Each lobe for itself: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
+  // Each lobe separately: the samples of a wide lobe would hide that those of a narrow one fill only a corner.
   for (const std::vector<Point2>& all : lobes_) {
-    // What lies elsewhere would be passed over for every part anew.
+    // Points outside the rectangle are removed once, not in each of its parts again.
     std::vector<Point2> points;
     for (const Point2& p : all)
       if (p.x >= whole.x0 && p.x < whole.x1 && p.y >= whole.y0 && p.y < whole.y1) points.push_back(p);

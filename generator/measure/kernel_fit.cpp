@@ -13,7 +13,7 @@ constexpr std::size_t kHeights = 4;
 using Heights = std::array<double, kHeights>;
 using Four = DrawnKernel<double, EvenKnots<double, int(kHeights)>>;
 
-/// Starts at 0, and is 1 where it is largest.
+/// The curve extended to start at u = 0, with its maximum scaled to 1.
 KernelCurve normalised(const KernelCurve& drawn) {
   KernelCurve c = drawn;
   if (c.u.front() > 0) {
@@ -25,8 +25,8 @@ KernelCurve normalised(const KernelCurve& drawn) {
   return c;
 }
 
-/// The curve's height at nodes of a quadrature over the distances in the square of x' and y': n - u is the length of
-/// the line there on which they are u apart.
+/// The curve's height at the nodes of a quadrature over the distance u = |x' - y'| in a square of side n. The points of
+/// the square at distance u form a line of length n - u, which is the weight.
 struct Target {
   std::vector<double> u, k, weight;
 };
@@ -36,7 +36,7 @@ Target make_target(const KernelCurve& curve, double n) {
   std::vector<double> ends{0, n};
   for (const double u : curve.u)
     if (u < n) ends.push_back(u);
-  // Equal steps for the curve, and steps in proportion for a peak at 0 and for what is beyond the last point.
+  // Equal steps for the curve; geometric steps for a peak at 0 and for the range beyond the last point.
   for (int i = 1; i <= 512; ++i) ends.push_back(end * i / 512);
   for (double u = 1e-5 * end; u < n; u *= 1.03) ends.push_back(u);
   std::sort(ends.begin(), ends.end());
@@ -54,7 +54,8 @@ Target make_target(const KernelCurve& curve, double n) {
   return t;
 }
 
-/// Heights of least L1 for knots `step` apart, and that L1: least squares, weighted anew by the residuals.
+/// The heights with the smallest L1 error for knots `step` apart, and that error. Found by least squares with weights
+/// recomputed from the residuals.
 struct Candidate {
   double step = 0, l1 = 0;
   Heights heights{};
@@ -62,7 +63,7 @@ struct Candidate {
 
 Candidate best_heights(const Target& target, double step, double lowest) {
   constexpr int kRounds = 60, kSweeps = 40;
-  // Each node lies between two knots: their numbers and the share of the second.
+  // Each node lies between two knots: the index of the first and the weight of the second.
   const std::size_t count = target.u.size();
   std::vector<std::size_t> knot(count);
   std::vector<double> share(count), residual(count, 1.);
@@ -114,7 +115,7 @@ Candidate best_step(const Target& target, double shortest, double longest, doubl
   const auto at = [&](double i) {
     return best_heights(target, i <= 0 ? longest : longest * std::pow(ratio, -i), lowest);
   };
-  // From the longest: of two that are as good, the one with the smaller n.
+  // Starts with the longest step: of two equally good results, the one with the smaller n is kept.
   std::vector<Candidate> grid;
   for (int i = 0; i <= steps; ++i) grid.push_back(at(i));
   Candidate best = grid[0];
@@ -127,7 +128,7 @@ Candidate best_step(const Target& target, double shortest, double longest, doubl
     const auto l1 = [&](int j) { return grid[std::size_t(std::clamp(j, 0, steps))].l1; };
     consider(grid[std::size_t(i)]);
     if (l1(i) > l1(i - 1) || l1(i) > l1(i + 1)) continue;
-    // Golden section between the neighbours of a low point.
+    // Golden-section search between the neighbours of a local minimum.
     const double golden = 0.5 * (std::sqrt(5.) - 1);
     double a = std::max(i - 1, 0), b = std::min(i + 1, steps);
     Candidate low = at(b - golden * (b - a)), high = at(a + golden * (b - a));
@@ -146,8 +147,8 @@ Candidate best_step(const Target& target, double shortest, double longest, doubl
   return best;
 }
 
-/// The sum of |f - g| cos over the light directions, of f and g that reflect all light and know no azimuth: over
-/// x = cos^2 theta_i, in cells that are small near the kernel's peak at y.
+/// The sum of |f - g| cos over the light directions. Both f and g must reflect all light and must not depend on the
+/// azimuth. The integral is over x = cos^2 theta_i, in cells that are small near the kernel's peak at y.
 double relative_l1(const KernelLobe<double, FreeKnots<double>>& f, const Brdf<double>& g, double y) {
   std::vector<double> ends{0, y, 1};
   for (int i = 1; i < 256; ++i) ends.push_back(i / 256.);
@@ -199,7 +200,7 @@ KernelFit fit_kernel(const KernelCurve& drawn, double n) {
     fit.values[name] = four.heights[i];
   }
 
-  // The quotient of two lines has its extremes at their ends.
+  // The quotient of two linear functions has its extremes at the ends of an interval.
   const auto truth = kernel_lobe(curve, n);
   std::vector<double> ends = curve.u;
   for (std::size_t i = 0; i < kHeights; ++i) ends.push_back(double(i) * n / fitted_n);
@@ -207,7 +208,7 @@ KernelFit fit_kernel(const KernelCurve& drawn, double n) {
   for (const double u : ends)
     if (u <= n) fit.kernel = std::max(fit.kernel, std::abs(four.k(u * fitted_n / n) / truth.drawn.k(u) - 1));
 
-  // Views in the middles of equal shares of all directions.
+  // Views at the centres of intervals with equal shares of all directions.
   constexpr int kViews = 8;
   const auto g = model.make_double(fit.values);
   for (int view = 0; view < kViews; ++view) {

@@ -116,7 +116,8 @@ std::vector<ParamValues> thin_out(const ModelInfo& info, const std::vector<Param
     covered.insert(pairs[best].begin(), pairs[best].end());
     out.push_back(cases[best]);
   }
-  // The rest at even distances, so that defaults, draws and ends all have their part.
+  // Takes the remaining cases at even distances, so that defaults, random values and ends of ranges are all
+  // represented.
   std::vector<std::size_t> left;
   for (std::size_t i = 0; i < cases.size(); ++i)
     if (!taken[i]) left.push_back(i);

@@ -17,7 +17,7 @@ std::array<double, 3> channels(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
 
 bool is_black(const Rgb<Wide>& c) { return !(c.r > Wide(0) && c.g > Wide(0) && c.b > Wide(0)); }
 
-/// Halfway on the chord, on the sphere again: both directions are above the surface, and so is every one between.
+/// The normalised midpoint of two directions. Both are above the surface, and so is every direction between them.
 Vec3<Wide> between(const Vec3<Wide>& a, const Vec3<Wide>& b) { return normalize((a + b) * Wide(0.5)); }
 
 }  // namespace
@@ -25,7 +25,7 @@ Vec3<Wide> between(const Vec3<Wide>& a, const Vec3<Wide>& b) { return normalize(
 std::optional<std::string> find_dark_place(const Model& model, const ParamValues& values, int pairs, Random& random) {
   const BoundModel bound = bind_model(model, values);
   std::unique_ptr<Brdf<Wide>> wide;
-  // Bisection is slow: a model that underflows in many places has to show a true zero among the first ones.
+  // Bisection is slow: a model that underflows in many places must show a true zero within the first few.
   constexpr int kTries = 6, kBisections = 108;
   int tries = 0;
   for (const auto& [wi, wo] : direction_pairs(*bound.brdf, pairs, random)) {
@@ -52,7 +52,7 @@ std::optional<std::string> find_dark_place(const Model& model, const ParamValues
       else
         light = middle, last = value;
     }
-    // 2^-14000, while the smallest number is 2^-16382.
+    // 2^-14000; the smallest number is 2^-16382.
     Wide far_from_underflow = Wide(0x1p-1000);
     for (int k = 1; k < 14; ++k) far_from_underflow *= Wide(0x1p-1000);
     if (minimum(last.r, minimum(last.g, last.b)) > far_from_underflow)
@@ -108,7 +108,7 @@ Edge sharpest_edge(const BoundModel& bound, int arcs, Random& random) {
     Kink sharpest{0, 0};
     for (int c = 0; c < kCandidates; ++c) {
       Kink k = coarse[std::size_t(c)];
-      // A jump of the derivative keeps its size when the view narrows; curvature fades.
+      // A jump of the derivative keeps its size as the interval shrinks; the effect of curvature fades.
       for (double h = 2 * reach / kCoarse; h > kFinest; h = 2 * h / kFine) k = kinks(k.at - h, k.at + h, kFine)[0];
       if (k.jump > sharpest.jump) sharpest = k;
     }
@@ -187,7 +187,7 @@ std::optional<double> least_mirror_share(const Brdf<double>& brdf, int samples, 
 std::optional<double> grazing_anisotropy(const BoundModel& bound) {
   constexpr double kDegree = kPi / 180, kWidest = 8 * kDegree;
   constexpr int kPoints = 64;
-  // Averaged over the azimuth of the view, for models with a tangent.
+  // For models with a tangent, averaged over the azimuth of the view.
   constexpr int kViews = 8;
   double total = 0;
   for (int view = 0; view < kViews; ++view) {
@@ -272,7 +272,7 @@ std::string property_table(bool markdown) {
     }
     return out;
   }
-  // Columns of text: a degree sign is two bytes wide and one column.
+  // The width in columns: a degree sign has two bytes but takes one column.
   const auto width = [](const std::string& s) {
     return std::size_t(std::count_if(s.begin(), s.end(), [](char c) { return (c & 0xC0) != 0x80; }));
   };

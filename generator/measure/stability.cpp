@@ -25,7 +25,8 @@ template <class T> std::unique_ptr<Brdf<T>> make(const Model& m, const ParamValu
     return m.make_wide(v);
 }
 
-/// A model in two types with the same parameters, which are rounded to the narrower one first.
+/// The same model in two scalar types. The parameters are first rounded to the narrower type, so that both get the same
+/// values.
 template <class Narrow, class Better> class Pair {
  public:
   Pair(const Model& model, ParamValues values) : model_(model), values_(std::move(values)) {
@@ -42,7 +43,7 @@ template <class Narrow, class Better> class Pair {
 
   const ParamValues& values() const { return values_; }
 
-  /// Adds what is found at one pair of directions; returns the amplified error.
+  /// Adds the errors at one pair of directions to `out`. Returns the amplified error.
   double judge(const Vec3<double>& wi_double, const Vec3<double>& wo_double, Stability& out) {
     const Vec3<Narrow> wi = Vec3<Narrow>::from(wi_double), wo = Vec3<Narrow>::from(wo_double);
     if (wi.z == Narrow(0) || wo.z == Narrow(0)) return 0;
@@ -59,7 +60,7 @@ template <class Narrow, class Better> class Pair {
     ++out.points;
     const double eps = double(std::numeric_limits<Narrow>::epsilon());
     const Rgb<Better> raw = value_of(model_, *better_, bi, bo);
-    // Channels that underflow in the narrow type carry no light.
+    // Channels that underflow in the narrow type carry no light and are ignored.
     keep_ = {1, 1, 1};
     const auto vanishes = [&](const Better& v) { return double(v) < double(std::numeric_limits<Narrow>::min()) / eps; };
     if (vanishes(raw.r)) keep_.r = 0;
@@ -68,7 +69,7 @@ template <class Narrow, class Better> class Pair {
     const Rgb<Better> truth = kept(raw);
     const double error = relative(kept(Rgb<Better>{Better(got.r), Better(got.g), Better(got.b)}), truth);
     if (error > out.relative) out.relative = error, out.where = where();
-    // The condition is 0 at best: most places need not be asked for it.
+    // The condition number is at least 0, so it need not be computed at most places.
     if (error <= eps * std::max(out.amplified, 0.5)) return error / eps;
     const double amplified = error / (eps * (1 + condition(bi, bo, truth)));
     if (amplified > out.amplified) out.amplified = amplified, out.amplified_where = where();
@@ -113,7 +114,7 @@ template <class Narrow, class Better> class Pair {
   const Model& model_;
   ParamValues values_;
   bool two_sided_ = false;
-  Rgb<double> keep_;  // 1 or 0: channels that are judged
+  Rgb<double> keep_;  // 1 or 0: channels that are compared
   std::unique_ptr<Brdf<Narrow>> narrow_;
   std::unique_ptr<Brdf<Better>> better_;
   std::vector<std::unique_ptr<Brdf<Better>>> nudged_;
@@ -130,15 +131,16 @@ Stability stability(const Model& model, const ParamValues& values, int points, s
   return out;
 }
 
-/// A number of [low, high] whose floating-point ordinal is uniform: as many between 1e-9 and 1e-8 as between 1 and 10.
+/// A number in [low, high] whose floating-point ordinal is uniform: as many numbers between 1e-9 and 1e-8 as between 1
+/// and 10.
 double ordinal_uniform(double low, double high, Random& random) {
   if (!(high > low)) return low;
   if (low < 0) {
-    // Both signs in equal parts.
+    // Positive and negative numbers with equal probability.
     const double magnitude = ordinal_uniform(0, std::max(-low, high), random);
     return std::clamp(random() & 1 ? magnitude : -magnitude, low, high);
   }
-  // Below 1e-300 is a quarter of what there is between 0 and 1, and all the same to a formula: one in 16 suffices.
+  // A quarter of all numbers in [0, 1] is below 1e-300, and formulas treat them all alike: one in 16 samples suffices.
   if (low == 0 && random() % 16 != 0) low = std::min(1e-20, high * 1e-20);
   const auto a = std::bit_cast<std::uint64_t>(low), b = std::bit_cast<std::uint64_t>(high);
   return std::bit_cast<double>(a + std::uniform_int_distribution<std::uint64_t>(0, b - a)(random));
@@ -147,7 +149,7 @@ double ordinal_uniform(double low, double high, Random& random) {
 Vec3<double> ordinal_direction(Random& random) {
   const double phi = 2 * kPi * uniform(random), small = ordinal_uniform(1e-12, 1, random);
   const double large = std::sqrt((1 - small) * (1 + small));
-  // Every second one counts its ordinals from the normal.
+  // Every second direction takes its ordinals from the angle to the normal.
   return random() & 1 ? Vec3<double>{large * std::cos(phi), large * std::sin(phi), small}
                       : Vec3<double>{small * std::cos(phi), small * std::sin(phi), std::max(large, 1e-12)};
 }
@@ -174,7 +176,8 @@ ParamValues anywhere(const ModelInfo& info, const std::vector<ParamValues>& usua
   return v;
 }
 
-/// Pairs where formulas break: near and at the mirror, backscattering, opposite and normal directions.
+/// Pairs of directions at which formulas tend to fail: near and at the mirror direction, backscattering, opposite
+/// directions, and the normal.
 std::array<Vec3<double>, 2> above_surface(const Brdf<double>& brdf, Random& random) {
   const Vec3<double> wo = random() % 16 == 0 ? Vec3<double>{0, 0, 1} : ordinal_direction(random);
   const Vec3<double> mirror{-wo.x, -wo.y, wo.z};
@@ -203,7 +206,7 @@ std::array<Vec3<double>, 2> above_surface(const Brdf<double>& brdf, Random& rand
   }
 }
 
-/// The same on either side where views from inside are meant, and close to ideal refraction.
+/// The same on both sides of the surface where views from inside are allowed, and pairs close to ideal refraction.
 std::array<Vec3<double>, 2> anywhere(const Brdf<double>& brdf, bool two_sided, Random& random) {
   auto pair = above_surface(brdf, random);
   if (!two_sided) return pair;

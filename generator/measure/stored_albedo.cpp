@@ -22,7 +22,8 @@ bool has_albedo_table(const Model& model) {
 
 StoreKey stored_albedo(const Model& model) {
   StoreKey key("albedos", model.info().name);
-  // Unlike a choice, a default matters: where a coefficient does not depend on a number, that is what it is taken at.
+  // The defaults of numbers are part of the key, unlike those of choices: a coefficient that does not depend on a
+  // number is tabulated at its default.
   key.add("defaults", format_values(model.info(), complete(model.info(), {})));
   for (const ParamInfo& p : model.info().params)
     key.add(p.name, fmt::format("{} {} {} {}", int(p.kind), p.min, p.max, fmt::join(p.choices, " ")));

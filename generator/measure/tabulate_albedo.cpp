@@ -26,7 +26,8 @@ constexpr AlbedoOptions kProofOptions{.absolute = kTableSettings.proof_error,
                                       .max_cells = int(kTableSettings.proof_cells),
                                       .witnesses = int(kTableSettings.proof_witnesses)};
 
-/// Combinations of choices that differ, and for each combination the index of the one that is the same.
+/// The combinations of choices that differ in their formula. `stands_for` has, for each combination, the index of the
+/// one that equals it.
 struct DistinctChoices {
   std::vector<ParamValues> combinations;
   std::vector<std::size_t> stands_for;
@@ -37,7 +38,7 @@ DistinctChoices distinct_choices(const Model& model) {
   std::map<std::string, std::size_t> seen;
   for (const Choices& c : all) {
     const ParamValues combination = with_choices(model.info(), c);
-    // A choice may say nothing beside another one.
+    // A choice may have no effect beside another one.
     const std::string text = all.size() > 1 ? formula_of(model, combination) : "";
     const auto [it, is_new] = seen.emplace(text, out.combinations.size());
     if (is_new) out.combinations.push_back(combination);
@@ -80,14 +81,15 @@ class Tabulator {
     for (std::size_t i = 1; i < polynomial_.coordinates().size(); ++i)
       defaults.push_back(model_.info().param(polynomial_.coordinates()[i].name)->value[0]);
     probes_.push_back(defaults);
-    // Near the ends of ranges, where peaks stand that random places miss.
+    // Probes near the ends of ranges, where peaks occur that random places miss.
     for (std::size_t i = 0; i < kTableSettings.corners; ++i) {
       Position corner;
       for (const Coordinate& c : polynomial_.coordinates()) corner.push_back(c.at(random() & 1 ? 0.97 : 0.03));
       probes_.push_back(corner);
     }
     for (int i = 0; i < 5; ++i) probes_.push_back(polynomial_.random_position(random));
-    // Coefficients that agree elsewhere may part at grazing views, where lobes lose what falls below the surface.
+    // Coefficients that are equal elsewhere may differ at grazing views, where lobes lose the light that falls below
+    // the surface.
     places_ = probes_;
     for (int i = 0; i < 12; ++i) {
       places_.push_back(polynomial_.random_position(random));
@@ -97,14 +99,14 @@ class Tabulator {
     for (Position& x : places_) polynomial_.freeze_turns(x);
   }
 
-  /// A coefficient that a grid is wanted for, and indices of the coordinates that it depends on.
+  /// A coefficient that needs a grid, and the indices of the coordinates that it depends on.
   struct NewTerm {
     Monomial monomial;
     std::vector<std::size_t> axes;
   };
 
   std::vector<AlbedoTerm> terms_of(const ParamValues& combination) {
-    // Coefficients at the probes, and along each coordinate through each of them.
+    // Coefficients at the probes, and along each coordinate through each probe.
     constexpr int kSteps = 4;
     std::vector<Coefficients> at_probe(places_.size());
     for_all(places_.size(),
@@ -159,8 +161,9 @@ class Tabulator {
     return terms;
   }
 
-  /// A grid that has this coefficient's values at every place, or -1. What a model takes from tables of its own albedo
-  /// is `slack` from a grid, its negative or the rest that it leaves of 1: no need to integrate all of it again.
+  /// Index of a grid that has this coefficient's values at every place, or -1. A coefficient that a model computes from
+  /// tables of its own albedo may be the negative of a grid, or 1 minus a grid, to within `slack`. Such a grid is
+  /// derived, not integrated again.
   int find_shared(const NewTerm& t, const std::vector<Coefficients>& at_probe, double slack) {
     const auto same = [&](std::size_t g, double offset, double sign, double tolerance) {
       for (std::size_t i = 0; i < at_probe.size(); ++i) {
@@ -197,7 +200,7 @@ class Tabulator {
     return out;
   }
 
-  /// One grid per term of the group, all on the same knots.
+  /// Makes one grid per term of the group, all on the same knots.
   std::vector<int> tabulate(const ParamValues& combination, const std::vector<NewTerm>& group,
                             const std::vector<Coefficients>& at_probe) {
     const std::vector<std::size_t>& axes = group[0].axes;
@@ -236,8 +239,8 @@ class Tabulator {
     return out;
   }
 
-  /// Compares at random points: with finer samples the interpolation and the polynomial in the colours, and with
-  /// albedo() that the samples tell the truth.
+  /// Verifies the table at random points: finer samples test the interpolation and the polynomial in the colours, and
+  /// albedo() tests that the samples are right.
   void prove() {
     struct Proof {
       std::size_t combination;
@@ -250,7 +253,7 @@ class Tabulator {
     std::uniform_real_distribution<double> uniform;
     std::vector<Proof> proofs;
     for (std::size_t c = 0; c < combinations_.size(); ++c) {
-      // Later combinations share most grids with the first; what depends on nothing needs no search.
+      // Later combinations share most grids with the first; where nothing varies, few points suffice.
       std::size_t axes = 0;
       for (const AlbedoTerm& t : known_terms(c)) axes = std::max(axes, table_.grids[std::size_t(t.grid)].axes.size());
       const int n = axes == 0 ? 4 : c == 0 ? 64 : 16;
@@ -274,8 +277,8 @@ class Tabulator {
       const Coefficients all =
           polynomial_.coefficients(combination, p.x, kAllAzimuths, kTableSettings.proof_samples, 1);
       const Coefficients one = polynomial_.coefficients(combination, p.x, p.phi, kTableSettings.proof_samples, 2);
-      // Random colours, different in every channel: proves that channels are apart and the polynomial is one. With the
-      // numbers that `one` used, so that noise hides nothing and looks like nothing.
+      // Random colours that differ in every channel show that channels are independent and that the dependence is
+      // polynomial. The random numbers are those of `one`, so that noise neither hides a difference nor looks like one.
       const MeanAlbedo direct = mean_albedos(*brdf, {brdf.get()}, p.x[0], p.phi, polynomial_.label(values),
                                              int(kTableSettings.proof_samples), 2);
       const auto require_equal = [&](const Rgb<double>& wanted, double error, const char* what) {
@@ -337,9 +340,9 @@ class Tabulator {
   std::vector<ParamValues> combinations_;
   std::vector<std::size_t> stands_for_;
   AlbedoPolynomial polynomial_;
-  std::vector<Position> probes_;                      // lines through these tell what a coefficient depends on
+  std::vector<Position> probes_;                      // lines through these show what a coefficient depends on
   std::vector<Position> places_;                      // the probes and more: where equal coefficients must agree
-  std::vector<std::vector<Rgb<double>>> signatures_;  // of each grid at each place
+  std::vector<std::vector<Rgb<double>>> signatures_;  // values of each grid at each place
   AlbedoTable table_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Combinations of a model's choices: what is recorded, tabulated or tested is so once for each.
+// Combinations of a model's choices. Recording, tabulation and tests are done once for each combination.
 #pragma once
 
 #include <vector>
@@ -10,12 +10,12 @@ namespace brdfc::inline model {
 
 /// One combination of the model's choices: an index into ParamInfo::choices for each Choice parameter, in schema order.
 using Choices = std::vector<int>;
-/// Every combination, in the order of an odometer whose last wheel turns fastest; an empty one of a model without
-/// choices.
+/// All combinations, in the order of an odometer: the last choice varies fastest. A model without choices has one,
+/// which is empty.
 std::vector<Choices> choice_combinations(const ModelInfo&);
-/// `values` with the identifiers of the combination.
+/// `values` with the choices of the combination.
 ParamValues with_choices(const ModelInfo&, const Choices&, ParamValues values = {});
-/// Whether the combination agrees with the choices that are among `fixed`; what else is in it does not count.
+/// True if the combination agrees with the choices in `fixed`; other values in `fixed` are ignored.
 bool admits(const ModelInfo&, const Choices&, const ParamValues& fixed);
 
 }  // namespace brdfc::inline model

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Glass that bends each channel by an index of its own.
+// Dispersive glass: each channel has its own refractive index.
 #pragma once
 
 #include <array>
@@ -9,11 +9,11 @@
 
 namespace brdfc::inline model {
 
-/// Fraunhofer's lines in nm, by which glass is told.
+/// Fraunhofer lines in nm, at which the indices of glass are specified.
 inline constexpr double kLineC = 656.2725, kLineD = 587.5618, kLineF = 486.1327;
 
-/// Dispersion as a parameter: 20 over Abbe's number V_d = (n_d - 1) / (n_F - n_C), as glTF has it
-/// (KHR_materials_dispersion), so that 0 is none and flint glass is near 1.
+/// Dispersion as a parameter: 20 divided by the Abbe number V_d = (n_d - 1) / (n_F - n_C), as in glTF
+/// (KHR_materials_dispersion). 0 is no dispersion, and flint glass is near 1.
 inline constexpr double kDispersion = 20;
 inline NumberSpec dispersion_spec() {
   return NumberSpec{"dispersion",
@@ -28,11 +28,11 @@ inline NumberSpec dispersion_spec() {
       .as(Optical::Dispersion);
 }
 
-/// Wavelengths in nm that stand for red, green and blue: the dominant ones of Rec.709's primaries under D65.
+/// The wavelengths in nm for red, green and blue: the dominant wavelengths of Rec.709's primaries under D65.
 inline constexpr std::array<double, 3> kChannelNm = {611.4, 549.1, 464.2};
 
-/// Refractive index by channel of a glass with the index n_d, by the first two terms of A.-L. Cauchy's series
-/// n = A + B / lambda^2.
+/// The refractive index by channel of a glass with the index n_d, from the first two terms of A.-L. Cauchy's series, n
+/// = A + B / lambda^2.
 template <class T> std::array<T, 3> dispersed(const T& index, const T& dispersion) {
   const auto inverse_square = [](double nm) { return 1 / (nm * nm); };
   const double from_C_to_F = inverse_square(kLineF) - inverse_square(kLineC);
@@ -43,7 +43,7 @@ template <class T> std::array<T, 3> dispersed(const T& index, const T& dispersio
   return {channel(kChannelNm[0]), channel(kChannelNm[1]), channel(kChannelNm[2])};
 }
 
-/// Fresnel's equations by channel.
+/// The Fresnel equations for each channel.
 template <class T> struct DielectricRgb { Rgb<T> reflected, refracted; };
 template <class T> DielectricRgb<T> fresnel_dielectric(const Vec3<T>& wo, const std::array<T, 3>& iors) {
   const Dielectric<T> r = fresnel_dielectric(wo, iors[0]), g = fresnel_dielectric(wo, iors[1]),
@@ -51,8 +51,8 @@ template <class T> DielectricRgb<T> fresnel_dielectric(const Vec3<T>& wo, const 
   return {{r.reflected, g.reflected, b.reflected}, {r.refracted, g.refracted, b.refracted}};
 }
 
-/// What models of a smooth boundary around a dielectric have in common: ideal reflection and refraction, shared out by
-/// Fresnel's equations.
+/// The common part of models of a smooth dielectric boundary: ideal reflection and refraction, weighted by the Fresnel
+/// equations.
 template <class T> struct DielectricBoundary {
   T index, dispersion;
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fresnel's equations for unpolarised light, in forms without cancellation.
+// The Fresnel equations for unpolarised light, in forms without cancellation.
 //
-// cosTheta > 0 and sin2 = sin^2 theta belong to the side of the light; indices are relative to that side.
+// cosTheta > 0 and sin2 = sin^2 theta are those of the direction on the incident side; indices are relative to that
+// side.
 #pragma once
 
 #include "core/vec.h"
@@ -9,8 +10,9 @@
 namespace brdfc::inline model {
 
 /// Reflectance of a conductor n + i k. With u + i v = sqrt((n + i k)^2 - sin^2),
-///   R_s = ((u - c)^2 + v^2) / ((u + c)^2 + v^2),  R_p = R_s ((u c - s^2)^2 + v^2 c^2) / ((u c + s^2)^2 + v^2 c^2):
-/// quotients of sums of squares. Of u^2 and v^2 the larger comes from the root and the smaller from u v = n k.
+///   R_s = ((u - c)^2 + v^2) / ((u + c)^2 + v^2),  R_p = R_s ((u c - s^2)^2 + v^2 c^2) / ((u c + s^2)^2 + v^2 c^2),
+/// which are quotients of sums of squares. The larger of u^2 and v^2 is computed from the root, the smaller from
+/// u v = n k.
 template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T& n, const T& k) {
   const T nk = n * k;
   const T real = named("real", (n - k) * (n + k) - sin2);
@@ -25,15 +27,15 @@ template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T
   return (Rs + Rp) / T(2);
 }
 
-/// What a smooth boundary of two dielectrics reflects and lets through; R + T = 1.
+/// The shares of light that a smooth dielectric boundary reflects and transmits; their sum is 1.
 template <class T> struct Dielectric { T reflected, refracted; };
 
-/// `eta`: index of the far side over that of the side of the light. With g^2 = eta^2 - sin^2,
+/// `eta` is the index of the far side divided by that of the incident side. With g^2 = eta^2 - sin^2,
 ///   r_s = (1 - eta^2) / (c + g)^2,  r_p = (eta^2 - 1) (eta^2 c^2 - s^2) / (eta^2 c + g)^2,
-/// differences of like numbers multiplied out, and T from its own formula instead of from 1 - R.
+/// where differences of similar numbers are expanded. T has its own formula and is not computed as 1 - R.
 template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& sin2, const T& eta) {
   const T sine = sqrt(sin2), c2 = cosTheta * cosTheta, step = (eta - T(1)) * (eta + T(1));
-  // eta^2 - sin^2: near the horizon from the cosine.
+  // eta^2 - sin^2; near the horizon computed from the cosine.
   const T g2 = named("g2", select(c2 < T(0.5), c2 + step, (eta - sine) * (eta + sine)));
   const auto total = g2 <= T(0);  // total internal reflection
   const T g = named("g", sqrt(maximum(g2, T(0))));
@@ -46,7 +48,8 @@ template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& 
   return {named("R_f", select(total, T(1), (rs * rs + rp * rp) / T(2))), named("T_f", select(total, T(0), through))};
 }
 
-/// The same for a direction on either side of the surface; `ior` is the index inside (z < 0) over the one outside.
+/// The same for a direction on either side of the surface. `ior` is the index inside (z < 0) divided by the one
+/// outside.
 template <class T> Dielectric<T> fresnel_dielectric(const Vec3<T>& wo, const T& ior) {
   return fresnel_dielectric(abs(wo.z), named("sin2", sin2_theta(wo)),
                             named("eta", select(wo.z > T(0), ior, T(1) / ior)));

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pieces of models that are formulas of the half vector.
+// Formulas of the half vector that several models share.
 #pragma once
 
 #include "model/sampling.h"
 
 namespace brdfc::inline model {
 
-/// Unit half vector, its cosine o.h = i.h = |wi + wo| / 2 to both directions, and 1 - o.h from
-/// |wi - wo|^2 = 4 (1 - (o.h)^2).
+/// The unit half vector; its cosine to both directions, o.h = i.h = |wi + wo| / 2; and 1 - o.h, computed from |wi -
+/// wo|^2 = 4 (1 - (o.h)^2).
 template <class T> struct HalfVector {
   Vec3<T> h;
   T oh, one_minus_oh;
@@ -21,8 +21,9 @@ template <class T> struct HalfVector {
   }
 };
 
-/// Slopes of the facet whose normal is h: tan theta_h times cosine and sine of its azimuth. Facets steeper than 10^7
-/// count as that steep: Gaussian slopes have none, and fourth powers of the slope stay finite in single precision.
+/// The slopes of a microfacet with the normal h: tan theta_h times cosine and sine of its azimuth. Slopes are limited
+/// to 10^7: beyond it Gaussian distributions are 0, and the limit keeps fourth powers of the slope finite in single
+/// precision.
 template <class T> struct Slopes {
   T x, y;
 
@@ -35,8 +36,8 @@ template <class T> struct Slopes {
   T inverse_cos2() const { return T(1) + x * x + y * y; }
 };
 
-/// The normal of a facet with slopes drawn from the Gaussian exp(-(x/ax)^2 - (y/ay)^2) / (pi ax ay). u1 = 1 would be an
-/// infinite slope; 100 is beyond the logarithm of the smallest 1 - u1 there is.
+/// A microfacet normal with slopes sampled from the Gaussian exp(-(x/ax)^2 - (y/ay)^2) / (pi ax ay). u1 = 1 would give
+/// an infinite slope; the limit of 100 is beyond the logarithm of the smallest possible 1 - u1.
 template <class T> Vec3<T> sample_gaussian_slopes(const T& ax, const T& ay, const T& u1, const T& u2) {
   const T r = named("r", sqrt(minimum(-log1p(-u1), T(100))));
   const T phi = named("phi", T(2) * pi<T>() * u2);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The conventions for shading normals that differ from the surface's own, shared by the shaders and the reference.
+// Conventions for shading normals that differ from the geometric normal, shared by the shaders and the reference.
 #pragma once
 
 #include "core/vec.h"
 
 namespace brdfc::inline model {
 
-/// Interpolated or bent normals can turn away from a viewer who still sees the surface. Such a view is moved to
-/// just above the horizon, in the same azimuth, so that silhouettes get the grazing colour and not black.
+/// Interpolated normals and bump maps can turn away from a viewer who still sees the surface. Such a view direction is
+/// moved to just above the horizon, at the same azimuth, so that silhouettes get the colour of grazing views and are
+/// not black.
 inline constexpr double kMinCosTheta = 1e-4;
 
 template <class T> Vec3<T> raise_to_horizon(const Vec3<T>& wo) {
@@ -19,29 +20,30 @@ template <class T> Vec3<T> raise_to_horizon(const Vec3<T>& wo) {
           named("cosTheta_o", select(below, low, wo.z))};
 }
 
-/// How high above the true surface bent_normal() brings the mirror direction at most, as a cosine.
+/// The largest height, as a cosine, above the true surface to which bent_normal() raises the mirror direction.
 inline constexpr double kMirrorRise = 0.01;
 
-/// How high it brings that for a view of this cosine.
+/// That height for a view with this cosine.
 template <class T> T least_mirror_rise(const T& cos_o) { return minimum(T(0.9) * cos_o, T(kMirrorRise)); }
 
-/// How far the mirror direction about a shading normal is above the true surface, as a cosine, less the height that
-/// bent_normal() gives it. Negative: the normal has to be bent. All directions are unit; wo is on the side of
-/// `geometric`, the true normal.
+/// The height of the mirror direction about a shading normal above the true surface, as a cosine, minus the height to
+/// which bent_normal() raises it. If it is negative, the normal has to be bent. All directions are unit vectors; wo is
+/// on the side of `geometric`, the true normal.
 template <class T> T mirror_rise(const Vec3<T>& geometric, const Vec3<T>& wo, const Vec3<T>& normal) {
   return T(2) * dot(normal, wo) * dot(normal, geometric) - dot(wo, geometric) - least_mirror_rise(dot(wo, geometric));
 }
 
-/// The shading normal, turned towards the true one until the mirror direction about it is just above the surface. Else
-/// a mirror, and with it much of a narrow lobe, would send its rays below the surface, where they are lost: meshes of
-/// few faces that are shaded smooth would be black there. Only for a negative mirror_rise(). This is Cycles' Bump Map
-/// Correction (kernel/closure/bsdf_util.h, ensure_valid_specular_reflection), which has the derivation.
+/// The shading normal, rotated towards the true normal until the mirror direction about it is just above the surface.
+/// Otherwise a mirror, and much of a narrow lobe, would reflect below the surface, where light is lost: low-polygon
+/// meshes with smooth shading would be black there. To be used only if mirror_rise() is negative. This is Cycles' Bump
+/// Map Correction (kernel/closure/bsdf_util.h, ensure_valid_specular_reflection); the derivation is there.
 template <class T> Vec3<T> bent_normal(const Vec3<T>& geometric, const Vec3<T>& wo, const Vec3<T>& normal) {
-  // In the plane of both normals: z along the true one, x to the side of the other.
+  // Coordinates in the plane of both normals: z along the true one, x towards the other.
   const Vec3<T> across = normal - geometric * dot(normal, geometric);
   const Vec3<T> x_axis = across / maximum(length(across), tiny<T>());
   const T x = dot(wo, x_axis), z = maximum(dot(wo, geometric), T(0)), least = least_mirror_rise(z);
-  // The square of the bent normal's z, a root of 4 a z^4 - 2 b z^2 + c = 0. Both are written so that nothing cancels.
+  // The square of the bent normal's z is a root of 4 a z^4 - 2 b z^2 + c = 0. Both roots are written without
+  // cancellation.
   const T a = maximum(sqr(x) + sqr(z), tiny<T>()), b = T(2) * (a + z * least), c = sqr(least + z);
   const T both = b + sqrt(maximum(sqr(b) - T(4) * a * c, T(0)));
   const T z2 = minimum(select(x < T(0), both / (T(4) * a), c / maximum(both, tiny<T>())), T(1));

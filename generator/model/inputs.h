@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Parameters as the inputs of a recorded model.
+// Sets the inputs of a recorded model from parameter values.
 #pragma once
 
 #include "model/model.h"
@@ -7,8 +7,8 @@
 
 namespace brdfc::inline model {
 
-/// Sets the inputs of a recorded model to the numbers and colours among these values, by their names: choices are not
-/// recorded.
+/// Sets the inputs of a recorded model to the numbers and colours in `values`, by name. Choices are not recorded, so
+/// they are ignored.
 template <class T> void set_inputs(Inputs<T>& inputs, const ParamValues& values) {
   for (const auto& [name, value] : values) {
     if (const double* v = std::get_if<double>(&value)) set_input(inputs, name, *v);

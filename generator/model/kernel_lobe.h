@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The construction behind Radziszewski and Alda's latitudinal lobe, for other kernels than theirs: any symmetric
-// positive kernel becomes a reflection that loses no light and looks the same from either side.
+// The construction of Radziszewski and Alda's latitudinal lobe for other kernels: any symmetric positive kernel gives a
+// reflection model that loses no light and is reciprocal.
 //
 // M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008, eqs. 9-16; "this particular
-// choice is not unique". x = cos^2 theta_i, y = cos^2 theta_r; the kernel is k(n |x' - y'|) over [0, 1]^2.
-// With A(u) the integral of k over [0, u], B that of A, and S(x') = A(n x') + A(n (1 - x')):
+// choice is not unique". x = cos^2 theta_i, y = cos^2 theta_r; the kernel is k(n |x' - y'|) over [0, 1]^2. With A(u)
+// the integral of k over [0, u], B that of A, and S(x') = A(n x') + A(n (1 - x')):
 //   marginal  M(x') = [B(n x') + B(n) - B(n (1 - x'))] / (2 B(n)), its density n S(x') / (2 B(n)),
-//   lobe      f_theta(x, y) = 4 B(n) k(n |x' - y'|) / (S(x') S(y')),  M(x') = x, M(y') = y,
-// which is eq. 13 put into eq. 9, with the factor 2 that eq. 8 asks for. k = sech^2 gives eq. 17. A kernel may also be
-// drawn: linear between heights and constant beyond the last, whose integrals are sums over the pieces.
+//   lobe      f_theta(x, y) = 4 B(n) k(n |x' - y'|) / (S(x') S(y')),  M(x') = x, M(y') = y.
+// This is eq. 13 inserted into eq. 9, with the factor 2 that eq. 8 requires. k = sech^2 gives eq. 17. A kernel may also
+// be drawn as a curve: linear between its knots and constant beyond the last. Its integrals are sums over the pieces.
 //
-// Stable forms. v = n x' is found on the half where it is small, from x or 1 - x, whichever is smaller; B(n) - B(n - v)
-// and 1 - A are written out for each kernel, since they cancel. Newton's steps stay in a bracket.
-// n ends at 1e4: places are up to n / 2, of which single precision leaves the kernel too few digits from 1e5.
-// Sampling: w = A(n (x' - y')) is linear in the random number, so that only A is inverted, in closed form; then x =
-// M(x').
+// Numerical stability: v = n x' is computed in the half where it is small, from the smaller of x and 1 - x.
+// B(n) - B(n - v) and 1 - A have their own formulas for each kernel, because the differences would cancel. Newton's
+// method stays in a bracket. The upper limit of n is 1e4: places reach n / 2, and from 1e5 on single precision leaves
+// too few digits for the kernel.
+//
+// Sampling: w = A(n (x' - y')) is linear in the random number, so only A has to be inverted, which is possible in
+// closed form; then x = M(x').
 #pragma once
 
 #include <vector>
@@ -23,7 +25,7 @@
 
 namespace brdfc::inline model {
 
-/// Knots 0, 1, 2, ... of a curve: what a shader has sockets for.
+/// Knots at 0, 1, 2, ...: the curves for which a shader has sockets.
 template <class T, int Count> struct EvenKnots {
   static constexpr int kNewtonSteps = 20;
   std::array<T, std::size_t(Count)> heights;
@@ -32,7 +34,7 @@ template <class T, int Count> struct EvenKnots {
   static T at(int i) { return T(i); }
 };
 
-/// Knots anywhere, increasing from 0, and as many as one likes: for numbers alone.
+/// Knots at any increasing positions from 0, in any number; only for numbers, not for recordings.
 template <class T> struct FreeKnots {
   static constexpr int kNewtonSteps = 60;
   std::vector<T> places, heights;
@@ -49,7 +51,7 @@ template <class T, class Knots> struct DrawnKernel : Knots {
   T height(int i) const { return heights[std::size_t(i)]; }
   T width(int i) const { return Knots::at(i + 1) - Knots::at(i); }
 
-  /// The kernel at x, which lies in piece i.
+  /// The kernel at x, which must lie in piece i.
   T inside(int i, const T& x) const {
     if (i == last()) return height(i);
     return (height(i) * (Knots::at(i + 1) - x) + height(i + 1) * (x - Knots::at(i))) / width(i);
@@ -60,11 +62,11 @@ template <class T, class Knots> struct DrawnKernel : Knots {
       value = select(u > Knots::at(i), inside(i, i < last() ? minimum(u, Knots::at(i + 1)) : u), value);
     return named("k", value);
   }
-  /// A(u) and B(u), by the piece that u lies in: sums of positive terms, exact for these curves.
+  /// A(u) and B(u), selected by the piece that contains u. They are sums of positive terms, exact for these curves.
   std::array<T, 2> integrals(const T& u) const {
     T t = u, left = height(0), right = height(1), span = width(0), area(0), moment(0), whole_area(0), whole_moment(0);
     for (int i = 1; i <= last(); ++i) {
-      // Over the piece before: its own integrals, and what lies below it.
+      // Adds the previous piece: its own integrals, and the area before it.
       const T w = width(i - 1);
       whole_moment = whole_moment + whole_area * w + (T(2) * height(i - 1) + height(i)) / T(6) * (w * w);
       whole_area = whole_area + (height(i - 1) + height(i)) / T(2) * w;
@@ -76,12 +78,12 @@ template <class T, class Knots> struct DrawnKernel : Knots {
       area = select(past, whole_area, area);
       moment = select(past, whole_moment, moment);
     }
-    // Beyond the last knot both ends are one height, and t and the span may be any.
+    // Beyond the last knot both ends have the same height, so that t and the span do not matter.
     const T rise = t * (right - left) / span;
     return {named("area", area + t * (left + left + rise) / T(2)),
             named("moment", moment + t * (area + t * (T(3) * left + rise) / T(6)))};
   }
-  /// The integral of (b - x) k over [a, b]: sums of positive terms.
+  /// The integral of (b - x) k over [a, b], as a sum of positive terms.
   T moment(const T& a, const T& b) const {
     T sum(0);
     for (int i = 0; i <= last(); ++i) {
@@ -94,7 +96,7 @@ template <class T, class Knots> struct DrawnKernel : Knots {
     }
     return named("moment", sum);
   }
-  /// u with A(u) = q: piece by piece, each a quadratic equation.
+  /// The u with A(u) = q. Each piece gives a quadratic equation.
   T invert_A(const T& q) const {
     T rest = q, u(0);
     for (int i = 0; i < last(); ++i) {
@@ -107,7 +109,7 @@ template <class T, class Knots> struct DrawnKernel : Knots {
   }
 };
 
-/// The lobe that a kernel gives. A model names its parameters.
+/// The lobe of a kernel. A model gives the parameters their names.
 template <class T, class Knots> struct KernelLobe {
   Choice kernel;
   T n;
@@ -116,7 +118,8 @@ template <class T, class Knots> struct KernelLobe {
 
   enum { Sech2, Exponential, Table };
 
-  /// e^v - 1 - v, by halving: e^v - 1 - v = (e^(v/2) - 1)^2 + 2 (e^(v/2) - 1 - v/2), all of one sign.
+  /// e^v - 1 - v, by halving: e^v - 1 - v = (e^(v/2) - 1)^2 + 2 (e^(v/2) - 1 - v/2), where all terms have the same
+  /// sign.
   static T psi(const T& v) {
     T sum(0), scale(1), z = v;
     for (int i = 0; i < 4; ++i) {
@@ -124,7 +127,7 @@ template <class T, class Knots> struct KernelLobe {
       sum = sum + scale * sqr(expm1(z));
       scale = scale * T(2);
     }
-    // |z| <= 1/16: the rest of the series is below 1e-17.
+    // For |z| <= 1/16 the rest of the series is below 1e-17.
     const T series =
         z * z / T(2) *
         (T(1) +
@@ -138,7 +141,7 @@ template <class T, class Knots> struct KernelLobe {
     return sum + scale * series;
   }
 
-  /// n; what is added at n = 0 changes no digit and keeps 0 / 0 away.
+  /// n with a tiny lower limit, which prevents 0 / 0 and changes no digit of the result.
   T gloss() const { return named("n_pos", maximum(n, T(1e-17))); }
 
   T k(const T& u) const {
@@ -172,19 +175,20 @@ template <class T, class Knots> struct KernelLobe {
     if (kernel == Table) return v * A(g - v) + drawn.moment(g - v, g);
     const T small = minimum(v, T(1));
     if (kernel == Exponential) {
-      // v (1 - e^-g) - e^-g psi(v); for large v e^-g psi(v) = e^(v-g) - e^-g (1 + v).
+      // v (1 - e^-g) - e^-g psi(v), where for large v e^-g psi(v) = e^(v-g) - e^-g (1 + v).
       const T tail = select(v < T(1), exp(-g) * psi(small), exp(v - g) - exp(-g) * (T(1) + v));
       return -v * expm1(-g) - tail;
     }
-    // ln cosh g - ln cosh(g - v) = -ln(cosh v - tanh g sinh v) for small g, with e^(2v - 2g) for large.
+    // ln cosh g - ln cosh(g - v) = -ln(cosh v - tanh g sinh v) for small g; for large g with e^(2v - 2g).
     const T sinh_half = stable_sinh(small / T(2)), sinh = stable_sinh(small);
     const T near = -log1p(T(2) * sinh_half * sinh_half - A(minimum(g, T(1))) * sinh);
     const T far = v - log1p(exp(T(2) * (v - g)) * -expm1(T(-2) * v) / (T(1) + exp(T(-2) * g)));
     return select(g < T(1), near, far);
   }
 
-  /// v = g x' with M(x') = p, for p <= 1/2. Where the kernel falls with the distance the root lies between g p and
-  /// 2 g p, so that the digits double from the start: eight steps are enough for any type. A drawn one may rise.
+  /// The v = g x' with M(x') = p, for p <= 1/2. For a kernel that decreases with the distance, the root is between g p
+  /// and 2 g p, so that each Newton step doubles the number of digits from the start: eight steps suffice for any type.
+  /// A drawn kernel may increase, and takes more.
   T invert_marginal(const T& g, const T& p) const {
     const T target = named("target", T(2) * B(g) * p);
     const std::array<T, 3> state = settle(kernel == Table ? Knots::kNewtonSteps : 8,
@@ -209,13 +213,13 @@ template <class T, class Knots> struct KernelLobe {
     return state[2];
   }
 
-  /// A direction's place on the kernel's axis: distance v to the nearer end, and which end that is.
+  /// The place of a direction on the kernel's axis: the distance v to the nearer end, and which end that is.
   struct Place {
     T v, low;  ///< low: 1 at the horizon's end, 0 at the normal's
   };
   Place place(const T& g, const Vec3<T>& w) const {
     const T x = w.z * w.z, y = sin2_theta(w);
-    // Not exactly normalised directions must not leave the half.
+    // If the direction is not exactly normalised, p must still not exceed 1/2.
     const T p = minimum(minimum(x, y) / (x + y), T(0.5));
     return {invert_marginal(g, p), select(x < y, T(1), T(0))};
   }
@@ -227,29 +231,30 @@ template <class T, class Knots> struct KernelLobe {
     const Place i = place(g, wi), o = place(g, wo);
     const T same = abs(i.v - o.v), across = maximum(g - i.v - o.v, T(0));
     const T near = select(i.low + o.low < T(1.5) && i.low + o.low > T(0.5), across, same);
-    // Far from both ends, and so beyond a drawn kernel's last knot, S no longer changes, and the places' difference is
-    // that of the directions over S: large places would leave it few digits.
+    // Far from both ends, and beyond a drawn kernel's last knot, S is constant. There the difference of the places is
+    // the difference of the directions divided by S; subtracting large places would lose digits.
     const T x_minus_y = select(wi.z + wo.z < T(1), (wi.z - wo.z) * (wi.z + wo.z),
                                (wo.x - wi.x) * (wo.x + wi.x) + (wo.y - wi.y) * (wo.y + wi.y));
     const T far = abs(x_minus_y) * (T(2) * B(g) / S(g, i.v));
     const T calm = kernel == Table ? maximum(T(40), drawn.at(drawn.last())) : T(40);
     const T u = named("u", select(minimum(i.v, o.v) > calm, far, near));
-    // Over S S in two steps: B is large with g and small with g^2.
+    // The division by S S is done in two steps, because B is large with g and small with g^2.
     return T(2) * (B(g) / S(g, i.v)) * (k(u) / S(g, o.v)) / pi<T>();
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return tint * select(above(wi, wo), lobe(wi, wo), T(0)); }
 
-  /// The cosine-weighted lobe is itself a density.
+  /// The cosine-weighted lobe is itself a pdf.
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), lobe(wi, wo) * wi.z, T(0)); }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const T g = gloss();
     const Place o = place(g, wo);
-    // Along the axis away from the end that wo is nearer to: r below it, g - r beyond.
+    // Along the axis, wo is at distance r from the nearer end and at distance g - r from the other.
     const T r = o.v, rest = g - r;
     const T total = A(r) + A(rest);
-    // w = A(n (x' - y')), and where A ends at 1 also 1 + w and 1 - w, which tell more when it is near.
+    // w = A(n (x' - y')). For kernels whose A approaches 1, also 1 + w and 1 - w, which are more precise when w is near
+    // -1 or 1.
     const T w = named("w", u.y * total - A(r)), mild = minimum(maximum(w, T(-0.75)), T(0.75));
     const T up = one_minus_A(r) + u.y * total, down = one_minus_A(rest) + (T(1) - u.y) * total;
     const auto log_of = [](const T& v) { return log(maximum(minimum(v, T(1)), tiny<T>())); };
@@ -266,7 +271,7 @@ template <class T, class Knots> struct KernelLobe {
     }
     const T step = named("step", select(abs(w) < T(0.5), near, far));
     const T v = minimum(maximum(r + step, T(0)), g);
-    // x = M(x') from the end that is nearer.
+    // x = M(x'), computed from the nearer end.
     const auto crossed = v > g / T(2);
     const T from_end = select(crossed, g - v, v);
     const T p = clamp01((B(from_end) + drop(g, from_end)) / (T(2) * B(g)));

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a reflection model is: a schema and formulas over a scalar type, registered under one name.
+// The definition of a reflection model: a schema and formulas over a scalar type, registered under one name.
 //
-// Conventions. Directions are unit vectors that leave the surface in a local frame whose z axis is the
-// normal: wi points to the light, wo to the viewer. eval() is the BRDF in 1/sr without the cosine and
-// without delta terms; pdf() is the density of sample() in solid angle at wi, for the same wo, delta terms
-// left out; mirror() is the weight of the delta term in the direction of ideal reflection. Albedo is the
-// integral of f cos(theta_i) over wi, plus the mirror weight. Colours are linear scene-referred RGB.
+// Conventions. Directions are unit vectors that point away from the surface, in a local frame whose z axis is the
+// normal: wi points to the light, wo to the viewer. eval() is the BRDF in 1/sr, without the cosine and without delta
+// terms. pdf() is the pdf of sample() per solid angle at wi, for the same wo, without delta terms. mirror() is the
+// weight of the delta term in the direction of ideal reflection. The albedo is the integral of f cos(theta_i) over wi,
+// plus the mirror weight. Colours are linear scene-referred RGB.
 //
-// A model has eval(), pdf() and sample(), or none of them: then it has delta terms alone, f and pdf are 0 and every
-// sample is lost.
+// A model defines all of eval(), pdf() and sample(), or none of them. With none it has only delta terms: f and pdf are
+// 0, and every sample is lost.
 //
-// Transmission. A model that lets light through separates two media, and z is the normal that leaves the object: a
-// direction with z < 0 lies inside. Then wo may be on either side; mirror(wo) reflects on its side, transmit(wo) is the
-// weight of the delta term in the direction of ideal refraction, channel by channel where they are bent apart
-// (channel_iors()), ior() the index inside over the one outside. One whose scatters_through() holds has f, pdf and
-// samples for wi on either side as well, cosines are absolute, and the albedo integrates over the sphere. Weights and f
-// count energy: a lossless boundary has albedo 1 from both sides, and f is reciprocal up to the squared index,
-// f(wi, wo) n(wo)^2 = f(wo, wi) n(wi)^2. Radiance is not scaled by it, as in Cycles.
+// Transmission. A transmissive model separates two media, and z is the normal that points out of the object: a
+// direction with z < 0 is inside. wo may be on either side. mirror(wo) reflects on wo's side. transmit(wo) is the
+// weight of the delta term in the direction of ideal refraction; for a dispersive model each channel has its own
+// direction (channel_iors()). ior() is the index inside divided by the one outside. If scatters_through() is true, f,
+// pdf and samples are also defined for wi on either side, cosines are absolute values, and the albedo is an integral
+// over the sphere. Weights and f count energy: a lossless boundary has albedo 1 from both sides, and f is reciprocal up
+// to the squared index, f(wi, wo) n(wo)^2 = f(wo, wi) n(wi)^2. Radiance is not scaled by the squared index, as in
+// Cycles.
 #pragma once
 
 #include <array>
@@ -36,7 +37,7 @@
 
 namespace brdfc::inline model {
 
-/// A sampled direction. pdf == 0 means: no direction (below the horizon); weight is then 0.
+/// A sampled direction. pdf == 0 means that there is none (it would be below the horizon); the weight is then 0.
 template <class T> struct Sample {
   Vec3<T> wi;
   Rgb<T> weight;  ///< f cos(theta_i) / pdf
@@ -47,48 +48,47 @@ template <class T> struct Sample {
 template <class T> class Brdf {
  public:
   virtual ~Brdf() = default;
-  /// BRDF in 1/sr; 0 unless both directions are above the surface.
+  /// The BRDF in 1/sr; 0 unless both directions are above the surface.
   virtual Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
-  /// Density of sample() per solid angle.
+  /// The pdf of sample(), per solid angle.
   virtual T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const = 0;
-  /// u: three numbers in [0, 1): lobe choice, and two for the direction.
+  /// `u` has three random numbers in [0, 1): one for the choice of lobe, and two for the direction.
   virtual Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const = 0;
-  /// Weight of ideal reflection; 0 for a model without a mirror term.
+  /// The weight of ideal reflection; 0 for a model without a mirror term.
   virtual Rgb<T> mirror(const Vec3<T>& wo) const = 0;
-  /// Weight of ideal refraction; 0 for a model without that term and beyond the critical angle.
+  /// The weight of ideal refraction; 0 for a model without that term, and beyond the critical angle.
   virtual Rgb<T> transmit(const Vec3<T>& wo) const = 0;
-  /// Refractive index inside over the one outside; 1 where nothing is let through.
+  /// The refractive index inside divided by the one outside; 1 for a model without transmission.
   virtual T ior() const = 0;
-  /// The same for ideal refraction of red, green and blue, which a model may bend apart.
+  /// The same for ideal refraction of red, green and blue, which differ in a dispersive model.
   virtual std::array<T, 3> channel_iors() const = 0;
-  /// Share of the light left after a distance inside.
+  /// The share of the light that remains after a distance inside.
   virtual Rgb<T> transmittance(const T& distance) const = 0;
-  /// Does f join directions on different sides, with the choices bound?
+  /// True if, with the choices bound, f connects directions on different sides.
   virtual bool scatters_through() const = 0;
-  /// The closures that equal the model, or nothing if no such sum is known. Delta terms alone are always known.
+  /// Closures whose sum equals the model; nullopt if no such sum is known. For delta terms alone it is always known.
   virtual std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const = 0;
-  /// Closures that carry most of f cos(theta_i) for any parameters, none for a model that declares no such sum. No
-  /// error is claimed: who uses them adds what they lack. Weights are not negative, nor is there a delta term among
-  /// them.
+  /// Closures that cover most of f cos(theta_i) for any parameters; empty if the model declares none. No error is
+  /// claimed: the caller adds what they lack. Their weights are not negative, and none is a delta term.
   virtual ClosureSum<T> base(const Vec3<T>& wo) const = 0;
-  /// Binds a number, the first element, or a colour anew. The value is not checked; another name than that of a number
-  /// or colour does nothing.
+  /// Sets a number (from the first element) or a colour to a new value. The value is not checked. Other names are
+  /// ignored.
   virtual void assign(const std::string& name, const std::array<double, 3>& value) = 0;
 };
 
 inline namespace BRDFC_INSTRUCTION_SET {
 
-/// A BRDF and the density of sampling it.
+/// The BRDF and the pdf.
 struct PackedEvaluation {
   Rgb<Pack> f;
   Pack pdf;
 };
 
-/// A model with its parameters bound that takes eight directions at once; its functions are Brdf's.
+/// A model with its parameters bound that evaluates eight directions at once; its functions are those of Brdf.
 class PackedBrdf {
  public:
   virtual ~PackedBrdf() = default;
-  /// eval() and pdf(), which have much in common.
+  /// eval() and pdf() together, because they share much computation.
   virtual PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const = 0;
   virtual Sample<Pack> sample(const Vec3<Pack>& wo, const Vec3<Pack>& u) const = 0;
   virtual Rgb<Pack> mirror(const Vec3<Pack>& wo) const = 0;
@@ -101,9 +101,9 @@ class PackedBrdf {
 
 }  // namespace BRDFC_INSTRUCTION_SET
 
-/// The formulas of a model over Pack, compiled for one instruction set. Arguments and results are passed by address,
-/// for each instruction set has a type Pack of its own; their layouts are the same. `model` is an M<Pack>. Null where
-/// the model lacks the term.
+/// The formulas of a model over Pack, compiled for one instruction set. Arguments and results are passed as void
+/// pointers, because each instruction set has its own type Pack; the layouts are the same. `model` is an M<Pack>. A
+/// pointer is null if the model lacks the term.
 struct PackedFormulas {
   void (*evaluate)(const void* model, const void* wi, const void* wo, void* evaluation);  ///< to a PackedEvaluation
   void (*sample)(const void* model, const void* wo, const void* u, void* sample);         ///< to a Sample<Pack>
@@ -111,7 +111,7 @@ struct PackedFormulas {
   void (*transmit)(const void* model, const void* wo, void* weight);                      ///< to an Rgb<Pack>
   void (*transmittance)(const void* model, const void* distance, void* share);            ///< to an Rgb<Pack>
 };
-/// Those that this machine's processor runs fastest.
+/// The formulas that are fastest on this machine's processor.
 const PackedFormulas* fastest(const PackedFormulas* baseline, const PackedFormulas* x86_64_v3,
                               const PackedFormulas* x86_64_v4);
 
@@ -120,49 +120,49 @@ class Model {
  public:
   virtual ~Model() = default;
   virtual const ModelInfo& info() const = 0;
-  /// What is wrong with the members that parameters() binds, as the rest of a sentence; nothing if each is bound once.
+  /// Reason why the members that parameters() binds are wrong, as a clause; nullopt if each is bound exactly once.
   virtual std::optional<std::string> misbound() const { return std::nullopt; }
-  /// False for a model with delta terms alone.
+  /// False for a model with only delta terms.
   virtual bool has_scatter() const = 0;
   virtual bool has_mirror() const = 0;
   virtual bool has_exact() const = 0;
-  /// The kinds of a base's closures, and what they are turned and stretched by, are the same for all choices
-  /// that have any.
+  /// The kinds of a base's closures, their orientation and their tangents must be the same for all choices that have a
+  /// base.
   virtual bool has_base() const { return false; }
   virtual bool has_transmit() const { return false; }
-  /// Does the inside absorb?
+  /// True if the inside absorbs light.
   virtual bool has_medium() const { return false; }
-  /// Does f join directions on different sides for some choice?
+  /// True if f connects directions on different sides for some choice.
   virtual bool has_through() const { return false; }
-  /// Views from inside (wo.z < 0) are meant as well.
+  /// True if views from inside (wo.z < 0) are supported.
   bool two_sided() const { return has_transmit() || has_through(); }
   /// Throws InputError naming model, parameter and what was expected.
   virtual std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const = 0;
   virtual std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const = 0;
   virtual std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const = 0;
   virtual std::unique_ptr<PackedBrdf> make_packed(const ParamValues&) const = 0;
-  /// Parameters in `fixed` become constants, other numbers and colours become inputs named after them.
-  /// A choice that is not fixed takes its default. A Recorder must be active.
+  /// Parameters in `fixed` become constants; other numbers and colours become inputs with their names. A choice that is
+  /// not fixed has its default. A Recorder must be active.
   virtual std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const = 0;
 };
 
-/// Throws InputError naming the model if parameters() leaves out a member: it would hold what was in memory.
+/// Throws InputError naming the model if parameters() omits a member, which would be uninitialised.
 void require_bound(const Model&);
 
-/// Name to model, in alphabetical order. Throws InputError if one is declared wrongly (model/registry.h), as the two
-/// functions below do.
+/// All models by name, in alphabetical order. Throws InputError if one is declared wrongly (model/registry.h), as do
+/// the two functions below.
 const std::map<std::string, std::unique_ptr<Model>>& models();
 /// Throws InputError that lists the known names.
 const Model& find_model(const std::string& name);
-/// That one, or without a name all of them.
+/// The model with this name, or all models if the name is empty.
 std::vector<const Model*> models_named(const std::string& name);
 
-/// Called by BRDFC_MODEL, before main(): nobody could catch what it threw. models() tells what is wrong.
+/// Called by BRDFC_MODEL before main(), so it does not throw, because nobody could catch that. models() reports errors.
 bool register_model(std::unique_ptr<Model>, const char* file);
 
 namespace detail {
 
-/// `values` is complete, so every look-up succeeds.
+/// `values` must be complete, so that every look-up succeeds.
 template <class T> struct BindVisitor {
   const ParamValues& values;
   void operator()(T& member, const NumberSpec& s) const { member = T(std::get<double>(values.at(s.name))); }
@@ -177,7 +177,7 @@ template <class T> struct BindVisitor {
   }
 };
 
-/// Binds one number or colour.
+/// Sets one number or colour.
 template <class T, class Value> struct AssignVisitor {
   const std::string& name;
   const std::array<Value, 3>& value;
@@ -190,7 +190,7 @@ template <class T, class Value> struct AssignVisitor {
   void operator()(Choice&, const ChoiceSpec&) const {}
 };
 
-/// Binds what is fixed to constants and the rest to inputs.
+/// Binds fixed parameters to constants and the others to inputs.
 struct RecordVisitor {
   const ParamValues& values;  // complete
   const ParamValues& fixed;
@@ -208,12 +208,12 @@ struct RecordVisitor {
   void operator()(Choice& member, const ChoiceSpec& s) const { BindVisitor<Expr>{values}(member, s); }
 };
 
-/// Where a parameter's member lies within its model, in bytes.
+/// The range of bytes that a parameter's member takes in its model.
 struct BoundMember {
   std::size_t first, end;
   std::string name;
 };
-/// Notes them; `begin` is the model.
+/// Collects these ranges; `begin` is the address of the model.
 struct PlaceVisitor {
   const void* begin;
   std::vector<BoundMember>& out;
@@ -222,7 +222,7 @@ struct PlaceVisitor {
     out.push_back({first, first + sizeof(Member), s.name});
   }
 };
-/// As Model::misbound(), of a model of so many bytes, 0 for one without members.
+/// The result of Model::misbound() for a model of `size` bytes; 0 for one without members.
 std::optional<std::string> misbound(std::vector<BoundMember>, std::size_t size);
 
 template <class M>
@@ -240,7 +240,7 @@ concept HasTransmit = requires(const M& m, const Vec3<double>& w) {
   m.transmit(w);
   m.ior();
 };
-/// Bends channels apart where disperses() holds.
+/// The channels have different indices if disperses() is true.
 template <class M>
 concept HasDispersion = HasTransmit<M> && requires(const M& m) {
   m.disperses();
@@ -352,7 +352,7 @@ template <template <class> class M, class T> class BrdfOf final : public Brdf<T>
       sum.back().ior = select(wo.z > T(0), ior, T(1) / ior);
     };
     if constexpr (HasDispersion<M<double>>) {
-      // One for each channel where they part, else one for all, in green's place.
+      // One closure per channel if the channels differ; otherwise one for all, which takes the place of green.
       const Rgb<T> weight = transmit(wo), none(T(0));
       const std::array<T, 3> iors = m_.channel_iors();
       const auto parted = m_.disperses();
@@ -458,7 +458,7 @@ template <template <class> class M> class PackedOf final : public PackedBrdf {
 
 template <template <class> class M> class ModelOf final : public Model {
  public:
-  /// `formulas`: for a further instruction set, if the model is compiled for any.
+  /// `formulas` are those for a further instruction set, if the model is compiled for any.
   explicit ModelOf(const PackedFormulas* formulas = &kPackedFormulas<M>)
       : info_(M<double>::info()), packed_formulas_(*formulas) {
     M<double> prototype;
@@ -466,7 +466,7 @@ template <template <class> class M> class ModelOf final : public Model {
   }
   const ModelInfo& info() const override { return info_; }
   std::optional<std::string> misbound() const override {
-    // Of floats, whose members leave no bytes unused between them.
+    // Tested with floats, whose members have no padding between them.
     M<float> prototype{};
     std::vector<BoundMember> members;
     prototype.parameters(PlaceVisitor{&prototype, members});
@@ -508,8 +508,9 @@ template <template <class> class M> class ModelOf final : public Model {
 
 }  // namespace detail
 
-/// Registers the class template M at start-up. The models are linked as objects, so the linker keeps this. It sees the
-/// variable as well: of two models with one class name it would else keep one class for both, without a word.
+/// Registers the class template M at start-up. The models are linked as object files, so the linker keeps the variable.
+/// The variable also makes the linker report two models with the same class name; otherwise it would silently use one
+/// class for both.
 #if !BRDFC_BASELINE
 #define BRDFC_MODEL(M)                                                                           \
   namespace packed::BRDFC_INSTRUCTION_SET {                                                      \

@@ -19,12 +19,12 @@ struct Row {
   int line;
 };
 
-/// What is said of a file on the way from its rows to a curve.
+/// Checks and cleans the rows of a file before they become a curve, and collects notes about that.
 class Cleaner {
  public:
   Cleaner(std::string file, std::vector<std::string>& notes) : file_(std::move(file)), notes_(notes) {}
 
-  /// Whether wavelengths are nanometres.
+  /// True if wavelengths are in nanometres.
   bool in_nanometres(const std::vector<Row>& n, const std::vector<Row>& k) {
     for (const auto* rows : {&n, &k})
       for (const Row& r : *rows) {
@@ -210,7 +210,7 @@ const std::vector<Substance>& substances() {
 }
 
 Substance find_substance(const std::string& name, const fs::path& folder) {
-  if (name.ends_with(".csv")) return read_substance(folder / name);  // an absolute name stays what it is
+  if (name.ends_with(".csv")) return read_substance(folder / name);  // an absolute path is not changed
   std::vector<std::string> known;
   for (const Substance& s : substances()) {
     if (s.name == name) return s;

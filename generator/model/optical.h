@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Substances by their measured refractive index n + i k over the wavelength, and what stands for them in the three
-// channels of a working space.
+// Substances given by their measured refractive index n + i k as a function of wavelength, and their approximation in
+// the three channels of a working space.
 //
-// What is linear in light is averaged over the spectrum (model/spectrum.h): the reflectance from above, R_0; the
-// complex amplitude of it, r = (n - 1 + i k) / (n + 1 + i k), whose square it is; the reflectance near the horizon.
-// Each channel gets the index of exactly its R_0, whose r has the phase that gives the reflectance near the horizon. It
-// is found from the mean amplitude's by Newton steps, and is off the integral over all wavelengths by at most 5e-3
-// between (tests/model/optical_test.cpp prints it).
+// Quantities that are linear in light are averaged over the spectrum (model/spectrum.h): the reflectance at normal
+// incidence, R_0; its complex amplitude r = (n - 1 + i k) / (n + 1 + i k), with R_0 = |r|^2; and the reflectance near
+// the horizon. Each channel gets an index with exactly its R_0, and with the phase of r that gives the reflectance near
+// the horizon. The phase is found by Newton's method, starting from that of the mean amplitude. Between these two
+// angles the reflectance differs from the integral over all wavelengths by at most 5e-3 (tests/model/optical_test.cpp
+// prints it).
 //
-// What lets light through may absorb it on the way: exp(-4 pi k d / lambda) after a distance d (Beer's law). Its colour
-// is taken at one thickness, where it is exact. Over other distances a channel has a power of it, as if all its
-// wavelengths were absorbed alike; power_law_error() says how far that is off.
+// A transparent substance may absorb light: exp(-4 pi k d / lambda) remains after a distance d (Beer's law). The colour
+// is exact at one thickness. For other distances each channel uses a power of it, as if all its wavelengths were
+// absorbed equally; power_law_error() measures the error of that.
 //
-// No index reflects more than all the light. Where a colour lies outside of the working space, as gold does outside of
-// Rec.709, a channel's R_0 may be above 1: it stops at kBrightest.
+// No index reflects more than all the light. If a colour is outside the working space, as gold is outside Rec.709, the
+// R_0 of a channel may be above 1; it is limited to kBrightest.
 #pragma once
 
 #include <array>
@@ -30,118 +31,119 @@
 
 namespace brdfc::inline model {
 
-/// The largest R_0 of a channel: n and k stay those of a metal.
+/// The largest R_0 of a channel, for which n and k are still those of a metal.
 inline constexpr double kBrightest = 0.999;
-/// Cosine of the angle near the horizon whose reflectance a channel's index has as well.
+/// The cosine of the grazing angle at which a channel's index also has the right reflectance.
 inline constexpr double kGrazing = 0.1;
-/// Wavelengths in nm that a substance's measurements must span: beyond them is less than a tenth of what the eye sees
-/// of white in any of X, Y and Z. Measurements go on as they end, which is said of those that end within kExpected.
+/// Wavelengths in nm that a substance's measurements must cover: those beyond contribute less than a tenth to X, Y and
+/// Z of white. Measurements are extended by their end values, with a note if they end within kExpected.
 inline constexpr double kNeededMin = 430, kNeededMax = 650;
 inline constexpr double kExpectedMin = 400, kExpectedMax = 700;
-/// Wavelengths in nm outside of which nothing is seen: a bad value there is left out.
+/// Wavelengths in nm outside of which light is invisible; an invalid value there is ignored.
 inline constexpr double kSeenMin = 380, kSeenMax = 780;
-/// The wavelength, whatever its unit, from which on all of a file's are taken for nanometres: the infrared of 100 um
-/// colours nothing.
+/// If any wavelength of a file is at least this number, whatever its unit, all are taken as nanometres: infrared of 100
+/// um has no effect on colour.
 inline constexpr double kNanometres = 100;
-/// Measured k below 0 down to this much are noise about 0.
+/// Measured values of k between 0 and minus this are noise about 0.
 inline constexpr double kNoiseOfK = 1e-3;
-/// The k from which on a substance is a conductor: it lets no light through that one could see.
+/// A substance with at least this k is a conductor: it transmits no visible light.
 inline constexpr double kConductor = 0.01;
 
-/// The thickness in metres at which absorption is exact where none is stated: that of catalogues of glass.
+/// The thickness in metres at which absorption is exact if none is stated: that of glass catalogues.
 inline constexpr double kThickness = 0.01;
-/// The range of thicknesses: one over it is a density that models accept.
+/// The range of thicknesses; one over a thickness is a density that models accept.
 inline constexpr double kThinnest = 1e-6, kThickest = 1e6;
-/// The least share of a channel that passes that thickness. Colours outside of the working space have none, which no
-/// absorption per length gives.
+/// The smallest share of a channel that is transmitted through that thickness. Colours outside the working space have
+/// none, which no absorption coefficient can produce.
 inline constexpr double kDarkest = 1e-4;
 
 /// The largest n or k that a file may have.
 inline constexpr double kMaxIndex = 100;
 
-/// Numbers over increasing wavelengths in nm.
+/// A function of wavelength, given by numbers at increasing wavelengths in nm.
 struct Curve {
   std::vector<double> nm, values;
-  /// Linear in between, constant beyond the ends; 0 of an empty one.
+  /// Linear interpolation, constant beyond the ends; 0 for an empty curve.
   double at(double wavelength) const;
 };
 
-/// A metal, a glass, a liquid.
+/// A substance: a metal, a glass, a liquid.
 struct Substance {
   std::string name;                     ///< "gold", or the path of a file
-  std::string label;                    ///< "Gold"; of a file without one its name
+  std::string label;                    ///< "Gold"; for a file without a label, its name
   std::string source;                   ///< who measured it; may be empty
-  Curve n, k;                           ///< k is empty where none is given
-  std::vector<std::string> notes = {};  ///< of a file: what was assumed, or left out of it
+  Curve n, k;                           ///< k is empty if none is given
+  std::vector<std::string> notes = {};  ///< for a file: assumptions that were made, and data that were ignored
 
-  /// Whether its mean k, as the eye weighs it, is that of a conductor.
+  /// True if its mean k, weighted by the sensitivity of the eye, is that of a conductor.
   bool conductor() const;
-  /// n at the Fraunhofer line d (587.56 nm), and Abbe's number (n_d - 1) / (n_F - n_C); infinite without dispersion.
+  /// n at the Fraunhofer d line (587.56 nm), and the Abbe number (n_d - 1) / (n_F - n_C), which is infinite without
+  /// dispersion.
   double index_d() const;
   double abbe() const;
-  /// Fresnel reflectance, unpolarised; cosTheta in (0, 1].
+  /// The Fresnel reflectance for unpolarised light; cosTheta in (0, 1].
   Xyz reflectance(double cosTheta) const;
-  /// Whether light is absorbed inside: k is given, and not 0 all over the visible.
+  /// True if light is absorbed inside: k is given and is not 0 at all visible wavelengths.
   bool absorbs() const;
-  /// What is left of light after that many metres inside.
+  /// The share of light that remains after this many metres inside.
   Xyz transmittance(double metres) const;
 };
 
-/// Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in micrometres and n, then the
-/// same of wl,k, which may be missing; or wl,n,k. Lines that start with # are skipped; the first is the label, the
-/// second the source. Wavelengths of 100 and more are nanometres; rows may come in any order, and of a wavelength that
-/// stands twice the mean is taken. What was assumed is said in Substance::notes. Throws InputError naming file, line
-/// and what was expected.
+/// Reads a file in the export format of refractiveindex.info: a line wl,n, rows with a wavelength in micrometres and n,
+/// then optionally the same for wl,k; or wl,n,k. Lines that start with # are skipped; the first of them is the label,
+/// the second the source. Wavelengths of 100 and more are nanometres. Rows may be in any order; for a wavelength that
+/// occurs twice the mean is used. Assumptions are listed in Substance::notes. Throws InputError naming file, line and
+/// what was expected.
 Substance read_substance(const std::filesystem::path&);
 
-/// Those of data/optical, by name.
+/// The substances of data/optical, by name.
 const std::vector<Substance>& substances();
-/// One of them, or a file if the name ends with .csv; a relative one is looked for in `folder`. Throws InputError
-/// listing the names, or as read_substance().
+/// One of these substances; or one read from a file if the name ends with .csv, where a relative path is relative to
+/// `folder`. Throws InputError that lists the names, or as read_substance() does.
 Substance find_substance(const std::string& name, const std::filesystem::path& folder);
 
-/// From X, Y and Z to the working space.
+/// Converts X, Y and Z to the working space.
 using ToRgb = std::function<std::array<double, 3>(const Xyz&)>;
 
-/// What a substance is in a working space.
+/// The optical values of a substance in a working space.
 struct OpticalValues {
   std::array<double, 3> n, k;         ///< by channel
-  std::array<double, 3> reflectance;  ///< from above, in [0, 1]
-  std::array<double, 3> unclipped;    ///< the same where a colour lies outside of the working space
-  double luminance;                   ///< Y of it
+  std::array<double, 3> reflectance;  ///< at normal incidence, in [0, 1]
+  std::array<double, 3> unclipped;    ///< the same without clipping, for a colour outside the working space
+  double luminance;                   ///< the luminance Y of the reflectance
 };
 OpticalValues optical_values(const Substance&, const ToRgb&);
 
-/// What is left of a channel after that many metres, in [kDarkest, 1].
+/// The share of each channel that remains after this many metres, in [kDarkest, 1].
 std::array<double, 3> attenuation(const Substance&, double metres, const ToRgb&);
-/// How far a channel is off at most after a distance, as a share of the light, where it has the power distance /
-/// thickness of what is left after the thickness; both in metres.
+/// The largest error of a channel after a distance, as a share of the light, if the share that remains after
+/// `thickness` is raised to the power distance / thickness. Both are in metres.
 double power_law_error(const Substance&, double thickness, double distance, const ToRgb&);
 
-/// The parameters of a model that say what its surface is made of (ParamInfo::optical), as the substance has them; the
-/// others are not in it. Absorption is exact at the thickness, in metres, which are the model's units of length.
-/// Throws InputError if the model has none for a substance of that kind, or if a thickness is given to a model or a
-/// substance that absorbs nothing.
+/// The values of a substance for those parameters of a model that describe its material (ParamInfo::optical); other
+/// parameters are not included. Absorption is exact at the thickness, which is in metres; they are the model's units of
+/// length. Throws InputError if the model has no parameters for a substance of that kind, or if a thickness is given
+/// but the model or the substance does not absorb.
 ParamValues parameters_of(const ModelInfo&, const Substance&, const ToRgb&, std::optional<double> thickness = {});
 
-/// Beer's law: what is left after that many metres at the wavelength in nm.
+/// Beer's law: the share that remains after this many metres, at the wavelength in nm.
 template <class T> T transmittance(const T& nm, const T& k, const T& metres) {
   return exp(-(T(4 * kPi) * k / (nm * T(1e-9))) * metres);
 }
 
-/// r at normal incidence.
+/// The amplitude r at normal incidence.
 template <class T> struct Amplitude { T real, imaginary; };
 template <class T> Amplitude<T> normal_amplitude(const T& n, const T& k) {
   const T below = named("below", sqr(n + T(1)) + sqr(k));
   return {((n - T(1)) * (n + T(1)) + sqr(k)) / below, T(2) * k / below};
 }
 
-/// n and k of a channel, from means over the spectrum: R_0, r, and the reflectance at kGrazing.
+/// n and k of a channel from means over the spectrum: R_0, r, and the reflectance at kGrazing.
 template <class T> struct Index { T n, k; };
 template <class T> Index<T> nearest_index(const T& R0, const Amplitude<T>& r, const T& grazing) {
   const T R = named("R", minimum(maximum(R0, T(1e-6)), T(kBrightest)));
   const T root = named("root", sqrt(R));
-  // From |r|^2 = R and the cosine and sine of its phase: n + i k = (1 + r) / (1 - r).
+  // n + i k = (1 + r) / (1 - r), from |r|^2 = R and the cosine and sine of the phase of r.
   const auto index = [&](const T& cosine, const T& sine) {
     const T below = T(1) + R - T(2) * root * cosine;
     return Index<T>{(T(1) - R) / below, T(2) * root * sine / below};
@@ -159,8 +161,9 @@ template <class T> Index<T> nearest_index(const T& R0, const Amplitude<T>& r, co
     const auto turned = [&](const T& angle) { return unit(p[0] - angle * p[1], p[1] + angle * p[0]); };
     const std::array<T, 2> up = turned(h), down = turned(-h);
     const T slope = (at_grazing(up[0], up[1]) - at_grazing(down[0], down[1])) / (T(2) * h);
-    // Damped, for without absorption nothing depends on the phase's sign: there the slope is 0.
-    // What stopped at kBrightest keeps the mean's phase: no index reflects what it should near the horizon.
+    // The step is damped, because without absorption the result does not depend on the phase's sign, and the slope
+    // there is 0.
+    // A channel limited to kBrightest keeps the phase of the mean: no index has its reflectance near the horizon.
     const T missing = select(R0 < T(kBrightest), grazing - at_grazing(p[0], p[1]), T(0));
     const T step = missing * slope / (sqr(slope) + T(1e-4));
     const T angle = minimum(maximum(step, T(-0.2)), T(0.2));

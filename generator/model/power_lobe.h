@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The lobe cos^e alpha about an axis, for exponents from 0 to 1e8.
 //
-// With q = |a - b|^2 / 2 = 1 - cos alpha of unit vectors the power is exp(e log1p(-q)): rounding moves q by its own
-// last digits, whereas a power of the dot product has lost all of them at e = 1e7. Near a right angle, where 1 - q
-// cancels and the dot product does not, the logarithm is taken of the latter. Sampling takes
-// 1 - cos alpha = -expm1(log1p(-u) / (e + 1)) for the same reason.
+// With q = |a - b|^2 / 2 = 1 - cos alpha for unit vectors, the power is computed as exp(e log1p(-q)). Rounding changes
+// only the last digits of q, while a power of the dot product has lost all digits at e = 1e7. Near a right angle 1 - q
+// cancels and the dot product does not, so there the logarithm of the dot product is used. For the same reason sampling
+// computes 1 - cos alpha = -expm1(log1p(-u) / (e + 1)).
 #pragma once
 
 #include "model/model.h"
@@ -21,12 +21,12 @@ template <class T> T power_lobe(const T& e, const Vec3<T>& a, const Vec3<T>& b) 
   return named("lobe", select(cosAlpha > T(0), exp(e * log_cos), T(0)));
 }
 
-/// Density of sample_power_lobe().
+/// The pdf of sample_power_lobe().
 template <class T> T power_lobe_pdf(const T& e, const Vec3<T>& axis, const Vec3<T>& w) {
   return (e + T(1)) / (T(2) * pi<T>()) * power_lobe(e, axis, w);
 }
 
-/// Direction about the z axis with density proportional to cos^e alpha.
+/// A direction about the z axis, sampled with a pdf proportional to cos^e alpha.
 template <class T> Vec3<T> sample_power_lobe(const T& e, const T& u1, const T& u2) {
   const T one_minus_cos = named("one_minus_cosAlpha", -expm1(log1p(-u1) / (e + T(1))));
   const T sinAlpha = named("sinAlpha", sqrt(one_minus_cos * (T(2) - one_minus_cos)));

@@ -10,7 +10,7 @@ namespace brdfc::inline model {
 namespace {
 
 void check_identifier(const std::string& what, const std::string& name) {
-  // Identifiers reach OSL, Python and file names: letters, digits and underscores only.
+  // Identifiers occur in OSL, Python and file names, so they may have lower-case letters, digits and underscores only.
   const bool plain = !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return std::islower(c) || std::isdigit(c) || c == '_';
   });
@@ -26,7 +26,7 @@ void check(const ModelInfo& info) {
   check_identifier("model name", info.name);
   check_free("model name", info.name, print::reserved_for_models(info.name));
   if (info.look == Look::Undeclared) input_error("{}: expected a look, such as .look = Look::Matte", info.name);
-  // Nodes have sockets of these names beside those of the parameters.
+  // Nodes have sockets with these names in addition to those of the parameters.
   std::set<std::string> names, labels = {"Normal", "Tangent"};
   for (const ParamInfo& p : info.params) {
     check_identifier(info.name + ": parameter name", p.name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Models under their names, as they come in; what is wrong with their declarations is told when they are asked for.
+// The models by name. Wrong declarations are accepted when a model is added, and reported when models are requested.
 #pragma once
 
 #include <map>
@@ -13,15 +13,15 @@ namespace brdfc::inline model {
 
 class Registry {
  public:
-  /// Never throws for a declaration. `file` is the one it stands in.
+  /// Adds a model. Never throws because of a wrong declaration. `file` is the file with the declaration.
   void add(std::unique_ptr<Model>, const std::string& file);
-  /// Throws InputError with a sentence a declaration that is wrong: a name that is taken or is no identifier, a
-  /// parameter named twice, ranges that contradict one another, a member that is no parameter.
+  /// Throws InputError with a sentence for each wrong declaration: a name that is taken or is not an identifier, two
+  /// parameters with the same name, contradictory ranges, a member that is not a parameter.
   const std::map<std::string, std::unique_ptr<Model>>& models() const;
 
  private:
   std::map<std::string, std::unique_ptr<Model>> models_;
-  std::map<std::string, std::string> files_;  ///< by names of models
+  std::map<std::string, std::string> files_;  ///< by model name
   std::vector<std::string> errors_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pieces of sampling that several models share.
+// Sampling functions that several models share.
 #pragma once
 
 #include <utility>
@@ -8,8 +8,9 @@
 
 namespace brdfc::inline model {
 
-/// iterate() for Newton's steps on the last of the state, ended early where numbers can tell that nothing changes any
-/// more. A step of 1e-10 leaves doubles nothing but rounding, among whose values it might wander for long.
+/// The same as iterate() for Newton's method on the last number of the state, but for numbers it stops when the result
+/// no longer changes. After a step of 1e-10 only rounding errors remain in double precision, and further steps would
+/// wander among them.
 template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
   for (int i = 0; i < count; ++i) {
     const std::array<T, N> last = std::exchange(state, step(state));
@@ -18,7 +19,7 @@ template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int coun
   }
   return state;
 }
-/// Each lane ends by itself: what it gives does not depend on its neighbours.
+/// Each lane stops by itself: its result does not depend on its neighbours.
 template <std::size_t N, class Step>
 std::array<Pack, N> settle(int count, const std::array<Pack, N>& begin, Step step) {
   std::array<Pack, N> state = begin;
@@ -36,27 +37,29 @@ std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step ste
   return iterate(count, state, step);
 }
 
-/// True where both directions are above the surface; the BRDF is 0 elsewhere.
+/// True if both directions are above the surface; elsewhere the BRDF is 0.
 template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
 
 /// Ideal reflection of wo about the normal.
 template <class T> Vec3<T> reflect(const Vec3<T>& wo) { return {-wo.x, -wo.y, wo.z}; }
 
-/// a + b for unit vectors, a multiple of their half vector. Where they are opposite the plain sum keeps only the error
-/// of their lengths. It is orthogonal to a - b, so what lies along a - b is that error, and is taken off.
+/// a + b for unit vectors, a multiple of their half vector. For nearly opposite vectors the plain sum would consist
+/// mainly of the errors of their lengths. The exact sum is orthogonal to a - b, so the component along a - b is such an
+/// error and is subtracted.
 template <class T> Vec3<T> sum_of_units(const Vec3<T>& a, const Vec3<T>& b) {
   const Vec3<T> s = a + b, d = a - b;
   return s - d * (dot(s, d) / maximum(dot(d, d), T(1)));
 }
 
-/// a - b for unit vectors, likewise. Near the normal this gives it the height that the rounded cosines have lost.
+/// a - b for unit vectors, corrected likewise. Near the normal this restores the z component that the rounded cosines
+/// have lost.
 template <class T> Vec3<T> difference_of_units(const Vec3<T>& a, const Vec3<T>& b) {
   const Vec3<T> s = a + b, d = a - b;
   return d - s * (dot(s, d) / maximum(dot(s, s), T(1)));
 }
 
-/// Ideal refraction of wo to the other side of the surface; `ior` is the index inside (z < 0) over the one outside.
-/// What lies beyond the critical angle comes out level with the surface.
+/// Ideal refraction of wo to the other side of the surface. `ior` is the index inside (z < 0) divided by the one
+/// outside. Beyond the critical angle the result is parallel to the surface.
 template <class T> Vec3<T> refract(const Vec3<T>& wo, const T& ior) {
   const auto outside = wo.z > T(0);
   const T scale = select(outside, T(1) / ior, ior);
@@ -68,16 +71,16 @@ template <class T> Vec3<T> refract(const Vec3<T>& wo, const T& ior) {
 /// cos(theta) / pi for a direction above the surface.
 template <class T> T cosine_pdf(const Vec3<T>& wi) { return select(wi.z > T(0), wi.z / pi<T>(), T(0)); }
 
-/// Direction with density cos(theta) / pi; u1 gives the height, u2 the azimuth.
+/// A direction with the pdf cos(theta) / pi; u1 determines the height, u2 the azimuth.
 template <class T> Vec3<T> sample_cosine(const T& u1, const T& u2) {
   const T phi = named("phi", T(2) * pi<T>() * u2);
   const T sinTheta = named("sinTheta", sqrt(u1));
   return {sinTheta * cos(phi), sinTheta * sin(phi), sqrt(maximum(T(1) - u1, T(0)))};
 }
 
-/// Direction above the surface with density (1 + 2 cos(theta)) / (4 pi), which does not vanish at the horizon.
+/// A direction above the surface with the pdf (1 + 2 cos(theta)) / (4 pi), which does not vanish at the horizon.
 template <class T> Vec3<T> sample_everywhere(const T& u1, const T& u2) {
-  // u1 = (c^2 + c) / 2, without cancellation.
+  // Solves u1 = (c^2 + c) / 2 without cancellation.
   const T c = T(4) * u1 / (T(1) + sqrt(T(1) + T(8) * u1)), sinTheta = sqrt(maximum(T(1) - c * c, T(0)));
   const T phi = T(2) * pi<T>() * u2;
   return {sinTheta * cos(phi), sinTheta * sin(phi), c};
@@ -86,13 +89,13 @@ template <class T> T everywhere_pdf(const Vec3<T>& wi) {
   return select(wi.z > T(0), (T(1) + T(2) * wi.z) / (T(4) * pi<T>()), T(0));
 }
 
-/// sinh x without cancellation, for x that e^x does not overflow.
+/// sinh x without cancellation, for x small enough that e^x does not overflow.
 template <class T> T stable_sinh(const T& x) {
   const T half = expm1(x) / T(2);
   return half + half / (T(2) * half + T(1));
 }
 
-/// A sample that does not exist where `exists` fails: weight and density 0.
+/// A sample with weight and pdf set to 0 unless `exists` is true.
 template <class Flag, class T>
 Sample<T> sample_if(const Flag& exists, const Vec3<T>& wi, const Rgb<T>& weight, const T& pdf) {
   return {wi, select(exists, weight, Rgb<T>(T(0))), select(exists, pdf, T(0))};
@@ -101,7 +104,7 @@ Sample<T> sample_if(const Flag& exists, const Vec3<T>& wi, const Rgb<T>& weight,
 /// (1 - c)^5, the angular part of Schlick's Fresnel approximation.
 template <class T> T schlick_weight(const T& cosTheta) { return pow5(clamp01(T(1) - cosTheta)); }
 
-/// 1 - (1 - c)^5: for small c as a polynomial, which does not cancel there but does near 1.
+/// 1 - (1 - c)^5. For small c it is evaluated as a polynomial, which has no cancellation there but has near 1.
 template <class T> T one_minus_schlick_weight(const T& c) {
   const T polynomial = c * (T(5) - c * (T(10) - c * (T(10) - c * (T(5) - c))));
   return select(c < T(0.25), polynomial, T(1) - pow5(T(1) - c));

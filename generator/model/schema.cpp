@@ -24,7 +24,7 @@ void check_range(const ModelInfo& m, const ParamInfo& p, double value) {
 ScaledRange range(const ParamInfo& p, double low, double high) {
   if (!p.by_factors) return {AxisScale::Linear, low, high};
   if (low > 0) return {AxisScale::Log, low, high};
-  // Where factors lead to no end; up to 1, log(1 + x) is as good as straight.
+  // A logarithmic scale can't reach 0. Up to 1, log(1 + x) is hardly different from a linear scale.
   return {high > 1 ? AxisScale::Log1p : AxisScale::Linear, low, high};
 }
 
@@ -152,7 +152,7 @@ ParamValues parse_values(const ModelInfo& info, const std::vector<std::string>& 
     const ParamInfo* p = info.param(name);
     if (values.count(name)) input_error("{}: {}: given twice", info.name, name);
     if (!p || p->kind == ParamKind::Choice) {
-      values[name] = text;  // complete() names what was expected
+      values[name] = text;  // complete() reports what was expected
     } else if (p->kind == ParamKind::Number) {
       values[name] = parse_number(info.name, name, text);
     } else {

@@ -18,7 +18,7 @@ constexpr const char* kManifest = "blender_manifest.toml";
 constexpr const char* kTranslations = "translations";
 constexpr const char *kId = "brdfc_shaders", *kName = "brdfc Shaders";
 
-/// Small letters, digits and single underscores between them.
+/// The text in small letters and digits, with single underscores for all other characters.
 std::string slug(const std::string& name) {
   std::string out;
   for (const char c : name) {
@@ -64,7 +64,7 @@ std::map<std::string, std::string> addon_files(const fs::path& folder, const std
     const std::string name = entry.path().lexically_relative(folder).generic_string();
     const std::string kind = entry.path().extension().string();
     const bool words = entry.path().parent_path().filename() == kTranslations && kind == ".json";
-    // The library of ready-made materials is made of all models.
+    // The library of ready-made materials uses all models, so only a pack of everything has it.
     const bool of_library = cut.empty() && name.starts_with("library/") && (kind == ".json" || kind == ".jpg");
     if (words || of_library || kind == ".py") files[name] = read_text(entry.path());
   }

@@ -24,7 +24,7 @@ Json looks_json() {
 
 namespace {
 
-/// By parameter that some choices leave unread: for each choice, those under which a formula reads it.
+/// For each parameter that is unused under some choices: by choice, the options under which a formula reads it.
 using Readers = std::map<std::string, std::vector<std::set<int>>>;
 
 Readers readers(const Model& model) {

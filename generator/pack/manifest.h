@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of manifest.json, which is all that the add-on knows of models and forms.
+// The parts of manifest.json, from which the add-on learns everything about models and forms.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,21 +15,22 @@ namespace brdfc::pack {
 
 using Json = nlohmann::ordered_json;
 
-/// Every look that a model may declare, in the order of menus.
+/// All looks that a model may declare, in the order of menus.
 Json looks_json();
-/// Of what is not fixed. `needs` of one: by choice, those without which no formula reads it.
+/// The parameters that are not fixed. `needs` of a parameter lists, by choice, the options under which a formula reads
+/// it.
 Json parameters_json(const Model&, const ParamValues& fixed);
 Json values_json(const ParamValues&);
-/// ParamInfo::optical of those of these parameters that have any, by name.
+/// ParamInfo::optical of those of these parameters that declare it, by name.
 Json optical_json(const Model&, const ParamValues&);
 Json error_json(const forms::FormError&);
-/// Without what is fixed. `file`: where the pack has the table as an image.
+/// The description of an albedo table without the fixed parameters. `file` is the table's image in the pack.
 Json table_json(const measure::AlbedoTable&, const std::string& file, const Model&, const ParamValues& fixed);
-/// The number that a fit runs over, and how far; null without one.
+/// The number that a fit runs over, and its range; null without one.
 Json axis_json(const std::optional<fit::FitAxis>&);
-/// How bright a form's highlight is: f cos about the mirror direction, the brighter of two views; and over which number
-/// of its sliders, if any. A clamp on indirect light shows the earlier the brighter it is. Null for a form in which a
-/// clamp does not show by that.
+/// The brightness of a form's highlight: f cos near the mirror direction, for the brighter of two views; and the number
+/// whose slider it depends on, if any. The brighter the highlight, the sooner clamping of indirect light becomes
+/// visible. Null for a form in which clamping does not become visible that way.
 Json highlight_json(const Model&, const forms::Form&, const forms::Shader&, const ParamValues& fixed);
 
 }  // namespace brdfc::pack

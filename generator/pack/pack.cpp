@@ -31,9 +31,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whatever the extension's id is: what reads packs knows this folder.
+/// The folder's name does not depend on the extension's id, because programs that read packs know it.
 constexpr const char* kFolder = "brdfc_shaders";
-/// What the manifest says of who wrote it, before the version.
+/// The manifest's "generator" entry, before the version.
 constexpr const char* kGenerator = "brdfc ";
 
 void write_text(const fs::path& path, const std::string& text) {
@@ -44,7 +44,7 @@ void write_text(const fs::path& path, const std::string& text) {
   if (!out) input_error("{}: cannot be written", path.string());
 }
 
-/// A folder beside the target that goes away unless renamed.
+/// A temporary folder beside the target, which is deleted unless it is renamed.
 class Staging {
  public:
   explicit Staging(const fs::path& out) : path_(out / fmt::format("{}{}", kPrefix, process_id())) {
@@ -64,7 +64,7 @@ class Staging {
  private:
   static constexpr const char* kPrefix = ".brdfc-build-";
 
-  /// What a build that was killed left behind: its process is gone.
+  /// Deletes the folders of builds that were killed: those whose process no longer exists.
   static void remove_abandoned(const fs::path& out) {
     std::error_code ignored;
     for (const fs::directory_entry& entry : fs::directory_iterator(out, ignored)) {
@@ -78,8 +78,8 @@ class Staging {
   fs::path path_;
 };
 
-/// Puts `fresh` where `target` is, in one step where the file system can exchange two names, so that at no time there
-/// is none; elsewhere the old folder steps aside first. It goes with the staging folder.
+/// Moves `fresh` to `target`. Where the file system can exchange two names this is one step, so that a target always
+/// exists. Elsewhere the old folder is moved away first. It is deleted with the staging folder.
 void replace_folder(const fs::path& fresh, const fs::path& target, const fs::path& scratch) {
   if (fs::exists(target)) {
     if (exchange(fresh, target)) return;
@@ -94,14 +94,14 @@ struct BuiltModel {
   std::vector<Line> lines;
 };
 
-/// What a form of a plan is made for.
+/// The setting for which a form of a plan is made.
 forms::Setting setting_of(const plan::PlannedModel& plan, const forms::Form& form) {
   forms::Setting setting{plan.fixed, plan.views, plan.max_lamps, plan.base};
   setting.fixed.merge(form.values(*plan.model, plan.fixed));
   return setting;
 }
 
-/// `whole_table`: of its albedo, where it has one.
+/// `whole_table` is the model's albedo table, if it has one.
 BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTable& whole_table,
                        const plan::Costs& costs, const fs::path& scratch) {
   const Model& model = *plan.model;
@@ -140,8 +140,8 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
     const measure::AlbedoTable of_form =
         fixed == plan.fixed ? table : measure::fold(whole_table, model, fixed, plan.views);
     const forms::Shader shader = form->write(model, of_form, setting);
-    // What the plan has saved shows against the whole shader, which is this one where nothing was left out.
-    // What is fitted exists for these parameters only.
+    // The savings of a plan are shown relative to the whole shader; if nothing was left out, that is this one. A fitted
+    // form exists for these parameters only.
     const ParamValues whole_fixed = form->made_of_fit() ? fixed : ParamValues{};
     const bool cut = !plan.views.all() || (!form->made_of_fit() && !plan.fixed.empty());
     const forms::Shader whole = cut && !form->native()
@@ -196,7 +196,7 @@ Result build_pack(const Options& options) {
   std::vector<BuiltModel> built(chosen.size());
   std::mutex mutex;
   int begun = 0;
-  // A thread that waits for parts of a model must not begin another one: recordings belong to their thread.
+  // A thread that waits for parts of a model must not begin another model, because recordings belong to their thread.
   std::vector<measure::AlbedoTable> tables(chosen.size());
   const auto tabulate = [&](std::size_t i) {
     const Model& model = *chosen[i].model;
@@ -210,16 +210,16 @@ Result build_pack(const Options& options) {
     }
     tbb::this_task_arena::isolate([&] { built[i] = build_model(chosen[i], tables[i], options.costs, staging.path()); });
   };
-  // Tables first: what is wrong with a model shows there, and sooner than in a fit.
+  // Tables come first: they show errors in a model sooner than a fit does.
   tbb::parallel_for(std::size_t(0), chosen.size(), tabulate, tbb::simple_partitioner());
-  // Fits that are not stored are made one at a time, by all cores; then models side by side, so that what one does in
-  // line keeps no core waiting.
+  // Fits that are not stored are made one at a time, using all cores. Then models are built in parallel, so that the
+  // serial parts of one keep no core waiting.
   for (const plan::PlannedModel& plan : chosen)
     for (const forms::Form* form : plan.forms) form->prepare(*plan.model, setting_of(plan, *form));
   tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   Result result;
-  // Blender's nodes that join closures take of the pool, too: Mix Shader makes two products and their sum.
+  // Blender's nodes that combine closures also take memory of the pool: Mix Shader makes two products and their sum.
   Json manifest = {{"format", 1},
                    {"generator", std::string(kGenerator) + BRDFC_VERSION},
                    {"hash", ""},

@@ -14,13 +14,13 @@
 namespace brdfc::pack {
 
 struct Options {
-  std::filesystem::path out;               ///< folder that receives brdfc_shaders/ and the zip, ID-<version>.zip
+  std::filesystem::path out;               ///< folder for brdfc_shaders/ and the zip, ID-<version>.zip
   std::filesystem::path addon;             ///< folder with the add-on's Python and blender_manifest.toml
-  std::filesystem::path python;            ///< folder with what the Python package has by hand
-  std::vector<plan::PlannedModel> models;  ///< what of each model
-  plan::Costs costs = {};                  ///< for the panel
+  std::filesystem::path python;            ///< folder with the Python package's hand-written files
+  std::vector<plan::PlannedModel> models;  ///< what to include of each model
+  plan::Costs costs = {};                  ///< shown in the panel
   std::function<void(const std::string& what, int done, int total)> progress;  ///< may be empty
-  std::string cut = {};  ///< name of what the models are cut to, for an id of its own (addon.h); empty: nothing
+  std::string cut = {};  ///< name of the scene that models are cut to, for an own id (addon.h); empty: not cut
 };
 
 /// A line of the table that a build prints.
@@ -30,9 +30,10 @@ struct Line {
   forms::FormError error;
   std::size_t table_floats = 0;
   double table_error = 0;
-  std::size_t bytes = 0;         ///< of the shader's text
-  std::size_t albedo_bytes = 0;  ///< of that of its Albedo output, where that is a shader of its own
-  /// The same with nothing left out, bytes of both texts together; equal where nothing is.
+  std::size_t bytes = 0;         ///< size of the shader's text
+  std::size_t albedo_bytes = 0;  ///< size of the text for its Albedo output, if that is a separate shader
+  /// The same for a form with nothing left out, `whole_bytes` for both texts together. Equal to the values above if
+  /// nothing is left out.
   int whole_closures = 0, whole_operations = 0, whole_statements = 0;
   std::size_t whole_table_floats = 0, whole_bytes = 0;
 };
@@ -42,12 +43,12 @@ struct Result {
   std::vector<Line> lines;
 };
 
-/// Throws InputError if `out` has a folder of the extension's name that this tool did not write: build_pack() deletes
-/// what is in it.
+/// Throws InputError if `out` has a folder with the extension's name that this tool did not write, because build_pack()
+/// deletes its contents.
 void require_target(const std::filesystem::path& out);
 
-/// Builds beside the target and renames, so that a target is whole or untouched. The same models give the same
-/// bytes. Throws InputError (paths, names) or ValueError (a model that gives a bad value).
+/// Builds beside the target and then renames, so that the target is either complete or untouched. The same models give
+/// the same bytes. Throws InputError (paths, names) or ValueError (a model that returns an invalid value).
 Result build_pack(const Options&);
 
 }  // namespace brdfc::pack

@@ -21,7 +21,7 @@ struct Recorded {
   Program eval, sample;
 };
 
-/// The current recorder receives both; names of the outputs are those of the shader's variables.
+/// Records into the current recorder. Names of the outputs are those of the shader's variables.
 Recorded record_both(const Model& model, const ParamValues& choices) {
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(choices);
   const Vec3<Expr> wo = input3("wo");
@@ -80,9 +80,9 @@ std::string probe_source(const Model& model, const ParamValues& choices) {
   if (!model.has_scatter()) input_error("{}: has delta terms alone, there is nothing to probe", model.info().name);
   Recorder recorder;
   const Recorded r = record_both(model, choices);
-  std::vector<std::string> taken;  // by parameters and what the node calls them
+  std::vector<std::string> taken;  // parameters, and their names in the node
   for (const ParamInfo& p : model.info().params) taken.insert(taken.end(), {p.name, "p_" + p.name});
-  // Inputs of the node, because Cycles passes on only attributes that nodes ask for.
+  // The values are inputs of the node, because Cycles passes on only attributes that nodes ask for.
   std::string parameters = "    float show = 0,\n    vector wi = 0,\n    vector wo = 0,\n    vector numbers = 0,\n";
   Statements body;
   for (const char* name : {"wi", "wo"})

@@ -30,7 +30,7 @@ std::string color(const std::array<double, 3>& c) {
   return fmt::format("({}, {}, {})", python_number(c[0]), python_number(c[1]), python_number(c[2]));
 }
 
-/// As a constructor's call.
+/// A parameter as a constructor call.
 std::string parameter(const ParamInfo& p) {
   const std::string name = python_string(p.name), label = python_string(p.label), doc = python_string(p.doc);
   switch (p.kind) {
@@ -64,7 +64,7 @@ std::string described(const ParamInfo& p) {
   }
 }
 
-/// "ashikhmin_shirley" as "AshikhminShirley".
+/// The class name for a model: "AshikhminShirley" for "ashikhmin_shirley".
 std::string class_name(const std::string& name) {
   std::string out;
   bool start = true;
@@ -75,7 +75,7 @@ std::string class_name(const std::string& name) {
   return out;
 }
 
-/// A module's functions: those of equal text are one.
+/// The functions of a module; functions with the same text are written once.
 class Functions {
  public:
   explicit Functions(const Model& model) : model_(model) {
@@ -83,7 +83,7 @@ class Functions {
       if (p.kind != ParamKind::Choice) parameters_.push_back(p.name);
   }
 
-  /// The functions of one combination of choices, as a constructor's call.
+  /// The functions for one combination of choices, as a constructor call.
   std::string add(const Choices& choices) {
     const ModelInfo& info = model_.info();
     std::string suffix;
@@ -93,7 +93,8 @@ class Functions {
     Recorder recorder(Precision::Double);
     const std::unique_ptr<Brdf<Expr>> brdf = model_.record(with_choices(info, choices));
     const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
-    // All before programs are made of them: what one formula names has that name in the others, too.
+    // All are recorded before programs are made of them, so that a name given in one formula also applies in the
+    // others.
     Rgb<Expr> f, reflected, refracted;
     Expr density;
     Sample<Expr> s;
@@ -128,7 +129,7 @@ class Functions {
   }
 
  private:
-  /// Its name, or None for no outputs.
+  /// The function's name, or None if there are no outputs.
   std::string function(const std::string& what, const std::string& suffix, const Program& program,
                        const std::vector<std::string>& directions) {
     if (program.outputs().empty()) return "None";
@@ -187,7 +188,7 @@ std::string tuple_of(const std::vector<double>& numbers) {
   return out + ")";
 }
 
-/// What optics.py works with: the observer, the substances, and the formulas.
+/// The data for optics.py: the observer, the substances, and the formulas.
 std::string optics_module() {
   std::string out = kHead + print::python_docstring({"Optical constants, and formulas over them."}, 0);
   out += "\nimport numpy as np\n\nfrom ._formula import table\n\n";

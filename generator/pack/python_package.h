@@ -11,16 +11,16 @@
 
 namespace brdfc::pack {
 
-/// Files of the package by their paths in it: a module a model, of its formulas in double precision, and the modules by
-/// hand of `source`, a folder that holds __init__.py. Throws InputError if that is missing.
+/// The files of the package, by path within it: one module per model, with its formulas in double precision, and the
+/// hand-written modules in `source`, a folder that contains __init__.py. Throws InputError if that file is missing.
 std::map<std::string, std::string> python_package(const std::vector<const Model*>&,
                                                   const std::filesystem::path& source);
 
-/// Throws InputError if there is something in the folder that is not this package as written before.
+/// Throws InputError if the folder contains anything other than this package as written before.
 void require_package(const std::filesystem::path& folder);
 
-/// A module of f cos(theta_i) of the closures that forms are sums of, a function each, in the names that OSL has for
-/// them: of components of wi, wo and the normal, and of what the closure takes. Directions above the surface.
+/// A module with a function for f cos(theta_i) of each closure that forms use, under its OSL name. The arguments are
+/// the components of wi, wo and the normal, and the closure's parameters. Directions must be above the surface.
 std::string closures_module();
 
 }  // namespace brdfc::pack

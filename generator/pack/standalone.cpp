@@ -30,7 +30,7 @@ std::string arguments(const ModelInfo& info) {
   return out;
 }
 
-/// What is recorded of a model with its choices bound.
+/// Records the outputs of a model with its choices bound.
 using Outputs = std::function<void(const Brdf<Expr>&, Program&)>;
 
 /// Statements that assign the outputs, for every combination of choices.
@@ -85,10 +85,10 @@ std::string choices_doc(const ModelInfo& info) {
   return out;
 }
 
-/// Exact closures where they equal the model for all choices, else the aimed form without lamps.
+/// The exact closures if they equal the model for all choices, otherwise the aimed form without lamps.
 std::string shader_of(const Model& model) {
   const std::vector<const forms::Form*> forms = forms::forms_of(model);
-  // Preferred first; an exact form that exists for some choices alone would take the others away.
+  // The preferred form that exists for all choices: an exact form for some choices only would remove the other choices.
   const auto whole = std::find_if(forms.begin(), forms.end(),
                                   [&](const forms::Form* form) { return form->values(model, {}).empty(); });
   const measure::AlbedoTable table =
@@ -176,7 +176,7 @@ std::map<std::filesystem::path, std::string> standalone_files(const std::vector<
     files[fmt::format("include/brdfc_{}.h", name)] = header_of(*model, functions);
     for (const Function& f : functions) called.merge(print::functions_in(f.body));
   }
-  for (const std::string& name : names) find_model(name);  // an unknown one is an error
+  for (const std::string& name : names) find_model(name);  // throws for an unknown name
   files["include/brdfc_library.h"] =
       "// What the headers of brdfc's models call.\n// SPDX-License-Identifier: GPL-3.0-or-later\n\n" +
       guarded("library", print::library_for(called));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Folders that commands write to, and what they may delete there.
+// Output folders of commands, and what commands may delete in them.
 #pragma once
 
 #include <filesystem>
@@ -7,11 +7,11 @@
 
 namespace brdfc::pack {
 
-/// Throws InputError unless the folder is absent, empty or one that this tool wrote, which `mark`, a file in it, says
-/// by having `text` in it: what is there is about to be deleted.
+/// Throws InputError unless the folder is absent, empty, or written by this tool, because its contents are about to be
+/// deleted. A folder counts as written by this tool if its file `mark` contains `text`.
 void require_replaceable(const std::filesystem::path& folder, const std::string& mark, const std::string& text);
 
-/// Makes it unless it is there. Throws InputError.
+/// Makes the folder if it does not exist. Throws InputError if that fails.
 void make_folder(const std::filesystem::path&);
 
 }  // namespace brdfc::pack

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Zip archives.
+// Writes zip archives.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace brdfc::pack {
 
-/// Fixed times and order: the same members give the same bytes. Throws InputError naming the path.
+/// Times and order are fixed, so that the same members give the same bytes. Throws InputError naming the path.
 void write_zip(const std::filesystem::path&, const std::map<std::string, std::string>& members);
 
 }  // namespace brdfc::pack

@@ -11,7 +11,7 @@
 namespace brdfc::plan {
 namespace {
 
-/// The unit of cost has a row of its own beside the forms of a model.
+/// The name of the row with the unit of cost, which is beside the forms of a model.
 constexpr const char* kUnit = "glossy";
 
 }  // namespace

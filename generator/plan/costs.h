@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What rendering with a form costs, as script/bench measured it.
+// The render cost of forms, as script/bench measured it.
 #pragma once
 
 #include <filesystem>
@@ -13,17 +13,17 @@
 
 namespace brdfc::plan {
 
-/// CPU time of forms with their model's default parameters, sampled ones with one direction, at equal samples and in
+/// CPU times of forms with their model's default parameters (sampled forms with one direction), at equal samples, in
 /// units of Blender's Glossy node.
 class Costs {
  public:
-  /// None is known.
+  /// No costs are known.
   Costs() = default;
-  /// The table of script/bench, its further columns ignored; without a file none is known. Throws InputError naming
-  /// file, line, column and what was expected.
+  /// Reads the table of script/bench, ignoring further columns. If there is no file, no costs are known. Throws
+  /// InputError naming file, line, column and what was expected.
   explicit Costs(const std::filesystem::path&);
 
-  /// Of a form of a model; nothing where it was not measured.
+  /// The cost of a form of a model; nullopt if it was not measured.
   std::optional<double> of(const Model&, const forms::Form&) const;
 
  private:

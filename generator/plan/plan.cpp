@@ -18,9 +18,9 @@ std::string value_text(const ModelInfo& info, const std::string& name, const Par
   return format_values(info, {{name, value}});
 }
 
-using Needs = std::vector<const MaterialNeed*>;  ///< of one model
+using Needs = std::vector<const MaterialNeed*>;  ///< of one model's materials
 
-/// What all materials of a model set to the same constant.
+/// The parameters that all materials of a model set to the same constant.
 ParamValues constants(const Needs& needs) {
   ParamValues fixed;
   for (const auto& [name, value] : needs.front()->values)
@@ -31,7 +31,7 @@ ParamValues constants(const Needs& needs) {
   return fixed;
 }
 
-/// How a parameter differs between the materials of a model or over one of them.
+/// A clause that says how a parameter differs between the materials of a model, or over one of them.
 std::string how_it_varies(const std::string& name, const Needs& needs) {
   for (const MaterialNeed* need : needs) {
     if (need->textured.count(name)) return fmt::format("{} varies over {}", name, need->id);
@@ -41,12 +41,12 @@ std::string how_it_varies(const std::string& name, const Needs& needs) {
   throw std::logic_error(name + " does not vary");
 }
 
-/// Why the materials of a model have no common form of this kind; nothing if they have one. One made of a fit takes
-/// what varies by its role.
+/// Reason why the materials of a model have no common form of this kind; nullopt if they have one. In a form made of a
+/// fit, parameters may vary according to their roles.
 std::optional<std::string> unfit(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
-  // What it lacks at any values comes before what the values are.
+  // Reasons that hold for any values are tested before those that depend on values.
   if (!model.has_scatter() || !form.made_of_fit()) return form.why_not(model, fixed);
   std::optional<std::string> axis;
   const fit::Roles& roles = fit::roles_of(model, fixed);
@@ -69,15 +69,15 @@ std::optional<std::string> unfit(const Needs& needs, const Form& form) {
   return form.why_not(model, fixed);
 }
 
-/// What one of the materials can be seen from.
+/// The cosines from which at least one of the materials can be seen.
 Cosines views_of(const Needs& needs) {
   Cosines views = needs.front()->views;
   for (const MaterialNeed* need : needs) views.add(need->views);
   return views;
 }
 
-/// Of the material that is off by most; 0 for a form that does not say. The mean along an axis says little of a
-/// material at one end of it.
+/// The error of the material with the largest error; 0 for a form that states none. The mean along an axis is not used,
+/// because it says little about a material at one end of it.
 double off_by(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
   const forms::Setting setting{constants(needs), views_of(needs)};
@@ -95,19 +95,19 @@ bool keeps_error(const Needs& needs, const Form& form, const Budget& budget) {
   return budget.error && !unfit(needs, form) && off_by(needs, form) <= *budget.error;
 }
 
-/// A form may exist for some choices only: the one that a material would need; empty if it has all.
+/// A form may exist for some choices only. Returns the choice that a material would need; empty if it has all of them.
 std::string lacking(const MaterialNeed& need, const Form& form) {
   for (const auto& [name, value] : form.values(*need.model, {}))
     if (need.values.at(name) != value) return value_text(need.model->info(), name, value);
   return {};
 }
 
-/// One cost for all materials of a model: the extension has one preferred form of it.
+/// All materials of a model have one cost, because the extension has one preferred form of it.
 std::optional<double> cost_of(const Needs& needs, const Form& form, const Budget& budget) {
   return budget.costs.of(*needs.front()->model, form);
 }
 
-/// What keeps a form from a time that it may take; empty if it keeps it.
+/// Reason why a form exceeds the time limit, as a clause; empty if it does not.
 std::string over_time(const Needs& needs, const Form& form, const Budget& budget) {
   if (!budget.time) return {};
   const auto cost = cost_of(needs, form, budget);
@@ -120,7 +120,7 @@ struct Chosen {
   std::string why;
 };
 
-/// The first of these forms that keeps the time, else the cheapest.
+/// The first of these forms within the time limit; if there is none, the cheapest.
 Chosen within_time(const Needs& needs, const std::vector<const Form*>& order, const Budget& budget) {
   const Form* cheapest = nullptr;
   for (const Form* form : order) {
@@ -132,8 +132,8 @@ Chosen within_time(const Needs& needs, const std::vector<const Form*>& order, co
   return {cheapest, fmt::format("no form is known to keep {:g}x, this is the cheapest", *budget.time)};
 }
 
-/// The forms that a budget allows besides those that are always: before that which aims where it has an error, and
-/// after it where it has a time alone.
+/// The forms that a budget allows in addition to those that always exist. They come before the aimed form if the budget
+/// has an error, and after it if the budget has only a time.
 std::vector<const Form*> allowed(const Needs& needs, const Budget& budget) {
   std::vector<const Form*> out;
   for (const Form* form : forms::forms())
@@ -143,7 +143,7 @@ std::vector<const Form*> allowed(const Needs& needs, const Budget& budget) {
   return out;
 }
 
-/// In place of a form that aims: that one, and where the budget allows them others.
+/// The forms to consider in place of an aimed form: the aimed form, and others that the budget allows.
 std::vector<const Form*> aimed_or_allowed(const Form& aimed, const Needs& needs, const Budget& budget) {
   std::vector<const Form*> out = allowed(needs, budget);
   out.insert(budget.error ? out.end() : out.begin(), &aimed);
@@ -156,15 +156,15 @@ const Form& aiming_form() {
   throw std::logic_error("no form aims at lamps");
 }
 
-/// Whether closures can be fitted that are the base of an aimed form.
+/// True if closures can be fitted that serve as the base of an aimed form.
 bool has_fitted_base(const Needs& needs) {
   return std::ranges::any_of(forms::forms(), [&](const Form* f) { return f->gives_base() && !unfit(needs, *f); });
 }
 
-/// That an aimed form has for the lamps there are.
+/// The number of lamps that an aimed form has slots for.
 int lamp_slots(const Budget& budget) { return std::min(budget.lamps.value_or(forms::kMaxLamps), forms::kMaxLamps); }
 
-/// What lamps without a size make of a form; empty where they do nothing to it.
+/// A clause about the effect of lamps without a size on a form; empty if there is none.
 std::string under_lamps(const Form& form, const Budget& budget) {
   const int lamps = std::max(budget.lamps.value_or(0), int(budget.sizeless.size()));
   const std::string shine = form.under_sizeless_lamps(lamps, lamp_slots(budget));
@@ -178,7 +178,7 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
     std::vector<const Form*> order;
     for (const Form* form : known) {
       if (form->when() != Form::When::Always || !lacking(need, *form).empty()) continue;
-      // Nothing has to be fitted for a material that has what comes first.
+      // If the first form is suitable, nothing has to be fitted for the material.
       if (!order.empty() && over_time(needs, *order.front(), budget).empty()) break;
       if (form->aims())
         for (const Form* f : aimed_or_allowed(*form, needs, budget)) order.push_back(f);
@@ -202,18 +202,18 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
   return {form, "asked for"};
 }
 
-/// Why no material has a form that exists for some: `chosen` by the others.
+/// Reason why no material uses a form that some could use. `chosen` has the forms that they use.
 std::string why_not(const Form& form, const Needs& needs, const std::vector<Chosen>& chosen, const Budget& budget) {
   const bool within_budget = form.when() == Form::When::WithinBudget;
   if (form.when() == Form::When::Asked) return "only where it is asked for";
   if (within_budget && !budget.error && !budget.time) return "nothing is fitted unasked";
-  // A fit is of whatever choices the materials have.
+  // A fit is for whatever choices the materials have, so these don't exclude it.
   const auto open = std::find_if(needs.begin(), needs.end(), [&](const MaterialNeed* need) {
     return need->representation == "auto" && (within_budget || lacking(*need, form).empty());
   });
   if (open == needs.end() && !(within_budget && budget.offer)) return "the materials ask for another";
-  // Of what comes after a form that keeps the budget nothing has to be known. Places among forms(), those within the
-  // budget just before that which aims, or just after it.
+  // A form that comes after one within the budget need not be examined. The place is the index among forms(); forms
+  // within the budget come just before the aimed form, or just after it.
   const auto place = [&](const Form& f) {
     const auto& all = forms::forms();
     const auto of = [&](const Form& g) { return 2 * (std::find(all.begin(), all.end(), &g) - all.begin()); };
@@ -229,7 +229,7 @@ std::string why_not(const Form& form, const Needs& needs, const std::vector<Chos
   return fmt::format("{} comes first", first.name());
 }
 
-/// Every form, and why it is taken or not.
+/// All forms, with the reason why each is taken or not.
 std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chosen>& chosen, const Budget& budget) {
   const Model& model = *needs.front()->model;
   std::vector<FormChoice> choices;
@@ -266,8 +266,8 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
       consider(*form, missing, false);
       continue;
     }
-    // What no fit is made for is there for all models alike, and taken by those who ask for it; or as what a material
-    // that leaves its form open is without OSL.
+    // A form that is not made of a fit exists for all models alike. It is taken only for materials that ask for it, and
+    // for those that leave their form open, if they would have none without OSL.
     const bool without_osl = budget.nodes && form->native() && !form->made_of_fit() &&
                              std::any_of(needs.begin(), needs.end(),
                                          [&](const MaterialNeed* need) {
@@ -300,13 +300,14 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
   plan.choices = choose_forms(needs, chosen, budget);
   for (const FormChoice& choice : plan.choices)
     if (choice.taken) plan.forms.push_back(choice.form);
-  // What "auto" is in Blender, too.
+  // The first forms of the list are those that "auto" materials use, also in Blender.
   std::stable_partition(plan.forms.begin(), plan.forms.end(), [&](const Form* form) {
     for (std::size_t i = 0; i < needs.size(); ++i)
       if (needs[i]->representation == "auto" && chosen[i].form == form) return true;
     return false;
   });
-  // A fit that an error was asked about is there anyway. Its costs were not measured, so that a time leaves it out.
+  // If the budget has an error, the fit is made anyway, so it also serves as a base. Its cost as a base was not
+  // measured, so it is not used if the budget has a time.
   const bool aimed = std::any_of(plan.forms.begin(), plan.forms.end(), [](const Form* form) { return form->aims(); });
   if (aimed && (budget.fit_bases || budget.error) && !budget.time && has_fitted_base(needs))
     plan.base = forms::AimedBase::Fitted;

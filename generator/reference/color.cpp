@@ -23,10 +23,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Begins the names of configurations that OpenColorIO brings, from version 2.2 on.
+/// Prefix of the configurations built into OpenColorIO, from version 2.2 on.
 constexpr const char* kBuiltIn = "ocio://";
 
-/// What the file says of its version; nothing where it says none.
+/// The version that a configuration file states; empty if it states none.
 std::string stated_version(const fs::path& file) {
   std::ifstream in(file);
   static const std::regex line_of_version(R"(^\s*ocio_profile_version:\s*([0-9.]+))");
@@ -36,7 +36,7 @@ std::string stated_version(const fs::path& file) {
   return {};
 }
 
-/// Whether a configuration says that it is of a later version than this library reads.
+/// True if a configuration states a later version than this library can read.
 bool is_later(const fs::path& file) {
   int major = 0, minor = 0, own_major = 0, own_minor = 0;
   if (file.string().starts_with(kBuiltIn) || file.extension() == ".ocioz")
@@ -47,7 +47,7 @@ bool is_later(const fs::path& file) {
   return std::pair(major, minor) > std::pair(own_major, own_minor);
 }
 
-/// From CIE XYZ, white D65, to the space of the role aces_interchange, or back.
+/// The transform from CIE XYZ with white D65 to the space of the role aces_interchange, or back.
 ocio::ConstTransformRcPtr xyz_of_aces(ocio::TransformDirection direction) {
   const auto transform = ocio::BuiltinTransform::Create();
   transform->setStyle("UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD");
@@ -55,7 +55,7 @@ ocio::ConstTransformRcPtr xyz_of_aces(ocio::TransformDirection direction) {
   return transform;
 }
 
-/// What our spaces are called in the configurations of ACES: 1.0 to 1.2, then those of 1.3 and 2.0.
+/// Names of our spaces in the ACES configurations: 1.0 to 1.2, then 1.3 and 2.0.
 const std::map<std::string, std::vector<const char*>> kOtherNames{
     {"Linear Rec.709", {"Linear Rec.709 (sRGB)", "lin_rec709_scene", "lin_rec709", "Utility - Linear - Rec.709"}},
     {"Linear Rec.2020", {"lin_rec2020_scene", "lin_rec2020", "Utility - Linear - Rec.2020"}},
@@ -63,10 +63,10 @@ const std::map<std::string, std::vector<const char*>> kOtherNames{
     {"sRGB",
      {"sRGB Encoded Rec.709 (sRGB)", "srgb_rec709_scene", "sRGB - Texture", "srgb_tx", "Utility - sRGB - Texture"}}};
 
-/// CIE XYZ of x and y, of luminance 1.
+/// CIE XYZ of the chromaticity (x, y) with luminance 1.
 Eigen::Vector3d xyz(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
 
-/// Of linear RGB to CIE XYZ with the white D65, adapted by Bradford's matrix (SMPTE RP 177).
+/// The matrix from linear RGB to CIE XYZ with white D65, adapted with the Bradford matrix (SMPTE RP 177).
 Eigen::Matrix3d xyz_d65_of(const Chromaticities& c) {
   const auto near = [&](std::size_t i, double x, double y) {
     return std::abs(c[i] - x) < 1e-3 && std::abs(c[i + 1] - y) < 1e-3;
@@ -82,7 +82,7 @@ Eigen::Matrix3d xyz_d65_of(const Chromaticities& c) {
   return bradford.inverse() * gain.asDiagonal() * bradford * to_xyz;
 }
 
-/// The processor's exact formulas: the default ones approximate powers to 1e-4.
+/// Uses the processor's exact formulas: the default ones approximate powers to 1e-4.
 void convert(const ocio::ConstProcessorRcPtr& processor, Image& image) {
   const auto cpu =
       processor->getOptimizedCPUProcessor(ocio::BIT_DEPTH_F32, ocio::BIT_DEPTH_F32, ocio::OPTIMIZATION_LOSSLESS);
@@ -95,7 +95,7 @@ void convert(const ocio::ConstProcessorRcPtr& processor, Image& image) {
 struct ColorConfig::Impl {
   ocio::ConstConfigRcPtr config;
 
-  /// By name, alias or role; the names that configurations of ACES have for working_spaces() as well.
+  /// Finds a space by name, alias or role, or by the name that ACES configurations use for one of working_spaces().
   ocio::ConstColorSpaceRcPtr find(const std::string& space) const {
     if (const auto found = config->getColorSpace(space.c_str())) return found;
     const auto others = kOtherNames.find(space);
@@ -115,7 +115,7 @@ struct ColorConfig::Impl {
 };
 
 ColorConfig::ColorConfig(const fs::path& file) : file_(file), impl_(std::make_unique<Impl>()) {
-  ocio::SetLoggingLevel(ocio::LOGGING_LEVEL_NONE);  // what matters comes as an exception
+  ocio::SetLoggingLevel(ocio::LOGGING_LEVEL_NONE);  // errors are reported as exceptions
   std::error_code ignored;
   const bool built_in = file.string().starts_with(kBuiltIn);
   if (!built_in && !fs::is_regular_file(file, ignored))
@@ -166,7 +166,7 @@ const ColorConfig& ColorConfig::current() {
     const fs::path own = data_dir() / "data" / "color" / "config.ocio";
     const char* given = std::getenv("OCIO");
     if (!given || !*given) return ColorConfig(own);
-    // Blender sets it for what it starts.
+    // Blender sets OCIO for the programs that it starts.
     if (is_later(given)) {
       const std::string version = stated_version(given);
       fmt::print(stderr, "brdfc: {} {}, later than OpenColorIO {} reads: taking {}\n", given,
@@ -225,7 +225,7 @@ void ColorConfig::srgb_to_scene_linear(Image& image) const {
     convert(impl_->config->getProcessor(found->getName(), ocio::ROLE_SCENE_LINEAR), image);
     return;
   }
-  // The curve of IEC 61966-2-1, and the primaries of Rec.709.
+  // The transfer curve of IEC 61966-2-1 and the Rec.709 primaries.
   const auto curve = ocio::ExponentWithLinearTransform::Create();
   curve->setGamma({2.4, 2.4, 2.4, 1});
   curve->setOffset({0.055, 0.055, 0.055, 0});
@@ -241,7 +241,7 @@ void ColorConfig::to_scene_linear(Image& image, const Chromaticities& stated) co
   convert(impl_->config->getProcessor(xyz_of_aces(ocio::TRANSFORM_DIR_INVERSE)), unit);
   convert(impl_->config->getProcessor(interchange().c_str(), ocio::ROLE_SCENE_LINEAR), unit);
   const Eigen::Matrix3f matrix = Eigen::Map<const Eigen::Matrix3f>(unit.rgb.data());
-  // Chromaticities are rounded to four digits.
+  // The tolerance allows for chromaticities rounded to four digits.
   if ((matrix - Eigen::Matrix3f::Identity()).cwiseAbs().maxCoeff() < 2e-4f) return;
   for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
     Eigen::Map<Eigen::Vector3f> pixel(&image.rgb[i]);
@@ -250,7 +250,7 @@ void ColorConfig::to_scene_linear(Image& image, const Chromaticities& stated) co
 }
 
 std::string ColorConfig::interchange() const {
-  // The role is of OpenColorIO 2; configurations of ACES before it have the space.
+  // The role exists since OpenColorIO 2; older ACES configurations have the space.
   for (const char* name : {"aces_interchange", "ACES2065-1", "ACES - ACES2065-1"})
     if (impl_->config->getColorSpace(name)) return name;
   input_error("{}: expected the role aces_interchange, which relates spaces to CIE XYZ", file_.string());
@@ -259,7 +259,7 @@ std::string ColorConfig::interchange() const {
 std::array<double, 3> ColorConfig::from_xyz(const Xyz& xyz) const {
   const std::string space = interchange();
   const char* interchange_space = space.c_str();
-  Image pixel;  // first the white
+  Image pixel;  // the white point first
   pixel.width = pixel.height = 1;
   pixel.rgb = {1, 1, 1};
   convert(impl_->config->getProcessor(ocio::ROLE_SCENE_LINEAR, interchange_space), pixel);

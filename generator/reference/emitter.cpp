@@ -12,13 +12,13 @@ namespace {
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
 
-/// Uniform in the disk of radius 1.
+/// A uniform sample of the disk of radius 1.
 std::array<double, 2> in_disk(const std::array<double, 2>& u) {
   const double r = sqrt(u[0]), phi = 2 * kPi * u[1];
   return {r * cos(phi), r * sin(phi)};
 }
 
-/// About n, with density cos(theta) / pi.
+/// A cosine-weighted sample about n, with pdf cos(theta) / pi.
 Vector about(const Vector& n, const std::array<double, 2>& u) {
   const auto [x, y] = in_disk(u);
   Vector a, b;
@@ -78,7 +78,7 @@ EmittedRay Emitter::from_far(const Vector& direction, const Color& radiance, dou
 EmittedRay Emitter::emit(double choice, const std::array<double, 3>& where, const std::array<double, 2>& way) const {
   const auto end = std::upper_bound(ends_.begin(), ends_.end() - 1, choice);
   const std::size_t i = std::size_t(end - ends_.begin());
-  if (!(chances_[i] > 0)) return {};  // rounding: the last one may have no chance
+  if (!(chances_[i] > 0)) return {};  // rounding: the last lamp may have probability 0
   const double chance = chances_[i];
   const std::array<double, 2> place{where[0], where[1]};
   if (i == scene_.lights.size()) {
@@ -96,7 +96,7 @@ EmittedRay Emitter::emit(double choice, const std::array<double, 3>& where, cons
       return from_far(sample_cone(light.direction, h, way[0], way[1]), light.radiance, chance / (2 * kPi * h), place);
     }
     case Light::Kind::Point: {
-      const Vector out = sample_cone({0, 0, 1}, 2, place[0], place[1]);  // anywhere on the sphere
+      const Vector out = sample_cone({0, 0, 1}, 2, place[0], place[1]);  // uniform on the sphere
       if (light.radius == 0) return {light.position, out, light.intensity * (4 * kPi / chance)};
       return {light.position + out * light.radius, about(out, way),
               light.radiance * (4 * sqr(kPi * light.radius) / chance)};

@@ -21,7 +21,7 @@ int threads_of(const RenderOptions& options) {
 }
 
 void in_arena(int threads, const std::function<void()>& f) {
-  // TBB allows no more threads than cores unless told to.
+  // By default TBB limits the number of threads to the number of cores.
   const tbb::global_control allow(
       tbb::global_control::max_allowed_parallelism,
       std::max(std::size_t(threads), tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));

@@ -35,7 +35,8 @@ int channel_index(const OIIO::ImageSpec& spec, const std::string& name) {
   return -1;
 }
 
-/// R, G, B without a layer, else those of the first layer that has all three, else the first channel as grey.
+/// Selects the channels: R, G, B without a layer name; else those of the first layer that has all three; else the first
+/// channel as grey.
 Channels find_channels(const OIIO::ImageSpec& spec) {
   Channels c{channel_index(spec, "R"), channel_index(spec, "G"), channel_index(spec, "B")};
   if (c.r >= 0 && c.g >= 0 && c.b >= 0) return c;
@@ -52,7 +53,7 @@ Channels find_channels(const OIIO::ImageSpec& spec) {
 
 struct File {
   OIIO::ImageSpec spec;
-  std::vector<float> data;  // interleaved, spec.nchannels a pixel
+  std::vector<float> data;  // interleaved, spec.nchannels values per pixel
 
   Image extract(const Channels& c) const {
     Image image(spec.width, spec.height);
@@ -70,7 +71,7 @@ struct File {
 struct Format {
   const char* name;
   std::vector<std::string> endings;
-  std::vector<std::string> magic;  ///< one of these begins a file
+  std::vector<std::string> magic;  ///< a file of this format begins with one of these
 };
 
 const std::vector<Format>& formats() {
@@ -85,7 +86,7 @@ const std::vector<Format>& formats() {
   return all;
 }
 
-/// The format whose files begin so; nullptr if it is none of formats().
+/// The format whose magic number the file begins with; nullptr if it is none of formats().
 const Format* format_of_content(const fs::path& path) {
   std::string start(4, '\0');
   std::ifstream(path, std::ios::binary).read(start.data(), std::streamsize(start.size()));
@@ -95,18 +96,18 @@ const Format* format_of_content(const fs::path& path) {
   return nullptr;
 }
 
-/// What OpenImageIO says, on one line.
+/// OpenImageIO's message on one line.
 std::string reason(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
 }
 
-/// Refuses an EXR file in whose first header something claims to be longer than the file: OpenEXR would reserve up to
-/// 2 GiB for it before it looks.
+/// Rejects an EXR file whose first header states that something is longer than the file: OpenEXR would reserve up to 2
+/// GiB before it checks this.
 void check_exr_header(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   const auto size = std::int64_t(fs::file_size(path));
-  in.seekg(8);  // magic number and version
+  in.seekg(8);  // skips magic number and version
   for (std::string name, type; std::getline(in, name, '\0') && !name.empty();) {
     std::array<unsigned char, 4> bytes{};
     std::getline(in, type, '\0');
@@ -132,10 +133,10 @@ File read_file(const fs::path& path) {
     input_error("{}: not {} {} file, as its name says{}", path.string(), format->name[0] == 'O' ? "an" : "a",
                 format->name, content ? fmt::format(", but {}", content->name) : "");
   if (type == ".exr") check_exr_header(path);
-  // The reader for that ending and no other: else each of some thirty tries its luck with a damaged file.
+  // Uses only the reader for that file extension. Otherwise about thirty readers would try to open a damaged file.
   const auto in = OIIO::ImageInput::create(type.substr(1));
   File file;
-  const QuietErrors quiet;  // libpng and libtiff say it as well
+  const QuietErrors quiet;  // libpng and libtiff also print the error themselves
   if (!in || !in->open(path.string(), file.spec))
     input_error("{}: damaged {} file: its header can't be read", path.string(), format->name);
   const auto& s = file.spec;
@@ -143,8 +144,8 @@ File read_file(const fs::path& path) {
       s.nchannels > 1024 || std::size_t(s.width) * s.height * s.nchannels > kMaxPixels)
     input_error("{}: {} x {} pixels with {} channels: expected a flat image with sides of at most {}", path.string(),
                 s.width, s.height, s.nchannels, kMaxSide);
-  // A few bytes may claim to be a picture of gigabytes. Nothing that is read here packs a value into less than a
-  // thousandth of its size (deflate, the densest of the codecs, ends at 1 : 1032).
+  // A few bytes may declare an image of gigabytes. None of the formats that are read here compresses a value to less
+  // than a thousandth of its size; the densest codec, deflate, reaches at most 1 : 1032.
   const std::size_t values = std::size_t(s.width) * s.height * s.nchannels;
   if (values > (std::size_t(1) << 20) + 1032 * fs::file_size(path))
     input_error("{}: damaged image: {} x {} pixels with {} channels do not fit into {} bytes", path.string(), s.width,
@@ -161,7 +162,8 @@ void write_file(const fs::path& path, const OIIO::ImageSpec& spec, const std::ve
     if (!out) input_error("{}: can't write this image format ({})", path.string(), reason(OIIO::geterror()));
     if (!out->open(temporary.string(), spec) || !out->write_image(OIIO::TypeDesc::FLOAT, data.data()) || !out->close())
       input_error("{}: can't write ({})", path.string(), reason(out->geterror()));
-    // OpenEXR hands the end of a small file to the system when it closes it, and does not tell if that fails.
+    // When OpenEXR closes a small file, it passes the last bytes to the operating system, and does not report if that
+    // fails. So the file is read back.
     const auto back = OIIO::ImageInput::open(temporary.string());
     std::vector<float> same(data.size());
     if (!back || !back->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, same.data()))
@@ -177,12 +179,12 @@ OIIO::ImageSpec exr_spec(int width, int height, std::vector<std::string> names) 
   OIIO::ImageSpec spec(width, height, int(names.size()), OIIO::TypeDesc::FLOAT);
   spec.channelnames = std::move(names);
   spec.attribute("compression", "zip");
-  // OpenImageIO stamps the present time unless one is given: equal pixels give equal files.
+  // OpenImageIO writes the present time unless one is set; with a fixed time equal pixels give equal files.
   spec.attribute("DateTime", "1980:01:01 00:00:00");
   return spec;
 }
 
-/// The working space that a file says its colours are in; empty if it says none.
+/// The working space that a file states for its colours; empty if it states none.
 std::string stated_working_space(const OIIO::ImageSpec& spec, const fs::path& path) {
   Chromaticities chromaticities;
   const bool known = spec.getattribute("chromaticities", kChromaticities, chromaticities.data());
@@ -206,7 +208,8 @@ ColorConfig config_of(const Rendering& r) {
   return current.with_working_space(r.working_space.empty() ? current.working_space() : r.working_space);
 }
 
-/// Primaries and white that a file says its colours are numbers of; nothing if it says none, or that they are data.
+/// The primaries and white point that a file states for its colours; nullopt if it states none, or states that they are
+/// not colours but data.
 std::optional<Chromaticities> stated_primaries(const OIIO::ImageSpec& spec, const fs::path& path) {
   const std::string id = spec.get_string_attribute("colorInteropID");
   if (id == "data" || id == "unknown") return std::nullopt;
@@ -221,7 +224,7 @@ std::optional<Chromaticities> stated_primaries(const OIIO::ImageSpec& spec, cons
   }
   Chromaticities stated;
   if (!spec.getattribute("chromaticities", kChromaticities, stated.data())) return std::nullopt;
-  // Coordinates of a triangle with an area, and a white that has a luminance.
+  // The chromaticities must span a triangle with an area, and the white must have a luminance.
   const double area =
       double(stated[2] - stated[0]) * (stated[5] - stated[1]) - double(stated[4] - stated[0]) * (stated[3] - stated[1]);
   if (!(std::abs(area) > 1e-6) || !(stated[7] > 0) ||
@@ -231,7 +234,8 @@ std::optional<Chromaticities> stated_primaries(const OIIO::ImageSpec& spec, cons
   return stated;
 }
 
-/// As Cycles of Blender 5.2 reads images; in 4.5 such channels alone are 0.
+/// Replaces pixels that are not finite with black, as Cycles in Blender 5.2 does when it reads images. In 4.5 only the
+/// channels concerned become 0.
 void blacken_what_is_not_finite(Image& image, const std::string& name, std::vector<std::string>* notes) {
   std::size_t bad = 0, first = 0;
   for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
@@ -452,7 +456,7 @@ void write_preview(const fs::path& path, const Rendering& rendering, double expo
 }
 
 Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wrap vertical) {
-  // Coordinates are of this or a neighbouring tile: no division.
+  // Coordinates are in this tile or a neighbouring one, so no division is needed.
   const auto index = [](int i, int size, Wrap wrap) {
     if (i < 0) return wrap == Wrap::Clamp ? 0 : size - 1;
     if (i >= size) return wrap == Wrap::Clamp ? size - 1 : 0;
@@ -462,7 +466,7 @@ Rgb<double> bilinear(const Image& image, double u, double v, Wrap horizontal, Wr
   const double x = part(u) * image.width - 0.5;
   const double fraction = vertical == Wrap::Repeat ? part(v) : std::clamp(v, 0.0, 1.0);
   const double y = (1 - fraction) * image.height - 0.5;
-  // Not below -1/2, where truncation rounds up.
+  // Rounds down; for coordinates below -1/2, truncation rounds up.
   const int column = int(x) - (x < 0), row = int(y) - (y < 0);
   const double s = x - column, t = y - row;
   const int x0 = index(column, image.width, horizontal), x1 = index(column + 1, image.width, horizontal);

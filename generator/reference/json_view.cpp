@@ -13,8 +13,8 @@ namespace {
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxBytes = std::size_t(64) << 20;
 
-/// nlohmann's messages start with "[json.exception.parse_error.101] "; people need only the rest, of which they can't
-/// read what was quoted from a file that is no text.
+/// nlohmann's messages start with "[json.exception.parse_error.101] ". Only the rest is shown, without what it quotes
+/// from a file that is not text.
 std::string plain_message(const std::string& what) {
   const auto end = what.find("] ");
   std::string text = end == std::string::npos ? what : what.substr(end + 2);
@@ -23,7 +23,7 @@ std::string plain_message(const std::string& what) {
   return text;
 }
 
-/// A key as a file would have it, in one line, without the quotes about it.
+/// A key as a file writes it, on one line, without the surrounding quotes.
 std::string shown(const std::string& key) {
   const std::string quoted = nlohmann::json(key).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return quoted.substr(1, quoted.size() - 2);

@@ -19,10 +19,10 @@ namespace {
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
 
-/// Parts of the particles, whose pictures are compared for the variance.
+/// The particles are divided into batches; the variance is estimated from the differences between their pictures.
 constexpr int kBatches = 64;
 
-/// Sums over particles, a colour a pixel.
+/// Sums over particles: one colour per pixel.
 struct Film {
   int width, height;
   std::vector<Color> sum;
@@ -44,7 +44,7 @@ class LightTracer {
 
   SurfaceScratch make_scratch() const { return SurfaceScratch(surfaces_); }
 
-  /// One particle, added to the film wherever the camera sees it.
+  /// Traces one particle, and adds it to the film wherever the camera sees it.
   void particle(std::uint64_t index, SurfaceScratch& scratch, Film& film) const {
     if (emitter_.empty()) return;
     Random random(std::uint64_t(settings_.seed), index, 0);
@@ -66,8 +66,8 @@ class LightTracer {
         return Vector{dot(w, hit.tangent), dot(w, bitangent), dot(w, hit.normal)};
       };
       const Vector from = to_local(-direction);
-      if (!(from.z > 0)) return;  // no model reflects what comes from below its normal
-      // From light that crosses the triangle to light that the normal is turned to.
+      if (!(from.z > 0)) return;  // no model reflects light that arrives from below its normal
+      // Converts light that crosses the triangle to light that arrives at a surface with the shading normal.
       power = power * (from.z / -dot(direction, hit.geometric));
       join(hit, surface, brdf, to_local, from, power, film);
 
@@ -95,7 +95,7 @@ class LightTracer {
     }
   }
 
-  /// What the camera sees of lamps and the environment themselves.
+  /// The lamps and the environment as the camera sees them directly.
   PixelMoments seen(const Lights& lights, int x, int y, int spp) const {
     PixelMoments out;
     Hit hit;
@@ -122,10 +122,11 @@ class LightTracer {
   }
 
  private:
-  /// Adds what goes straight to the camera. The value of a pixel is the mean over its area on the film of the radiance
-  /// that arrives there; by the change from film to solid angle to surface each watt that is reflected into a steradian
-  /// counts cos / (d^2 cos^3 a), with d the distance, a the angle to the view axis and A the pixel's area on the film a
-  /// unit away. Parallel rays: cos / A.
+  /// Connects a hit with the camera, and adds the light that it reflects straight to the camera. The value of a pixel
+  /// is the mean, over its area on the film, of the radiance that arrives there. The change of variables from film to
+  /// solid angle to surface gives each watt per steradian that is reflected the weight cos / (A d^2 cos^3 a), where d
+  /// is the distance, a the angle to the view axis, and A the pixel's area on the film at distance 1. For an
+  /// orthographic camera the weight is cos / A.
   template <class ToLocal> void join(const Hit& hit, const Surface& surface, const Brdf<double>& brdf,
                                      const ToLocal& to_local, const Vector& from, const Color& power,
                                      Film& film) const {
@@ -157,7 +158,7 @@ class LightTracer {
   const bool swapped_;
   const Tracer tracer_;
   const Emitter emitter_;
-  const double pixel_;  // side of a pixel on the film a unit away; orthographic: in scene units
+  const double pixel_;  // side of a pixel, on the film at distance 1; orthographic: in scene units
   std::vector<Surface> surfaces_;
 };
 
@@ -192,7 +193,7 @@ RenderResult render_from_lamps(const Scene& scene, const RenderOptions& options)
   clock.begin_tracing();
   const std::uint64_t particles = std::uint64_t(pixels) * std::uint64_t(settings.spp);
 
-  // Batches are added in their order, whatever thread makes them: a picture depends on the seed alone.
+  // Batches are added in a fixed order, whichever thread renders them, so the picture depends on the seed alone.
   const int threads = threads_of(options);
   std::vector<PixelMoments> moments(pixels);
   int done = 0;

@@ -23,7 +23,7 @@ struct Box {
   double diagonal2() const { return dot(high - low, high - low); }
 };
 
-/// Places and directions, each as three coordinates by which sets are divided.
+/// The coordinates by which sets of lamps are divided: three of the position and three of the direction.
 constexpr int kCoordinates = 6;
 double coordinate(const LampBounds& lamp, int which) {
   const Vector& v = which < 3 ? lamp.centre : lamp.direction;
@@ -33,12 +33,12 @@ double coordinate(const LampBounds& lamp, int which) {
 }  // namespace
 
 struct LightTree::Builder {
-  using Set = std::span<std::size_t>;  // of lamps
+  using Set = std::span<std::size_t>;  // indices of lamps
 
   std::span<const LampBounds> lamps;
   LightTree& tree;
 
-  /// Of lamps that are all near or all far.
+  /// Bounds of lamps that are either all near or all far.
   LampBounds bounds(Set set) const {
     if (set.size() == 1) return lamps[set[0]];
     LampBounds out;
@@ -59,7 +59,7 @@ struct LightTree::Builder {
       out.radius = std::max(out.radius, length(lamps[i].centre - out.centre) + lamps[i].radius);
     if (least_cos > 0 && length(axis) > 1e-6) {
       out.direction = normalize(axis);
-      // Room for acos(), which is coarse near 1.
+      // A margin for acos(), which is inaccurate near 1.
       double widest = 0;
       for (const std::size_t i : set)
         widest = std::max(widest, std::acos(std::clamp(dot(out.direction, lamps[i].direction), -1.0, 1.0)) +
@@ -69,14 +69,14 @@ struct LightTree::Builder {
     return out;
   }
 
-  /// How much is lost if lamps of these bounds are not told apart.
+  /// The loss of accuracy if lamps with these bounds are sampled as one.
   static double cost(const Box& box, double power, const Vector& directions, std::size_t count, bool all_ways) {
-    // The length of the mean of unit vectors is 1 where they are equal.
+    // The length of the mean of unit vectors is 1 if they are equal.
     const double spread = all_ways ? 1 : 1 - length(directions) / double(count);
     return power * (box.diagonal2() + 1e-30) * (1 + 2 * spread);
   }
 
-  /// Divides a set of two lamps or more into two sets.
+  /// Divides a set of at least two lamps into two sets.
   std::array<Set, 2> divide(Set set) const {
     constexpr int kBuckets = 16;
     struct Bucket {
@@ -129,7 +129,7 @@ struct LightTree::Builder {
         if (cost < best) best = cost, best_coordinate = which, best_bucket = at, best_low = low, best_scale = scale;
       }
     }
-    std::size_t middle = set.size() / 2;  // equal lamps: any half
+    std::size_t middle = set.size() / 2;  // equal lamps: any half will do
     if (best_coordinate >= 0)
       middle = std::size_t(std::partition(set.begin(), set.end(),
                                           [&](std::size_t i) {
@@ -139,9 +139,9 @@ struct LightTree::Builder {
     return {set.first(middle), set.subspan(middle)};
   }
 
-  /// A node of the lamps in the sets; returns its index. `depth`: nodes above it.
+  /// Makes a node with the lamps in the sets, and returns its index. `depth` is the number of nodes above it.
   std::size_t node(std::vector<Set> sets, std::size_t depth) {
-    // Near the bottom of a tree that is too deep sets are halved, wherever their lamps are.
+    // Near the bottom of a tree that is too deep, sets are halved regardless of where their lamps are.
     const bool halve = depth + 24 > kMostDeep;
     while (sets.size() < kWidth) {
       double most = -1;

@@ -14,7 +14,7 @@ namespace {
 
 using Vector = Vec3<double>;
 
-/// Colours out of the working space's gamut have negative components, which need samples as well.
+/// Colours outside the working space's gamut have negative components, which need samples as well.
 Rgb<double> magnitude(const Rgb<double>& c) { return {std::abs(c.r), std::abs(c.g), std::abs(c.b)}; }
 
 }  // namespace
@@ -32,7 +32,7 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(
   for (int y = 0; y < height_; ++y) {
     const double solid_angle = ((y == 0 ? 1.0 : z_[y - 1]) - z_[y]) * 2 * kPi / width_;
     for (int x = 0; x < width_; ++x) {
-      // The integral of the bilinear reconstruction over a texel: (1, 6, 1) / 8 in each direction.
+      // The integral of the bilinear reconstruction over a texel: weights (1, 6, 1) / 8 in each direction.
       double sum = 0;
       for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i)
@@ -53,7 +53,7 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment) : image_(
       cells_[i].density = weight[i] / total / solid_angle;
     }
   }
-  // Vose's alias table: a cell in constant time.
+  // Vose's alias method: selects a cell in constant time.
   std::vector<int> small, large;
   for (std::size_t i = 0; i < cells; ++i) {
     weight[i] *= double(cells) / total;
@@ -90,7 +90,7 @@ std::size_t EnvironmentSampler::cell_at(double u, double v) const {
 double EnvironmentSampler::pdf(double u, double v) const { return cells_.empty() ? 0 : cells_[cell_at(u, v)].density; }
 
 void EnvironmentSampler::fetch_texels(int x, int y) const {
-  // The colour is between this row and one of its neighbours.
+  // Bilinear interpolation needs this row and one of its neighbours.
   for (int row = std::max(y - 1, 0); row <= std::min(y + 1, height_ - 1); ++row)
     __builtin_prefetch(image_.pixel(x, row));
 }
@@ -177,7 +177,7 @@ template <class Body> void Lights::of_kind(Light::Kind kind, const Body& body) {
 
 template <Light::Kind kKind> inline double Lights::weight(const Lamp& lamp, const Vector& p, const Vector& normal) {
   if constexpr (kKind == Light::Kind::Sun) {
-    // Of the disk of the sun the highest point counts.
+    // The highest point of the sun's disk decides whether it is above the horizon.
     return dot(-lamp.direction, normal) > -lamp.radius ? lamp.luminance : 0.0;
   } else {
     const Vector d = lamp.position - p;
@@ -261,7 +261,7 @@ inline double Lights::pdf_of_hit(const Lamp& lamp, const Vector& p, const Vector
     const Vector q = w * t - d;
     const double a = dot(q, lamp.u) * lamp.per_u2, b = dot(q, lamp.v) * lamp.per_v2;
     const bool inside = kKind == Light::Kind::Disk ? a * a + b * b <= 1 : maximum(abs(a), abs(b)) <= 1;
-    // dot(d, direction) < 0 in front of the lamp, so t > 0 there.
+    // In front of the lamp dot(d, direction) < 0, so t > 0 there.
     const bool meets = (cosine > 0) & (t > 0) & (t < distance) & inside;
     return meets ? t * t / (cosine * lamp.area) : 0;
   }
@@ -356,7 +356,7 @@ BRDFC_VECTORISED void Lights::sample(const Vectors& p, const Vectors& normal, st
         out.radiance.set(k, scene_.environment.radiance(image_u[k], image_v[k]));
       }
   }
-  // By rounding the last light may be chosen without a chance.
+  // Because of rounding, the last light may be selected although its probability is 0.
   for (std::size_t k = 0; k < count; ++k)
     out.pdf[k] = lit[k] ? out.pdf[k] * (tree_ ? chance_of_chosen[k] : chance[k][chosen[k]]) : 0;
 }

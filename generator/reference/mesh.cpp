@@ -51,7 +51,7 @@ template <class T>
 void write_npy(const std::filesystem::path& path, const T* data, std::size_t rows, std::size_t columns) {
   std::string header =
       fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", npy_type<T>(), rows, columns);
-  header.append(63 - (10 + header.size()) % 64, ' ');  // the data start at a multiple of 64 bytes
+  header.append(63 - (10 + header.size()) % 64, ' ');  // pads the header: the data start at a multiple of 64 bytes
   header += '\n';
   write_beside(path, [&](const std::filesystem::path& temporary) {
     std::ofstream out(temporary, std::ios::binary);

@@ -35,19 +35,19 @@ Vector vector_of(const std::array<float, 3>& a) { return {a[0], a[1], a[2]}; }
 struct Triangle {
   std::array<Corner, 3> corners;
   std::size_t face;
-  Vector normal;  ///< the cross product of two sides, twice the area long
+  Vector normal;  ///< the cross product of two sides; its length is twice the area
 };
 
-/// Corners of a polygon in its plane, anticlockwise.
+/// The corners of a polygon in its plane, anticlockwise.
 using Outline = std::vector<std::array<double, 2>>;
 
-/// Twice the area of a triangle of an outline, positive if it is anticlockwise.
+/// Twice the signed area of a triangle of an outline, positive if it is anticlockwise.
 double turn(const Outline& p, std::size_t a, std::size_t b, std::size_t c) {
   return (p[b][0] - p[a][0]) * (p[c][1] - p[a][1]) - (p[b][1] - p[a][1]) * (p[c][0] - p[a][0]);
 }
 
-/// Cuts a simple polygon of n corners into n - 2 triangles, by ears. Of one that crosses itself, which has no
-/// interior, come n - 2 triangles as well.
+/// Triangulates a simple polygon of n corners into n - 2 triangles by ear clipping. A polygon that crosses itself has
+/// no interior, but gives n - 2 triangles as well.
 std::vector<std::array<std::size_t, 3>> cut(const Outline& p) {
   std::vector<std::size_t> left(p.size());
   for (std::size_t i = 0; i < p.size(); ++i) left[i] = i;
@@ -78,7 +78,7 @@ std::vector<std::array<std::size_t, 3>> cut(const Outline& p) {
   return triangles;
 }
 
-/// Triangles of all faces: n - 2 of a face of n corners, in the file's order.
+/// The triangles of all faces in the file's order: n - 2 for a face with n corners.
 std::vector<Triangle> triangulate(const MeshFile& file) {
   std::vector<Triangle> out;
   const auto at = [&](const Corner& c) { return vector_of(file.positions[std::size_t(c.position)]); };
@@ -93,7 +93,8 @@ std::vector<Triangle> triangulate(const MeshFile& file) {
       add(0, 1, 2);
       continue;
     }
-    // Newell's normal is that of the plane that fits best; the polygon is seen along its largest axis.
+    // Newell's method gives the normal of the plane that fits best. The polygon is projected along the largest axis of
+    // that normal.
     Vector normal{0, 0, 0};
     for (std::size_t i = 1; i + 1 < n; ++i)
       normal = normal + cross(at(corners[i]) - at(corners[0]), at(corners[i + 1]) - at(corners[0]));
@@ -119,8 +120,8 @@ struct PositionHash {
   }
 };
 
-/// At each place of a vertex the mean of the normals of the triangles there, weighted by their angles, as Blender's
-/// Shade Smooth has it; 0 where they cancel.
+/// Smooth normals: at each vertex position the mean of the normals of the adjoining triangles, weighted by their
+/// angles, as Blender's Shade Smooth computes it; 0 if they cancel.
 class AveragedNormals {
  public:
   AveragedNormals(const MeshFile& file, const std::vector<Triangle>& triangles) : place_(file.positions.size()) {
@@ -149,13 +150,13 @@ class AveragedNormals {
   std::vector<Vector> sums_;
 };
 
-/// Makes vertices of corners: equal ones are one vertex.
+/// Makes vertices from corners; equal corners share a vertex.
 class Vertices {
  public:
   Vertices(const MeshFile& file, Mesh& mesh, bool with_normals, bool with_uvs)
       : file_(file), mesh_(mesh), with_normals_(with_normals), with_uvs_(with_uvs) {}
 
-  /// `normal` has a length; `key` is equal for equal normals at that position.
+  /// `normal` must not be zero. `key` must be the same for equal normals at that position.
   std::int32_t add(const Corner& corner, std::int64_t key, const Vector& normal) {
     const auto [found, is_new] =
         known_.try_emplace({corner.position, corner.uv, with_normals_ ? key : 0}, mesh_.vertices.size());
@@ -197,7 +198,7 @@ MeshFile read_file(const fs::path& path) {
   input_error("{}: expected a mesh file that ends in .obj, .ply, .stl, .gltf or .glb", path.string());
 }
 
-/// "1 face of no area", "2 faces of no area": the first word is made a plural.
+/// A count with a noun, "1 face of no area" or "2 faces of no area": the first word gets the plural ending.
 std::string counted(std::size_t count, std::string_view what) {
   const std::string_view word = what.substr(0, what.find_first_of(" ,"));
   return fmt::format("{} {}{}{}", count, word, count == 1 ? "" : "s", what.substr(word.size()));
@@ -278,7 +279,7 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
     for (const Corner& c : t.corners)
       if (!is_finite(file.positions[std::size_t(c.position)]))
         input_error("{}: vertex {} is not finite", name, c.position + 1);
-    // They reflect nothing, and have no normal.
+    // Triangles without an area reflect nothing and have no normal.
     if (length(t.normal) == 0) {
       ++without_area;
       continue;
@@ -288,7 +289,8 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
     for (std::size_t k = 0; k < 3; ++k) {
       Corner c = t.corners[k];
       if (!usable_uv(c)) c.uv = -1, lacks_uvs = true;
-      // Below 0 the keys of facets, from 0 on those of the file's normals, and behind these those of averaged ones.
+      // Keys below 0 belong to flat facets, those from 0 on to the file's normals, and those after them to smooth
+      // normals.
       std::int64_t key = -1 - std::int64_t(i);
       Vector normal = t.normal;
       if (with_normals && c.normal >= 0) {

@@ -22,11 +22,11 @@ namespace {
 
 constexpr int kMaxInt = std::numeric_limits<int>::max();
 
-/// Rows of a 3 x 4 matrix.
+/// The rows of a 3 x 4 matrix.
 using Matrix = std::array<std::array<double, 4>, 3>;
 
 constexpr Matrix kIdentity{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-/// From glTF's y up to z up, as Blender's importer turns it.
+/// Rotates from glTF's y-up to z-up, as Blender's importer does.
 constexpr Matrix kUpright{{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}}};
 
 Matrix product(const Matrix& a, const Matrix& b) {
@@ -44,14 +44,14 @@ double determinant(const Matrix& m) {
          m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
-/// The components of an accessor, and how many there are to an element.
+/// The components of an accessor, and their number per element.
 struct Values {
   std::vector<double> data;
   std::size_t width = 1;
   std::size_t count() const { return data.size() / width; }
 };
 
-/// Topologies of primitives, by glTF's numbers.
+/// Topologies of primitives, with glTF's numbers.
 enum Mode { Points, Lines, LineLoop, LineStrip, Triangles, TriangleStrip, TriangleFan };
 
 class GltfReader {
@@ -77,7 +77,7 @@ class GltfReader {
       if (const auto nodes = scene.find("nodes"))
         for (const JsonView& node : nodes->elements()) roots.push_back(node.integer(0, kMaxInt));
     } else if (const auto nodes = root.find("nodes")) {
-      // Without scenes: the nodes that are nobody's children.
+      // A file without scenes: takes the nodes that are no node's child.
       std::vector<bool> child(nodes->elements().size(), false);
       for (const JsonView& node : nodes->elements())
         if (const auto children = node.find("children"))
@@ -91,14 +91,14 @@ class GltfReader {
       seen_.assign(nodes_.size(), false);
     }
     read_nodes(roots);
-    file_.flat = true;  // says glTF of what has no normals
+    file_.flat = true;  // glTF's rule for primitives without normals
     return std::move(file_);
   }
 
  private:
   JsonView root() const { return JsonView(json_, name_); }
 
-  /// An element of a list at the top of the file, by an index that `where` states.
+  /// An element of a list at the top level of the file. `where` is the place of the index.
   JsonView element(const JsonView& list, const JsonView& where, int index) const {
     const auto elements = list.elements();
     if (index < 0 || std::size_t(index) >= elements.size())
@@ -110,7 +110,8 @@ class GltfReader {
     return element(root().at(list), where, where.integer(0, kMaxInt));
   }
 
-  /// A head of 12 bytes, then chunks: length, type, bytes; the first holds JSON, the second the first buffer.
+  /// The binary format: a header of 12 bytes, then chunks of length, type and bytes. The first chunk holds the JSON,
+  /// the second the first buffer.
   std::string json_of_binary(const std::string& bytes) {
     const auto number = [&](std::size_t at) {
       std::uint32_t value;
@@ -133,7 +134,7 @@ class GltfReader {
     return json;
   }
 
-  /// Refuses what changes where triangles are and is not known here.
+  /// Rejects extensions that change where triangles are and are not supported here.
   void check_extensions(const JsonView& root) const {
     static const std::map<std::string, std::string> known{
         {"KHR_draco_mesh_compression", "compressed by Draco; expected a file without mesh compression"},
@@ -147,7 +148,7 @@ class GltfReader {
     if (const auto required = root.find("extensionsRequired"))
       for (const JsonView& e : required->elements()) {
         const std::string name = e.text();
-        // Of materials, textures and lights nothing is read.
+        // Materials, textures and lights are not read, so their extensions do not matter.
         if (name == "KHR_mesh_quantization" || name == "KHR_texture_transform" ||
             name.find("_materials_") != name.npos || name.find("_texture_") != name.npos ||
             name.find("_lights_") != name.npos)
@@ -207,7 +208,7 @@ class GltfReader {
 
   struct Bytes {
     const std::string* data;
-    std::size_t begin, size, stride;  ///< stride: 0 where elements follow one another
+    std::size_t begin, size, stride;  ///< stride: 0 if elements are contiguous
   };
 
   Bytes view(const JsonView& where) {
@@ -236,7 +237,7 @@ class GltfReader {
     type.fail("a component type of 5120 to 5123, 5125 or 5126");
   }
 
-  /// A component; integers that stand for [0, 1] or [-1, 1] if `normalized`.
+  /// Reads a component. If `normalized`, integers stand for [0, 1] or [-1, 1].
   static double component(const char* at, int type, bool normalized) {
     const auto read = [&]<class T>(T) {
       T value;
@@ -262,7 +263,7 @@ class GltfReader {
     }
   }
 
-  /// Fills `out` with `count` elements of `width` components that begin at an offset of a view of bytes.
+  /// Fills `out` with `count` elements of `width` components each, which begin at an offset in a buffer view.
   static void fill(const JsonView& where, const Bytes& bytes, std::size_t offset, std::size_t count, std::size_t width,
                    const JsonView& type, bool normalized, std::vector<double>& out) {
     const std::size_t size = size_of(type), stride = bytes.stride ? bytes.stride : size * width;
@@ -358,7 +359,7 @@ class GltfReader {
       const Matrix matrix = product(entry.above, transform_of(node));
       if (const auto mesh = node.find("mesh")) {
         if (node.has("skin")) ++file_.left_out["skin, whose mesh keeps its rest pose"];
-        // Bones, not the node, say where a mesh with a skin is.
+        // A mesh with a skin is placed by its bones, not by the node.
         read_mesh(element("meshes", *mesh), node.has("skin") ? kUpright : matrix);
       }
       if (const auto children = node.find("children")) {
@@ -406,7 +407,7 @@ class GltfReader {
                first_uv = std::int32_t(file_.uvs.size());
     if (file_.positions.size() + n > std::size_t(std::numeric_limits<std::int32_t>::max()))
       input_error("{}: more than 2147483647 vertices", name_);
-    // Normals turn by the inverse transpose, of which the cofactors are a multiple.
+    // Normals are transformed by the inverse transpose; the cofactors are a multiple of it.
     const bool mirrored = determinant(matrix) < 0;
     const auto column = [&](std::size_t k) { return Vec3<double>{matrix[0][k], matrix[1][k], matrix[2][k]}; };
     const Vec3<double> cofactors[3] = {cross(column(1), column(2)), cross(column(2), column(0)),

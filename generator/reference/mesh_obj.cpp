@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kBlank = " \t\r\v\f";
 
-/// Takes the first word off a text; empty at its end.
+/// Removes the first word from a text and returns it; empty at the end of the text.
 std::string_view next_word(std::string_view& text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlank), text.size()));
   const std::string_view word = text.substr(0, text.find_first_of(kBlank));
@@ -30,7 +30,7 @@ class ObjReader {
     std::string joined;
     for (std::string_view rest = bytes_; !rest.empty();) {
       std::string_view line = take_line(rest);
-      // A backslash at its end joins a line to the next one.
+      // A backslash at the end of a line joins it to the next one.
       if (ends_in_backslash(line)) {
         joined.clear();
         while (ends_in_backslash(line)) {
@@ -60,7 +60,7 @@ class ObjReader {
     return line.ends_with('\\');
   }
 
-  /// A comment begins the line or follows a blank: 1.#QNAN is none.
+  /// A comment begins at the start of a line or after a blank; the # in 1.#QNAN does not begin one.
   static std::string_view without_comment(std::string_view line) {
     for (std::size_t i = 0; i < line.size(); ++i)
       if (line[i] == '#' && (i == 0 || kBlank.find(line[i - 1]) != kBlank.npos)) return line.substr(0, i);
@@ -102,7 +102,7 @@ class ObjReader {
     }
   }
 
-  /// N numbers, of which the first `needed` must be there and the others are 0; more than N are skipped.
+  /// N numbers. The first `needed` must be present, missing others are 0, and those after N are ignored.
   template <std::size_t N> std::array<float, N> numbers(std::string_view rest, std::size_t needed) const {
     std::array<float, N> out{};
     for (std::size_t i = 0; i < N; ++i) {
@@ -110,7 +110,7 @@ class ObjReader {
       if (word.empty() && i >= needed) break;
       const std::string_view all = word;
       if (word.starts_with('+')) word.remove_prefix(1);
-      // So write C libraries of Windows what is not a number: 1.#QNAN, -1.#IND.
+      // Windows C libraries write values that are not numbers like this: 1.#QNAN, -1.#IND.
       const auto value = word.find('#') != word.npos ? std::nan("") : parse<double>(word);
       if (!value) error("expected {} numbers, got '{:.60}'", N, all);
       out[i] = float(*value);
@@ -118,7 +118,8 @@ class ObjReader {
     return out;
   }
 
-  /// "position", "position/uv", "position//normal" or "position/uv/normal"; counted from 1, or back from the last.
+  /// "position", "position/uv", "position//normal" or "position/uv/normal". Indices count from 1, negative ones from
+  /// the end.
   MeshFile::Corner corner(std::string_view word) const {
     const std::string_view all = word;
     MeshFile::Corner c;
@@ -138,7 +139,7 @@ class ObjReader {
     return c;
   }
 
-  /// Faces may come before their vertices.
+  /// Checks the indices at the end, because faces may come before their vertices.
   void check_corners() {
     for (std::size_t face = 0, i = 0; face < file_.ends.size(); ++face)
       for (; i < file_.ends[face]; ++i) {
@@ -157,7 +158,7 @@ class ObjReader {
 
   std::string name_, bytes_;
   int line_ = 0;
-  std::vector<int> lines_;  // one a face
+  std::vector<int> lines_;  // one per face
   std::int32_t material_ = -1;
   MeshFile file_;
 };

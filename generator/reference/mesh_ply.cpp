@@ -32,7 +32,7 @@ std::optional<Type> type_of(const std::string& name) {
 struct Property {
   std::string name;
   Type type = Type::Float32;
-  std::optional<Type> count;  ///< of a list: the type of its length
+  std::optional<Type> count;  ///< for a list: the type of its length
 };
 
 struct Element {
@@ -55,12 +55,12 @@ class PlyReader {
       else
         skip(e);
     }
-    // Faces may come before the vertices.
+    // Checks the indices at the end, because faces may come before the vertices.
     for (const MeshFile::Corner& c : file_.corners)
       if (c.position < 0 || std::size_t(c.position) >= file_.positions.size())
         input_error("{}: a face uses vertex {}, expected 0 to {}", name_, c.position,
                     std::int64_t(file_.positions.size()) - 1);
-    // A normal, and UVs where faces have none of their own, belong to the vertex of the same number.
+    // A vertex has the normal of the same index, and the UVs too where faces have none of their own.
     const auto of_vertices = std::int32_t(file_.uvs.size());
     file_.uvs.insert(file_.uvs.end(), face_uvs_.begin(), face_uvs_.end());
     for (MeshFile::Corner& c : file_.corners) {
@@ -108,7 +108,8 @@ class PlyReader {
       }
       if (!good) input_error("{}: line {} does not belong in the header of a PLY file", name_, number);
     }
-    // An element takes a byte a property at least; without one, it would not end the file however many there are.
+    // An element takes at least one byte per property. An element without properties would never reach the end of the
+    // file, whatever its count.
     for (const Element& e : elements_)
       if (e.count > bytes_.size()) input_error("{}: {} of '{}' do not fit into the file", name_, e.count, e.name);
   }
@@ -134,7 +135,7 @@ class PlyReader {
       at_ = end;
       const std::string_view all = word;
       if (word.starts_with('+')) word.remove_prefix(1);
-      // So write C libraries of Windows what is not a number: 1.#QNAN, -1.#IND.
+      // Windows C libraries write values that are not numbers like this: 1.#QNAN, -1.#IND.
       const auto number = word.find('#') != word.npos ? std::nan("") : parse<double>(word);
       if (!number) input_error("{}: expected a number of a {}, got '{:.60}'", name_, element_, all);
       return *number;
@@ -191,7 +192,7 @@ class PlyReader {
     if (!x || !y || !z) input_error("{}: expected the properties x, y and z of vertices", name_);
     if (!file_.positions.empty()) input_error("{}: expected one list of vertices, found two", name_);
     const auto nx = find(e, {"nx"}), ny = find(e, {"ny"}), nz = find(e, {"nz"});
-    // MeshLab, Blender, and older tools.
+    // Names that MeshLab, Blender and older tools use.
     const auto u = find(e, {"s", "u", "texture_u", "u0", "tx"}), v = find(e, {"t", "v", "texture_v", "v0", "ty"});
     std::vector<double> one;
     std::vector<float> row(e.properties.size());
@@ -222,7 +223,7 @@ class PlyReader {
       }
       const bool own = uvs && e.properties[*uvs].count && of_uvs.size() == 2 * of_corners.size();
       for (std::size_t k = 0; k < of_corners.size(); ++k) {
-        // Till the end, where the number of vertices is known: -2 and below are UVs of faces.
+        // Until the end, when the number of vertices is known, indices of -2 and below are UVs of faces.
         file_.corners.push_back({index(of_corners[k]), -1, own ? -2 - std::int32_t(face_uvs_.size()) : -1});
         if (own) face_uvs_.push_back({float(of_uvs[2 * k]), float(of_uvs[2 * k + 1])});
       }
@@ -236,7 +237,7 @@ class PlyReader {
     return std::int32_t(value);
   }
 
-  /// Strips of triangles, which -1 separates; every second triangle has its corners the other way round.
+  /// Adds triangle strips, which -1 separates. Every second triangle of a strip has the opposite orientation.
   void add_strips(const std::vector<double>& list) {
     for (std::size_t begin = 0; begin < list.size();) {
       const std::size_t end =

@@ -11,7 +11,8 @@ namespace brdfc::reference {
 
 namespace {
 
-/// A head of 80 bytes, the number of triangles, then 50 bytes each: a normal, three corners, two bytes of something.
+/// The binary format: a header of 80 bytes, the number of triangles, then 50 bytes for each: a normal, three corners,
+/// and two bytes of attributes.
 constexpr std::size_t kHead = 84, kEach = 50;
 
 MeshFile read_binary(const std::string& bytes, std::size_t count) {
@@ -67,7 +68,7 @@ MeshFile read_text(const std::string& name, std::string_view text) {
       if (!in_loop) input_error("{} line {}: the end of a loop that was not begun", name, line);
       in_loop = false;
       file.end_face();
-    } else if (key == "solid" || key == "endsolid") {  // a name follows, of any words
+    } else if (key == "solid" || key == "endsolid") {  // a name follows, which may have any words
       text.remove_prefix(std::min(text.find('\n'), text.size()));
     }
   }
@@ -82,7 +83,7 @@ MeshFile read_stl(const std::filesystem::path& path) {
   std::uint32_t count = 0;
   if (bytes.size() >= kHead) std::memcpy(&count, &bytes[kHead - 4], sizeof count);
   const std::size_t expected = kHead + kEach * std::size_t(count);
-  // Binary files may begin with "solid" as well, and some have bytes behind the last triangle.
+  // Binary files may also begin with "solid", and some have bytes after the last triangle.
   const bool text = bytes.starts_with("solid") && bytes.find('\0') == bytes.npos;
   MeshFile file;
   if (bytes.size() >= kHead && (bytes.size() == expected || !text)) {

@@ -14,8 +14,8 @@ namespace {
 using Vector = Vec3<double>;
 using Color = Rgb<double>;
 
-/// Dimensions of a bounce: which term, which lobe, its direction, whether the path goes on, and for each side which
-/// lamp, where, and where else.
+/// Sample dimensions of a bounce: the term (delta or lobe), the lobe, its direction, Russian roulette; and for each
+/// side of the surface three for light samples: the light, the place on it, and one more for an environment image.
 constexpr std::uint64_t kDimensions = 10;
 constexpr std::uint64_t dimension_of(int bounce) { return 1 + kDimensions * std::uint64_t(bounce); }
 constexpr std::uint64_t light_dimension(int bounce, bool far) {
@@ -70,7 +70,7 @@ void PathTracer::follow(std::span<const Start> starts, Wave& wave, std::span<Col
     wave.shadow_rays.clear();
     wave.next.clear();
     wave.next_rays.clear();
-    // For the first blocks; scatter() does it for later ones.
+    // Prefetches for the first blocks; scatter() does it for later ones.
     if (lights_.choose_more() && bounce <= settings_.max_bounces) {
       const std::size_t first = std::size_t(wave.places[0]);
       for (std::size_t k = 0; k < 2 * kBlock; ++k) fetch(wave, first + k, bounce, &Lights::fetch_slot);
@@ -108,7 +108,7 @@ void PathTracer::sort_by_material(Wave& wave) const {
 BRDFC_VECTORISED void PathTracer::gather(int from, int end, Wave& wave) const {
   Block& b = *wave.block;
   b.count = std::min(kBlock, std::size_t(end - from));
-  // The last one fills up the vector that it is in.
+  // Copies of the last path fill the rest of the vector.
   for (std::size_t k = 0; k < lanes_for(b.count); ++k) {
     const std::size_t i = std::size_t(wave.order[std::size_t(from) + std::min(k, b.count - 1)]);
     const Path& path = *(b.paths[k] = wave.active[i]);
@@ -304,7 +304,7 @@ BRDFC_VECTORISED void PathTracer::choose(const Surface& surface, const PackedBrd
       if (has_transmit) surface.check("transmit", refract(w, ior[k]), w, lane(transmit, k));
       delta_chances[k] = surface.delta_chance(lane(mirror, k) + lane(transmit, k), w.z);
     }
-  // What crossing does to radiance.
+  // The factor by which radiance changes when light crosses the surface.
   const auto crossing_by = [&](double index, std::size_t k) {
     return !settings_.scale_radiance ? 1 : wo.z[k] > 0 ? 1 / sqr(index) : sqr(index);
   };
@@ -331,7 +331,7 @@ BRDFC_VECTORISED void PathTracer::choose(const Surface& surface, const PackedBrd
       Path& path = *b.paths[at];
       wave.shadows.push_back(
           {&path, path.throughput * (far ? crossing_by(ior[k], k) : 1) * (value * (weight / light_pdf))});
-      // A little short of a lamp, which may lie in a surface.
+      // The shadow ray ends a little before the lamp, which may lie in a surface.
       wave.shadow_rays.push_back({side.from[at], side.lights.wi[at], side.lights.distance[at] * (1 - 0x1p-18)});
     }
   }

@@ -8,7 +8,7 @@
 namespace brdfc::reference {
 namespace {
 
-/// In [0, 1), of 32 bits: added to the number of a cell it is not rounded up to the next one.
+/// A number in [0, 1) with 32 bits: adding it to the index of a cell never rounds up to the next cell.
 double fraction(std::uint64_t hash) { return double(hash >> 32) * 0x1p-32; }
 
 }  // namespace
@@ -33,8 +33,8 @@ double radical_inverse(std::uint32_t i) {
 }
 
 std::uint32_t permuted(std::uint32_t i, std::uint32_t n, std::uint64_t key) {
-  // A bijection of the next power of two, repeated until it lands below n: a walk along its cycles, which comes back to
-  // such a number at the latest at i.
+  // A bijection on the integers below the next power of two, repeated until the result is below n. This walks along one
+  // of its cycles, which returns to i at the latest, so the loop ends.
   const int bits = std::bit_width(n - 1);
   if (bits == 0) return 0;
   const std::uint64_t mask = (std::uint64_t(1) << bits) - 1;
@@ -45,8 +45,8 @@ std::uint32_t permuted(std::uint32_t i, std::uint32_t n, std::uint64_t key) {
     for (int k = 0; k < 4; ++k) {
       round = Random::mix(round + 0x9e3779b97f4a7c15ULL);
       x = (x + round) & mask;              // each step is invertible: addition,
-      x = x * ((round >> 32) | 1) & mask;  // product with an odd number,
-      x ^= x >> shift;                     // what is above, onto what is below
+      x = x * ((round >> 32) | 1) & mask;  // multiplication by an odd number,
+      x ^= x >> shift;                     // xor of the high bits into the low ones
     }
   } while (x >= n);
   return std::uint32_t(x);
@@ -70,7 +70,7 @@ std::array<double, 2> PatternPoints::point(int index, std::uint64_t key) const {
     case Pattern::Jittered:
       return {(column + a) / columns_, (row + b) / rows_};
     case Pattern::MultiJittered: {
-      // Each cell's x lies in one of `rows` parts of its column, each part taken once, and likewise y.
+      // Each column is divided into `rows` parts, and the x of each of its cells lies in a different part; likewise y.
       const std::uint32_t part_x = permuted(row, rows_, Random::mix(key ^ 0x2545f4914f6cdd1dULL) + column);
       const std::uint32_t part_y = permuted(column, columns_, Random::mix(key ^ 0x9fb21c651e98df25ULL) + row);
       return {(column * rows_ + part_x + a) / count_, (row * columns_ + part_y + b) / count_};

@@ -24,8 +24,8 @@ double smooth_step(double from, double to, double x) {
   return t * t * (3 - 2 * t);
 }
 
-/// A pale horizon under a deep zenith, dark ground with a lit square pattern, a small sun, and a row of
-/// luminous panels of three colours: edges and points at which the width of a lobe can be seen.
+/// A sky: pale horizon, deep blue zenith, dark ground with a bright square pattern, a small sun, and a row of luminous
+/// panels in three colours. Its edges and points show the width of a lobe.
 Color sky(const Direction& d) {
   const double azimuth = atan2(d.y, d.x), elevation = asin(std::clamp(d.z, -1.0, 1.0));
   const Direction sun = normalize(Direction{0.62, -0.48, 0.62});
@@ -38,7 +38,7 @@ Color sky(const Direction& d) {
     return which == 0 ? Color(9, 7.5, 6) : which == 1 ? Color(2.5, 5, 9) : Color(7, 3, 1.2);
   }
   if (d.z < 0) {
-    const double x = d.x / -d.z, y = d.y / -d.z;  // the ground one unit below
+    const double x = d.x / -d.z, y = d.y / -d.z;  // the ground is one unit below the camera
     const bool light = (int(std::floor(x)) + int(std::floor(y))) % 2 == 0;
     const Color ground = light ? Color(0.32, 0.28, 0.22) : Color(0.08, 0.07, 0.06);
     return mix(Color(0.2, 0.18, 0.15), ground, smooth_step(0, 0.25, -d.z));
@@ -50,7 +50,7 @@ Color sky(const Direction& d) {
 
 bool inside(double x, double from, double to) { return x >= from && x <= to; }
 
-/// A room, seen from its middle: two ceiling lamps, a window with crossbars, a door, a tiled floor.
+/// A room seen from its centre: two ceiling lamps, a window with crossbars, a door, and a tiled floor.
 Color interior(const Direction& d) {
   const double half_x = 4, half_y = 3, up = 1.6, down = 1.2;
   const double tx = half_x / std::max(std::abs(d.x), 1e-12), ty = half_y / std::max(std::abs(d.y), 1e-12);
@@ -84,7 +84,7 @@ Color interior(const Direction& d) {
   return {0.3, 0.31, 0.29};
 }
 
-/// Half of the sphere in cells of 15 degrees is bright: a structured world to test samplers with.
+/// Cells of 15 degrees, half of them bright: a structured environment for tests of samplers.
 Color checker(const Direction& d) {
   double u, v;
   direction_to_equirectangular(d, u, v);

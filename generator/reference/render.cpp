@@ -16,7 +16,7 @@ namespace brdfc::reference {
 namespace {
 
 constexpr int kTile = 16;
-/// Paths followed together: enough to fill packets after many bounces, few enough for a core's cache.
+/// Number of paths that are traced together: enough to fill packets after many bounces, few enough for a core's cache.
 constexpr int kWave = 1024;
 
 }  // namespace
@@ -38,8 +38,9 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
 
   tbb::enumerable_thread_specific<PathTracer::Wave> waves([&] { return tracer.make_wave(); });
   const int together = options.wave > 0 ? options.wave : kWave;
-  // A pass gives every pixel the same number of further samples; passes are short, so that stopping loses little
-  // evenness. Pixels add up their samples in order, so the number of passes does not change the result.
+  // Each pass adds the same number of samples to every pixel. Passes are short, so that a render that is stopped has
+  // nearly the same number of samples everywhere. Pixels add up their samples in order, so the number of passes does
+  // not change the result.
   const auto pass = [&](int from, int to, bool stoppable) {
     tbb::parallel_for(
         tbb::blocked_range<int>(0, tiles, 1),
@@ -78,7 +79,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options) {
     if (clock.cancelled()) break;
     done = to;
     const double pass_seconds = clock.seconds() - pass_start;
-    // Passes of about half a second.
+    // Adapts the number of samples so that a pass takes about half a second.
     if (pass_seconds < 0.25) step *= 2;
     if (pass_seconds > 1 && step > 1) step /= 2;
     if (options.progress) {

@@ -55,7 +55,7 @@ class Loader {
     scene_.resolved["settings"] = {
         {"width", s.width}, {"height", s.height},           {"spp", s.spp},
         {"seed", s.seed},   {"max_bounces", s.max_bounces}, {"scale_radiance", s.scale_radiance}};
-    // Blender has its own ways.
+    // Only settings other than the defaults are listed: Blender has its own patterns and strategies.
     if (s.pattern != Pattern::Random) scene_.resolved["settings"]["pattern"] = pattern_names()[std::size_t(s.pattern)];
     if (s.strategy != Strategy::Mis)
       scene_.resolved["settings"]["strategy"] = strategy_names()[std::size_t(s.strategy)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lamps and the environment of a scene file.
+// Reads the lamps and the environment of a scene file.
 #include <algorithm>
 #include <cmath>
 
@@ -19,7 +19,7 @@ Vec3<double> read_direction(const JsonView& j) {
   return normalize(d);
 }
 
-/// They stay what they are, as in Cycles.
+/// Notes negative values, which are kept, as in Cycles.
 void note_negative(SceneFiles& files, const Image& image, const std::string& name) {
   std::size_t count = 0, first = 0;
   float least = 0;

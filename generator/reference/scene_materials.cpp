@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Materials of a scene file: models, values, textures and substances.
+// Reads the materials of a scene file: models, values, textures and substances.
 #include <algorithm>
 
 #include "model/optical.h"
@@ -97,7 +97,7 @@ class MaterialReader {
     return kept;
   }
 
-  /// What is beyond the range of the parameter becomes the end of it, as in the shaders.
+  /// Clamps values to the range of the parameter, as the shaders do.
   void limit(Image& image, const ParamInfo& info, const std::string& name) {
     std::size_t count = 0, first = 0;
     float worst = 0;
@@ -127,7 +127,7 @@ class MaterialReader {
     return j.numbers<3>(info.min, info.max);
   }
 
-  /// Those that a substance sets, in the working space.
+  /// The parameters that a substance sets, in the working space.
   ParamValues optical_parameters(const JsonView& j, const ModelInfo& info, std::optional<double> thickness) {
     try {
       const Substance substance = find_substance(j.text(), files_.path().parent_path());
@@ -139,7 +139,7 @@ class MaterialReader {
     }
   }
 
-  /// The mean, after a check that every texel is in the range of the parameter.
+  /// The mean of the texels. Every texel must be in the range of the parameter.
   static ParamValue texture_mean(const JsonView& j, const ParamInfo& info, const Image& image) {
     std::array<double, 3> sum{0, 0, 0};
     for (std::size_t i = 0; i < image.rgb.size(); i += 3)

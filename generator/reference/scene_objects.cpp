@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Objects of a scene file: shapes, transforms, and the material of each.
+// Reads the objects of a scene file: shapes, transforms, and the material of each.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -48,13 +48,13 @@ class ObjectReader {
   }
 
  private:
-  /// A mesh as objects have it, and what the resolved scene says of it.
+  /// A mesh for objects, and its description in the resolved scene.
   struct Shape {
     std::shared_ptr<const Mesh> mesh;
     json resolved;
   };
 
-  /// Shapes of the same text are read or made once.
+  /// Shapes with the same JSON text are read or made once.
   const Shape& read_shape(const JsonView& j) {
     const std::string text = j.json().dump();
     if (const auto known = shapes_.find(text); known != shapes_.end()) return known->second;
@@ -101,7 +101,7 @@ class ObjectReader {
     for (std::size_t i = 0; i < flat.size(); ++i) out[i / N][i % N] = flat[i];
   }
 
-  /// First scale, then turn about x, then y, then z (Blender's "XYZ"), then move.
+  /// The order is scale, rotation about x, about y, about z (Blender's "XYZ"), translation.
   static Transform read_transform(const std::optional<JsonView>& j, json& resolved) {
     std::array<double, 3> translate{0, 0, 0}, rotate{0, 0, 0}, scale{1, 1, 1};
     if (j) {
@@ -118,7 +118,7 @@ class ObjectReader {
     resolved = {{"translate", translate}, {"rotate_degrees", rotate}, {"scale", scale}};
     Transform t;
     t.translation = vector_of(translate);
-    // Exact at multiples of a right angle, so that axis-aligned things stay so.
+    // Exact at multiples of a right angle, so that axis-aligned objects stay so.
     const auto sine = [](double degrees) {
       const double r = std::remainder(degrees, 360.0);
       return r == 0 || abs(r) == 180 ? 0.0 : r == 90 ? 1.0 : r == -90 ? -1.0 : sin(r * kPi / 180);
@@ -136,7 +136,7 @@ class ObjectReader {
 
   SceneFiles& files_;
   Scene& scene_;
-  std::map<std::string, Shape> shapes_;  // by their text
+  std::map<std::string, Shape> shapes_;  // by their JSON text
 };
 
 }  // namespace

@@ -19,8 +19,8 @@ void add_triangle(Mesh& mesh, std::size_t a, std::size_t b, std::size_t c) {
   mesh.triangles.push_back({std::int32_t(a), std::int32_t(b), std::int32_t(c)});
 }
 
-/// Two triangles a cell of a grid of vertices, `rows` * `columns` of them, row by row, anticlockwise where columns run
-/// to the right and rows upwards.
+/// Adds two triangles for each cell of a grid of `rows` * `columns` vertices, stored row by row. They are anticlockwise
+/// if columns run to the right and rows upwards.
 void add_grid(Mesh& mesh, std::size_t rows, std::size_t columns) {
   for (std::size_t j = 0; j + 1 < rows; ++j)
     for (std::size_t i = 0; i + 1 < columns; ++i) {
@@ -30,7 +30,7 @@ void add_grid(Mesh& mesh, std::size_t rows, std::size_t columns) {
     }
 }
 
-/// A number in [0, 1) that is the same everywhere, which std::uniform_real_distribution does not promise.
+/// A number in [0, 1) that is the same on every platform, which std::uniform_real_distribution does not guarantee.
 double uniform(std::mt19937& random) { return random() * 0x1p-32; }
 
 using Position = Vec3<double>;
@@ -39,7 +39,8 @@ using Position = Vec3<double>;
 
 Mesh make_sphere(double radius, int segments, int rings, bool smooth) {
   Mesh mesh;
-  // sin and cos of multiples of a right angle are not exact: clear them, so that poles and seam close exactly.
+  // sin and cos of multiples of a right angle are not exact. Tiny values are set to 0, so that poles and seam close
+  // exactly.
   const auto clean = [](double x) { return abs(x) < 1e-15 ? 0.0 : x; };
   for (int j = 0; j <= rings; ++j) {
     const double theta = kPi * j / rings;  // 0 at the lower pole
@@ -56,7 +57,7 @@ Mesh make_sphere(double radius, int segments, int rings, bool smooth) {
   for (int j = 0; j < rings; ++j)
     for (int i = 0; i < segments; ++i) {
       const std::size_t a = std::size_t(j) * row + i, b = a + 1, c = b + row, d = a + row;
-      if (j > 0) add_triangle(mesh, a, b, c);  // the first and the last ring have one triangle a segment
+      if (j > 0) add_triangle(mesh, a, b, c);  // the first and the last ring have one triangle per segment
       if (j < rings - 1) add_triangle(mesh, a, c, d);
     }
   return mesh;
@@ -118,7 +119,7 @@ Mesh make_cylinder(double radius, double height, int segments, bool smooth) {
     return mesh.vertices.size() - 1;
   };
   for (int i = 0; i < segments; ++i) {
-    // A segment has corners of its own: flat sides share no normals.
+    // Each segment has its own corners, because flat sides share no normals.
     const auto [c0, s0] = at(i);
     const auto [c1, s1] = at(i + 1);
     const auto [cm, sm] = std::pair(cos(2 * kPi * (i + 0.5) / segments), sin(2 * kPi * (i + 0.5) / segments));
@@ -157,8 +158,8 @@ Mesh make_knot(int p, int q, double tube, int ripples, int segments, int sides) 
   };
   const double turn = 2 * kPi;
   const auto surface = [&](double t, double angle) {
-    // The frame about the direction outwards from the ring closes after a whole turn, as Frenet's would, and does not
-    // flip where the curve is straight.
+    // A frame based on the direction away from the ring's centre. Like the Frenet frame it closes after a whole turn,
+    // but it does not flip where the curve is straight.
     const Position tangent = normalize(along(t));
     const Position outwards = centre(t) - Position{cos(p * t), sin(p * t), 0};
     const Position side = normalize(outwards - tangent * dot(outwards, tangent)), up = cross(tangent, side);
@@ -169,7 +170,7 @@ Mesh make_knot(int p, int q, double tube, int ripples, int segments, int sides) 
   for (int j = 0; j <= segments; ++j)
     for (int i = 0; i <= sides; ++i) {
       const double t = turn * (j % segments) / segments, angle = turn * (i % sides) / sides;
-      // Central differences: the step's error, 1e-10 of the normal, is below a float's.
+      // Central differences: the error due to the step, 1e-10 of the normal, is below the precision of float.
       const double step = 1e-5;
       const Position x = surface(t, angle);
       const Position n = normalize(cross(surface(t, angle + step) - surface(t, angle - step),
@@ -195,7 +196,7 @@ Mesh make_tiles(int count, double relief, double joint, int resolution, int seed
       const double angle = 2 * kPi * uniform(random), length = 0.5 + uniform(random);  // in tiles
       waves.push_back({2 * kPi / length * cos(angle), 2 * kPi / length * sin(angle), 2 * kPi * uniform(random)});
     }
-  // Waves of this amplitude have a sum with the root mean square 1.
+  // With this amplitude the sum of the waves has a root mean square of 1.
   const double amplitude = sqrt(2.0 / kWaves);
   const auto height = [&](int i, int j, double x, double y) {
     double sum = 0;
@@ -211,7 +212,7 @@ Mesh make_tiles(int count, double relief, double joint, int resolution, int seed
       const int ti = std::min(i / resolution, count - 1), tj = std::min(j / resolution, count - 1);
       const double x = double(i) / resolution - ti, y = double(j) / resolution - tj;
       constexpr double kStep = 1e-6;
-      // One-sided at a tile's edges, where all tiles have height and slope 0.
+      // One-sided differences at a tile's edges, where all tiles have height and slope 0.
       const auto slope = [&](double dx, double dy) {
         const double x0 = std::max(x - dx, 0.0), x1 = std::min(x + dx, 1.0);
         const double y0 = std::max(y - dy, 0.0), y1 = std::min(y + dy, 1.0);

@@ -19,7 +19,7 @@ std::array<float, 3> to_floats(const Vector& v) { return {float(v.x), float(v.y)
 
 constexpr std::size_t kPacket = 16;
 
-/// Triangles that a mesh has at least that is shared: of fewer a copy is small.
+/// Smallest number of triangles for which instances of a mesh share it; smaller meshes are cheap to copy.
 constexpr std::size_t kLeastShared = 256;
 
 void put(const Ray& from, RTCRay& to) {
@@ -39,7 +39,7 @@ void put(const Ray& from, RTCRay16& to, std::size_t k) {
   to.id[k] = to.flags[k] = 0;
 }
 
-/// Which rays of a packet count: the first `count`.
+/// The mask of active rays in a packet: the first `count`.
 struct alignas(64) Valid {
   int lanes[kPacket];
   explicit Valid(std::size_t count) {
@@ -47,7 +47,7 @@ struct alignas(64) Valid {
   }
 };
 
-/// The lanes of a packet that count, `count` of them; behind these the last one again.
+/// The indices of the active lanes of a packet. The rest of the array repeats the last one.
 struct Active {
   unsigned lanes[kPacket], count = 0;
   Active(const int* valid, unsigned all) {
@@ -85,7 +85,7 @@ template <class SetVertices>
 void Tracer::attach_triangles(RTCScene scene, unsigned id, const Mesh& mesh, const SetVertices& set_vertices) const {
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   set_vertices(geometry);
-  // Copied, since Embree may read 16 bytes at the last triangle.
+  // The indices are copied, because Embree may read 16 bytes at the last triangle.
   if (void* indices =
           rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()))
     std::copy_n(mesh.triangles.front().data(), 3 * mesh.triangles.size(), static_cast<std::int32_t*>(indices));
@@ -160,7 +160,7 @@ Tracer::Tracer(const Scene& scene, std::size_t most_copies, std::size_t memory) 
             rtcAttachGeometryByID(out, geometry, unsigned(i));
             rtcReleaseGeometry(geometry);
           } else {
-            // Embree may read 16 bytes at a vertex, which a corner has.
+            // Embree may read 16 bytes at a vertex; a corner is that large.
             attach_triangles(out, unsigned(i), *part.mesh, [&](RTCGeometry geometry) {
               rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, part.corners.data(), 0,
                                          sizeof(Corner), part.corners.size());
@@ -215,7 +215,7 @@ void Tracer::bounds_of_part(const RTCBoundsFunctionArguments* arguments) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  // Rays are rounded to float.
+  // Margins, because rays are rounded to float.
   const auto margin = [](double a, double b) { return std::max(std::abs(a), std::abs(b)) * 0x1p-20; };
   const Vector m{margin(low.x, high.x), margin(low.y, high.y), margin(low.z, high.z)};
   const auto [x0, y0, z0] = to_floats(low - m);
@@ -364,7 +364,8 @@ inline Point Tracer::point(const Place& place, const Vector& origin, const Vecto
   const auto& [na, nb, nc] = place.normals;
   const double wb = place.u, wc = place.v, wa = 1 - wb - wc;
   Point out;
-  // From the corners, not along the ray: so that the point is in the plane of the triangle.
+  // The point is interpolated from the corners, not computed along the ray, so that it lies in the plane of the
+  // triangle.
   out.p = a * wa + b * wb + c * wc;
   out.distance = length(out.p - origin);
   const Vector geometric = unit(cross(b - a, c - a)), normal = na * wa + nb * wb + nc * wc;

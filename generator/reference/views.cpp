@@ -12,14 +12,15 @@ namespace {
 
 using Vector = Vec3<double>;
 
-/// Triangles are halved until the cones about their directions are this narrow, in radians, or so often.
+/// Triangles are subdivided until the cones that contain their directions are narrower than kFine radians, at most
+/// kHalvings times.
 constexpr double kFine = 0.003;
 constexpr int kHalvings = 20;
-/// What single precision makes of places and of cosines.
+/// Error margins of single precision: of positions, and of cosines.
 constexpr double kRounding = 1e-6, kSlack = 1e-5;
-/// Pixels beyond the picture's edge that a pixel filter may reach.
+/// Number of pixels beyond the picture's edge that a pixel filter may reach.
 constexpr double kBorder = 2;
-/// Pairs of a triangle and a corner that are looked at to find a scene convex.
+/// A scene is tested for convexity only if it has no more pairs of a triangle and a vertex than this.
 constexpr std::size_t kPairs = 20'000'000;
 
 struct Corner {
@@ -35,7 +36,8 @@ struct Cone {
   Vector axis;
   double angle;
 };
-/// Holds all directions between three of any lengths: below a right angle cones are convex, and else it holds all.
+/// A cone that contains all directions between the three vectors, whatever their lengths. Cones are convex if their
+/// half-angle is less than a right angle; otherwise the cone contains all directions.
 Cone cone(const Vector& a, const Vector& b, const Vector& c) {
   Cone out{{0, 0, 1}, 0};
   const std::array<Vector, 3> unit = {normalize(a), normalize(b), normalize(c)};
@@ -45,7 +47,7 @@ Cone cone(const Vector& a, const Vector& b, const Vector& c) {
   return narrow ? out : Cone{{0, 0, 1}, kPi};
 }
 
-/// Towards a camera.
+/// The directions and distances from points to the camera.
 class Viewer {
  public:
   Viewer(const Camera& camera, const RenderSettings& settings)
@@ -55,7 +57,7 @@ class Viewer {
 
   Vector from(const Vector& p) const { return camera_.orthographic ? -camera_.forward : camera_.position - p; }
   double depth(const Vector& p) const { return dot(p - camera_.position, camera_.forward); }
-  /// Beyond one edge of the picture, or behind the camera.
+  /// True if the triangle is entirely beyond one edge of the picture, or behind the camera.
   bool out_of_sight(const Corners& c) const {
     const auto all = [&](const auto& beyond) { return beyond(c[0].p) && beyond(c[1].p) && beyond(c[2].p); };
     const auto beyond = [&](const Vector& side, double edge) {
@@ -77,7 +79,7 @@ class Viewer {
   double edge_x_ = 0, edge_y_;
 };
 
-/// Calls each(corners, twice the area along the normal) for the triangles of an object as they stand in the scene.
+/// Calls each(corners, twice the area along the normal) for every triangle of an object in scene coordinates.
 template <class Each> void for_triangles(const Object& object, const Each& each) {
   const Mesh& mesh = *object.mesh;
   for (const auto& triangle : mesh.triangles) {
@@ -93,7 +95,7 @@ template <class Each> void for_triangles(const Object& object, const Each& each)
   }
 }
 
-/// What is seen of a triangle whose normals are turned to the side of the viewer, added to `seen`.
+/// Adds the cosines at which a triangle is seen to `seen`. `front` and `back` are the sides that may face the viewer.
 void add_seen(Cosines& seen, const Viewer& viewer, const Corners& c, bool front, bool back, int halvings) {
   if (viewer.out_of_sight(c)) return;
   const Cone to_viewer = viewer.cone(c), normals = cone(c[0].normal, c[1].normal, c[2].normal);
@@ -115,7 +117,8 @@ void add_seen(Cosines& seen, const Viewer& viewer, const Corners& c, bool front,
     add_seen(seen, viewer, part, front, back, halvings - 1);
 }
 
-/// Whether the triangles of a mesh enclose a space: each edge of one is that of one other, the other way round.
+/// True if the triangles of a mesh enclose a volume: each edge of a triangle belongs to exactly one other, in the
+/// opposite direction.
 bool closed(const Mesh& mesh) {
   using Place = std::array<float, 3>;
   std::map<std::pair<Place, Place>, int> edges;
@@ -129,7 +132,7 @@ bool closed(const Mesh& mesh) {
   return std::ranges::all_of(edges, [](const auto& edge) { return edge.second == 0; });
 }
 
-/// Whether the camera sees nothing but sides of triangles before which there is nothing.
+/// True if the camera sees only sides of triangles that have nothing in front of them.
 bool nothing_in_front(const Scene& scene, const Viewer& viewer) {
   std::vector<Vector> places;
   std::size_t triangles = 0;
@@ -157,7 +160,7 @@ bool nothing_in_front(const Scene& scene, const Viewer& viewer) {
       hides = hides || before;
       faces_viewer = faces_viewer || !before;
     });
-    // Seen from outside a convex body hides its own inner sides.
+    // A convex body seen from outside hides the inner sides of its own triangles.
     if (!good || (hides && !(faces_viewer && closed(*o.mesh)))) return false;
   }
   return true;

@@ -12,7 +12,7 @@
 namespace brdfc::report {
 namespace {
 
-/// Lines of an axis of powers of 10 from `left` to `right`, named; `y` is where a value lies.
+/// Draws labelled lines at powers of 10 from `left` to `right`; y(value) is a value's position.
 template <class Y>
 void put_decades(std::string& out, double left, double right, double bottom, double top, const Y& y) {
   for (double decade = bottom; decade <= top; ++decade) {
@@ -103,7 +103,7 @@ void put_chart(std::string& out, const SceneReport& s) {
       (kLeft + kWidth - kRight) / 2, kHeight - 6);
   put(out, "<text x=\"14\" y=\"{}\" transform=\"rotate(-90 14 {})\" text-anchor=\"middle\">relMSE</text>\n",
       kHeight / 2 - 10, kHeight / 2 - 10);
-  // From below: a name that would lie on another moves up until it is free.
+  // From bottom to top: a label that would overlap another moves up until there is room.
   std::ranges::stable_sort(points, std::less(), [](const FormReport* f) { return f->difference.rel_mse; });
   constexpr double kLine = 13, kLetter = 7;
   struct Name {

@@ -16,7 +16,7 @@ using reference::Rendering;
 
 namespace fs = std::filesystem;
 
-constexpr double kMost = 1e12;  // seconds, samples, error: no sensible figure is larger
+constexpr double kMost = 1e12;  // limit of seconds, samples and errors: larger figures are mistakes
 constexpr int kMostCount = 1'000'000'000;
 
 double median(std::vector<double> v) {
@@ -38,7 +38,7 @@ std::vector<double> read_times(const JsonView& view, std::size_t count) {
   return out;
 }
 
-/// null = not measured.
+/// Reads an error; null means not measured.
 std::optional<double> read_error(const JsonView& view) {
   return view.json().is_null() ? std::nullopt : std::optional(view.number(0, kMost));
 }
@@ -66,7 +66,7 @@ struct FormImages {
 FormImages read_form(const fs::path& folder, const JsonView& view, const SceneReport& scene) {
   FormReport form;
   form.form = view.at("form").text();
-  // It becomes part of file names.
+  // The name becomes part of file names.
   if (form.form == "reference" || form.form.find_first_of("/\\") != std::string::npos)
     view.at("form").fail("a name without slashes other than \"reference\"");
   const JsonView images = view.at("images");
@@ -94,8 +94,8 @@ FormImages read_form(const fs::path& folder, const JsonView& view, const SceneRe
   return {std::move(form), std::move(pictures)};
 }
 
-/// Of forms that cost more than the Glossy node fewer images fit into its time; cheaper ones have no more than were
-/// made.
+/// Computes the difference at equal render time. For a form that costs more than the Glossy node, fewer images fit into
+/// the Glossy node's time. A cheaper form has no more images than were rendered.
 void set_equal_time(FormReport& form, const std::vector<Rendering>& pictures, const SceneReport& scene) {
   if (!form.cost || !(*form.cost > 0)) return;
   const double count = double(pictures.size());
@@ -105,7 +105,8 @@ void set_equal_time(FormReport& form, const std::vector<Rendering>& pictures, co
       measure_difference(form.equal_time_picture, scene.reference, form.images.front(), scene.reference_image);
 }
 
-/// Times of a form's pictures, or of those with so many samples on which convergence was measured; empty without such.
+/// Render times of a form's pictures. With convergence_spp, those of the convergence pictures with that many samples;
+/// empty if there are none.
 std::vector<double> times_of(const FormReport& form, std::optional<int> convergence_spp) {
   if (!convergence_spp) return form.cpu_seconds;
   for (const ConvergencePoint& p : form.convergence)
@@ -113,8 +114,8 @@ std::vector<double> times_of(const FormReport& form, std::optional<int> converge
   return {};
 }
 
-/// Of the pictures that took longest. Times are paired by index: what slows the machine for a while slows both of a
-/// pair.
+/// Computes the costs from the pictures that took longest. Times are paired by index, because a slowdown of the machine
+/// affects both pictures of a pair.
 void set_costs(std::vector<FormReport>& forms) {
   const auto glossy =
       std::find_if(forms.begin(), forms.end(), [](const FormReport& f) { return f.form == kNativeForm; });
@@ -148,7 +149,7 @@ ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view, 
   if (pictures.size() < 2) images.fail("at least two images");
   const Rendering mean = mean_of(pictures);
   for (std::size_t i = 0; i < mean.mean.rgb.size(); ++i)
-    // The variance is that of the mean of all the images; a single one has so many times more.
+    // The variance is that of the mean of n images; that of a single image is n times larger.
     point.noise += double(mean.variance->rgb[i]) * double(pictures.size()) /
                    (sqr(double(mean.mean.rgb[i])) + kRelMseEpsilon) / double(mean.mean.rgb.size());
   if (!std::isfinite(point.noise)) images.fail("images of finite numbers");
@@ -156,8 +157,8 @@ ConvergencePoint read_convergence(const fs::path& folder, const JsonView& view, 
   return point;
 }
 
-/// Samples a pixel to a noise, on straight lines between the points of a doubly logarithmic plot; beyond them, noise is
-/// taken to fall as it does for a mean, by half with twice the samples.
+/// The number of samples per pixel for a given noise, by linear interpolation between the points of a log-log plot.
+/// Beyond the points noise is assumed to be inversely proportional to the number of samples.
 std::optional<double> samples_for(const std::vector<ConvergencePoint>& points, double noise) {
   if (points.size() < 2 || !(noise > 0)) return std::nullopt;
   for (const ConvergencePoint& p : points)
@@ -185,7 +186,7 @@ void set_equal_error(std::vector<FormReport>& forms) {
       form.equal_error.emplace_back();
       const auto at = std::find_if(unit.begin(), unit.end(), [&](const ConvergencePoint& p) { return p.spp == spp; });
       if (at == unit.end() || !(median(at->cpu_seconds) > 0)) continue;
-      // The time of a sample is known best where most were taken.
+      // The time per sample is measured best with the largest number of samples.
       if (const auto needed = samples_for(form.convergence, at->noise))
         form.equal_error.back() =
             *needed * seconds_a_sample(form.convergence.back()) / (spp * seconds_a_sample(unit.back()));

@@ -12,7 +12,7 @@
 namespace brdfc::report {
 namespace {
 
-/// Blender's own nodes, by form.
+/// Names of Blender's own nodes, by form.
 constexpr std::pair<const char*, const char*> kNodes[] = {
     {kNativeForm, "Blender's Glossy node"},
     {"principled", "Blender's Principled node"},

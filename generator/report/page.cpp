@@ -18,7 +18,7 @@ namespace {
 
 std::string cost(const FormReport& f) { return or_dash(f.cost, fmt::format("{:.2f}", f.cost.value_or(0))); }
 
-/// More than three standard deviations away: noise alone explains it once in 370 cases.
+/// True if the bias exceeds three standard deviations; noise alone does that once in 370 cases.
 bool biased(const Difference& d) { return std::abs(d.bias) > 3 * d.bias_error && std::abs(d.bias) > 1e-5; }
 
 std::string bias(const Difference& d) {
@@ -48,7 +48,7 @@ std::string equal_error(const FormReport& f) {
   return out.empty() ? kDash : out;
 }
 
-/// The form that materials have by default: what a report of one scene is mainly about.
+/// The form that materials have by default: the main subject of a report about one scene.
 const FormReport* by_default(const SceneReport& s) {
   for (const char* name : {"auto", "exact", "aimed"})
     for (const FormReport& f : s.forms)
@@ -56,14 +56,14 @@ const FormReport* by_default(const SceneReport& s) {
   return nullptr;
 }
 
-/// Whether something but noise sets the picture apart from the reference.
+/// True if the picture differs from the reference by more than noise.
 bool differs(const FormReport& f) { return f.test ? !f.test->passed() : biased(f.difference); }
 
 std::string count(std::size_t n, const char* one, const char* many) {
   return fmt::format("{} {}", n, n == 1 ? one : many);
 }
 
-/// What the page finds, in three sentences: is it right, what does it cost, what is worst.
+/// The result in three sentences: whether the pictures are right, what the forms cost, and which is worst.
 void put_verdict(std::string& out, const std::vector<SceneReport>& scenes) {
   std::size_t judged = 0, same = 0;
   std::vector<double> costs;
@@ -101,7 +101,7 @@ void put_verdict(std::string& out, const std::vector<SceneReport>& scenes) {
   out += "</p>\n";
 }
 
-/// A row a scene, a column a form: the error, whether it is noise alone, and the time.
+/// A table with a row per scene and a column per form: the error, whether it is only noise, and the time.
 void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
   const std::vector<std::string> forms = all_forms(scenes);
   out += "<table class=\"summary\"><thead><tr><th class=\"left\">Scene</th>";
@@ -155,7 +155,7 @@ void put_figures(std::string& out, const SceneReport& s) {
   out += "</tbody></table></div></details>\n";
 }
 
-/// A list of models that shows the scenes with one of them alone. Without scripts it shows all.
+/// A menu of models; a selection shows only that model's scenes. Without JavaScript all scenes are shown.
 void put_filter(std::string& out, const std::vector<SceneReport>& scenes) {
   std::set<std::string> models;
   for (const SceneReport& s : scenes) models.merge(models_of(s));
@@ -175,14 +175,14 @@ document.getElementById("model").addEventListener("change", event => {
 std::string number(double v) { return fmt::format("{:.3g}", v); }
 
 void put_scale(std::string& out, double at) {
-  // The colours of difference_image().
+  // The colours are those of difference_image().
   put(out,
       "<div class=\"scale\">Difference of radiance: darker in Blender {}{} <span class=\"bar\" style=\"background:"
       "linear-gradient(to right,#00f,#fff,#f00)\"></span> +{} brighter in Blender</div>\n",
       kMinus, number(at), number(at));
 }
 
-/// `alone`: the only scene, whose chart stands on top.
+/// `alone` is true for the only scene of a report; its chart is at the top of the page.
 void put_scene(std::string& out, const SceneReport& s, const Previews& p, bool alone) {
   put(out, "<section id=\"{}\" {}><h2>{}</h2>\n<p>{}</p>\n", escaped(s.scene), marked(s), escaped(s.scene),
       escaped(s.description));
@@ -269,7 +269,7 @@ void put_provenance(std::string& out, const std::vector<SceneReport>& scenes) {
       "<p>Page written by brdfc {}. The same figures are in <a href=\"report.json\">report.json</a> and "
       "<a href=\"report.csv\">report.csv</a>.</p>\n",
       BRDFC_VERSION);
-  // What all scenes share is said once.
+  // Provenance that all scenes share is stated once.
   std::map<std::string, std::string> shared = scenes.front().provenance;
   for (const SceneReport& s : scenes)
     std::erase_if(shared, [&](const auto& item) {

@@ -25,7 +25,7 @@ template <class PerPixel> std::vector<double> per_pixel(const reference::Image& 
   return out;
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not below x > 0.
+/// The smallest number >= x that is 1, 2 or 5 times a power of ten; x > 0.
 double round_up_125(double x) {
   const double power = std::pow(10, std::floor(std::log10(x)));
   for (const double step : {1.0, 2.0, 5.0})
@@ -39,12 +39,12 @@ Previews write_previews(const fs::path& folder, const SceneReport& scene) {
   const reference::Image& reference = scene.reference.mean;
   Previews out;
   const auto luminances = per_pixel(reference, [&](int x, int y) { return luminance(reference.color(x, y)); });
-  // Scenes that fit into [0, 1] but for noise, furnaces above all, are shown as they are.
+  // Scenes that lie in [0, 1] except for noise, above all furnaces, are shown unchanged.
   const double bright = quantile(luminances, 0.98);
   out.exposure = bright > 1.1 ? -std::log2(bright) : 0;
 
-  // One scale for all forms of a scene, so that they can be compared; the most extreme percent may saturate, and so
-  // may Blender's own node, which is far from the model by nature.
+  // One scale for all forms of a scene, so that they can be compared. The most extreme percent may saturate, and so may
+  // Blender's own node, which always differs much from the model.
   double largest = 1e-6, mean = 0;
   for (const FormReport& form : scene.forms) {
     if (form.form == kNativeForm && scene.forms.size() > 1) continue;

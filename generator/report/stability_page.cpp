@@ -21,14 +21,15 @@ namespace {
 
 constexpr int kWidth = 240, kHeight = 160, kScale = 2;
 
-/// Relative error at (x, y) in [0, 1]^2, y upwards; NaN where a form breaks, negative where there is no light.
+/// Relative error at (x, y) in [0, 1]^2, with y upwards. NaN means that the formula fails, a negative value that there
+/// is no light.
 using Map = std::function<double(double x, double y)>;
 
 std::array<double, 3> color_of(double error) {
   if (!std::isfinite(error)) return {0.85, 0.1, 0.1};
   if (error < 0) return {0.75, 0.75, 0.75};
   const double t = std::clamp((std::log10(std::max(error, 1e-17)) + 16) / 16, 0., 1.);
-  // From dark blue by green to yellow: light is bad.
+  // From dark blue through green to yellow: bright colours are large errors.
   return {std::clamp(1.6 * t - 0.45, 0.05, 1.), std::clamp(0.1 + 0.9 * t, 0., 0.95),
           std::clamp(0.45 - 0.35 * t, 0.1, 1.)};
 }
@@ -52,7 +53,7 @@ void write_map(const std::string& path, const Map& map) {
     throw InputError(fmt::format("{}: expected a place that can be written", path));
 }
 
-/// A direction stands for the unit vector nearest to it.
+/// The unit vector that a rounded direction stands for.
 Vec3<Wide> exact(const Vec3<double>& w) { return normalize(Vec3<Wide>::from(w)); }
 
 double relative_error(double got, const Wide& truth) {
@@ -61,16 +62,16 @@ double relative_error(double got, const Wide& truth) {
   return double(Wide(abs(Wide((Wide(got) - truth) / truth))));
 }
 
-// ---- the formulas as printed: they exist here alone, to be compared ------------------------------------------
+// ---- the formulas as printed in the papers; they exist only here, for comparison ---------------------------------
 
-/// Radziszewski and Alda, eq. 17, with the factor 2 that it lacks.
+/// Radziszewski and Alda, eq. 17, with the factor 2 that is missing there.
 double printed_f_theta(double n, double x, double y) {
   const double m = 2 * std::log(std::cosh(n)), t2 = std::pow(std::tanh(n), 2);
   const double d = t2 - (1 - std::exp(-m * x)) * (1 - std::exp(-m * y));
   return 2 * m * t2 * std::exp(-m * (x + y)) / (d * d);
 }
 
-/// Ashikhmin and Shirley, eq. 16 with eq. 11, R_s = 1.
+/// Ashikhmin and Shirley, eq. 16 with eq. 11, for R_s = 1.
 double printed_specular(double nu, double nv, const Vec3<double>& wi, const Vec3<double>& wo) {
   const Vec3<double> h = normalize(wi + wo);
   const double hn = h.z, exponent = (nu * h.x * h.x + nv * h.y * h.y) / (1 - hn * hn);
@@ -82,7 +83,7 @@ double printed_highlight(double e, const Vec3<double>& wi, const Vec3<double>& w
   return std::pow(std::max(wo.z * wi.z - wo.x * wi.x - wo.y * wi.y, 0.), e) / wi.z;
 }
 
-/// Oren and Nayar's full formula of section 4.3, from angles; rho = 1.
+/// Oren and Nayar's full formula of section 4.3, computed from angles, for rho = 1.
 double printed_rough(double sigma, const Vec3<double>& wi, const Vec3<double>& wo) {
   const double ti = std::acos(wi.z), to = std::acos(wo.z), s = sigma * sigma;
   const double a = std::max(ti, to), b = std::min(ti, to);
@@ -102,14 +103,14 @@ struct Figure {
   Map map;
 };
 
-/// The printed value's error, or that of our formula without one.
+/// The relative error of a printed formula's value, or of our formula if none is given.
 double error_of(const Model& model, const ParamValues& v, const Vec3<double>& wi, const Vec3<double>& wo,
                 std::optional<double> printed) {
   return relative_error(printed ? *printed : model.make_double(v)->eval(wi, wo).r,
                         model.make_wide(v)->eval(exact(wi), exact(wo)).r);
 }
 
-/// In the plane of incidence of kOblique, away from ideal reflection towards the normal.
+/// Directions in the plane of incidence of kOblique, rotated from ideal reflection towards the normal by `angle`.
 const Vec3<double> kOblique = direction(std::sqrt(0.75), 0.4);
 Vec3<double> beside_reflection(double angle) {
   const double c = std::cos(kPi / 6 - angle), s = std::sin(kPi / 6 - angle);
@@ -144,7 +145,7 @@ std::vector<Figure> printed_forms() {
                       only(printed, printed_highlight(e, wi, kOblique)));
     };
   };
-  // Opposite directions, where the printed difference sin alpha - (2 beta / pi)^3 meets tan beta.
+  // Nearly opposite azimuths, where the printed formula multiplies sin alpha - (2 beta / pi)^3 by tan beta.
   const auto rough = [=](bool printed) -> Map {
     return [=](double x, double y) {
       const double sigma = 0.66 * y, c = by_factors(1e-12, 1, x);
@@ -169,7 +170,7 @@ std::vector<Figure> printed_forms() {
           {"oren_nayar_ours", "Oren-Nayar, ours", grazing, "sigma from 0 to 0.66", rough(false)}};
 }
 
-/// Largest error over some directions of light, for every view and value of the model's first number.
+/// The largest error over some light directions, for every view and every value of the model's first number.
 Figure figure_of(const Model& model) {
   const ModelInfo& info = model.info();
   const ParamInfo* number = nullptr;

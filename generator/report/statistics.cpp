@@ -53,7 +53,7 @@ Difference measure_difference(const Rendering& picture, const Rendering& referen
       deviation_a += std::sqrt(va);
       deviation_b += std::sqrt(vb);
     }
-    // The channels of a pixel come from the same paths, so they err together.
+    // The channels of a pixel come from the same paths, so their errors are correlated.
     variance_a += sqr(deviation_a);
     variance_b += sqr(deviation_b);
   }
@@ -62,32 +62,32 @@ Difference measure_difference(const Rendering& picture, const Rendering& referen
   d.rel_mse = comparison.rel_mse;
   d.noise = noise / double(count);
   d.bias = ratio - 1;
-  // First order in both means, which are independent of each other.
+  // First-order error propagation; the two means are independent.
   d.bias_error = std::sqrt(variance_a + sqr(ratio) * variance_b) / double(count) / comparison.mean_b;
   return d;
 }
 
 namespace {
 
-/// Rounding in single precision, there and here: relative to the reference, one standard deviation.
+/// Single-precision rounding in both renderers: one standard deviation, relative to the reference.
 constexpr double kRounding = 1e-5;
-/// What is left of a lobe far from its middle: relative to the mean of the whole reference, one standard deviation. In
-/// single precision e^-80 is a number, in the reference's double it may have been cut to 0; nobody sees either.
+/// The tail of a lobe far from its centre: one standard deviation, relative to the mean of the whole reference. e^-80
+/// is not 0 in single precision, but the reference may have cut it off to 0 in double; the difference is invisible.
 constexpr double kUnseen = 1e-12;
 
-/// A mean with its variance and the degrees of freedom of that variance.
+/// A mean, its variance, and the degrees of freedom of that variance.
 struct Estimate {
   double mean = 0, variance = 0, degrees = 1;
 };
 
-/// Two-sided p of Welch's test; 1 where both agree without noise, 0 where they differ without noise.
-/// `unseen`: radiance that counts as none.
+/// The two-sided p-value of Welch's test: 1 if both agree without noise, 0 if they differ without noise. Radiance up to
+/// `unseen` counts as none.
 double welch_p(const Estimate& a, const Estimate& b, double unseen) {
   const double rounding = sqr(kRounding * b.mean) + sqr(unseen);
   const double variance = a.variance + b.variance + rounding;
   const double d = std::abs(a.mean - b.mean);
   if (!(variance > 0)) return d > 0 ? 0 : 1;
-  // Rounding has no degrees of freedom to lose; a variance of 0 has none to give.
+  // The variance of rounding counts as known exactly, and a variance of 0 does not reduce the degrees of freedom.
   const double lost = sqr(a.variance) / a.degrees + sqr(b.variance) / b.degrees;
   const double degrees = lost > 0 ? std::min(sqr(variance) / lost, 1e9) : 1e9;
   const boost::math::students_t t(degrees);
@@ -96,7 +96,7 @@ double welch_p(const Estimate& a, const Estimate& b, double unseen) {
 
 double sidak(int tests) { return 1 - std::pow(1 - kTestSignificance, 1.0 / std::max(tests, 1)); }
 
-/// Of the mean of equally good pictures, from their spread.
+/// The mean of pictures with equal noise, with its variance from their spread.
 template <class Value> Estimate estimate(std::size_t count, const Value& value) {
   double sum = 0, squares = 0;
   for (std::size_t i = 0; i < count; ++i) sum += value(i);
@@ -127,7 +127,7 @@ WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& refer
   if (pictures.size() < 2) throw std::invalid_argument("Welch's test needs two pictures at least");
   if (!reference.variance) throw std::invalid_argument("Welch's test needs the reference's variance");
   for (const Rendering& r : pictures)
-    reference::compare(r, reference, picture_name, reference_name);  // sizes, finite values
+    reference::compare(r, reference, picture_name, reference_name);  // checks sizes and finite values
 
   const int width = reference.mean.width, height = reference.mean.height;
   const double samples = reference.metadata.is_object() ? reference.metadata.value("samples", 1e6) : 1e6;
@@ -152,7 +152,7 @@ WelchTest welch_test(std::span<const Rendering> pictures, const Rendering& refer
       const int x1 = std::min(x0 + kTestTile, width), y1 = std::min(y0 + kTestTile, height);
       const double n = double(x1 - x0) * (y1 - y0);
       std::vector<double> means(pictures.size(), 0);
-      // Of the tile's mean, and of one of its pixels as they are on average.
+      // Estimates for the tile's mean, and for an average pixel of the tile.
       Estimate b{0, 0, std::max(samples - 1, 1.0)}, usual_a{0, 0, n * double(pictures.size() - 1)}, usual_b = b;
       std::vector<std::pair<Estimate, Estimate>> pixels;
       for (int y = y0; y < y1; ++y)

@@ -50,7 +50,7 @@ ordered_json form_json(const FormReport& f) {
           {"materials", materials}};
 }
 
-/// RFC 4180: quoted when it holds a separator, a quote or a line break.
+/// Per RFC 4180 a field is quoted if it contains a separator, a quote or a line break.
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string out = "\"";

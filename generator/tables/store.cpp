@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 std::string file_name(const StoreKey& key) { return fmt::format("{}_{}.exr", key.model(), key.hash().substr(0, 16)); }
 
-/// Files of a model, of any hash: names of models may begin alike, and what follows is a hash of 16 digits and no more.
+/// The stored files of a model with any hash. Names of models may begin alike, so exactly 16 digits must follow.
 std::vector<fs::path> files_of(const fs::path& folder, const std::string& model) {
   std::vector<fs::path> out;
   std::error_code ignored;

@@ -35,7 +35,7 @@ void require_lookup(const Table& t, std::size_t coordinates) {
 }
 
 Rgb<double> interpolate(const Table& t, const std::vector<double>& x) {
-  // Weights of the two knots on every axis, then the sum over the corners of the cell.
+  // Computes the weights of the two knots on every axis, then sums over the corners of the cell.
   std::vector<std::size_t> cell;
   std::vector<double> weight;
   for (std::size_t a = 0; a < t.axes.size(); ++a) {

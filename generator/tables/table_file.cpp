@@ -49,7 +49,7 @@ void write_table_image(const TableImage& image, const std::filesystem::path& pat
   OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::FLOAT);
   spec.attribute(kMeta, image.meta);
   spec.attribute("compression", "zip");
-  // OpenImageIO stamps the present time unless one is given.
+  // OpenImageIO writes the present time unless one is set.
   spec.attribute("DateTime", "1980:01:01 00:00:00");
   const std::string beside = path.string() + ".part.exr";
   const auto out = OIIO::ImageOutput::create(beside);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the fuzz targets share. A reader of strangers' files may do two things with any bytes: read them, or throw
+// Common code of the fuzz targets. A reader of untrusted files may do two things with any bytes: read them, or throw
 // InputError with a message of one line. Any other exception ends the target, as a memory error does.
 #pragma once
 
@@ -15,7 +15,7 @@
 
 namespace brdfc::fuzz {
 
-/// A folder of this process, in memory where the system has such a place; removed at the end.
+/// A folder for this process, in memory if the system has such a place; deleted at the end.
 inline const std::filesystem::path& folder() {
   static const struct Folder {
     std::filesystem::path path;
@@ -40,7 +40,7 @@ inline std::filesystem::path write(const std::string& name, const std::uint8_t* 
   return path;
 }
 
-/// Runs a reader; what it may throw is checked and swallowed.
+/// Runs a reader, and checks and catches its exceptions.
 template <class Read> void expect_value_or_input_error(const Read& read) {
   try {
     read();
