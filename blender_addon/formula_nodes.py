@@ -312,6 +312,7 @@ _SEEN = [
     ["used", "FLOAT"],
     ["active", "FLOAT"],
     ["above", "FLOAT"],
+    ["whole", "FLOAT"],
 ]
 _SLOT = ("place", "turn", "scale", "shape")
 _AXES = [
@@ -353,7 +354,7 @@ def _lamp_group(parts):
     """The group that makes of a cone the closure that carries what the model gives there. Nothing
     of it is computed where the factor `lit` is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    numbers = ("drop", "chord", "flat", "lit", "room", "u_0", "u_1", "u_2")
+    numbers = ("drop", "chord", "flat", "lit", "room", "whole", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
     inputs += _AXES
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
@@ -367,7 +368,8 @@ def _lamp_group(parts):
         point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
         value = here.add("value", **(found | {"wi": _local(w, point, frame)}))["value"]
-        value = w.scaled(value, w.mix(found["flat"], 1.0, on_flat["emphasis"]))
+        emphasis = w.mix(found["flat"], 1.0, on_flat["emphasis"])
+        value = w.scaled(value, w.math("MULTIPLY", emphasis, found["whole"]))
         cone = {name: found[name] for name in ("chord", "flat", "room")}
         lobe = here.add("lobe", value=value, u_2=found["u_2"], **cone)
         toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))

@@ -51,6 +51,7 @@ template <class T> struct LampCone {
   T used;           ///< 0: the slot is empty, else 1
   T active;         ///< 0: the lamp is left to drawn directions, or the slot is empty, else 1
   T above;          ///< 1 where a part of it is above the horizon, else 0
+  T whole;          ///< all of the cone over its part above the horizon
 };
 
 /// Half the width of the lobe of a drawn direction. It keeps off lamps by that.
@@ -63,6 +64,8 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   /// Of the sine of the radius, squared: from where on drawn directions meet a lamp well (tangent 1.5), and that of
   /// what has no size. What is left of a cone's normal's height over its rim, at least.
   constexpr double kWidest = 2.25 / 3.25, kPoint = 1e-8, kLeastRise = 0.01;
+  /// Of a cone that is above the horizon to a smaller part, light is lost rather than made of few samples.
+  constexpr double kLeastPart = 0.05;
   const T kind = slot.shape.x;
   const auto ball = kind < T(1.5);
   const auto sun = kind > T(1.5) && kind < T(2.5);
@@ -97,7 +100,12 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   const auto shines_here = select(flat, facing, T(1)) > T(0.01);
   cone.used = select(used, T(1), T(0));
   cone.active = select(usable && shines_here, T(1), T(0));
-  cone.above = select(T(0) < dot(cone.towards, normal) + cone.reach, T(1), T(0));
+  const T height = dot(cone.towards, normal);
+  cone.above = select(T(0) < height + cone.reach, T(1), T(0));
+  // f is averaged over all of the lamp, with zeros below the horizon, and the surface hides that part of the cone. The
+  // part of a disk above a line, to 0.02.
+  const T x = maximum(minimum(height / sine, T(1)), T(-1));
+  cone.whole = T(1) / maximum(x * (T(0.75) - T(0.25) * (x * x)) + T(0.5), T(kLeastPart));
   return cone;
 }
 

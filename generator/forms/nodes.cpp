@@ -91,6 +91,7 @@ NodeProgram record_cone() {
     p.output("used", cone.used);
     p.output("active", cone.active);
     p.output("above", cone.above);
+    p.output("whole", cone.whole);
   });
 }
 NodeProgram record_flat() {

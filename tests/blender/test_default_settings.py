@@ -78,12 +78,12 @@ def blocks(picture, index):
 
 
 @pytest.mark.slow
-def test_every_model_in_a_new_file(extension, new_file):
+def test_every_model_in_a_new_file(extension, new_file, few_of):
     """What *Add > Shader > brdfc* gives has nothing to say, and is right: under a new file's lamp,
     world and settings, with Open Shading Language off and on, where forms draw or aim and have been
     held against the reference renderer. Means of balls, and blocks of pixels as far as noise
     tells."""
-    models = list(extension.api.models())
+    models = few_of(extension.api.models(), 8)
     materials = [extension.api.new_material(model) for model in models]
     few_samples(new_file, 24)
     gallery(new_file, materials)

@@ -125,7 +125,7 @@ def difference(a, b):
     )
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_a_white_world(extension, model, values):
     """Blocks of a ball are those of directions drawn in Open Shading Language."""
@@ -137,7 +137,7 @@ def test_a_white_world(extension, model, values):
 
 
 @pytest.mark.full
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "light", [lamps, flat_lamps, one_before_the_other], ids=lambda f: f.__name__
 )
