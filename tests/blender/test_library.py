@@ -227,7 +227,9 @@ def assert_aims_at(extension, material, lamp):
     assert [s.default_value for s in first.inputs] == pytest.approx(list(lamp.location))
 
 
-@pytest.mark.parametrize(("by_hand", "osl"), [(True, True), (False, True), (True, False), (False, False)])
+@pytest.mark.parametrize(
+    ("by_hand", "osl"), [(True, True), (False, True), (True, False), (False, False)]
+)
 def test_dragging_brings_nothing_twice_and_finds_the_lamps(extension, made, empty, by_hand, osl):
     empty.cycles.shading_system = osl
     lamp = helpers.add_lamp(empty, name="Key", location=(1, 2, 3), energy=100)

@@ -165,8 +165,8 @@ def test_noise_under_a_rectangle(extension):
     found = blocks_of(extension, "cook_torrance", {}, "nodes", rectangle, 16)
     noise = found.var(0, ddof=1).sum() / (found.mean(0) ** 2).sum()
     # Half of the samples of the lamp are in the cone: 0.23 of the square of a pixel's light each.
-    # Blender 4.5 has 1.0 times that, 5.0 2.1 times; where the cone carried its own light alone it was
-    # 24 times.
+    # Blender 4.5 has 1.0 times that, 5.0 2.1 times; a cone that carries its own light alone has 24
+    # times that in 4.5.
     assert noise < 4 * 0.23 / (16 * BLOCK**2), noise
 
 
