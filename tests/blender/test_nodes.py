@@ -11,6 +11,8 @@ from helpers import add_camera, add_lamp, add_sphere, add_world, albedo, render,
 from test_aimed import SUNS, off_under_a_sun
 
 SLOW = pytest.mark.slow
+#: Of what takes long script/test runs one version, and script/evidence all.
+IN_ONE_VERSION = SLOW if bpy.app.version < (5, 0, 0) else pytest.mark.evidence
 BLOCK = 8
 
 
@@ -20,6 +22,7 @@ def settings(extension, scene, samples, osl, size=64):
     scene.render.resolution_x = scene.render.resolution_y = size
 
 
+@IN_ONE_VERSION
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
