@@ -689,7 +689,7 @@ def phong(tmp_path):
     ],
 )
 def test_build_takes_a_form_that_keeps_the_time(phong, options, form):
-    result = phong("--explain", *options)
+    result = phong("--explain", "--osl-only", *options)
     assert result.returncode == 0, result.stderr
     (model,) = json.loads(result.stdout)["models"]
     choices = {c["form"]: c for c in model["choices"]}
@@ -733,12 +733,20 @@ def test_build_prints_every_form_with_cost_and_error(phong):
     assert "not taken: nothing is fitted unasked" in without
 
 
+def test_what_renders_without_osl_is_beside_the_form(phong):
+    for options, forms in (([], {"aimed", "nodes"}), (["--osl-only"], {"aimed"})):
+        (model,) = json.loads(phong("--explain", *options).stdout)["models"]
+        assert {c["form"] for c in model["choices"] if c["taken"]} == forms
+        manifest = json.loads((phong.out / "brdfc_shaders" / "manifest.json").read_text())
+        assert set(manifest["models"]["phong"]["representations"]) == forms
+
+
 def test_lamps_of_a_blend(phong):
     """Which have no size is said of the form that is taken; how many there are, is had in slots."""
     content = json.loads(phong.file.read_text())
     lamps = {"sizeless_lamps": ["Sun.001"], "lamps": 2}
     phong.file.write_text(json.dumps(content | lamps))
-    (model,) = json.loads(phong("--explain").stdout)["models"]
+    (model,) = json.loads(phong("--explain", "--osl-only").stdout)["models"]
     (taken,) = [c for c in model["choices"] if c["taken"]]
     assert taken["form"] == "aimed" and "Sun.001 without a size" in taken["why"]
     assert "slots for lamps beyond 2: the scene has no more" in model["left_out"]
