@@ -9,10 +9,9 @@ filled by a handler are emptied before a step back, for what they hold may be go
 filled again afterwards.
 """
 
-import bpy
 from bpy.app.handlers import persistent
 
-from . import device, lamps, nodes
+from . import app_handlers, device, lamps, nodes
 from .i18n import of_error
 
 #: Whether groups are being filled; the scene of which a picture is being made; session_uid of
@@ -25,9 +24,11 @@ _filled = set()
 def follow(scene=None):
     """Has the groups of the file suit a scene, or that of the first window."""
     global _busy
+    if _busy or nodes.is_at_work():
+        return
     groups = nodes.automatic_groups()
     scene = scene or lamps.current_scene()
-    if _busy or nodes.is_at_work() or not groups or scene is None:
+    if not groups or scene is None:
         return
     _busy = True
     try:
@@ -104,11 +105,8 @@ _HANDLERS = {
 
 
 def register():
-    for name, function in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
+    app_handlers.register(_HANDLERS)
 
 
 def unregister():
-    for name, function in _HANDLERS.items():
-        if function in (handlers := getattr(bpy.app.handlers, name)):
-            handlers.remove(function)
+    app_handlers.unregister(_HANDLERS)

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Says on the console why models are black or stood in for: without a window there is no panel."""
 
-import bpy
 from bpy.app.handlers import persistent
 
-from . import checks
+from . import app_handlers, checks
 
 
 def _materials(scene):
@@ -31,8 +30,8 @@ def _before_render(scene, *_):
 
 
 def register():
-    bpy.app.handlers.render_init.append(_before_render)
+    app_handlers.register({"render_init": _before_render})
 
 
 def unregister():
-    bpy.app.handlers.render_init.remove(_before_render)
+    app_handlers.unregister({"render_init": _before_render})

@@ -375,7 +375,7 @@ def _lamp_group(parts):
         toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
         return {"BSDF": w.shown(found["lit"], toon)}
 
-    content = ["lamp", 1, {name: parts.data[name] for name in ("value", "flat", "lobe")}]
+    content = ["lamp", {name: parts.data[name] for name in ("value", "flat", "lobe")}]
     return _group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 

@@ -8,7 +8,7 @@ Blender itself would have each drag add another copy where the file has a group 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import automatic, lamps, nodes
+from . import app_handlers, automatic, lamps, nodes
 
 
 def _brought(context):
@@ -39,8 +39,8 @@ def _after_import(context):
 
 
 def register():
-    bpy.app.handlers.blend_import_post.append(_after_import)
+    app_handlers.register({"blend_import_post": _after_import})
 
 
 def unregister():
-    bpy.app.handlers.blend_import_post.remove(_after_import)
+    app_handlers.unregister({"blend_import_post": _after_import})

@@ -60,8 +60,11 @@ def keep(group, digest):
         folder = _folder()
         name = _name(digest)
         part = folder / f"{name}.{os.getpid()}"
-        bpy.data.libraries.write(str(part), {group}, compress=True)
-        os.replace(part, folder / name)
+        try:
+            bpy.data.libraries.write(str(part), {group}, compress=True)
+            os.replace(part, folder / name)
+        finally:
+            part.unlink(missing_ok=True)
         current = f"-{version()}-"
         for path in folder.glob(f"*{_ENDING}"):
             if current not in path.name:

@@ -191,8 +191,7 @@ def _fill_native_group(group, model_name, representation, source, twin_group):
         instead = None
         if twin_group is not None:
             sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
-            inputs = {i: sources.get(name) for name, i in twin_group[TAG]["sockets"].items()}
-            instead = stand_in.twin_of(group, twin_group, inputs)
+            instead = _instance(group, twin_group, sources)
         elif stand_in.has_node(model_name) and "baked" not in group[TAG]:
             instead = stand_in.node_of(group, model_name, parameters, constants)
         if instead is not None:
@@ -319,8 +318,7 @@ def _fill_group(group, model_name, representation, texts, twin_group):
     sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
     instead = None
     if twin_group is not None:
-        of_twin = {i: sources.get(name) for name, i in twin_group[TAG]["sockets"].items()}
-        instead = stand_in.twin_of(group, twin_group, of_twin)
+        instead = _instance(group, twin_group, sources)
     elif stand_in.has_node(model_name) and "baked" not in tag:
         constants = pack.constants(model_name, representation)
         instead = stand_in.node_of(group, model_name, sources, constants)
@@ -525,12 +523,8 @@ def form_in_script(node):
 
 
 def automatic_groups():
-    """Groups of this file, and of the installed version, that suit themselves to the scene."""
-    return [
-        group
-        for group in bpy.data.node_groups
-        if group.library is None and AUTO in group.get(TAG, ()) and _is_current(group)
-    ]
+    """Groups of this file that suit themselves to the scene."""
+    return [g for g in bpy.data.node_groups if g.library is None and AUTO in g.get(TAG, ())]
 
 
 def _is_current(group):
@@ -543,11 +537,16 @@ def _is_current(group):
 
 def suit(group, lacks_osl):
     """Has an automatic group be the form that a scene with or without Open Shading Language can
-    render; sockets stay. Returns whether it was another. Raises CompileError; it is then as it
-    was."""
+    render, if the installed version made it; sockets stay. Returns whether it was another. Raises
+    CompileError; it is then as it was."""
     tag = group[TAG]
+    # Handlers ask at each change of the scene, and to tell the version takes a hash.
+    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl:
+        return False
+    if not _is_current(group):
+        return False
     wanted = pack.native_form(tag["model"]) if lacks_osl else tag[AUTO]
-    if wanted is None or (tag["representation"] == wanted and group.nodes):
+    if wanted is None:
         return False
     _suit(group, wanted)
     return True

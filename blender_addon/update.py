@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.app.handlers import persistent
 
-from . import editable, nodes, pack
+from . import app_handlers, editable, nodes, pack
 from .i18n import form_name, of_error, say
 
 
@@ -37,11 +37,11 @@ def _after_load(_path):
 
 
 def register():
-    bpy.app.handlers.load_post.append(_after_load)
+    app_handlers.register({"load_post": _after_load})
 
 
 def unregister():
-    bpy.app.handlers.load_post.remove(_after_load)
+    app_handlers.unregister({"load_post": _after_load})
 
 
 def others():

@@ -4,6 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
+from .. import app_handlers
 from . import emission, filling, meshes, shared_group, slots
 
 #: The scene of which a picture is being made.
@@ -125,12 +126,9 @@ _HANDLERS = {
 
 def register():
     """Has Blender call the handlers."""
-    for name, function in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
+    app_handlers.register(_HANDLERS)
 
 
 def unregister():
     """Takes them away again."""
-    for name, function in _HANDLERS.items():
-        if function in (handlers := getattr(bpy.app.handlers, name)):
-            handlers.remove(function)
+    app_handlers.unregister(_HANDLERS)
