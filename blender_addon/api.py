@@ -37,11 +37,11 @@ from . import (
     usage,
 )
 from .checks import Finding
+from .compiler import CompileError
 from .i18n import say
 from .lamps import Lamp
 from .lean import PlanError
 from .library import LibraryError
-from .nodes import CompileError
 from .pack import PackError
 from .update import Update
 

@@ -7,6 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import app_handlers, editable, nodes, pack
+from .group_sockets import VECTORS
 from .i18n import form_name, of_error, say
 
 
@@ -73,7 +74,7 @@ def refusal(material, node):
         return say("this version has no model {model!r}", model=model_name)
     known = pack.parameters(model_name)
     for name, value in nodes.all_values(node).items():
-        if name in pack.fixed(model_name) or name in nodes.VECTORS:
+        if name in pack.fixed(model_name) or name in VECTORS:
             continue
         if name not in known:
             return say(

@@ -104,6 +104,7 @@ def extension(extension_zip):
         "device",
         "energy",
         "lean",
+        "group_content",
         "nodes",
         "operators",
         "pack",

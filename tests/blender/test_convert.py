@@ -467,7 +467,7 @@ def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkey
     def fail_second(*arguments):
         calls.append(arguments)
         if len(calls) == 2:
-            raise extension.nodes.CompileError("as if it could not")
+            raise extension.api.CompileError("as if it could not")
         compile_(*arguments)
 
     monkeypatch.setattr(compiler, "compile_script", fail_second)

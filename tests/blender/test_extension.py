@@ -104,7 +104,7 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
             assert extension.nodes.identity(node) == (model, representation)
             script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
             found = {s.identifier: s.type for s in script.inputs}
-            expected = extension.nodes.expected_inputs(model, representation)
+            expected = extension.group_content.expected_inputs(model, representation)
             assert expected.items() <= found.items()
             apart = extension.nodes.has_albedo_script(model, representation)
             outputs = ["BSDF"] if apart else ["BSDF", "Albedo"]

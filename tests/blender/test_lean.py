@@ -279,7 +279,7 @@ def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeyp
     def fail_second(*arguments):
         calls.append(arguments)
         if len(calls) == 2:
-            raise extension.nodes.CompileError("as if it could not")
+            raise extension.api.CompileError("as if it could not")
         compile_(*arguments)
 
     monkeypatch.setattr(compiler, "compile_script", fail_second)
