@@ -6,7 +6,11 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import automatic, console, i18n, imports, lamps, operators, plot_panel, ui, update
+from . import lamps, operators
+from .common import i18n
+from .groups import automatic, imports, update
+from .panels import plot_panel, ui
+from .warnings import checks, console
 
 
 def _refuse_beside_another():
@@ -14,13 +18,14 @@ def _refuse_beside_another():
     of them would take the first one's away."""
     other = getattr(bpy.types, ui.MATERIAL_PT_brdfc.__name__, None)
     if other is not None and other.__module__ != ui.__name__:
-        package = other.__module__.rpartition(".")[0]
+        package = other.__module__.removesuffix(".ui").removesuffix(".panels")
         raise RuntimeError(f"{package} is enabled, which has the same menus: disable it first")
 
 
 def register():
     _refuse_beside_another()
     i18n.register()
+    lamps.limit_by(checks.lamps_that_fit)
     operators.register()
     ui.register()
     plot_panel.register()

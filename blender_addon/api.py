@@ -18,32 +18,20 @@ from pathlib import Path
 
 import bpy
 
-from . import (
-    automatic,
-    bump_correction,
-    checks,
-    convert,
-    editable,
-    expected,
-    kernel,
-    lamp_checks,
-    lamps,
-    lean,
-    library,
-    nodes,
-    pack,
-    shader_trees,
-    update,
-    usage,
-)
-from .checks import Finding
-from .compiler import CompileError
-from .i18n import say
+from . import convert, lamps, lean, library
+from .common import editable, expected
+from .common.i18n import say
+from .content.compiler import CompileError
+from .groups import automatic, bump_correction, nodes, update, usage
+from .groups.update import Update
 from .lamps import Lamp
 from .lean import PlanError
 from .library import LibraryError
-from .pack import PackError
-from .update import Update
+from .packs import kernel, pack
+from .packs.pack import PackError
+from .trees import shader_trees
+from .warnings import checks, lamp_checks
+from .warnings.checks import Finding
 
 __all__ = [
     "CompileError",
@@ -214,7 +202,7 @@ def set_substance(material, substance, node=None, thickness=None):
     another name, a file that can't be read, naming line and what was expected, a model without such
     parameters, and a thickness of what absorbs nothing; nothing is changed then.
     """
-    from . import optical
+    from .packs import optical
 
     node = _the_node(material) if node is None else expected.node(node)
     found = optical.find(substance)
@@ -319,7 +307,7 @@ def remove_library():
 
 def albedo(model, cos_theta_o, **parameters):
     """Directional albedo (r, g, b) from the model's table. Raises ValueError."""
-    from . import energy
+    from .packs import energy
 
     if not isinstance(cos_theta_o, Real) or not 0 < cos_theta_o <= 1:
         raise ValueError(f"cos_theta_o: expected a number in (0, 1], got {cos_theta_o!r}")

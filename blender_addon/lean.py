@@ -16,9 +16,13 @@ from pathlib import Path
 
 import bpy
 
-from . import lamp_checks, lamps, nodes, pack, usage
-from .i18n import say
-from .jobs import Job, ProgramJob
+from . import lamps
+from .common.extension import PACKAGE
+from .common.i18n import say
+from .common.jobs import Job, ProgramJob
+from .groups import nodes, usage
+from .packs import pack
+from .warnings import lamp_checks
 
 #: Forms that a budget does not choose: they are for who asks for them.
 ASKED_FOR = ("twin", "nodes")
@@ -31,7 +35,7 @@ class PlanError(RuntimeError):
 def program():
     """Path of brdfc: of the extension's preferences, of the environment variable BRDFC_TOOL, found
     on the PATH, or where pip puts programs for the Python that runs. Raises PlanError."""
-    addon = bpy.context.preferences.addons.get(__package__)
+    addon = bpy.context.preferences.addons.get(PACKAGE)
     named = getattr(addon.preferences, "program", "") if addon and addon.preferences else ""
     for what, path in (
         (say("the extension's preferences name it"), bpy.path.abspath(named)),

@@ -72,7 +72,12 @@ def install(folder):
     bpy.ops.extensions.package_install_files(
         filepath=str(archive), repo="user_default", enable_on_install=True
     )
-    return {n: import_module(f"{PACKAGE}.{n}") for n in ("api", "nodes", "pack", "scene_loader")}
+    from scene_loader import SceneLoader
+
+    modules = {n: import_module(f"{PACKAGE}.{n}") for n in ("api", "groups.nodes", "packs.pack")}
+    return {n.split(".")[-1]: module for n, module in modules.items()} | {
+        "scene_loader": SceneLoader(PACKAGE)
+    }
 
 
 def use_device(kind):

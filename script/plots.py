@@ -9,7 +9,6 @@ of each model take, and of its forms that have a curve of their own:
 import sys
 import tempfile
 import time
-from importlib import import_module
 
 import numpy as np
 import render_scene
@@ -41,8 +40,7 @@ def main(extension, out):
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as resources:
         bpy, loader = render_scene.start_blender(extension, resources)
         api, nodes, panel = (
-            import_module(loader.__name__.replace("scene_loader", name))
-            for name in ("api", "nodes", "plot_panel")
+            loader.module(name) for name in ("api", "groups.nodes", "panels.plot_panel")
         )
 
         def node_of(model, form):

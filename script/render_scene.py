@@ -21,7 +21,6 @@ usage or input.
 
 import argparse
 import contextlib
-import importlib
 import json
 import os
 import resource
@@ -63,11 +62,12 @@ def quiet():
 
 def start_blender(extension, resources):
     """Imports bpy with temporary user folders and installs the extension. Returns bpy and
-    scene_loader."""
+    a SceneLoader."""
     os.environ["BLENDER_USER_RESOURCES"] = str(resources)
     # Blender leaves the bytecode of each compiled script in the folder for temporary files.
     tempfile.tempdir = str(resources)
     import bpy
+    from scene_loader import SceneLoader
 
     with quiet():
         bpy.ops.preferences.addon_enable(module="bl_pkg")
@@ -78,11 +78,10 @@ def start_blender(extension, resources):
         # A pack cut to a scene has its own id.
         with zipfile.ZipFile(extension) as archive:
             about = tomllib.loads(archive.read("blender_manifest.toml").decode())
-        loader = f"bl_ext.user_default.{about['id']}.scene_loader"
-        scene_loader = importlib.import_module(loader)
+        loader = SceneLoader(f"bl_ext.user_default.{about['id']}")
     except (KeyError, ImportError, zipfile.BadZipFile) as error:
         raise UsageError(f"{extension}: not an extension of brdfc: {error}") from error
-    return bpy, scene_loader
+    return bpy, loader
 
 
 def cpu_seconds():

@@ -1,16 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rooms of the code: what generator/CMakeLists.txt says of them, what their files include, and
-both as a page with a drawing."""
+"""The rooms of the generator and of the extension: what each is for, what its files include or
+import, and both as a page with drawings by Graphviz."""
 
-import itertools
+import ast
 import re
+import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
+import grimp
 from markdown_table import heading, line
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, DRAWING = ROOT / "docs/tables/rooms.md", ROOT / "docs/tables/rooms.svg"
+TABLES = ROOT / "docs/tables"
+PAGE, DRAWING, ADDON_DRAWING = (TABLES / n for n in ("rooms.md", "rooms.svg", "addon_rooms.svg"))
+ADDON = "blender_addon"
 
 
 def listed():
@@ -38,82 +44,81 @@ def included(rooms):
     return out
 
 
-def reduced(below):
-    """The arrows without those that longer paths imply."""
-
-    def reached(room):
-        return set(below[room]).union(*(reached(b) for b in below[room]))
-
-    return {
-        room: [b for b in direct if not any(b in reached(other) for other in direct)]
-        for room, direct in below.items()
-    }
+def addon_rooms():
+    """By room of the extension, the lowest first: what it is for. The order is that of
+    pyproject.toml, which import-linter holds imports to."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (contract,) = settings["tool"]["importlinter"]["contracts"]
+    return {room: purpose(room) for room in reversed(contract["layers"])}
 
 
-def bends(new, at, below):
-    return sum(abs(column - at[b][0]) for room, (column, _) in new.items() for b in below[room])
+def addon_files(room):
+    folder = ROOT / ADDON / room
+    return sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
 
 
-def places(below):
-    """By room: column and row in the drawing. The longest path goes straight down; other rooms are
-    beside it, near those that they build on."""
+def purpose(room):
+    """The first sentence of a room's docstring."""
+    folder = ROOT / ADDON / room
+    file = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
+    doc = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))
+    return doc.split("\n\n")[0].replace("\n", " ")
 
-    def way(room):
-        return [*max((way(b) for b in below[room]), key=len, default=[]), room]
 
-    rows = {room: len(way(room)) - 1 for room in below}
-    trunk = max((way(room) for room in below), key=len)
-    at = {room: (0, rows[room]) for room in trunk}
-    for row in range(len(trunk)):
-        beside = [room for room in below if rows[room] == row and room not in at]
+def imported(rooms):
+    """By room of the extension: the other rooms that its modules import, in the order of
+    `rooms`."""
+    sys.path.insert(0, str(ROOT))  # where grimp looks for the package, which it does not run
+    graph = grimp.build_graph(ADDON, cache_dir=None)
+    named = {room: set() for room in rooms}
+    for module in graph.modules:
+        if module.count(".") and (room := module.split(".")[1]) in rooms:
+            found = graph.find_modules_directly_imported_by(module)
+            named[room] |= {other.split(".")[1] for other in found if other.count(".")}
+    return {room: [other for other in rooms if other in named[room] - {room}] for room in rooms}
 
-        ways = itertools.permutations((1, -1, 2, -2), len(beside))
-        placed = [dict(zip(beside, ((c, row) for c in columns), strict=True)) for columns in ways]
-        at |= min(placed, key=lambda new, at=at: bends(new, at, below))
-    return at
+
+def lines_of(paths):
+    return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in paths)
 
 
 def drawing(below):
-    below = reduced(below)
-    at = places(below)
-    wide, high, box, tall = 150, 66, 110, 34
-    left = min(column for column, _ in at.values())
-    middle = {
-        room: (box / 2 + 1 + (column - left) * wide, tall / 2 + 1 + row * high)
-        for room, (column, row) in at.items()
-    }
-    size = [max(m[i] for m in middle.values()) + e / 2 + 1 for i, e in ((0, box), (1, tall))]
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]:g}" height="{size[1]:g}" '
-        'font-family="sans-serif" font-size="15" text-anchor="middle">',
-        '<marker id="tip" markerWidth="8" markerHeight="8" refX="7" refY="4" orient="auto">'
-        '<path d="M0 0 8 4 0 8z" fill="#789"/></marker>',
-    ]
-    for room, others in below.items():
-        x1, y1 = middle[room][0], middle[room][1] - tall / 2
-        for other in others:
-            x0, y0 = middle[other][0], middle[other][1] + tall / 2
-            # Down its own column, then across to the room.
-            turn = y1 - high + tall
-            lines.append(
-                f'<path d="M{x0:g} {y0:g}V{turn:g}C{x0:g} {y1:g} {x1:g} {turn:g} {x1:g} {y1:g}" '
-                'fill="none" stroke="#789" stroke-width="1.5" marker-end="url(#tip)"/>'
-            )
-    for room, (x, y) in middle.items():
-        lines.append(
-            f'<rect x="{x - box / 2:g}" y="{y - tall / 2:g}" width="{box}" height="{tall}" rx="6" '
-            f'fill="#e8eef4" stroke="#789"/><text x="{x:g}" y="{y + 5:g}">{room}</text>'
-        )
-    return "\n".join([*lines, "</svg>", ""])
+    """An SVG of what each room builds on, without arrows that longer ways imply."""
+    edges = [f"{other} -> {room};" for room, others in below.items() for other in others]
+    text = "\n".join(
+        [
+            "digraph rooms {",
+            'node [shape=box, style="rounded,filled", fillcolor="#e8eef4", color="#778899",',
+            '  fontname="sans-serif", fontsize=13, width=1.3];',
+            'edge [color="#778899", arrowsize=0.7];',
+            *(f"{room};" for room in below),
+            *edges,
+            "}",
+        ]
+    )
+    for command in (["tred"], ["dot", "-Tsvg"]):
+        text = subprocess.run(
+            command, input=text, capture_output=True, text=True, check=True
+        ).stdout
+    return text
 
 
-def page(rooms, below):
+def arrows(svg):
+    """The rooms and arrows of a drawing, wherever Graphviz placed them."""
+    return set(re.findall(r"<title>(.*?)</title>", svg))
+
+
+def page(rooms, below, addon, addon_below):
     lines = [
         "# Rooms of the code, drawn",
         "",
-        "Made by `script/rooms` of `generator/CMakeLists.txt` and of what files include. An arrow",
-        "leads to a room that includes the other; what a longer way says has none. Models register",
-        "themselves, so nothing includes them.",
+        "Made by `script/rooms` of `generator/CMakeLists.txt`, `pyproject.toml`, and of what files",
+        "include or import. An arrow leads to a room that builds on the other; what a longer way",
+        "says has none.",
+        "",
+        "## The generator",
+        "",
+        "Models register themselves, so nothing includes them.",
         "",
         "![Rooms and arrows](rooms.svg)",
         "",
@@ -123,11 +128,23 @@ def page(rooms, below):
         count = sum(len(text.splitlines()) for text in sources(room))
         uses = ", ".join(below[room]) or "-"
         lines.append(line(f"`{room}`", doc, uses, round(count, -2)))
+    lines += [
+        "",
+        "## The extension",
+        "",
+        "![Rooms and arrows](addon_rooms.svg)",
+        "",
+        *heading(f"Room of `{ADDON}/`", "What it is for", "Imports", "Lines, about"),
+    ]
+    for room, doc in addon.items():
+        uses = ", ".join(addon_below[room]) or "-"
+        lines.append(line(f"`{room}`", doc, uses, round(lines_of(addon_files(room)), -1)))
     return "\n".join([*lines, ""])
 
 
 if __name__ == "__main__":
-    rooms = listed()
-    below = included(rooms)
-    PAGE.write_text(page(rooms, below), encoding="utf-8")
+    rooms, addon = listed(), addon_rooms()
+    below, addon_below = included(rooms), imported(addon)
+    PAGE.write_text(page(rooms, below, addon, addon_below), encoding="utf-8")
     DRAWING.write_text(drawing(below), encoding="utf-8")
+    ADDON_DRAWING.write_text(drawing(addon_below), encoding="utf-8")

@@ -6,9 +6,9 @@ import functools
 
 import bpy
 
-from .. import animation, shader_trees, shader_values
-from ..i18n import Sentence, say
-from ..native_bsdf import Native
+from ..common.i18n import Sentence, say
+from ..nearest.native_bsdf import Native
+from ..trees import animation, shader_trees, shader_values
 
 #: Roughnesses at which a model is to be near where a texture gives it.
 ROUGHNESSES = (0.2, 0.5, 0.8)

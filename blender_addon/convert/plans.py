@@ -4,11 +4,14 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from .. import device, editable, lamps, nodes, pack, shader_trees
-from ..i18n import Sentence, say
-from ..native_bsdf import Native
-from ..nearest_model import nearest, with_width
-from ..seen_node import SeenNode
+from .. import lamps
+from ..common import editable
+from ..common.i18n import Sentence, say
+from ..groups import nodes
+from ..nearest.native_bsdf import Native
+from ..nearest.nearest_model import nearest, with_width
+from ..packs import device, pack
+from ..trees import shader_trees
 from .node_values import (
     KINDS,
     KNOWN_SOCKETS,
@@ -20,6 +23,7 @@ from .node_values import (
     glows,
     is_transparent,
 )
+from .seen_node import SeenNode
 
 #: Error of a plan above which it is refused where no other limit is given.
 LIMIT = 0.35

@@ -5,7 +5,10 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from .. import bump_correction, editable, nodes, pack, shader_trees, shader_values
+from ..common import editable
+from ..groups import bump_correction, nodes
+from ..packs import pack
+from ..trees import shader_trees, shader_values
 from .node_values import KINDS
 from .plans import Part
 

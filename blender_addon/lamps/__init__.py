@@ -7,7 +7,7 @@ A list that is out of date costs noise, and the light of lamps without a size th
 are right otherwise, whatever it says.
 """
 
-from .filling import count, current_scene, ensure_group, follow, see, seen
+from .filling import count, current_scene, ensure_group, follow, limit_by, see, seen
 from .handlers import register, unregister
 from .lights import has_importance, is_sizeless
 from .scenes import lamps_of
@@ -31,6 +31,7 @@ __all__ = [
     "is_group",
     "is_sizeless",
     "lamps_of",
+    "limit_by",
     "part_names",
     "register",
     "remove_unused_group",

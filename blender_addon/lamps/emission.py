@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 
-from .. import color, shader_trees, shader_values
+from ..common import color
+from ..trees import shader_trees, shader_values
 from . import ies
 
 

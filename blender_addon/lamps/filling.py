@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import bpy
 
-from .. import device
+from ..packs import device
 from . import scenes, shared_group, slots, world
 
 #: Numbers of a slot.
@@ -34,15 +34,24 @@ def _arranged(chosen, before):
     return sorted(arranged[: len(chosen)], key=lambda c: -c.width)
 
 
-def _checks():
-    from .. import checks  # which looks into nodes, and these into this package
+def _no_limit(scene):
+    return None
 
-    return checks
+
+_room = _no_limit
+
+
+def limit_by(lamps_that_fit):
+    """Sets the function that counts how many lamps the open file's materials can aim at on a
+    scene's device: given the scene, it returns a tuple that begins with the number, or None. It
+    looks into groups, which are made of this package."""
+    global _room
+    _room = lamps_that_fit
 
 
 def limit_of(scene):
     """How many lamps materials can aim at on a scene's device."""
-    found = _checks().lamps_that_fit(scene)
+    found = _room(scene)
     return slots.SLOTS if found is None else min(found[0], slots.SLOTS)
 
 

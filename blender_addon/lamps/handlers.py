@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import app_handlers
+from ..common import app_handlers
 from . import emission, filling, meshes, shared_group, slots
 
 #: The scene of which a picture is being made.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from mathutils import Matrix, Vector, geometry
 
-from ..i18n import say
+from ..common.i18n import say
 from . import emission, slots
 
 #: A lobe covers the whole ball around a mesh, and within it the model and what is seen of the lamp

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..i18n import say
+from ..common.i18n import say
 from . import emission, instancers, lights, meshes, slots, world
 
 #: Angular radius from which it counts that a lamp's light differs over it: what a lobe carries is

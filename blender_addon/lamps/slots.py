@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..i18n import say
+from ..common.i18n import say
 
 #: How many lamps the shared group holds.
 SLOTS = 8

@@ -4,8 +4,9 @@
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from .. import color, shader_trees, shader_values
-from ..i18n import say
+from ..common import color
+from ..common.i18n import say
+from ..trees import shader_trees, shader_values
 from . import bright_spots, emission, slots
 
 #: Types of Sky Texture that show a sun; NISHITA became two in 5.0.

@@ -18,9 +18,10 @@ from pathlib import Path, PurePosixPath
 
 import bpy
 
-from .. import pack
-from ..i18n import say
-from ..jobs import ProgramJob
+from ..common.extension import PACKAGE
+from ..common.i18n import say
+from ..common.jobs import ProgramJob
+from ..packs import pack
 
 _HERE = Path(__file__).parent
 #: What the library is called in the Asset Browser, and on top of its catalogues.
@@ -141,8 +142,7 @@ def stamp():
 
 def folder():
     """Where this extension's library is, which may not be made yet; uninstalling takes it away."""
-    package = __package__.rpartition(".")[0]
-    return Path(bpy.utils.extension_path_user(package)) / "library"
+    return Path(bpy.utils.extension_path_user(PACKAGE)) / "library"
 
 
 def registered():

@@ -3,21 +3,9 @@
 
 import bpy
 
-from .adding import (
-    BRDFC_OT_add_node,
-    BRDFC_OT_new_material,
-    BRDFC_OT_search,
-)
-from .convert import (
-    BRDFC_OT_convert,
-    BRDFC_OT_convert_back,
-)
-from .lean import (
-    BRDFC_OT_bake,
-    BRDFC_OT_bake_apply,
-    BRDFC_OT_bake_plan,
-    BRDFC_OT_write_materials,
-)
+from .adding import BRDFC_OT_add_node, BRDFC_OT_new_material, BRDFC_OT_search
+from .convert import BRDFC_OT_convert, BRDFC_OT_convert_back
+from .lean import BRDFC_OT_bake, BRDFC_OT_bake_apply, BRDFC_OT_bake_plan, BRDFC_OT_write_materials
 from .model import (
     BRDFC_OT_add_albedo,
     BRDFC_OT_details,
@@ -27,11 +15,7 @@ from .model import (
     BRDFC_OT_switch,
     BRDFC_OT_update,
 )
-from .preferences import (
-    BRDFC_OT_add_library,
-    BRDFC_OT_remove_library,
-    BrdfcPreferences,
-)
+from .preferences import BRDFC_OT_add_library, BRDFC_OT_remove_library, BrdfcPreferences
 from .settings import (
     BRDFC_OT_enable_osl,
     BRDFC_OT_enlarge_lamps,

@@ -5,8 +5,10 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 from bpy.types import Operator
 
-from .. import api, nodes, pack
-from ..i18n import rpt, say, tip
+from .. import api
+from ..common.i18n import rpt, say, tip
+from ..groups import nodes
+from ..packs import pack
 from .common import ERRORS, refused, report_osl, stays
 
 

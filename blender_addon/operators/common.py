@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators share: how they refuse, and whose material they are about."""
 
-from .. import checks, editable, nodes
-from ..i18n import Sentence, iface, of_error, rpt, say, tip
+from ..common import editable
+from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
+from ..groups import nodes
+from ..warnings import checks
 
 ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
 

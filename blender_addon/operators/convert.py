@@ -6,9 +6,10 @@ import math
 from bpy.props import FloatProperty
 from bpy.types import Operator
 
-from .. import api, convert, nodes
-from ..i18n import rpt, say
-from ..labels import wrapped
+from .. import api, convert
+from ..common.i18n import rpt, say
+from ..groups import nodes
+from ..panels.labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
 
 

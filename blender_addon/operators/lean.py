@@ -6,8 +6,8 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
 from .. import api
-from ..i18n import rpt, say
-from ..labels import wrapped
+from ..common.i18n import rpt, say
+from ..panels.labels import wrapped
 from .common import ERRORS, Long, refused
 
 

@@ -7,10 +7,13 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Operator
 
-from .. import api, color, editable, kernel, nodes, optical
-from ..i18n import Sentence, iface, of_error, rpt, say, tip
-from ..labels import wrapped
-from ..methods import METHODS
+from .. import api
+from ..common import color, editable
+from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
+from ..groups import nodes
+from ..packs import kernel, optical
+from ..panels.labels import wrapped
+from ..panels.methods import METHODS
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
 
 
@@ -83,7 +86,7 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
         return {"FINISHED"}
 
     def lines(self, context):
-        from .. import ui
+        from ..panels import ui
 
         try:
             node = model_node(context.object.active_material, self.node)

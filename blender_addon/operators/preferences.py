@@ -5,7 +5,8 @@ from bpy.props import BoolProperty, StringProperty
 from bpy.types import AddonPreferences, Operator
 
 from .. import api, library
-from ..i18n import rpt, say
+from ..common.extension import PACKAGE
+from ..common.i18n import rpt, say
 from .common import ERRORS, Long, refused
 
 
@@ -70,7 +71,7 @@ def draw_library(layout):
 
 
 class BrdfcPreferences(AddonPreferences):
-    bl_idname = __package__.rpartition(".")[0]  # that of the extension
+    bl_idname = PACKAGE
 
     program: StringProperty(
         name="Program brdfc",

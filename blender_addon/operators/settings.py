@@ -3,8 +3,9 @@
 
 from bpy.types import Operator
 
-from .. import api, checks
-from ..i18n import rpt, say
+from .. import api
+from ..common.i18n import rpt, say
+from ..warnings import checks
 from .common import ChangesActiveMaterial, OfActiveMaterial, refused
 
 

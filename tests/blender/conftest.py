@@ -98,21 +98,24 @@ def extension(extension_zip):
         filepath=str(extension_zip), repo="user_default", enable_on_install=True
     )
     assert PACKAGE in bpy.context.preferences.addons
-    names = (
+    modules = (
         "api",
-        "checks",
-        "device",
-        "energy",
+        "content.group_content",
+        "groups.nodes",
         "lean",
-        "group_content",
-        "nodes",
         "operators",
-        "pack",
-        "scene_loader",
-        "ui",
+        "packs.device",
+        "packs.energy",
+        "packs.pack",
+        "panels.ui",
+        "warnings.checks",
     )
+    from scene_loader import SceneLoader  # which needs bpy
+
     return SimpleNamespace(
-        package=PACKAGE, **{name: import_module(f"{PACKAGE}.{name}") for name in names}
+        package=PACKAGE,
+        scene_loader=SceneLoader(PACKAGE),
+        **{name.split(".")[-1]: import_module(f"{PACKAGE}.{name}") for name in modules},
     )
 
 

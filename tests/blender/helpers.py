@@ -269,7 +269,7 @@ def script_material(extension, name, source, surface="BSDF"):
     tree = empty_tree(material)
     script = tree.nodes.new("ShaderNodeScript")
     script.mode = "INTERNAL"
-    import_module(f"{extension.package}.compiler").compile_script(script, text, name)
+    import_module(f"{extension.package}.content.compiler").compile_script(script, text, name)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(script.outputs[surface], output.inputs["Surface"])
     material.cycles.use_bump_map_correction = False

@@ -196,7 +196,7 @@ def test_several_models_in_one_material_aim_at_fewer_lamps(extension, cpu):
 
 
 def test_blenders_own_shaders_in_a_material_count(extension, cpu):
-    pool = import_module(f"{extension.package}.closure_pool")
+    pool = import_module(f"{extension.package}.warnings.closure_pool")
     alone = pool.of_material(mix_of(extension, cpu, "phong", 1)).slots
     kinds = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfDiffuse")
     material = mix_of(extension, cpu, "phong", 1, kinds)

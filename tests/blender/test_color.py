@@ -79,7 +79,7 @@ def use_working_space(name):
 
 @pytest.fixture
 def color(extension):
-    return importlib.import_module(f"{extension.package}.color")
+    return importlib.import_module(f"{extension.package}.common.color")
 
 
 def of_index(values):

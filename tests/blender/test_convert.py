@@ -43,7 +43,7 @@ def convert(extension, empty):
 
 
 def nearest_model(convert):
-    return import_module("..nearest_model", convert.__package__)
+    return import_module("..nearest.nearest_model", convert.__package__)
 
 
 def only(plans):
@@ -461,7 +461,7 @@ def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkey
     before = helpers.counts()
     plans = convert.plan(materials)
     assert helpers.counts() == before
-    compiler = import_module(f"{extension.package}.compiler")
+    compiler = import_module(f"{extension.package}.content.compiler")
     compile_, calls = compiler.compile_script, []
 
     def fail_second(*arguments):

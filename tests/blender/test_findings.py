@@ -436,7 +436,7 @@ def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch
     stands_in = "Blender's own nodes stand in, error 15 %: Phong"
     assert said == [f"brdfc: Open Shading Language is off: {stands_in}"]
     empty.cycles.shading_system = True
-    console = import_module(f"{extension.package}.console")
+    console = import_module(f"{extension.package}.warnings.console")
     monkeypatch.setattr(extension.device, "gpu_backend", lambda: "CUDA")
     empty.cycles.device = "GPU"
     glass = extension.api.new_material("glass", "exact")

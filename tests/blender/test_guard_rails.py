@@ -96,7 +96,7 @@ def test_one_line_and_one_button(extension, empty, phong, monkeypatch, spoil, li
     first = next(i for i, entry in enumerate(log) if entry.startswith("operator"))
     said, offered = log[:first], log[first]
     assert line in " ".join(said)
-    labels = import_module(f"{extension.package}.labels")
+    labels = import_module(f"{extension.package}.panels.labels")
     assert len(said) <= 2 and max(map(labels.width, said)) <= labels.room(icon=True)
     assert offered == f"operator {button}"
     module, name = button.split()[0].split(".")
@@ -191,7 +191,10 @@ def test_what_would_be_lost_is_said_and_kept(extension, empty, lose, why):
         assert kept_node[0].node_tree == node.node_tree, "one group serves both"
     group = node.node_tree
     lose(group[nodes.TAG])
-    if lose is lose_a_choice and import_module(f"{extension.package}.group_sockets").has_menus():
+    if (
+        lose is lose_a_choice
+        and import_module(f"{extension.package}.content.group_sockets").has_menus()
+    ):
         pytest.skip("menus of later versions of Blender hold labels, which can't be pretended")
     said = shown(extension, material, empty)
     assert why in " ".join(said)
@@ -235,7 +238,7 @@ def test_files_are_updated_when_they_are_opened_if_the_preferences_say_so(
         assert ("outdated" in codes[0]) != wanted
         assert "kept" in codes[1]
     assert api.get_parameters(phong)["e"] == pytest.approx(20)
-    update = import_module(f"{extension.package}.update")
+    update = import_module(f"{extension.package}.groups.update")
     assert update.last.count == 1 and "'gone'" in update.last.refusals[0]
 
 

@@ -10,7 +10,7 @@ import pytest
 @pytest.fixture
 def kept(extension, empty):
     """The module, with an empty folder."""
-    module = import_module(f"{extension.package}.kept_groups")
+    module = import_module(f"{extension.package}.content.kept_groups")
     for path in module._folder().iterdir():
         path.unlink()
     return module

@@ -273,7 +273,7 @@ def test_without_the_program_nothing_changes(extension, used, tmp_path, monkeypa
 
 
 def test_a_shader_that_fails_to_compile_changes_nothing(extension, used, monkeypatch):
-    compiler = import_module(f"{extension.package}.compiler")
+    compiler = import_module(f"{extension.package}.content.compiler")
     compile_, calls = compiler.compile_script, []
 
     def fail_second(*arguments):

@@ -22,12 +22,12 @@ SCRIPTS = Path(__file__).parents[2] / "script"
 
 @pytest.fixture(scope="module")
 def panel(extension):
-    return import_module(f"{extension.package}.plot_panel")
+    return import_module(f"{extension.package}.panels.plot_panel")
 
 
 @pytest.fixture(scope="module")
 def plots(extension):
-    return import_module(f"{extension.package}.plots")
+    return import_module(f"{extension.package}.plotting.plots")
 
 
 def pixels_of(preview):
@@ -275,7 +275,7 @@ def test_the_nearest_glossy_node_is_as_rough_as_its_own_lobe(plots, extension, p
 
 @pytest.fixture(scope="module")
 def principled(extension):
-    return import_module(f"{extension.package}.principled")
+    return import_module(f"{extension.package}.nearest.principled")
 
 
 @pytest.fixture(scope="module")
@@ -381,7 +381,7 @@ def test_the_curve_of_the_principled_node_is_dashed(extension, panel, plots, emp
 
 @pytest.fixture(scope="module")
 def form_light(extension):
-    return import_module(f"{extension.package}.form_light")
+    return import_module(f"{extension.package}.plotting.form_light")
 
 
 def of_form(form_light, plots, extension, material, wi, wo):
@@ -592,7 +592,7 @@ def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
     ],
 )
 def test_what_is_no_fitted_shader_is_unreadable(extension, text):
-    shader_text = import_module(f"{extension.package}.shader_text")
+    shader_text = import_module(f"{extension.package}.plotting.shader_text")
     source = f"\nshader s(\n)\n{{\n{text}; BSDF = x;\n}}"
     wi = np.array([[0.0, 0.0, 1.0]])
     with pytest.raises(shader_text.Unreadable):

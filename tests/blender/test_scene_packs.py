@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from helpers import render
+from scene_loader import SceneLoader
 
 SCENES = Path(__file__).parents[2] / "scenes"
 #: Those whose materials have what differs: mirrors, glass, metal, textures, all models at once.
@@ -60,10 +61,10 @@ def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool,
     (path,) = (built / "out").glob("*.zip")
     tool("scene", source, "--out", tmp_path / "scene")
     with installed(extension, path) as module:
-        scene = module("scene_loader").load_scene(tmp_path / "scene" / "scene.json")
+        scene = SceneLoader(module("api").__package__).load_scene(tmp_path / "scene" / "scene.json")
         picture = render(scene)[..., :3]
-        made = {m.name: module("nodes").group_nodes(m) for m in bpy.data.materials}
-        models = {module("nodes").identity(n)[0] for ours in made.values() for n in ours}
+        made = {m.name: module("groups.nodes").group_nodes(m) for m in bpy.data.materials}
+        models = {module("groups.nodes").identity(n)[0] for ours in made.values() for n in ours}
     assert models == {m["model"] for m in content["materials"].values()}
     assert np.isfinite(picture).all() and picture.max() > 1e-3
 

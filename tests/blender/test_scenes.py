@@ -371,7 +371,7 @@ def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch
     materials = {"white": {"model": "lambert", "parameters": {"rho": [0.2, 0.5, 0.8]}}}
     path = scene_file(lights=sun, materials=materials)
     before = render(extension.scene_loader.load_scene(path))
-    monkeypatch.setattr(extension.scene_loader.pack, "model_names", lambda: ["minnaert"])
+    monkeypatch.setattr(extension.pack, "model_names", lambda: ["minnaert"])
     scene = extension.scene_loader.load_scene(path)
     (material,) = {s.material for o in scene.objects for s in o.material_slots}
     assert not extension.nodes.group_nodes(material)

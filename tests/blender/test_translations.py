@@ -16,7 +16,7 @@ LOCALES = ("de_DE", "ja_JP")
 
 @pytest.fixture
 def i18n(extension):
-    return import_module(f"{extension.package}.i18n")
+    return import_module(f"{extension.package}.common.i18n")
 
 
 @pytest.fixture
@@ -44,7 +44,9 @@ def phong(extension, empty):
 def classes(extension):
     """Every class of the extension that Blender draws."""
     kinds = (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.AddonPreferences)
-    drawn = [import_module(f"{extension.package}.{name}") for name in ("ui", "plot_panel")]
+    drawn = [
+        import_module(f"{extension.package}.{name}") for name in ("panels.ui", "panels.plot_panel")
+    ]
     for module in (*drawn, *helpers.modules_of_operators(extension)):
         for _, found in inspect.getmembers(module, inspect.isclass):
             if (
@@ -150,7 +152,7 @@ def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
 
 @pytest.mark.parametrize("locale", [None, *LOCALES])
 def test_lines_fit_the_panel(extension, i18n, locale):
-    labels = import_module(f"{extension.package}.labels")
+    labels = import_module(f"{extension.package}.panels.labels")
     texts = (
         i18n.catalogues()[locale].values() if locale else [k[1] for k in i18n.catalogues()["de_DE"]]
     )

@@ -306,12 +306,12 @@ def shader_as_a_colour(bench):
 
 @pytest.fixture
 def trees(extension):
-    return import_module(f"{extension.package}.shader_trees")
+    return import_module(f"{extension.package}.trees.shader_trees")
 
 
 @pytest.fixture
 def values(extension):
-    return import_module(f"{extension.package}.shader_values")
+    return import_module(f"{extension.package}.trees.shader_values")
 
 
 @pytest.fixture

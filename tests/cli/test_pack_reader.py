@@ -26,7 +26,7 @@ def read(tmp_path, monkeypatch):
     package = types.ModuleType("extension_without_blender")
     package.__path__ = [str(ROOT / "blender_addon")]
     monkeypatch.setitem(sys.modules, package.__name__, package)
-    pack = importlib.import_module(f"{package.__name__}.pack")
+    pack = importlib.import_module(f"{package.__name__}.packs.pack")
 
     def reader(data):
         (tmp_path / "manifest.json").write_bytes(data)

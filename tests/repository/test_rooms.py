@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rooms include what they link, which is above them; the page that draws them is that of now."""
+"""Rooms include or import what is below them alone; the page that draws them is that of now."""
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,7 @@ import rooms_page
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = rooms_page.listed()
 BELOW = rooms_page.included(ROOMS)
+LINTER = Path(sys.executable).with_name("lint-imports")
 
 
 def test_every_folder_is_a_room():
@@ -23,11 +27,39 @@ def test_a_room_includes_what_it_links_and_that_is_above(room):
     assert all(order.index(other) < order.index(room) for other in BELOW[room])
 
 
+def test_the_extension_imports_downwards_alone():
+    done = subprocess.run([LINTER, "--no-cache"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("common/expected.py", "from ..groups import nodes"),
+        ("trees/animation.py", "def f():\n    from ..lamps import slots"),
+        ("new_room/__init__.py", "x = 1"),
+    ],
+)
+def test_an_import_upwards_or_an_unlisted_room_is_found(tmp_path, module, line):
+    shutil.copytree(ROOT / "blender_addon", tmp_path / "blender_addon")
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    changed = tmp_path / "blender_addon" / module
+    changed.parent.mkdir(exist_ok=True)
+    with changed.open("a", encoding="utf-8") as out:
+        out.write(f"\n{line}\n")
+    done = subprocess.run([LINTER, "--no-cache"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0 and changed.parent.name in done.stdout
+
+
 def test_the_page_is_that_of_now():
     def without_lines(page):  # they change with every change
         return re.sub(r"\| \d+ \|$", "|", page, flags=re.M)
 
+    addon = rooms_page.addon_rooms()
+    addon_below = rooms_page.imported(addon)
     written = rooms_page.PAGE.read_text(encoding="utf-8")
-    assert without_lines(written) == without_lines(rooms_page.page(ROOMS, BELOW)), "script/rooms"
-    drawing = rooms_page.DRAWING.read_text(encoding="utf-8")
-    assert drawing == rooms_page.drawing(BELOW), "script/rooms"
+    now = rooms_page.page(ROOMS, BELOW, addon, addon_below)
+    assert without_lines(written) == without_lines(now), "script/rooms"
+    for file, below in ((rooms_page.DRAWING, BELOW), (rooms_page.ADDON_DRAWING, addon_below)):
+        drawn = rooms_page.arrows(file.read_text(encoding="utf-8"))
+        assert drawn == rooms_page.arrows(rooms_page.drawing(below)), "script/rooms"

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiles shaders by the OSL compiler that Cycles brings, and finds out what went wrong."""
+
+import contextlib
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ..common.i18n import say
+from ..packs import pack
+
+
+class CompileError(RuntimeError):
+    """Cycles could not compile a shader, or compiled it to something else than expected."""
+
+
+def _find_oslquery():
+    """Makes the `oslquery` module importable, which Cycles needs to find a script's sockets.
+
+    Blender proper has it on its path. The bpy wheel has not: there it lies in the folder of
+    site-packages that ships with the wheel.
+    """
+    try:
+        import oslquery  # noqa: F401
+
+        return
+    except ImportError:
+        pass
+    root = Path(bpy.utils.resource_path("LOCAL"))
+    # On Windows without a folder of the version.
+    layouts = ("python/lib/python3.*/site-packages", "python/lib/site-packages")
+    added = [str(p) for layout in layouts for p in root.glob(layout)]
+    # At the end, so that what the interpreter already has keeps its priority.
+    sys.path.extend(p for p in added if p not in sys.path)
+    try:
+        import oslquery  # noqa: F401
+    except ImportError as error:
+        raise CompileError(
+            say(
+                "Blender's compiler of shaders can't be loaded",
+                more=f"the module oslquery: {error}. A separately installed OpenImageIO in the "
+                "same Python gets in its way",
+            )
+        ) from error
+
+
+@contextlib.contextmanager
+def _captured_stderr():
+    """Collects what native code prints: the OSL compiler reports errors nowhere else."""
+    lines = []
+    try:
+        saved = os.dup(2)
+    except OSError:  # a windowed application without a console
+        yield lines
+        return
+    with tempfile.TemporaryFile() as sink:
+        os.dup2(sink.fileno(), 2)
+        try:
+            yield lines
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+            sink.seek(0)
+            lines += sink.read().decode(errors="replace").splitlines()
+
+
+def compile_script(script_node, text, what):
+    """Has a script node run a text; `what` is that to people. Raises CompileError."""
+    import cycles.osl
+
+    if not pack.osl_available():
+        raise CompileError(pack.NO_OSL)
+    _find_oslquery()
+    reports = []
+    with _captured_stderr() as console:
+        # Under Cycles the assignment compiles by itself; under another engine it does nothing.
+        script_node.script = text
+        if not script_node.bytecode:
+            cycles.osl.update_script_node(
+                script_node, lambda kind, message: reports.append((kind, message))
+            )
+    if script_node.bytecode and script_node.outputs:
+        return
+    lines = [line.strip() for line in console if "error" in line.lower()]
+    lines += [message for kind, message in reports if "ERROR" in kind]
+    detail = "; ".join(dict.fromkeys(lines[:4])) or "the compiler gave no reason"
+    raise CompileError(
+        say(
+            "Blender could not compile the shader of a model",
+            more=f"{what}: the shader failed to compile: {detail}",
+        )
+    )

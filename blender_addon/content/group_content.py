@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the node group of a model holds: script nodes, or Blender's own, with the sockets of the
+model's parameters, lamps and what stands in where scripts do not run. nodes.py makes and keeps the
+groups themselves.
+"""
+
+import json
+
+from .. import lamps
+from ..common.i18n import say
+from ..packs import pack
+from . import compiler, formula_nodes, stand_in, twin
+from .compiler import CompileError
+from .group_sockets import VECTORS, Interface
+from .wiring import Wiring
+
+TAG = pack.TAG
+OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
+ALBEDO = "Albedo"
+#: What the tag of a group says of its scripts.
+_OF_SCRIPTS = ("script_inputs", "albedo_apart", "albedo_inputs", "stands_in")
+_SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
+
+
+def is_native(group):
+    """Whether a group of this extension is made of Blender's own nodes, without a script."""
+    return "script_inputs" not in group[TAG]
+
+
+def has_albedo_script(model_name, representation):
+    """Whether the Albedo output of a form is a script of its own, which a group has if asked."""
+    return pack.representation(model_name, representation).get("albedo_shader") is not None
+
+
+def expected_inputs(model_name, representation):
+    """Identifiers of the script node's inputs and the types of their sockets."""
+    inputs = {
+        p["name"]: _SOCKET_TYPES[p["kind"]]
+        for p in pack.socket_parameters(model_name, representation).values()
+    }
+    inputs |= {pack.NORMAL: "VECTOR", pack.TANGENT: "VECTOR"}
+    inputs |= dict.fromkeys(_lamp_inputs(model_name, representation), "VECTOR")
+    return inputs
+
+
+def _lamp_inputs(model_name, representation):
+    """Inputs of a form that the shared group of lamps feeds; a form may have fewer slots."""
+    slots = pack.representation(model_name, representation).get("lamps") or 0
+    if slots > lamps.SLOTS:
+        raise pack.PackError(
+            f"manifest.json: {model_name} ({representation}): expected at most {lamps.SLOTS} "
+            f"lamps, got {slots}"
+        )
+    return lamps.part_names(slots)
+
+
+def scripts(group):
+    """The script node that gives the closure, and the one of the Albedo output, if it has one."""
+    found = [n for n in group.nodes if n.bl_idname == "ShaderNodeScript"]
+    albedo = next((n for n in found if n.name == ALBEDO), None)
+    others = (n for n in found if n.name not in (ALBEDO, stand_in.NODE))
+    return next(others, None), albedo
+
+
+def _script_problem(script, inputs, outputs):
+    if script is None:
+        return "has no script node"
+    if not script.bytecode:
+        return "is not compiled"
+    for sockets, expected in ((script.inputs, inputs), (script.outputs, outputs)):
+        found = {s.identifier: s.type for s in sockets}
+        if missing := sorted(set(expected) - set(found)):
+            return f"lacks the sockets {', '.join(missing)}"
+        for name, kind in expected.items():
+            if found[name] != kind:
+                return f"has a socket {name} of type {found[name]}, expected {kind}"
+    return None
+
+
+def script_problem(group):
+    """What is wrong with a group's script nodes, or None.
+
+    A shader that fails to compile raises nothing in Cycles: it leaves a node without sockets.
+    """
+    if is_native(group):
+        return None
+    tag = group[TAG]
+    script, albedo = scripts(group)
+    inputs, albedo_inputs = dict(tag["script_inputs"]), tag.get("albedo_inputs")
+    # Files of older versions have both outputs in one script, as have forms of small tables.
+    alone = tag.get("albedo_apart", False)
+    outputs = {n: k for n, k in OUTPUTS.items() if not alone or n != ALBEDO}
+    if problem := _script_problem(script, inputs, outputs):
+        return problem
+    if tag.get("stands_in") and _script_problem(*stand_in.expected(group)):
+        return f"has lost its node {stand_in.NODE}"
+    if albedo_inputs is None:
+        return None
+    problem = _script_problem(albedo, dict(albedo_inputs), {ALBEDO: OUTPUTS[ALBEDO]})
+    return problem and f"of the Albedo output {problem}"
+
+
+def _add_outputs(group, outputs):
+    kinds = {"SHADER": "NodeSocketShader", "RGBA": "NodeSocketColor"}
+    items = group.interface.items_tree
+    present = {i.name for i in items if i.item_type == "SOCKET" and i.in_out == "OUTPUT"}
+    for name in (n for n in OUTPUTS if n in outputs and n not in present):
+        group.interface.new_socket(name, in_out="OUTPUT", socket_type=kinds[OUTPUTS[name]])
+
+
+def _start_group(group, outputs):
+    """Output sockets, and the nodes that stand for the group's inputs and outputs."""
+    _add_outputs(group, outputs)
+    return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+
+
+def outputs_of(model_name, representation, albedo):
+    """Names of the outputs of a form of scripts; `albedo` as in ensure_group()."""
+    apart = has_albedo_script(model_name, representation)
+    return [name for name in OUTPUTS if albedo or not apart or name != ALBEDO]
+
+
+def fill_with_nodes(group, model_name, representation, source, twin_group):
+    """Forms of Blender's own nodes have the sockets of the others; what a twin looks like does not
+    hang on a tangent. `twin_group`: that of the model's twin, or None."""
+    data = json.loads(source)
+    label = pack.model(model_name)["label"]
+    # A twin's sockets keep the identifiers that files have: outputs come first.
+    _add_outputs(group, OUTPUTS if representation == "twin" else ())
+    group_input = group.nodes.new("NodeGroupInput")
+    group_input.location = (-300, 0)
+    interface = Interface(group, group_input, {})
+    parameters = _relays(group, interface, pack.socket_parameters(model_name, representation))
+    normal, tangent = map(interface.vector, VECTORS)
+    if representation == "twin":
+        made = dict(
+            zip(OUTPUTS, twin.wire(group, data, normal, parameters, f"{label} (twin)"), strict=True)
+        )
+    else:
+        slots = []
+        if names := _lamp_inputs(model_name, representation):
+            shared = _add_lamps(group)
+            slots = lamps.by_slot([shared.outputs[name] for name in names])
+        constants = pack.constants(model_name, representation)
+        made = formula_nodes.wire(
+            group,
+            data,
+            normal,
+            tangent,
+            parameters | formula_nodes.numbers(constants),
+            slots,
+            label,
+        )
+        instead = None
+        if twin_group is not None:
+            sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
+            instead = _instance(group, twin_group, sources)
+        elif stand_in.has_node(model_name) and "baked" not in group[TAG]:
+            instead = stand_in.node_of(group, model_name, parameters, constants)
+        if instead is not None:
+            made = stand_in.add_in_eevee(group, made, instead)
+    if representation != "twin":
+        _add_outputs(group, made)
+    group_output = group.nodes.new("NodeGroupOutput")
+    for name, output in made.items():
+        group.links.new(output, group_output.inputs[name])
+    group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
+    group[TAG]["sockets"] = interface.identifiers()
+
+
+def _relays(group, interface, parameters):
+    """An output within the group for each of these parameters."""
+    found = {}
+    for name, parameter in parameters.items():
+        relay = group.nodes.new("NodeReroute")
+        relay.location = (-100, -40 * len(found))
+        interface.parameter(name, relay.inputs[0], parameter)
+        found[name] = relay.outputs[0]
+    return found
+
+
+def fill_with_form(group, model_name, native, with_osl, group_of):
+    """Fills a group that takes the place of another form with Blender's own nodes: those of the
+    form `native`; where a choice is one that it lacks, the model's twin. Sockets stay.
+    `group_of`: makes the group of a form, or finds it."""
+    form = group_of(model_name, native)
+    tag = group[TAG]
+    _add_outputs(group, outputs_of(model_name, with_osl, tag["with_albedo"]))
+    group_input, group_output = (group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output"))
+    group_input.location, group_output.location = (-500, 0), (400, 0)
+    interface = Interface(group, group_input, tag.get("sockets", {}))
+    sources = _relays(group, interface, pack.socket_parameters(model_name, with_osl))
+    sources |= {name: interface.vector(name) for name in VECTORS}
+    made = _instance(group, form, sources)
+    limits = {n: v for n, v in pack.form_values(model_name, native).items() if n in sources}
+    if limits:
+        made = _only_where(group, model_name, limits, sources, made, group_of)
+    for socket in group_output.inputs:
+        if socket.name in made:
+            group.links.new(made[socket.name], socket)
+    group_output.is_active_output = True
+    tag["sockets"] = interface.identifiers()
+    for name in _OF_SCRIPTS:
+        tag.pop(name, None)
+
+
+def _instance(group, inner, sources):
+    """The outputs, by name, of a group within another. `sources`: outputs by parameter."""
+    inputs = {i: sources.get(name) for name, i in inner[TAG]["sockets"].items()}
+    return stand_in.twin_of(group, inner, inputs)
+
+
+def _only_where(group, model_name, limits, sources, made, group_of):
+    """Outputs by name: `made` where choices are these, and those of the twin elsewhere."""
+    w, chosen = Wiring(group), None
+    for name, only in limits.items():
+        index = pack.parameters(model_name)[name]["choices"].index(only)
+        same = w.math("COMPARE", sources[name], index, 0.25)
+        chosen = same if chosen is None else w.math("MULTIPLY", chosen, same)
+    if "twin" not in pack.model(model_name)["representations"]:
+        return made | {"BSDF": w.shown(chosen, made["BSDF"])}
+    twin_ = _instance(group, group_of(model_name, "twin"), sources)
+    return twin_ | made | stand_in.choose(group, chosen, twin_, made)
+
+
+def _add_lamps(group):
+    """The node that tells where the lamps are."""
+    shared = group.nodes.new("ShaderNodeGroup")
+    shared.node_tree = lamps.ensure_group()
+    shared.location = (-500, -400)
+    return shared
+
+
+def _add_script(group, text, what):
+    script = group.nodes.new("ShaderNodeScript")
+    script.mode = "INTERNAL"
+    compiler.compile_script(script, text, what)
+    return script
+
+
+def fill_with_scripts(group, model_name, representation, texts, twin_group):
+    """`texts`: of the script and, where the Albedo output has one of its own that was asked for, of
+    that. `twin_group`: that of the model's twin, or None."""
+    what = f"{model_name} ({representation})"
+    apart = has_albedo_script(model_name, representation)
+    outputs = outputs_of(model_name, representation, len(texts) > 1)
+    group_input, group_output = _start_group(group, outputs)
+    group_output.is_active_output = True
+    group_input.location, group_output.location = (-500, 0), (300, 0)
+    script = _add_script(group, texts[0], what)
+    from_scripts = {s.identifier: s for s in script.outputs}
+    tag = group[TAG]
+    tag["script_inputs"] = expected_inputs(model_name, representation)
+    tag["albedo_apart"] = apart
+    if len(texts) > 1:
+        albedo = _add_script(group, texts[1], f"{what}, the Albedo output")
+        albedo.name = albedo.label = ALBEDO
+        albedo.location = (0, -400)
+        only_light = {pack.TANGENT, *_lamp_inputs(model_name, representation)}
+        tag["albedo_inputs"] = {
+            name: kind for name, kind in tag["script_inputs"].items() if name not in only_light
+        }
+        from_scripts |= {s.identifier: s for s in albedo.outputs}
+    if problem := script_problem(group):
+        raise CompileError(
+            say(
+                "Blender could not compile the shader of a model",
+                more=f"{what}: the compiled shader {problem}",
+            )
+        )
+
+    inputs = {s.identifier: s for s in script.inputs}
+    interface = Interface(group, group_input, tag.get("sockets", {}))
+    for name, parameter in pack.socket_parameters(model_name, representation).items():
+        interface.parameter(name, inputs[name], parameter)
+    for name in VECTORS:
+        group.links.new(interface.vector(name), inputs[name])
+    if lamp_inputs := _lamp_inputs(model_name, representation):
+        shared = _add_lamps(group)
+        for name in lamp_inputs:
+            group.links.new(shared.outputs[name], inputs[name])
+    sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
+    instead = None
+    if twin_group is not None:
+        instead = _instance(group, twin_group, sources)
+    elif stand_in.has_node(model_name) and "baked" not in tag:
+        constants = pack.constants(model_name, representation)
+        instead = stand_in.node_of(group, model_name, sources, constants)
+    if instead is not None:
+        tag["stands_in"] = True
+        runs = _add_script(group, stand_in.text(), "what tells where shaders run")
+        for name, output in stand_in.add(group, runs, from_scripts, instead).items():
+            from_scripts[name] = output
+        group_output.location.x += 100
+    for output in outputs:
+        group.links.new(from_scripts[output], group_output.inputs[output])
+    if len(texts) > 1:
+        for socket in albedo.inputs:
+            group.links.new(sources[socket.identifier], socket)
+    tag["sockets"] = interface.identifiers()

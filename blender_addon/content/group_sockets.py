@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Input sockets of node groups: one a parameter of the model, with range and tooltip."""
+
+import bpy
+
+from ..packs import pack
+from ..packs.pack import choice_label
+
+
+def _output(group_input, socket):
+    """The output of a group's input node that stands for a socket of the group."""
+    return next(s for s in group_input.outputs if s.identifier == socket.identifier)
+
+
+def _socket(group, name, kind, description, **settings):
+    socket = group.interface.new_socket(
+        name, in_out="INPUT", socket_type=kind, description=description
+    )
+    for key, value in settings.items():
+        setattr(socket, key, value)
+    return socket
+
+
+def _range_text(parameter):
+    unit = f" {parameter['unit']}" if parameter.get("unit") else ""
+    return f"{parameter['min']:g} to {parameter['max']:g}{unit}"
+
+
+def tooltip(parameter):
+    """Tooltip of a parameter's socket: its description and what it accepts."""
+    doc = parameter["doc"].rstrip()
+    doc += "" if doc.endswith((".", "!", "?")) or not doc else "."
+    if parameter["kind"] == "number":
+        return f"{doc} Accepted: {_range_text(parameter)}"
+    if parameter["kind"] == "choice":
+        listed = ", ".join(f"{i} = {c}" for i, c in enumerate(parameter["choices"]))
+        return f"{doc} {listed}"
+    return doc.removesuffix(".")
+
+
+def has_menus():
+    """Whether shader groups can have menu sockets (from 5.0); a choice is a number before that."""
+    return bpy.app.version >= (5, 0, 0)
+
+
+def _choice_socket(group, parameter):
+    default = parameter["choices"].index(parameter["default"])
+    if has_menus():
+        return _socket(group, parameter["label"], "NodeSocketMenu", tooltip(parameter))
+    return _socket(
+        group,
+        parameter["label"],
+        "NodeSocketInt",
+        tooltip(parameter),
+        min_value=0,
+        max_value=len(parameter["choices"]) - 1,
+        default_value=default,
+    )
+
+
+def _link_choice(group, source, target, parameter):
+    if not has_menus():
+        group.links.new(source, target)
+        return
+    switch = group.nodes.new("GeometryNodeMenuSwitch")
+    switch.label = parameter["label"]
+    switch.data_type = "INT"
+    switch.enum_items.clear()
+    for identifier in parameter["choices"]:
+        switch.enum_items.new(choice_label(identifier))
+    values = [s for s in switch.inputs if s.type == "INT"]
+    for index, value in enumerate(values):
+        value.default_value = index
+    group.links.new(source, switch.inputs[0])
+    group.links.new(switch.outputs[0], target)
+
+
+def _number_socket(group, parameter):
+    label, text = parameter["label"], tooltip(parameter)
+    if parameter["kind"] == "color":
+        color = (*parameter["default"], 1.0)
+        return _socket(group, label, "NodeSocketColor", text, default_value=color)
+    # Blender holds a slider to a socket's range but accepts other typed numbers: that is
+    # the meaning of the soft range. Out of the accepted range, the panel warns.
+    low, high = parameter["soft_min"], parameter["soft_max"]
+    settings = {"min_value": low, "max_value": high}
+    if (low, high) == (0, 1) == (parameter["min"], parameter["max"]):
+        settings = {"subtype": "FACTOR"} | settings
+    return _socket(
+        group, label, "NodeSocketFloat", text, **settings, default_value=parameter["default"]
+    )
+
+
+def add_parameter(group, group_input, target, parameter, socket=None):
+    """Links the socket of a parameter, which is made unless it is given, to an input within the
+    group. Returns it."""
+    is_choice, is_new = parameter["kind"] == "choice", socket is None
+    if is_new:
+        socket = (_choice_socket if is_choice else _number_socket)(group, parameter)
+    source = _output(group_input, socket)
+    if not is_choice:
+        group.links.new(source, target)
+        return socket
+    _link_choice(group, source, target, parameter)
+    if is_new and has_menus():  # which knows its items by its link
+        socket.default_value = choice_label(parameter["default"])
+    return socket
+
+
+#: Sockets of a group beside its model's parameters, and their tooltips.
+VECTORS = {
+    pack.NORMAL: "Shading normal; unlinked, the one of the surface",
+    pack.TANGENT: "First axis of anisotropy; unlinked, the object's Z axis along the surface",
+}
+
+
+def vector_socket(group, name, text):
+    # Without a value, an unlinked input keeps the shader's own default: the shading normal, and
+    # the frame that the shader builds for itself.
+    return _socket(group, name, "NodeSocketVector", text, hide_value=True)
+
+
+class Interface:
+    """Sockets of a group by name: made where the group lacks them, and linked to its nodes."""
+
+    def __init__(self, group, group_input, known):
+        """`known`: identifiers of the sockets that the group has, by name."""
+        self.group, self.group_input = group, group_input
+        items = (i for i in group.interface.items_tree if i.item_type == "SOCKET")
+        found = {item.identifier: item for item in items if item.in_out == "INPUT"}
+        self.sockets = {name: found[i] for name, i in known.items() if i in found}
+
+    def parameter(self, name, target, parameter):
+        """Links a parameter to an input within the group."""
+        have = self.sockets.get(name)
+        self.sockets[name] = add_parameter(self.group, self.group_input, target, parameter, have)
+
+    def vector(self, name):
+        """The output within the group that has what is linked to one of VECTORS."""
+        if name not in self.sockets:
+            self.sockets[name] = vector_socket(self.group, name, VECTORS[name])
+        return _output(self.group_input, self.sockets[name])
+
+    def identifiers(self):
+        return {name: socket.identifier for name, socket in self.sockets.items()}

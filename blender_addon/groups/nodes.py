@@ -1,0 +1,625 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Node groups around an OSL script node, and for twins around Blender's own nodes.
+
+A group is made once per model, representation and version of the shader, and reused. Source and
+bytecode both lie inside the .blend, so a saved file renders where the extension is not installed.
+"""
+
+import contextlib
+import json
+
+import bpy
+
+from .. import lamps
+from ..common import editable
+from ..common.i18n import say
+from ..content import formula_nodes, group_content, stand_in
+from ..content.group_content import ALBEDO, has_albedo_script, is_native, script_problem
+from ..packs import device, pack
+from ..packs.pack import choice_label
+from ..trees import animation, shader_trees
+
+TAG = pack.TAG
+#: In the tag of a group that suits itself to the scene: its form where that has Open Shading
+#: Language.
+AUTO = "auto"
+
+
+def empty_tree(owner):
+    """The node tree of a new material or world, without a node."""
+    if owner.node_tree is None:  # before 5.0 it starts without nodes
+        owner.use_nodes = True
+    owner.node_tree.nodes.clear()
+    return owner.node_tree
+
+
+def is_fitted(node):
+    """Whether the form of a group node is closures, or Blender's own, fitted to the model; others
+    reflect what the model does, on average."""
+    return identity(node)[1] in ("twin", "fitted")
+
+
+def source_text(group):
+    """The source of a group's shader, which the file holds; "" of a group that has lost it."""
+    script, _ = group_content.scripts(group)
+    return script.script.as_string() if script is not None and script.script else ""
+
+
+def is_ours(node):
+    """Whether a node is a group of this extension, also of another version of it."""
+    tree = getattr(node, "node_tree", None)
+    return node.bl_idname == "ShaderNodeGroup" and tree is not None and TAG in tree
+
+
+def find_group(model_name, representation, albedo=False, automatic=None):
+    """The group of the current version of a shader, if the file has a sound one; `albedo` as in
+    ensure_group. `automatic`: the form with Open Shading Language, of a group that suits itself to
+    the scene."""
+    albedo = albedo and has_albedo_script(model_name, automatic or representation)
+    digest = pack.digest(model_name, representation)
+    for group in bpy.data.node_groups:
+        tag = group.get(TAG)
+        if group.library is None and tag is not None and tag.get("digest") == digest:
+            same = (tag["model"], tag["representation"]) == (model_name, representation)
+            has_albedo = tag["with_albedo"] if AUTO in tag else "albedo_inputs" in tag
+            if same and tag.get(AUTO) == automatic and has_albedo == albedo and is_sound(group):
+                return group
+    return None
+
+
+def is_sound(group):
+    """Whether a group has all that it was made with."""
+    return bool(group.nodes) and script_problem(group) is None
+
+
+def with_parts(groups):
+    """These groups, and those of this extension within them."""
+    found, new = set(), set(groups)
+    while new:
+        found |= new
+        new = {n.node_tree for group in new for n in group.nodes if is_ours(n)} - found
+    return found
+
+
+def unite(groups):
+    """Has groups that came from another file give way to equal ones of the open file."""
+    stand_in.keep_one_text()
+
+    # Parts of others first: of all forms their twins, of automatic ones their forms.
+    def depth(group):
+        return 2 if AUTO in group[TAG] else int(group[TAG]["representation"] != "twin")
+
+    for group in sorted(groups, key=depth):
+        _give_way(group)
+
+
+def _give_way(group):
+    """Puts the group of the open file that is equal in its place, if there is one."""
+    tag = group[TAG].to_dict()
+    for other in bpy.data.node_groups:
+        same = other != group and other.library is None and TAG in other
+        if same and other[TAG].to_dict() == tag and script_problem(other) is None:
+            group.user_remap(other)
+            remove_group(group)
+            return
+
+
+def _let_go(group):
+    """Has the texts of a group, which older versions kept for good, go with their last user."""
+    for text in (n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script):
+        text.use_fake_user = False
+
+
+def ensure_group(model_name, representation="auto", baked=None, albedo=False, values=None):
+    """Node group of a model, made if the file has none. Raises ValueError, CompileError.
+
+    Nothing is left in the file when it fails. That of "auto" suits itself to the scene, where the
+    model has a form for that: see suit(). `values` of parameters tell which forms there are.
+    `baked`: hash of the extension that a pack of the open file alone, which pack.use() has taken,
+    stands in for. `albedo`: with the Albedo output, also where that takes a script of large tables.
+    """
+    if representation == "auto" and not baked:
+        with_osl = pack.automatic(model_name, values)
+        if pack.native_form(model_name) and not pack.is_native(model_name, with_osl):
+            return _ensure_automatic(model_name, with_osl, albedo)
+    representation = pack.resolve(model_name, representation, values)
+    if group := find_group(model_name, representation, albedo):
+        _let_go(group)
+        return group
+    with _new_group(model_name, representation, representation, albedo) as group:
+        if baked:
+            # The pack will be gone.
+            entry = {
+                "of": baked,
+                "form": pack.representation(model_name, representation),
+                "parameters": pack.parameters(model_name),
+            }
+            group[TAG]["baked"] = json.dumps(entry)
+        _fill(group, model_name, representation, albedo)
+    return group
+
+
+def _ensure_automatic(model_name, with_osl, albedo):
+    """Node group that suits itself to the scene; `with_osl`: its form where that has OSL."""
+    native = pack.native_form(model_name)
+    for form in (with_osl, native):
+        if group := find_group(model_name, form, albedo, with_osl):
+            _let_go(group)
+            suit(group, device.lacks_osl(lamps.current_scene()))
+            return group
+    with _new_group(model_name, "auto", with_osl, albedo) as group:
+        tag = group[TAG]
+        tag[AUTO], tag["with_albedo"] = with_osl, albedo and has_albedo_script(model_name, with_osl)
+        tag["native_only"] = json.dumps(pack.form_values(model_name, native))
+        _suit(group, native if device.lacks_osl(lamps.current_scene()) else with_osl)
+    return group
+
+
+#: Groups that are being made. Lamps are looked for then, and Blender calls handlers.
+_unfinished = []
+
+
+def is_at_work():
+    """Whether a group is being made."""
+    return bool(_unfinished)
+
+
+@contextlib.contextmanager
+def _new_group(model_name, name, form, albedo):
+    """A new group with the sockets of a form, for the body to fill; where that raises, it and what
+    it was made of are taken out of the file again."""
+    known = set(bpy.data.node_groups)
+    parts = [name, *([ALBEDO] if albedo and has_albedo_script(model_name, form) else [])]
+    title = f"{pack.model(model_name)['label']} ({', '.join(parts)})"
+    group = bpy.data.node_groups.new(title, "ShaderNodeTree")
+    _unfinished.append(group)
+    try:
+        group.color_tag = "SHADER"
+        group.description = pack.model(model_name)["doc"]
+        group[TAG] = {
+            "model": model_name,
+            "representation": form,
+            "digest": pack.digest(model_name, form),
+            "made_by": pack.manifest()["generator"],
+            "choices": json.dumps(pack.form_choices(model_name, form)),
+            "only": json.dumps(pack.constants(model_name, form)),
+        }
+        yield group
+    except BaseException:
+        remove_group(group)
+        remove_unused_groups(known)  # a twin that was made for it
+        raise
+    finally:
+        _unfinished.pop()
+
+
+def _fill(group, model_name, representation, albedo):
+    """Makes the nodes of a form in a group. Raises CompileError; texts that were made are gone
+    then."""
+    stem, source = pack.source(model_name, representation)
+    sources = {stem: source}
+    if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
+        sources |= dict([of_albedo])
+    # Lean ones hold no more than a render needs.
+    has_twin = "twin" in pack.model(model_name)["representations"]
+    stands_in = representation != "twin" and "baked" not in group[TAG] and has_twin
+    twin_group = ensure_group(model_name, "twin") if stands_in else None
+    if pack.is_native(model_name, representation):
+        group_content.fill_with_nodes(group, model_name, representation, source, twin_group)
+        return
+    before = list(group.nodes)
+    texts = [stand_in.new_text(f"{stem}.osl", source) for stem, source in sources.items()]
+    names = [text.name for text in texts]
+    try:
+        group_content.fill_with_scripts(group, model_name, representation, texts, twin_group)
+    except BaseException:
+        _remove_others(group, before)
+        for name in set(names) & set(bpy.data.texts.keys()):
+            bpy.data.texts.remove(bpy.data.texts[name])
+        raise
+
+
+def _remove_others(group, kept):
+    for node in [node for node in group.nodes if node not in kept]:
+        group.nodes.remove(node)
+
+
+def form_in_script(node):
+    """The form that says which values a node's sockets can have; of an automatic one that with
+    Open Shading Language."""
+    tag = node.node_tree[TAG]
+    return tag.get(AUTO, tag["representation"])
+
+
+def automatic_groups():
+    """Groups of this file that suit themselves to the scene."""
+    return [g for g in bpy.data.node_groups if g.library is None and AUTO in g.get(TAG, ())]
+
+
+def _is_current(group):
+    tag = group[TAG]
+    try:
+        return tag["digest"] == pack.digest(tag["model"], tag["representation"])
+    except ValueError:  # a model or form that the installed version does not have
+        return False
+
+
+def suit(group, lacks_osl):
+    """Has an automatic group be the form that a scene with or without Open Shading Language can
+    render, if the installed version made it; sockets stay. Returns whether it was another. Raises
+    CompileError; it is then as it was."""
+    tag = group[TAG]
+    # Handlers ask at each change of the scene, and to tell the version takes a hash.
+    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl:
+        return False
+    if not _is_current(group):
+        return False
+    wanted = pack.native_form(tag["model"]) if lacks_osl else tag[AUTO]
+    if wanted is None:
+        return False
+    _suit(group, wanted)
+    return True
+
+
+def _suit(group, form):
+    tag, before = group[TAG].to_dict(), list(group.nodes)
+    inner = {n.node_tree.session_uid for n in before if is_ours(n)}
+    texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
+    model_name, with_osl = tag["model"], tag[AUTO]
+    try:
+        if form == with_osl:
+            _fill(group, model_name, form, tag["with_albedo"])
+        else:
+            group_content.fill_with_form(group, model_name, form, with_osl, ensure_group)
+    except BaseException:
+        _remove_others(group, before)
+        group[TAG] = tag
+        raise
+    for node in before:
+        group.nodes.remove(node)
+    group[TAG]["representation"] = form
+    group[TAG]["digest"] = pack.digest(model_name, form)
+    _clear_away(inner, texts)
+
+
+def empty(group):
+    """Takes all nodes out of an automatic group; suit() makes them again."""
+    group.nodes.clear()
+
+
+def add_group_node(tree, model_name, representation="auto", values=None):
+    """Adds a group node to a shader tree and returns it; `values` as in ensure_group()."""
+    group = ensure_group(model_name, representation, values=values)
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.width = 200
+    node.label = pack.model(model_name)["label"]
+    return node
+
+
+def identity(node):
+    """(model, representation) of a group node. Of an automatic one the form that it has now, for
+    its choices."""
+    tag = node.node_tree[TAG]
+    if _lacks_choice(node):
+        return tag["model"], tag[AUTO]
+    return tag["model"], tag["representation"]
+
+
+def is_automatic(node):
+    """Whether a node has the form that the scene can render, whichever that is."""
+    return AUTO in node.node_tree[TAG]
+
+
+def _lacks_choice(node):
+    """Whether an automatic node stands where there is no Open Shading Language, with a choice that
+    its form lacks there: its twin is shown."""
+    tag = node.node_tree[TAG]
+    if tag.get(AUTO, tag["representation"]) == tag["representation"]:
+        return False
+    only = pack.canonical(json.loads(tag["native_only"]))
+    return any(not pack.same(get_value(node, name), value) for name, value in only.items())
+
+
+def runs_anywhere(node):
+    """Whether what a node shows needs no Open Shading Language."""
+    return is_native(node.node_tree) and not _lacks_choice(node)
+
+
+def is_stood_in_for(node):
+    """Whether Blender's own nodes stand in for a node where its form does not run."""
+    inner = [n.node_tree[TAG]["representation"] for n in node.node_tree.nodes if is_ours(n)]
+    has_twin = "twin" in inner
+    return stand_in.is_in(node.node_tree) or (has_twin and _lacks_choice(node))
+
+
+def made_of(group):
+    """The group that has the nodes of a form: an automatic one may have another in it."""
+    if AUTO in group[TAG] and group[TAG][AUTO] != group[TAG]["representation"]:
+        form = group[TAG]["representation"]
+        inner = (n.node_tree for n in group.nodes if is_ours(n))
+        return next((g for g in inner if g[TAG]["representation"] == form), group)
+    return group
+
+
+def is_baked(node):
+    """Whether the group was made for the open file alone; see lean.py."""
+    return "baked" in node.node_tree[TAG]
+
+
+def made_by(node):
+    """Which version made a node's group, as "brdfc 1.2.3"; the first ones did not say."""
+    return node.node_tree[TAG].get("made_by", "brdfc 0")
+
+
+def is_newer(node):
+    """Whether a later version than the installed one made a node's group."""
+    return pack.version(made_by(node)) > pack.version(pack.manifest()["generator"])
+
+
+def manifest_entry(node):
+    """What the manifest says of a node's form, and its parameters by name; None where the group is
+    of another version of the extension."""
+    model_name, representation = identity(node)
+    tag = node.node_tree[TAG]
+    if is_baked(node):
+        entry = json.loads(tag["baked"])
+        same = entry["of"] == pack.manifest()["hash"]
+        return (entry["form"], entry["parameters"]) if same else None
+    if not _is_current(node.node_tree):
+        return None
+    return pack.representation(model_name, representation), pack.parameters(model_name)
+
+
+def sockets(node):
+    """Input sockets of a group node by parameter name, and Normal, Tangent."""
+    by_identifier = {s.identifier: s for s in node.inputs}
+    return {
+        name: by_identifier[identifier]
+        for name, identifier in node.node_tree[TAG]["sockets"].items()
+        if identifier in by_identifier
+    }
+
+
+def _choices(node, name):
+    return json.loads(node.node_tree[TAG]["choices"])[name]
+
+
+def _only(node):
+    """Values of the parameters that a form has one value of; files of older versions lack them."""
+    return pack.canonical(json.loads(node.node_tree[TAG].get("only", "{}")))
+
+
+def set_value(node, name, value):
+    """Sets a socket to a value in the canonical form of pack.check_value."""
+    socket = sockets(node).get(name)
+    if socket is None:  # there is one value
+        return
+    if socket.type == "RGBA":
+        value = (*value, 1.0)
+    elif socket.type == "MENU":
+        value = choice_label(value)
+    elif socket.type == "INT" and isinstance(value, str):
+        value = _choices(node, name).index(value)
+    socket.default_value = value
+
+
+def get_value(node, name):
+    """Value of a socket in the same form; None where a node's output reaches it, and of a vector.
+    Links that Cycles ignores do not count."""
+    socket = sockets(node).get(name)
+    if socket is None:
+        only = _only(node)
+        return only[name] if name in only else _choices(node, name)[0]
+    reached = shader_trees.reach(socket)
+    if reached.output is not None or socket.type == "VECTOR":
+        return None
+    if socket.type == "RGBA":
+        return tuple(socket.default_value)[:3] if reached.holder else (0.0, 0.0, 0.0)
+    if socket.type == "MENU":
+        labels = {choice_label(c): c for c in _choices(node, name)}
+        return labels.get(socket.default_value)
+    if socket.type == "INT":
+        choices, index = _choices(node, name), socket.default_value if reached.holder else 0
+        return choices[min(max(index, 0), len(choices) - 1)]
+    return socket.default_value if reached.holder else 0.0
+
+
+def varying(node):
+    """Parameters of a group node that are not constant: what a link controls, a curve animates or a
+    driver sets. Links that Cycles ignores do not count."""
+    moved = animation.inputs(node)
+    return {
+        name
+        for name, s in sockets(node).items()
+        if s.identifier in moved or shader_trees.is_driven(s)
+    }
+
+
+def _trees(tree, seen):
+    if tree is None or tree in seen:
+        return
+    seen.append(tree)
+    for node in tree.nodes:
+        if hasattr(node, "node_tree") and not is_ours(node):
+            _trees(node.node_tree, seen)
+
+
+def trees_within(node):
+    """The trees of a group node, nested groups included; those of this extension have none."""
+    trees = []
+    if not is_ours(node):
+        _trees(getattr(node, "node_tree", None), trees)
+    return trees
+
+
+def all_nodes(owner):
+    """Every node of a material or world, those in nested groups included, but for what groups of
+    this extension hold."""
+    trees = []
+    _trees(owner.node_tree, trees)
+    return [node for tree in trees for node in tree.nodes]
+
+
+def group_nodes(material):
+    """Every group node of this extension in a material, nested groups included."""
+    return [node for node in all_nodes(material) if is_ours(node)]
+
+
+def shown_nodes(material):
+    """The same of those that Cycles shows: what is muted, lies behind links that are, or reaches no
+    active output is not among them."""
+    found = (shown.node for shown in shader_trees.shown(material))
+    return list(dict.fromkeys(node for node in found if is_ours(node)))
+
+
+def make_local(tree):
+    """Makes the groups, scripts and images that a tree of this file is made of this file's own."""
+    for node in tree.nodes:
+        for name in ("node_tree", "script", "image"):
+            inner = getattr(node, name, None)
+            if inner is not None and editable.refusal(inner):
+                inner.make_local()
+        if getattr(node, "node_tree", None) is not None:
+            make_local(node.node_tree)
+
+
+def all_values(node):
+    """Value of each parameter by name, as get_value() has it."""
+    choices = json.loads(node.node_tree[TAG]["choices"])
+    names = dict.fromkeys((*choices, *_only(node), *sockets(node)))
+    return {name: get_value(node, name) for name in names}
+
+
+def constants(node):
+    """The same, and None for what is varying()."""
+    return all_values(node) | dict.fromkeys(varying(node))
+
+
+def remove_group(group):
+    """Takes a group out of the file, and its texts, images and twin, if nothing else has them."""
+    texts = {n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script}
+    images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage" and n.image}
+    inner = {n.node_tree.session_uid for n in group.nodes if is_ours(n)}
+    bpy.data.node_groups.remove(group)
+    for image in images:
+        if image.users == 0:
+            bpy.data.images.remove(image)
+    _clear_away(inner, texts)
+
+
+def _clear_away(uids, texts):
+    """Takes what were parts of a group out of the file where nothing else has them: groups with
+    these session_uids, and texts."""
+    trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
+    used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
+    for text in {*texts, *stand_in.texts()}:
+        if text not in used:
+            bpy.data.texts.remove(text)
+    # Those that go take what only they have with them.
+    while unused := [g for g in bpy.data.node_groups if g.session_uid in uids and g.users == 0]:
+        remove_group(unused[0])
+    formula_nodes.remove_unused_parts()
+    lamps.remove_unused_group()
+
+
+def remove_unused_groups(kept=()):
+    """Takes every group of this extension that no node has out of the file, but for those."""
+
+    def unused(group):
+        ours = TAG in group and group.library is None
+        return ours and group.users == 0 and group not in kept
+
+    while group := next(filter(unused, bpy.data.node_groups), None):
+        remove_group(group)
+
+
+def switch(node, representation):
+    """Puts another representation of the same model into a group node; values and links stay.
+
+    Raises ValueError, also where the file would not keep that, CompileError; the node is then as it
+    was.
+    """
+    editable.check(node.id_data)
+    model_name, _ = identity(node)
+    values = constants(node)
+    if representation != "auto":
+        pack.resolve(model_name, representation, values)
+    group = ensure_group(model_name, representation, albedo=uses_albedo(node), values=values)
+    _exchange(node, group)
+
+
+def _exchange(node, group):
+    """Puts another group into a node; that of before goes where nothing else has it."""
+    before = node.node_tree
+    replace_group(node, group)
+    if before.users == 0 and before.library is None:
+        remove_group(before)
+
+
+def uses_albedo(node):
+    """Whether something is linked to a group node's Albedo output."""
+    return ALBEDO in node.outputs and node.outputs[ALBEDO].is_linked
+
+
+def add_albedo(node):
+    """Gives a group node the Albedo output, if it lacks that; values and links stay.
+
+    Raises ValueError for one that lacks it and is not of the installed extension, and where the
+    file would not keep that; CompileError.
+    """
+    editable.check(node.id_data)
+    if ALBEDO in node.outputs:
+        return
+    if is_baked(node) or manifest_entry(node) is None:
+        name = node.label or node.name
+        if is_baked(node):
+            raise ValueError(
+                say(
+                    "{node} is lean: choose a render method first, which brings the whole model "
+                    "back",
+                    node=name,
+                )
+            )
+        raise ValueError(
+            say("{node} is of another version of the extension: update it first", node=name)
+        )
+    tag = node.node_tree[TAG]
+    if is_automatic(node):
+        _exchange(node, _ensure_automatic(tag["model"], tag[AUTO], albedo=True))
+        return
+    _exchange(node, ensure_group(*identity(node), albedo=True))
+
+
+def replace_group(node, group):
+    """Puts another group of the same model into a group node; values, links and animation stay.
+    Animation of what the group has no socket of is muted."""
+    if group == node.node_tree:
+        return
+    tree = node.id_data
+    names = {s.identifier: name for name, s in sockets(node).items()}
+    animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.hold(node)]
+    values = all_values(node)
+    incoming = [
+        (link.from_socket, name, link.is_muted)
+        for name, s in sockets(node).items()
+        for link in s.links
+    ]
+    outgoing = [(s.name, link.to_socket, link.is_muted) for s in node.outputs for link in s.links]
+    for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:
+        tree.links.remove(link)
+    node.node_tree = group
+    present = sockets(node)
+    for name, value in values.items():
+        if name in present and value is not None:
+            set_value(node, name, value)
+    for source, name, muted in incoming:
+        if name in present:
+            tree.links.new(source, present[name]).is_muted = muted
+    for name, target, muted in outgoing:
+        tree.links.new(node.outputs[name], target).is_muted = muted
+    for curve, owner, name in animated:  # which knows sockets by their number
+        if name in present:
+            animation.follow(curve, owner, present[name])
+        else:
+            curve.mute = True

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials of another version of the extension, in a file that is opened with this one."""
+
+from dataclasses import dataclass
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..common import app_handlers, editable
+from ..common.extension import PACKAGE
+from ..common.i18n import form_name, of_error, say
+from ..content.group_sockets import VECTORS
+from ..packs import pack
+from . import nodes
+
+
+@dataclass(frozen=True)
+class Update:
+    """What update() did: how many nodes have this version's shaders now, and a sentence for each
+    that kept what it had, or that took another form."""
+
+    count: int
+    refusals: tuple
+    notes: tuple
+
+
+#: What the update of the file that was opened last did, if the preferences ask for one.
+last = None
+
+
+@persistent
+def _after_load(_path):
+    global last
+    last = None
+    addon = bpy.context.preferences.addons.get(PACKAGE)
+    if addon is None or not addon.preferences.update_on_load or not others():
+        return
+    last = update()
+    for sentence in (*last.refusals, *last.notes):
+        print(f"brdfc: {sentence}")
+
+
+def register():
+    app_handlers.register({"load_post": _after_load})
+
+
+def unregister():
+    app_handlers.unregister({"load_post": _after_load})
+
+
+def others():
+    """[(material, node)]: group nodes of the open file that are of another version."""
+    found = []
+    for material in bpy.data.materials:
+        for node in nodes.group_nodes(material):
+            # A group that several materials share has its node in each of them.
+            if nodes.manifest_entry(node) is None and node not in [n for _, n in found]:
+                found.append((material, node))
+    return found
+
+
+def refusal(material, node):
+    """Why a node can't take this version's shader with all that it is set to; None if it can."""
+    model_name, _ = nodes.identity(node)
+    for block in (material, node.id_data):
+        if block.library is not None:
+            return say("it is linked from {file}; update it there", file=block.library.filepath)
+    if why := editable.refusal(material, node.id_data):
+        return why
+    if nodes.is_newer(node):
+        return say(
+            "{later} made it, and this is {own}",
+            later=nodes.made_by(node),
+            own=pack.manifest()["generator"],
+        )
+    if model_name not in pack.model_names():
+        return say("this version has no model {model!r}", model=model_name)
+    known = pack.parameters(model_name)
+    for name, value in nodes.all_values(node).items():
+        if name in pack.fixed(model_name) or name in VECTORS:
+            continue
+        if name not in known:
+            return say(
+                "this version's {model} has no parameter {parameter!r}",
+                model=model_name,
+                parameter=name,
+            )
+        choices = known[name].get("choices")
+        if choices and value is not None and value not in choices:
+            return say(
+                "{parameter} is {value!r} there, and no longer a choice",
+                parameter=known[name]["label"],
+                value=value,
+            )
+    return None
+
+
+def update():
+    """Gives every node of another version the shader of this one; values, links and form stay.
+
+    A form that is no more becomes "auto". What can't be kept is not lost: such a node stays as it
+    is, with its old shader, which goes on rendering. Returns an Update.
+    """
+    count, refusals, notes = 0, [], []
+    for material, node in others():
+        what = f"{material.name}, {node.label or node.name}"
+        if why := refusal(material, node):
+            refusals.append(say("{node}: {what}", node=what, what=why))
+            continue
+        model_name, form = nodes.identity(node)
+        try:
+            try:
+                nodes.switch(node, form)
+            except ValueError:
+                nodes.switch(node, "auto")
+                said = say(
+                    "{before} is now {after}",
+                    before=form_name(form),
+                    after=form_name(nodes.identity(node)[1]),
+                )
+                notes.append(say("{node}: {what}", node=what, what=said))
+        except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors
+            refusals.append(say("{node}: {what}", node=what, what=of_error(error)[0]))
+            continue
+        count += 1
+    nodes.remove_unused_groups()
+    return Update(count, tuple(refusals), tuple(notes))

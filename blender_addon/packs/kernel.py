@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The kernel of a model as a curve draws it."""
+
+from ..common.i18n import Sentence, say
+from . import pack
+
+#: The model whose kernel may be drawn, and its heights: equally far apart, the last at u = 3.
+MODEL = "lossless"
+_HEIGHTS = ("h0", "h1", "h2", "h3")
+
+
+def heights(curve):
+    """The parameters of MODEL that are a Float Curve's heights over the largest.
+
+    Raises ValueError for another node, and where a height is not positive or too small beside the
+    largest.
+    """
+    if curve.bl_idname != "ShaderNodeFloatCurve":
+        raise ValueError(
+            say(
+                "Node {node!r}: expected a Float Curve, got {kind}",
+                node=curve.name,
+                kind=Sentence(curve.bl_label),
+            )
+        )
+    mapping = curve.mapping
+    mapping.initialize()  # a new curve can't be evaluated before
+    places = [i / (len(_HEIGHTS) - 1) for i in range(len(_HEIGHTS))]
+    found = [mapping.evaluate(mapping.curves[0], x) for x in places]
+    lowest = pack.parameters(MODEL).get("h0", {"min": 0})["min"]
+    for x, height in zip(places, found, strict=True):
+        where = {"curve": curve.name, "x": f"{x:.3g}"}
+        if not height > 0:
+            raise ValueError(
+                say(
+                    "Curve {curve!r} at x = {x}: expected a height above 0, got {height}",
+                    **where,
+                    height=f"{height:.3g}",
+                )
+            )
+        if height < lowest * max(found):
+            raise ValueError(
+                say(
+                    "Curve {curve!r} at x = {x}: expected at least {lowest} of the largest "
+                    "height, got {height} of it",
+                    **where,
+                    lowest=f"{lowest:g}",
+                    height=f"{height / max(found):.3g}",
+                )
+            )
+    relative = (height / max(found) for height in found)
+    return dict(zip(_HEIGHTS, relative, strict=True))

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Render methods in plain words: what each is good for."""
+
+from ..common.i18n import say
+
+#: What each form means to who chooses one; "form" is the word of scripts for a render method.
+METHODS = {
+    "auto": say(
+        "Automatic: Exact or Aimed with Open Shading Language on, Formula Nodes with it off and on "
+        "GPUs. The material follows when you change that"
+    ),
+    "exact": say(
+        "Exact: Cycles' own shaders add up to the model. No error, and the noise of Blender's own "
+        "nodes"
+    ),
+    "aimed": say(
+        "Aimed: Cycles samples the lamps, and random rays find all other light. No error on "
+        "average, and little noise"
+    ),
+    "sampled": say(
+        "Sampled: random rays alone, which rarely meet small lamps. No error on average, and much "
+        "noise"
+    ),
+    "fitted": say(
+        "Fitted: eight of Cycles' own shaders that come close to the model. A small error, and the "
+        "noise of Blender's own nodes"
+    ),
+    "nodes": say(
+        "Formula Nodes: the model's formulas as Blender's math nodes. No error on average, on "
+        "every device and without Open Shading Language, and more noise under skies"
+    ),
+    "twin": say(
+        "Blender Nodes: Glossy and Diffuse nodes that come close to the model, for quick looks. "
+        "EEVEE and Material Preview show them in any case. A larger error"
+    ),
+}

@@ -1,0 +1,404 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Menus and panels."""
+
+import math
+
+import bpy
+import numpy as np
+from bpy.types import Menu, Panel
+
+from .. import convert, lamps
+from ..common import color, editable
+from ..common.i18n import button, form_name, iface, of_error, say
+from ..groups import nodes
+from ..packs import device, energy, kernel, optical, pack
+from ..trees import shader_trees
+from ..warnings import checks
+from .labels import wrapped
+from .methods import METHODS
+
+#: Headings of menus by the looks that models declare.
+LOOKS = {
+    "matte": say("Matte"),
+    "glossy": say("Glossy"),
+    "metal": say("Metal"),
+    "glass": say("Glass"),
+    "special": say("Special"),
+}
+
+
+def menu_label(name):
+    """A model's label and its paper's authors and year: what typing into a menu finds."""
+    entry = pack.model(name)
+    return f"{entry['label']} ({pack.citation(entry)})"
+
+
+def _draw_models(layout, operator):
+    layout.operator("brdfc.search", icon="VIEWZOOM")
+    for look, names in pack.by_look().items():
+        layout.separator()
+        layout.label(text=iface(LOOKS[look]), translate=False)
+        for name in names:
+            # The names are those of the papers, in every language.
+            item = layout.operator(operator, text=menu_label(name), translate=False)
+            item.model = name
+            item.representation = "auto"
+
+
+class NODE_MT_brdfc(Menu):
+    bl_idname = "NODE_MT_brdfc"
+    bl_label = "brdfc"
+
+    def draw(self, context):
+        _draw_models(self.layout, "brdfc.add_node")
+
+
+class MATERIAL_MT_brdfc(Menu):
+    bl_idname = "MATERIAL_MT_brdfc"
+    bl_label = "New Reflection Model"
+
+    def draw(self, context):
+        _draw_models(self.layout, "brdfc.new_material")
+
+
+def draw_add_menu(self, context):
+    self.layout.separator()
+    self.layout.menu(NODE_MT_brdfc.bl_idname)
+
+
+def draw_material_menu(self, context):
+    self.layout.menu(MATERIAL_MT_brdfc.bl_idname, icon="SHADING_RENDERED")
+    self.layout.operator("brdfc.convert", icon="FILE_REFRESH")
+
+
+def error_text(entry):
+    """The measured error of a form in a few words."""
+    error = entry["error"]
+    if (off := error.get("relative_l1")) is not None:
+        return percent(off)
+    # Drawn directions: what is measured is that nothing is lost.
+    if error.get("albedo") is not None:
+        return say("none, only noise")
+    return say("not measured")
+
+
+def error_line(form):
+    """The same as the panel has it, with what it is a part of."""
+    error = error_text(form)
+    if (form["error"].get("relative_l1") or 0) < ROUNDING:
+        return say("Error: {error}", error=error)
+    return say("Error: {error} of the light", error=error)
+
+
+def percent(part):
+    """A part of the light in percent; rounding is not told from 0."""
+    if part < ROUNDING:
+        return say("none")
+    return say("{percent} %", percent=f"{100 * part:.2g}")
+
+
+#: Errors below this are rounding of single precision.
+ROUNDING = 1e-5
+
+
+def details(node, form):
+    """What the panel leaves out of a node's form, a sentence a line."""
+    error = form["error"]
+    out = [
+        say("{what}: {error}", what=what, error=percent(error[key]))
+        for key, what in (
+            (
+                "relative_l1",
+                say(
+                    "Part of the reflected light that goes in other directions than the model says"
+                ),
+            ),
+            ("relative_l2", say("The same by squares, to which bright spots count more")),
+            ("albedo", say("Largest error of how much is reflected, of a white surface")),
+        )
+        if error.get(key) is not None
+    ]
+    if error.get("note"):  # the tool's words, with the place where the form is worst
+        out.append(error["note"].capitalize())
+    out.append(say("Render time at equal samples: {cost}", cost=cost_text(node, form)))
+    if form.get("closures"):
+        out.append(say("Closures of Cycles: {count}", count=form["closures"]))
+    return out
+
+
+def cost_text(node, form):
+    """Render time of a node's form in units of Blender's Glossy node."""
+    if form["cost"] is None:
+        return say("not measured")
+    # A form of other parameters, which a pack cut to a scene holds, has another one.
+    cut = nodes.is_baked(node) or pack.fixed(nodes.identity(node)[0])
+    times = f"{form['cost']:.2f}"
+    if cut:
+        return say("{times} x Glossy, at default parameters", times=times)
+    return say("{times} x Glossy", times=times)
+
+
+#: View angles in degrees at which the panel shows energy.
+ANGLES = (0, 45, 75, 85)
+
+
+def energy_text(node):
+    """Directional albedo for the current values at a few view angles that occur, or why there is
+    none."""
+    model_name, _ = nodes.identity(node)
+    values = {}
+    for name, parameter in pack.parameters(model_name).items():
+        value = nodes.get_value(node, name)
+        if value is None:
+            return say("depends on what is linked to {socket}", socket=parameter["label"])
+        values[name] = value
+    low, high = energy.views(model_name)
+    numbers = []
+    for angle in ANGLES:
+        cosine = math.cos(math.radians(angle))
+        if not low <= cosine <= high:
+            continue
+        rgb = energy.albedo(model_name, values, cosine)
+        luminance = color.luminance(np.array(rgb))
+        numbers.append(f"{angle}\u00b0\u00a0{luminance:.3f}")  # on one line
+    return ", ".join(numbers) or say("not at a view angle of this scene")
+
+
+def _add_method(row, node, name, pressed):
+    """The button of a render method."""
+    item = row.operator("brdfc.switch", text=form_name(name).template, depress=pressed)
+    item.node, item.representation = node.name, name
+
+
+def _draw_form(layout, node, form, scene, changes):
+    model_name, representation = nodes.identity(node)
+    if lean := nodes.is_baked(node):
+        wrapped(
+            layout,
+            say("Lean: only what this file needs. A render method brings the whole model back"),
+        )
+    entry = pack.model(model_name)
+    row = layout.row(align=True)
+    row.enabled = changes
+    values = {key: nodes.get_value(node, key) for key in pack.parameters(model_name)}
+    refusals, automatic = [], nodes.is_automatic(node)
+    if pack.native_form(model_name):
+        _add_method(row, node, "auto", automatic)
+    for name in entry["representations"]:
+        refusal = pack.refusal(model_name, name, values)
+        if refusal := refusal or checks.device_refusal(model_name, name, scene):
+            refusals.append(refusal)
+            continue
+        _add_method(row, node, name, name == representation and not lean and not automatic)
+    column = layout.column(align=True)
+    if automatic:
+        wrapped(column, METHODS["auto"])
+    wrapped(column, METHODS[representation])
+    for refusal in refusals:
+        wrapped(column, refusal)
+    # A button, for labels have no tooltip that could say what the number means.
+    line = column.row()
+    line.alignment = "LEFT"
+    line.operator(
+        "brdfc.details",
+        text=iface(error_line(form)),
+        translate=False,
+        icon="QUESTION",
+        emboss=False,
+    ).node = node.name
+    wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
+    if entry.get("albedo"):
+        wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
+
+
+def _draw_values(layout, node):
+    column = layout.column()
+    column.use_property_split = True
+    for socket in nodes.sockets(node).values():
+        if socket.type != "VECTOR":
+            row = column.row()
+            row.enabled = not shader_trees.is_driven(socket)
+            row.prop(socket, "default_value", text=socket.name, translate=False)
+
+
+def draw_node(layout, node, scene):
+    """Model, form, error, cost, energy and values of one group node."""
+    model_name, _ = nodes.identity(node)
+    layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
+    changes = editable.stays(node.id_data)
+    if made := nodes.manifest_entry(node):
+        entry = pack.model(model_name)
+        column = layout.column(align=True)
+        for said in filter(None, (entry["paper"], entry["equations"])):
+            wrapped(column, said)
+        _draw_form(layout, node, made[0], scene, changes)
+    _draw_values(layout, node)
+    layout = layout.column()
+    layout.enabled = changes
+    if made and optical.can_have(model_name):
+        menu = layout.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
+        menu.node = node.name
+    if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
+        layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
+    if model_name == kernel.MODEL:
+        layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
+
+
+def draw_lamps(layout, material, scene):
+    """Which lamps the material's models aim at, where a model does."""
+    forms = [made[0] for n in nodes.group_nodes(material) if (made := nodes.manifest_entry(n))]
+    slots = max((form.get("lamps") or 0 for form in forms), default=0)
+    if slots == 0:
+        return
+    box = layout.box()
+    found = lamps.seen(scene)
+    taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
+    if taken:
+        said = say("Free of noise under {lamps}", lamps=", ".join(taken))
+    else:
+        said = say("Free of noise under no lamp yet")
+    wrapped(box.column(align=True), said, "LIGHT")
+    limit = checks.lamps_that_fit(scene)
+    if limit is not None and limit[0] < slots:
+        room, largest = limit
+        if device.runs_on_optix(scene):
+            said = say(
+                "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
+                "Shader mixes shares it",
+                count=room,
+            )
+        else:
+            said = say(
+                "Cycles has room for {count} lamps beside the shaders of {material}",
+                count=room,
+                material=largest.name,
+            )
+        wrapped(box.column(align=True), said, "ERROR")
+    box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
+
+
+_DOWNLOAD = ("wm.url_open", button("Get Blender"), {"url": "https://www.blender.org/download/"})
+_ENLARGE = ("brdfc.enlarge_lamps", button("Give Lamps a Size"), {})
+_MAKE_LOCAL = ("brdfc.make_local", button("Make Local"), {})
+#: The button under a finding of each code: operator, text, properties.
+BUTTONS = {
+    "blender_version": _DOWNLOAD,
+    "no_osl": _DOWNLOAD,
+    "engine": ("brdfc.enable_osl", button("Use Cycles"), {}),
+    "osl_off": ("brdfc.enable_osl", button("Turn On OSL"), {}),
+    "device": ("brdfc.enable_osl", button("Use the CPU"), {}),
+    "device_elsewhere": ("brdfc.enable_osl", button("Use the CPU"), {}),
+    "outdated": ("brdfc.update", button("Update Materials"), {}),
+    "newer": ("screen.userpref_show", button("Look for Updates"), {"section": "EXTENSIONS"}),
+    "bump_correction": ("brdfc.fix_material", button("Set Up Material"), {}),
+    "path_guiding": ("brdfc.no_guiding", button("Turn Off Path Guiding"), {}),
+    "lost_lamps": _ENLARGE,
+    "zero_size_lights": _ENLARGE,
+    "linked_lamps": _MAKE_LOCAL,
+}
+
+
+def _more(layout, said):
+    """A button for what is behind a sentence, where there is something."""
+    if more := getattr(said, "more", ""):
+        row = layout.row()
+        row.alignment = "LEFT"
+        row.operator("brdfc.more", icon="QUESTION", emboss=False).text = more
+
+
+def draw_findings(layout, found):
+    """Findings, with buttons that mend what can be mended; what two say alike stands there once."""
+    said, offered = set(), set()
+    for finding in found:
+        line = iface(finding.message)
+        if line not in said:
+            row = layout.column(align=True)
+            row.alert = finding.severity == "ERROR"
+            wrapped(row, line, "ERROR" if finding.severity == "ERROR" else "INFO")
+            _more(layout, finding.message)
+        said.add(line)
+        if finding.code in BUTTONS and finding.code not in offered:
+            offered.add(finding.code)
+            operator, text, settings = BUTTONS[finding.code]
+            item = layout.operator(operator, text=text, icon="CHECKMARK")
+            for key, value in settings.items():
+                setattr(item, key, value)
+
+
+def draw_material(layout, material, scene):
+    """Everything the panels show for a material: what makes the picture another one comes first."""
+    found = checks.warnings(material, scene)
+    first = [f for f in found if f.severity == "ERROR" or f.code in checks.UNABLE]
+    draw_findings(layout, first)
+    ours = nodes.group_nodes(material)
+    if why := editable.refusal(material, *(node.id_data for node in ours)):
+        wrapped(layout.column(align=True), why, "LINKED")
+        if not any(BUTTONS.get(f.code) == _MAKE_LOCAL for f in found):
+            layout.operator(_MAKE_LOCAL[0], text=_MAKE_LOCAL[1], icon="CHECKMARK")
+    for node in ours:
+        draw_node(layout.box(), node, scene)
+    draw_lamps(layout, material, scene)
+    draw_findings(layout, [f for f in found if f not in first])
+    if any(convert.is_converted(node) for node in ours):
+        layout.operator("brdfc.convert_back", icon="LOOP_BACK")
+    layout.operator("brdfc.write_materials", icon="EXPORT")
+    layout.operator("brdfc.bake", icon="MOD_DECIM")
+
+
+class _BrdfcPanel:
+    bl_label = "Reflection Model"
+
+    def draw(self, context):
+        try:
+            draw_material(self.layout, context.object.active_material, context.scene)
+        except pack.PackError as error:
+            said, _ = of_error(error)
+            wrapped(self.layout, said, "ERROR")
+            _more(self.layout, said)
+
+
+def _has_ours(context):
+    material = getattr(context.object, "active_material", None)
+    return material is not None and bool(nodes.group_nodes(material))
+
+
+class MATERIAL_PT_brdfc(_BrdfcPanel, Panel):
+    bl_idname = "MATERIAL_PT_brdfc"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "material"
+
+    @classmethod
+    def poll(cls, context):
+        return _has_ours(context)
+
+
+class NODE_PT_brdfc(_BrdfcPanel, Panel):
+    bl_idname = "NODE_PT_brdfc"
+    bl_space_type = "NODE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "brdfc"
+
+    @classmethod
+    def poll(cls, context):
+        return context.space_data.tree_type == "ShaderNodeTree" and _has_ours(context)
+
+
+_CLASSES = (NODE_MT_brdfc, MATERIAL_MT_brdfc, MATERIAL_PT_brdfc, NODE_PT_brdfc)
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+_MENUS = (
+    ("NODE_MT_category_shader_shader", draw_add_menu),
+    ("MATERIAL_MT_context_menu", draw_material_menu),
+)
+
+
+def register():
+    _register()
+    for menu, draw in _MENUS:
+        getattr(bpy.types, menu).append(draw)
+
+
+def unregister():
+    for menu, draw in reversed(_MENUS):
+        getattr(bpy.types, menu).remove(draw)
+    _unregister()

@@ -1,0 +1,461 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of what a material's values do, drawn with the model's formulas on NumPy arrays.
+
+Three, one above the other: the light that leaves in the plane of incidence, half of a circle, or
+all of it where light is let through; balls under a lamp; and the share of the light that is
+reflected over the angle of the view. Red, green and blue are drawn apart, and add up to white. The
+model is drawn in lines, the material's form in dots where it reflects other light, and the nearest
+Principled node in dashes. Of Blender nothing is known here but what its screen shows of a colour.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import brdfc
+from ..brdfc._model import sequence
+from ..common import color
+from ..nearest import native_bsdf
+from ..nearest.principled import Nearest, Shares, misplaced, nearest
+
+#: Pixels across, of a ball, and of the key below it.
+SIZE, BALL, KEY = 324, 108, 10
+#: Rows of a picture, the lowest first.
+CURVES, BALLS, ABOVE = slice(0, 104), slice(104, 222), slice(222, 384)
+#: The angle in degrees that light comes from, in the half circle.
+INCIDENCE = 45.0
+#: Samples of an albedo, of each way that a form's is sampled, and angles of their curves.
+_SAMPLES, _FORM_SAMPLES, _VIEWS = 256, (128, 128, 256), 13
+_HALF = SIZE // 2
+_PAPER, _GRID, _INK = 0.13, 0.28, 0.55
+#: Dots of a form's curve: no colour that curves of red, green and blue add up to.
+_DOTS = np.array([1.0, 0.35, 0.75])
+#: Pixels from one dash or dot to the next, and which part of them is drawn.
+_DASHED, _DOTTED = (9.4, 0.6), (6.8, 0.42)
+#: Pixels from a model's arrow to the node's.
+_ASIDE = 5.0
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What a picture shows beside the model's own light; None for what it does not."""
+
+    #: Blender's own nodes whose lobes are nearest: the roughness of the Glossy node, and
+    glossy: float | None = None
+    principled: Nearest | None = None
+    #: Part of the half circle's light that the material's form sends elsewhere.
+    form: float | None = None
+    #: Shares (r, g, b) of light from INCIDENCE that are ideally reflected and refracted.
+    mirror: tuple | None = None
+    refracted: tuple | None = None
+
+
+def values_in_range(model, values):
+    """Values as a node has them, whose last digit may lie beyond a range: sockets are floats. What
+    is None, as linked, or of no parameter is left out."""
+    known = {}
+    for name, parameter in model.parameters.items():
+        value = values.get(name)
+        if value is None:
+            continue
+        if isinstance(parameter, brdfc.Choice):
+            known[name] = value
+        else:
+            known[name] = np.clip(np.asarray(value, float), parameter.min, parameter.max)
+    return known
+
+
+def _slice(theta):
+    return np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=-1)
+
+
+def slice_of(model, values, theta):
+    """f cos for light from INCIDENCE at these angles, positive where it is reflected to: (N, 3)."""
+    light = _slice(np.radians(-INCIDENCE))
+    return model.eval(_slice(theta), light, **values) * np.cos(theta)[:, None]
+
+
+def glossy_slice(alpha, theta):
+    """The same of Blender's Glossy node, white, with GGX's distribution of that width: (N,). Width
+    is the node's roughness squared; the light of further reflections is left out."""
+    light = _slice(np.radians(-INCIDENCE))
+    return native_bsdf.facets(_slice(theta), light, (alpha, alpha))
+
+
+@functools.cache
+def _glossy_slices():
+    """Roughnesses of the Glossy node, and their slices."""
+    roughness = np.linspace(0.05, 1, 39)
+    return roughness, np.stack([glossy_slice(r * r, _angles()) for r in roughness])
+
+
+def nearest_glossy(curve):
+    """The roughness of the Glossy node whose slice has the shape nearest to a curve over _angles(),
+    and that slice, as high as fits best; nothing for a curve that is 0."""
+    if not curve.any():
+        return None
+    roughness, slices = _glossy_slices()
+    heights = slices @ curve / np.sum(slices * slices, axis=1)
+    best = int(np.argmin(np.sum((heights[:, None] * slices - curve) ** 2, axis=1)))
+    return float(roughness[best]), heights[best] * slices[best]
+
+
+@functools.cache
+def _angles():
+    """Angles of the half circle, densest about the mirror direction, where lobes are narrow."""
+    even = np.linspace(-np.pi / 2, np.pi / 2, 361)
+    near = np.radians(INCIDENCE) + np.geomspace(1e-4, 0.2, 60)[:, None] * np.array([-1, 1])
+    return np.unique(np.concatenate([even, near.ravel(), [np.radians(INCIDENCE)]]))
+
+
+@functools.cache
+def _polar_grid(whole=False):
+    """Of the upper half's pixels the radius, 1 at the rim, and the angle; the first row is the
+    lowest. Then pixels of a radius. `whole`: a circle, not the upper half of one."""
+    unit, middle = (0.47 * _HALF, 0.5 * _HALF) if whole else (0.94 * _HALF, 0.03 * _HALF)
+    x, y = np.meshgrid(np.arange(SIZE) + 0.5 - _HALF, np.arange(_HALF) + 0.5 - middle)
+    return np.hypot(x, y) / unit, np.arctan2(x, y), unit
+
+
+@functools.cache
+def _pixels_among_angles(whole):
+    """Where the angle of each pixel lies among _angles(): the one below, and how far beyond it."""
+    angles, (_, angle, _) = _angles(), _polar_grid(whole)
+    below = np.clip(np.searchsorted(angles, angle) - 1, 0, len(angles) - 2)
+    share = (angle - angles[below]) / (angles[below + 1] - angles[below])
+    return below, np.clip(share, 0, 1)
+
+
+def _in_pixels(curve, whole):
+    """A curve over _angles() at the angles of the pixels."""
+    below, share = _pixels_among_angles(whole)
+    return curve[below] + share * np.diff(curve)[below]
+
+
+def _line(curve, dash=None, whole=False):
+    """How much of each pixel a curve over _angles() covers, 0 to 1, in a line of two pixels.
+    `dash`: pixels from one dash to the next, and which part of them is drawn."""
+    radius, angle, unit = _polar_grid(whole)
+    at, slope = _in_pixels(curve, whole), _in_pixels(np.gradient(curve, _angles()), whole)
+    off = np.abs(radius - at) / np.sqrt(1 + (slope / np.maximum(radius, 0.02)) ** 2)
+    # Steep flanks of a narrow lobe would draw a line beyond its tip.
+    tip = curve.max() + 1.4 / unit
+    ink = np.clip(1.8 - off * unit, 0, 1) * (radius < tip) * (np.abs(angle) <= np.pi / 2)
+    if dash:  # by the way along the curve, which on flanks is the radius
+        steps = np.hypot(np.diff(curve), 0.5 * (curve[1:] + curve[:-1]) * np.diff(_angles()))
+        way = _in_pixels(np.concatenate([[0], np.cumsum(steps)]), whole)
+        along = np.where(np.abs(slope) > radius, radius, way)
+        ink *= along * unit % dash[0] < dash[0] * dash[1]
+    return ink
+
+
+def _draw_curves(picture, line, own, form, node):
+    """Draws curves (N, 3) of the model, and of its form and the Principled node or None."""
+    for c in range(3):
+        np.maximum(picture[..., c], line(own[:, c]), out=picture[..., c])
+        if node is not None:
+            dashes = 0.85 * line(node[:, c], _DASHED)
+            np.maximum(picture[..., c], dashes, out=picture[..., c])
+    if form is not None:
+        for channel in np.unique(form, axis=1).T:
+            dots = line(channel, _DOTTED)
+            on = dots > 0
+            picture[on] += dots[on][:, None] * (_DOTS - picture[on])
+
+
+def _draw_arrow(picture, direction, shares, whole, aside=0):
+    """An arrow from the middle to the rim, bright as far as the share of each channel. `aside`:
+    pixels beside that, for a dashed one without a head."""
+    radius, angle, unit = _polar_grid(whole)
+    along, across = radius * np.cos(angle - direction), radius * np.sin(angle - direction)
+    along, across = along * unit, np.abs(across * unit - aside)
+    drawn = (along > 0) & (along % _DASHED[0] < _DASHED[0] * _DASHED[1] if aside else True)
+    if not aside:
+        head = np.clip(0.45 * (unit - along) + 0.5 - across, 0, 1) * (along > unit - 11)
+        shaft = np.clip(1.2 - across, 0, 1) * (along < unit - 10)
+        arrow = _INK * np.maximum(head, shaft) * drawn
+        np.maximum(picture, arrow[..., None], out=picture)
+    for c, share in enumerate(shares):
+        ink = np.clip(2 - across, 0, 1) * drawn * (along < share * unit)
+        np.maximum(picture[..., c], ink, out=picture[..., c])
+
+
+def _complete(model, values):
+    return {name: p.default for name, p in model.parameters.items()} | values
+
+
+def _refraction(ior):
+    """The angle from the upper normal of light that goes on below."""
+    return np.pi - np.arcsin(np.clip(np.sin(np.radians(INCIDENCE)) / ior, 0, 1))
+
+
+def _draw_lobes(picture, own, form, node, whole):
+    """Draws curves of what is scattered, over the model's peak; returns what the legend says."""
+    radius, angle, _ = _polar_grid(whole)
+    peak = own.max()
+    if not peak > 0:
+        return {}
+    over_peak = 0.95 / peak * own
+    glossy = nearest_glossy(over_peak.mean(axis=1))
+    if glossy:
+        shade = 0.5 * _line(np.minimum(glossy[1], 1.0), whole=whole)
+        np.maximum(picture, shade[..., None], out=picture)
+    for c in range(3):
+        within = (radius < _in_pixels(over_peak[:, c], whole)) & (np.abs(angle) <= np.pi / 2)
+        np.maximum(picture[..., c], 0.35 * within, out=picture[..., c])
+    others = (None if c is None else np.clip(0.95 / peak * c, 0, 1) for c in (form, node))
+    _draw_curves(picture, functools.partial(_line, whole=whole), over_peak, *others)
+    off = None if form is None else misplaced(form, own, np.gradient(_angles()))
+    return {"glossy": glossy[0] if glossy else None, "form": off}
+
+
+def _polar(found, ior):
+    here, near = found.here, found.near
+    whole = bool(here.refracted.any())
+    radius, angle, unit = _polar_grid(whole)
+    picture = np.full((_HALF, SIZE, 3), _PAPER)
+    for ring in (0.25, 0.5, 0.75, 1.0):
+        on = np.abs(radius - ring) * unit < 0.6
+        picture[on if whole else on & (np.abs(angle) <= np.pi / 2)] = _GRID
+    if whole:  # the surface
+        picture[_HALF // 2, np.abs(np.arange(SIZE) + 0.5 - _HALF) < unit] = _INK
+    from_light = np.abs(angle + np.radians(INCIDENCE)) * radius * unit < 0.9
+    picture[from_light & (radius < 1)] = _INK
+    said = _draw_lobes(picture, *found.slices, whole)
+    # What has no width is an arrow.
+    if here.mirror.any():
+        _draw_arrow(picture, np.radians(INCIDENCE), here.mirror, whole)
+        said["mirror"] = tuple(here.mirror.tolist())
+    if whole:
+        _draw_arrow(picture, _refraction(ior), here.refracted, whole)
+        said["refracted"] = tuple(here.refracted.tolist())
+    if near and any(near.mirror):
+        _draw_arrow(picture, np.radians(INCIDENCE), near.mirror, whole, _ASIDE)
+    if whole and near and near.transmission:
+        _draw_arrow(picture, _refraction(near.ior), near.refracted, whole, _ASIDE)
+    return picture, Legend(principled=near, **said)
+
+
+@functools.cache
+def _ball():
+    """Where the ball is, and in each pixel of it the frame of its surface, its third axis last; the
+    first is the object's Z axis along the surface, as the shaders have it."""
+    x = ((np.arange(BALL) + 0.5) / BALL * 2 - 1) / 0.92
+    x, y = np.meshgrid(x, x)
+    on = x * x + y * y < 1
+    n = np.stack([x[on], y[on], np.sqrt(1 - x[on] ** 2 - y[on] ** 2)], axis=-1)
+    up = np.array([0.0, 1.0, 0.0])
+    t = up - n * (n @ up)[:, None]
+    t = t / np.maximum(np.linalg.norm(t, axis=-1, keepdims=True), 1e-9)
+    frame = np.stack([t, np.cross(n, t), n], axis=-2)
+    # From the upper left, and the viewer far away in front.
+    lamp = np.array([-0.45, 0.6, 0.66])
+    lamp = lamp / np.linalg.norm(lamp)
+    wi, wo = frame @ lamp, frame @ np.array([0.0, 0.0, 1.0])
+    wi, wo = (w / np.linalg.norm(w, axis=-1, keepdims=True) for w in (wi, wo))
+    mirrored = 2 * n * n[:, 2:] - np.array([0.0, 0.0, 1.0])
+    sky = np.clip(0.5 + mirrored[:, 1:2], 0, 1) * 0.8
+    return on, wi, wo, sky
+
+
+def ball_light(scattered, mirror):
+    """What a ball sends to the viewer, of a lamp that gives a white matte surface that faces it 1,
+    and of a sky in what reflects like a mirror: linear RGB of the pixels of _ball(). `scattered`: f
+    cos, and `mirror`: weight of an ideal mirror, of these pixels."""
+    _, wi, _, sky = _ball()
+    return np.pi * scattered * (wi[:, 2:] > 0) + mirror * sky
+
+
+@functools.cache
+def _rings():
+    """Pixels of the ball in groups of eight that are seen at one angle: their index among those of
+    _ball(), (k, 8); and wi (k, 8, 3) and wo (k, 3) in a frame that holds the viewer."""
+    on, wi, wo, _ = _ball()
+    number = np.zeros(on.shape, int)
+    number[on] = np.arange(on.sum())
+    half = BALL // 2
+    x, y = np.nonzero(np.tril(on[half:, half:]))
+    mates = [(a, b) for p, q in ((x, y), (y, x)) for a in (p, ~p) for b in (q, ~q)]
+    index = np.stack([number[half + a, half + b] for a, b in mates], axis=-1)
+    wi, wo = wi[index], wo[index]
+    sine = np.hypot(wo[..., 0], wo[..., 1])
+    c, s = wo[..., 0] / sine, wo[..., 1] / sine
+    turned = [c * wi[..., 0] + s * wi[..., 1], c * wi[..., 1] - s * wi[..., 0], wi[..., 2]]
+    viewer = np.stack([sine, 0 * sine, wo[..., 2]], axis=-1)
+    return index, np.stack(turned, axis=-1), viewer[:, 0]
+
+
+def displayed(linear):
+    """Linear light as a screen has it; 1 becomes 0.8, what is brighter never quite white."""
+    return color.to_screen(1 - np.exp(-linear))
+
+
+def _balls(lights):
+    """Of the model, its form and the Principled node, or None: beside each other, with the line,
+    the dots and the dashes of their curves below."""
+    picture = np.full((BALL + KEY, SIZE, 3), _PAPER)
+    keys = (np.ones(3), 1.0, 1.0), (_DOTS, *_DOTTED), (np.full(3, 0.85), *_DASHED)
+    shown = [(light, key) for light, key in zip(lights, keys, strict=True) if light is not None]
+    on, stroke = _ball()[0], np.arange(BALL // 2)
+    for i, (light, (ink, step, part)) in enumerate(shown):
+        left = (2 * i + 1) * SIZE // (2 * len(shown)) - BALL // 2
+        picture[KEY:, left : left + BALL][on] = displayed(light)
+        drawn = left + BALL // 4 + stroke[stroke % step < step * part]
+        picture[KEY // 2 : KEY // 2 + 2, drawn] = ink
+    return picture
+
+
+def _degrees():
+    return np.linspace(0, 88, _VIEWS)
+
+
+@functools.cache
+def _views():
+    return np.cos(np.radians(_degrees()))
+
+
+def _directions():
+    return _slice(-np.arccos(_views()))
+
+
+def albedo_curve(model, values):
+    """The share of light that is reflected, at _VIEWS angles from 0 to 88 degrees: (_VIEWS, 3)."""
+    return model.albedo(_views(), samples=_SAMPLES, **values)
+
+
+@functools.cache
+def _numbers():
+    """Of samples of the model, of facets and of a matte surface."""
+    return np.split(sequence(sum(_FORM_SAMPLES)), np.cumsum(_FORM_SAMPLES)[:2])
+
+
+def _form_excess(model, values, scattered, width):
+    """The share of light that a form scatters beyond what the model does, (_VIEWS, 3). `scattered`:
+    its f cos for wi (_VIEWS, n, 3). By samples of the model, of facets of this width and of a matte
+    surface, each weighed by the density of all; they cancel where the two scatter the same."""
+    wo, (u, of_h, of_z) = _directions()[:, None], _numbers()
+    drawn = model.sample(wo, u, **values)
+    h = native_bsdf.draw_facets(of_h[:, 1:], (width, width))
+    mirrored = 2 * (wo * h).sum(-1, keepdims=True) * h - wo
+    r, phi = np.sqrt(of_z[:, 1]), 2 * np.pi * of_z[:, 2]
+    matte = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
+    matte = np.broadcast_to(matte, (_VIEWS, *matte.shape))
+    wi = np.concatenate([drawn.wi, mirrored, matte], axis=1)
+    lit = wi[..., 2] > 1e-6
+    lit[:, : len(u)] &= drawn.pdf > 0
+    wi = np.where(lit[..., None], wi, [0.0, 0.0, 1.0])
+    wi = wi / np.linalg.norm(wi, axis=-1, keepdims=True)
+    h = native_bsdf.half(wi, wo)
+    facets = native_bsdf.distribution(h, (width, width), False) * h[..., 2]
+    facets = facets / (4 * np.maximum((wo * h).sum(-1), 1e-9))
+    densities = model.pdf(wi, wo, **values), facets, wi[..., 2] / np.pi
+    density = sum(n * p for n, p in zip(_FORM_SAMPLES, densities, strict=True))
+    more = scattered(wi) - model.eval(wi, wo, **values) * wi[..., 2:]
+    return (more * (lit / density)[..., None]).sum(axis=1)
+
+
+def _albedo(own, form, node):
+    """Over the view angle, 0 to 90 degrees, of the model, its form and the Principled node; the
+    line is 1, all of the light."""
+    height, margin, top = CURVES.stop - CURVES.start, 8, 1.15
+    picture = np.full((height, SIZE, 3), _PAPER)
+    across, along = SIZE - 2 * margin, height - 2 * margin
+    rows, columns = np.arange(height)[:, None], np.arange(margin, margin + across)
+    for share, ink in ((0.0, _INK), (0.5, _GRID), (1.0, _INK)):
+        picture[margin + round(share / top * along), margin : margin + across] = ink
+    picture[margin : margin + along, margin] = _INK
+
+    def line(curve, dash=None):
+        at = np.interp((columns - margin) * 90 / across, _degrees(), curve)
+        at = margin + np.clip(at, 0, top) / top * along
+        slope = np.gradient(at)
+        ink = np.clip(1.5 - np.abs(rows - at) / np.sqrt(1 + slope**2), 0, 1)
+        if dash:
+            ink *= np.cumsum(np.hypot(1, slope)) % dash[0] < dash[0] * dash[1]
+        return ink
+
+    _draw_curves(picture[:, margin : margin + across], line, own, form, node)
+    return picture
+
+
+@dataclass(frozen=True)
+class Light:
+    """What is reflected: of the model, then of its form and of the nearest Principled node, None
+    where there is none to draw."""
+
+    #: f cos over _angles(), (N, 3), of light from INCIDENCE.
+    slices: tuple
+    #: Shares of the light at _VIEWS angles, (_VIEWS, 3), ideally reflected and refracted included.
+    albedos: tuple
+    #: ball_light().
+    balls: tuple
+    #: Of light from INCIDENCE, of the model.
+    here: Shares
+    near: Nearest | None
+
+
+def _of_form(model, values, form, shares, width):
+    """What a form scatters in the plane of incidence, its albedo, and its ball. All forms that are
+    fitted are the same about the normal: one view of each ring of the ball spares most of the work.
+    """
+    index, lights, viewers = _rings()
+    wo = np.concatenate([_slice(np.radians([-INCIDENCE])), _directions(), viewers])
+    lobes = form(_complete(model, values), wo)
+    one, views, rings = slice(0, 1), slice(1, 1 + _VIEWS), slice(1 + _VIEWS, None)
+    curve = lobes.scattered(_slice(_angles())[None], one)[0]
+    excess = _form_excess(model, values, lambda wi: lobes.scattered(wi, views), width)
+    ball = np.empty((2, len(_ball()[1]), 3))
+    ball[0, index] = lobes.scattered(lights, rings)
+    ball[1, index] = lobes.ideal(rings)[:, None]
+    return curve, shares.scattered + excess + lobes.ideal(views), ball_light(*ball)
+
+
+def _of_node(near):
+    """The same of a Principled node."""
+    native, wo = near.native, _directions()
+    taken, scale = native_bsdf.by_view(native, wo)
+    _, wi, viewers, _ = _ball()
+    # By the cosine, which falls from view to view.
+    at = [np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in (taken, *scale.T)]
+    of_view = at[0], np.stack(at[1:], axis=-1)
+    f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, *of_view) * (not near.transmission)
+    ball = ball_light(f_cos, native_bsdf.mirror(native, viewers))
+    return near.curve, native_bsdf.albedo(native, wo, taken, scale), ball
+
+
+def light(model, values, form=None):
+    """The Light of a model at values_in_range(), and of what draw() has as `form`."""
+    wo, here = _directions(), _slice(np.radians(-INCIDENCE))
+    curve, albedo = slice_of(model, values, _angles()), albedo_curve(model, values)
+    mirror, refracted = model.mirror(wo, **values), model.transmit(wo, **values)
+    shares = Shares(mirror, np.maximum(albedo - mirror - refracted, 0), refracted)
+    scattered = np.array([np.interp(INCIDENCE, _degrees(), c) for c in shares.scattered.T])
+    here = Shares(model.mirror(here, **values), scattered, model.transmit(here, **values))
+    near = nearest(curve, _angles(), INCIDENCE, _views(), shares, here)
+    _, wi, viewers, _ = _ball()
+    f_cos, lit = np.zeros_like(wi), wi[:, 2] > 0
+    f_cos[lit] = model.eval(wi[lit], viewers[lit], **values) * wi[lit, 2:]
+    own = curve, albedo, ball_light(f_cos, model.mirror(viewers, **values))
+    width = max(near.roughness**2, 0.01) if near else 1.0
+    formed = _of_form(model, values, form, shares, width) if form else (None,) * 3
+    node = _of_node(near) if near else (None,) * 3
+    return Light(*zip(own, formed, node, strict=True), here, near)
+
+
+def draw(model_name, values, form=None):
+    """The picture of a model with a node's values: (rows, SIZE, 4), 0 to 1 as a screen shows it,
+    the first row the lowest; and its Legend. `form`: what gives shader_text.Lobes of a form that
+    reflects other light, as a function of complete values and viewers (k, 3).
+
+    Raises ValueError for a model that this extension does not have, and what `form` raises.
+    """
+    model = brdfc.model(model_name)
+    known = values_in_range(model, values)
+    found = light(model, known, form)
+    above, legend = _polar(found, _complete(model, known).get("ior", 1.0))
+    picture = np.ones((ABOVE.stop, SIZE, 4))
+    picture[CURVES, :, :3] = _albedo(*found.albedos)
+    picture[BALLS, :, :3] = _balls(found.balls)
+    picture[ABOVE, :, :3] = above
+    return picture, legend

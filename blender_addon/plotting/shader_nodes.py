@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The nodes of a twin, executed on NumPy arrays: what its group scatters.
+
+It knows the nodes that twin.py wires; a file may hold others.
+"""
+
+import numpy as np
+
+from ..trees import shader_trees
+from . import shader_text
+from .shader_text import Lobes, Unreadable
+
+_MATH = {
+    "ADD": np.add,
+    "SUBTRACT": np.subtract,
+    "MULTIPLY": np.multiply,
+    "MULTIPLY_ADD": lambda x, y, z: x * y + z,
+    "LOGARITHM": lambda x, base: np.log(x) / np.log(base),
+    "MINIMUM": np.minimum,
+    "MAXIMUM": np.maximum,
+    "LESS_THAN": lambda x, y: np.where(x < y, 1.0, 0.0),
+}
+_VECTORS = {
+    "ADD": np.add,
+    "SUBTRACT": np.subtract,
+    "MULTIPLY": np.multiply,
+    "SCALE": np.multiply,
+    "DOT_PRODUCT": lambda x, y: (x * y).sum(0),
+    "CROSS_PRODUCT": lambda x, y: np.cross(x, y, axis=0),
+    "LENGTH": lambda x: np.sqrt((x * x).sum(0)),
+    "NORMALIZE": lambda x: x / np.sqrt((x * x).sum(0)),
+}
+_DISTRIBUTIONS = {"GGX": "ggx", "BECKMANN": "beckmann"}
+
+
+#: Steps of the table that Blender reads a curve from.
+_CURVE_STEPS = 256
+
+
+def _pixels(image):
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(height, width, 4)
+
+
+def _between(rows, at):
+    """Of rows at places, linear between their middles, 0 to 1 over all; the edge goes on."""
+    last = len(rows) - 1
+    at = np.clip(at * len(rows) - 0.5, 0, last)
+    below = np.asarray(at, int)
+    low, high = rows[below], rows[np.minimum(below + 1, last)]
+    return low + (high - low) * (at - below).reshape(at.shape + (1,) * (low.ndim - at.ndim))
+
+
+class _Execution:
+    """Of a group, for viewers (3, k, 1); sockets are computed once. `given`: values of the group's
+    inputs by identifier. A vector's components come first; of a shader it is Lobes."""
+
+    def __init__(self, group, given, wo):
+        self._given, self._wo = given, wo
+        self._pictures = {}
+        # A socket's own list of links is a search through those of the tree.
+        self._sources = {
+            link.to_socket.as_pointer(): link.from_socket
+            for link in group.links
+            if shader_trees.counts(link)
+        }
+        self._known = {}
+
+    def value(self, socket):
+        """Of an input."""
+        source = self._sources.get(socket.as_pointer())
+        if source is None:
+            return _constant(socket.default_value)
+        key = source.as_pointer()
+        if key not in self._known:
+            self._known[key] = self._output(source.node, source)
+        return self._known[key]
+
+    def _output(self, node, socket):
+        kind = node.bl_idname.removeprefix("ShaderNode")
+        compute = getattr(self, f"_{kind.lower()}", None)
+        if compute is None or node.mute:
+            raise Unreadable(f"unexpected {'muted ' if node.mute else ''}node {kind}")
+        return compute(node, socket)
+
+    def _nodegroupinput(self, node, socket):
+        return _constant(self._given[socket.identifier])
+
+    def _nodereroute(self, node, socket):
+        return self.value(node.inputs[0])
+
+    def _newgeometry(self, node, socket):
+        return {"Incoming": self._wo, "Normal": _constant((0.0, 0.0, 1.0))}[socket.name]
+
+    def _math(self, node, socket):
+        return _MATH[node.operation](*(self.value(s) for s in node.inputs if s.enabled))
+
+    def _vectormath(self, node, socket):
+        return _VECTORS[node.operation](*(self.value(s) for s in node.inputs if s.enabled))
+
+    def _combinexyz(self, node, socket):
+        return shader_text.vector(*(self.value(s) for s in node.inputs))
+
+    def _separatecolor(self, node, socket):
+        return self.value(node.inputs["Color"])[("Red", "Green", "Blue").index(socket.name)]
+
+    def _floatcurve(self, node, socket):
+        mapping = node.mapping
+        mapping.initialize()  # of a file that was opened
+        places = np.linspace(0, 1, _CURVE_STEPS + 1)
+        heights = [mapping.evaluate(mapping.curves[0], float(x)) for x in places]
+        return np.interp(self.value(node.inputs["Value"]), places, heights)
+
+    def _teximage(self, node, socket):
+        u, v, _ = self.value(node.inputs["Vector"])
+        name = node.image.name_full
+        if name not in self._pictures:
+            self._pictures[name] = _pixels(node.image)
+        if np.ptp(v) > 0:
+            raise Unreadable("expected one row of an image")
+        return np.moveaxis(_between(_between(self._pictures[name], v[0, :1])[0], u), -1, 0)
+
+    def _addshader(self, node, socket):
+        return self.value(node.inputs[0]) + self.value(node.inputs[1])
+
+    def _coloured(self, node, name, *given):
+        return self.value(node.inputs["Color"]) * Lobes.of(self._wo, name, *given)
+
+    def _bsdfdiffuse(self, node, socket):
+        return self._coloured(node, "diffuse", self.value(node.inputs["Normal"]))
+
+    def _bsdfanisotropic(self, node, socket):
+        normal = self.value(node.inputs["Normal"])
+        width = self.value(node.inputs["Roughness"]) ** 2
+        if not np.any(width):
+            return self._coloured(node, "reflection", normal)
+        kind = _DISTRIBUTIONS[node.distribution]
+        return self._coloured(node, "microfacet", kind, normal, (0, 0, 0), width, width)
+
+
+def _constant(value):
+    """A number, or a vector or colour."""
+    return np.reshape(value[:3], (3, 1, 1)) if hasattr(value, "__len__") else value
+
+
+def lobes(group, given, wo):
+    """Lobes of a group's BSDF for viewers (k, 3), unit vectors above the surface. `given`: numbers
+    and colours by the identifiers of the group's inputs. It and what it returns raise Unreadable.
+    """
+    try:
+        (end,) = (node for node in group.nodes if node.bl_idname == "NodeGroupOutput")
+        found = _Execution(group, given, np.transpose(wo)[:, :, None]).value(end.inputs["BSDF"])
+    except shader_text.FAILURES as error:
+        raise Unreadable(str(error)) from error
+    if not isinstance(found, Lobes):
+        raise Unreadable("expected a group whose BSDF is a sum of closures")
+    return found

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The darkest, brightest and mean values of images that textures show."""
+
+import os
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..common import color
+
+#: About how many pixels a mean is taken of.
+_SAMPLES = 1 << 16
+
+
+@dataclass(frozen=True)
+class Range:
+    """Of red, green, blue, in linear light of the working space, and alpha: (4,) each."""
+
+    low: np.ndarray
+    high: np.ndarray
+    mean: np.ndarray
+
+
+#: Range by image: reading a large one takes half a second.
+_known = {}
+
+
+def of(image):
+    """Range of an image; None where there is none, or it can't be told: a movie, a sequence, tiles,
+    a colour space other than sRGB and data."""
+    if image is None or image.source not in {"FILE", "GENERATED"}:
+        return None
+    key = (image.session_uid, image.source, image.alpha_mode, image.colorspace_settings.name)
+    key += (_version(image),)
+    if image.is_dirty or key not in _known:  # nothing tells when an image is painted again
+        _known[key] = _read(image)
+    return _known[key]
+
+
+def _version(image):
+    """Another one where the file of an image has changed."""
+    if image.packed_file is not None:
+        return image.packed_file.size
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    try:
+        return path, os.stat(path).st_mtime_ns
+    except OSError:
+        return path
+
+
+def _read(image):
+    loaded = image.has_data
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    if len(pixels) == 0 or len(pixels) != len(image.pixels):
+        return None
+    image.pixels.foreach_get(pixels)
+    is_float, channels = image.is_float, image.channels
+    if not loaded and image.source == "FILE":
+        image.buffers_free()
+    return _range(image, pixels.reshape(-1, channels), is_float)
+
+
+def _range(image, pixels, is_float):
+    step = max(len(pixels) // _SAMPLES, 1) | 1
+    rows = np.concatenate([[pixels.min(0), pixels.max(0)], pixels[::step]]).astype(float)
+    if rows.shape[1] < 3:
+        rows = np.concatenate([rows[:, :1].repeat(3, 1), rows[:, 1:]], 1)
+    rgb, alpha = rows[:, :3], rows[:, 3:]
+    if rows.shape[1] < 4 or image.alpha_mode == "NONE":
+        alpha = np.ones((len(rows), 1))
+    settings = image.colorspace_settings
+    if not is_float and not settings.is_data:  # Blender has floats in the working space already
+        if settings.name != "sRGB":
+            return None
+        rgb = color.from_rec709(color.from_srgb(rgb))
+    rows = np.concatenate([rgb, alpha], 1)
+    if not np.isfinite(rows).all():
+        return None
+    return Range(rows[0], rows[1], rows[2:].mean(0))

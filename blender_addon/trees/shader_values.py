@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values that reach sockets where these are constant, or known on average.
+
+It knows the nodes that importers and artists put in front of a material's sockets; what others make
+of their inputs is not known here.
+"""
+
+import numpy as np
+
+from ..common import color
+from . import animation, image_range, shader_trees
+
+_WIDTH = {"RGBA": 3, "VECTOR": 3}
+
+
+class Unknown(Exception):
+    """A value that differs from place to place, is animated, or is made by a node that is not known
+    here."""
+
+
+def constant(socket, within=()):
+    """The value of an input socket wherever its node is shown: a number or (r, g, b); None where it
+    differs from place to place, is animated, or is not known, as that of images. `within`: as
+    shader_trees.reach() has it."""
+    return Constants().told(socket, within)
+
+
+def current(socket, within=()):
+    """The same at the current frame: animated values are those that Blender shows now."""
+    return Current().told(socket, within)
+
+
+def mean(socket, within=()):
+    """The same, on average over the images that reach it."""
+    return _Mean(images=True).told(socket, within)
+
+
+def _plain(value):
+    return tuple(float(v) for v in value) if np.ndim(value) else float(value)
+
+
+def _as_type(value, socket):
+    """As a socket of a type takes what is linked to it."""
+    wide = socket.type in _WIDTH
+    if wide and not np.ndim(value):
+        return np.full(3, value, float)
+    if not wide and np.ndim(value):
+        return float(color.luminance(np.asarray(value, float)))
+    return value
+
+
+def _own(socket):
+    """The value that an input or output holds."""
+    value = getattr(socket, "default_value", None)
+    if value is None or isinstance(value, str):
+        raise Unknown
+    return np.array(value[:3], float) if hasattr(value, "__len__") else float(value)
+
+
+def _named(sockets, *names):
+    return next(s for s in sockets if s.enabled and s.name in names)
+
+
+def _clip(value):
+    return np.clip(value, 0, 1)
+
+
+_MATH = {
+    "ADD": lambda a, b, c: a + b,
+    "SUBTRACT": lambda a, b, c: a - b,
+    "MULTIPLY": lambda a, b, c: a * b,
+    "DIVIDE": lambda a, b, c: a / b if b else 0.0,
+    "MULTIPLY_ADD": lambda a, b, c: a * b + c,
+    "POWER": lambda a, b, c: a**b if a > 0 else 0.0,
+    "SQRT": lambda a, b, c: max(a, 0.0) ** 0.5,
+    "MINIMUM": lambda a, b, c: min(a, b),
+    "MAXIMUM": lambda a, b, c: max(a, b),
+    "LESS_THAN": lambda a, b, c: float(a < b),
+    "GREATER_THAN": lambda a, b, c: float(a > b),
+    "ABSOLUTE": lambda a, b, c: abs(a),
+}
+#: What a colour b makes of a colour a, all of it.
+_BLENDS = {
+    "MIX": lambda a, b: b,
+    "MULTIPLY": lambda a, b: a * b,
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+    "SCREEN": lambda a, b: 1 - (1 - a) * (1 - b),
+}
+
+
+class Constants:
+    """constant() of several sockets, which looks for what animates a node once. `images`: whether
+    those that are one colour all over are constants, which takes reading them."""
+
+    def __init__(self, images=False):
+        self._moved, self._images = {}, images
+
+    def told(self, socket, within=()):
+        try:
+            return _plain(self.of(socket, within))
+        except Unknown:
+            return None
+
+    def of(self, socket, within):
+        """The value of an input: an array (3,) or a number. Raises Unknown."""
+        reached = shader_trees.reach(socket, within)
+        if reached.output is not None:
+            return _as_type(self._output(reached), socket)
+        if reached.holder is None:
+            return np.zeros(3) if socket.type in _WIDTH else 0.0
+        return _as_type(self._own(reached.holder), socket)
+
+    def _own(self, socket):
+        if self._is_moved(socket.node, animation.value_of(socket)):
+            raise Unknown
+        return _own(socket)
+
+    def _moves(self, node):
+        if node not in self._moved:
+            self._moved[node] = animation.moved(node)
+        return self._moved[node]
+
+    def _is_moved(self, node, what):
+        return what in self._moves(node)
+
+    def _output(self, reached):
+        node, output = reached.node, reached.output
+        kind = node.bl_idname.removeprefix("ShaderNode")
+        compute = getattr(self, f"_{kind.lower()}", None)
+        if compute is None:
+            raise Unknown
+        if self._has_moving_settings(node):
+            raise Unknown
+        return compute(node, output, lambda socket: self.of(socket, reached.within))
+
+    def _has_moving_settings(self, node):
+        return any(pointer == node.as_pointer() for pointer, _ in self._moves(node))
+
+    def _rgb(self, node, output, of):
+        return self._own(output)
+
+    _value = _rgb
+
+    def _math(self, node, output, of):
+        if node.operation not in _MATH:
+            raise Unknown
+        inputs = list(node.inputs)
+        if node.operation == "MULTIPLY" and self._one_is_zero(inputs[:2], of):
+            return 0.0
+        values = [of(s) if s.enabled else 0.0 for s in inputs]
+        value = _MATH[node.operation](*values)
+        return _clip(value) if node.use_clamp else value
+
+    @staticmethod
+    def _one_is_zero(inputs, of):
+        for socket in inputs:
+            try:
+                if of(socket) == 0:
+                    return True
+            except Unknown:
+                continue
+        return False
+
+    def _mix(self, node, output, of):
+        if node.data_type not in {"FLOAT", "RGBA"}:
+            raise Unknown
+        factor, a, b = (_named(node.inputs, name) for name in ("Factor", "A", "B"))
+        blend = node.blend_type if node.data_type == "RGBA" else "MIX"
+        return self._mixed(blend, factor, a, b, node.clamp_factor, node.clamp_result, of)
+
+    def _mixrgb(self, node, output, of):
+        factor, a, b = node.inputs
+        return self._mixed(node.blend_type, factor, a, b, True, node.use_clamp, of)
+
+    @staticmethod
+    def _mixed(blend, factor, a, b, clamp_factor, clamp_result, of):
+        if blend not in _BLENDS:
+            raise Unknown
+        t = of(factor)
+        t = _clip(t) if clamp_factor else t
+        if t == 0:
+            value = of(a)
+        elif t == 1 and blend == "MIX":
+            value = of(b)
+        else:
+            first = of(a)
+            value = first + t * (_BLENDS[blend](first, of(b)) - first)
+        return _clip(value) if clamp_result else value
+
+    def _clamp(self, node, output, of):
+        value, low, high = (of(s) for s in node.inputs)
+        if node.clamp_type == "RANGE" and low > high:
+            low, high = high, low
+        return min(max(value, low), high)
+
+    def _invert(self, node, output, of):
+        factor, value = (of(s) for s in node.inputs)
+        return value + factor * (1 - 2 * value)
+
+    def _rgbtobw(self, node, output, of):
+        return float(color.luminance(of(node.inputs[0])))
+
+    def _separatecolor(self, node, output, of):
+        if node.mode != "RGB":
+            raise Unknown
+        return of(node.inputs[0])[list(node.outputs).index(output)]
+
+    def _combinecolor(self, node, output, of):
+        if node.mode != "RGB":
+            raise Unknown
+        return np.array([of(s) for s in node.inputs])
+
+    def _separatexyz(self, node, output, of):
+        return of(node.inputs[0])[list(node.outputs).index(output)]
+
+    def _combinexyz(self, node, output, of):
+        return np.array([of(s) for s in node.inputs])
+
+    # Of files before 5.0.
+    _separatergb, _combinergb = _separatexyz, _combinexyz
+
+    def _valtorgb(self, node, output, of):
+        found = node.color_ramp.evaluate(of(node.inputs[0]))
+        return found[3] if output.name == "Alpha" else np.array(found[:3])
+
+    def _teximage(self, node, output, of):
+        found = image_range.of(node.image) if self._images else None
+        if found is None:
+            raise Unknown
+        return self._of_image(node, found, slice(3) if output.name == "Color" else 3)
+
+    def _of_image(self, node, found, channels):
+        # Where a picture ends there is nothing.
+        same = np.array_equal(found.low[channels], found.high[channels])
+        if not same or node.extension == "CLIP":
+            raise Unknown
+        return found.low[channels]
+
+
+class Current(Constants):
+    """current() of several sockets."""
+
+    def _is_moved(self, node, what):
+        return False
+
+    def _has_moving_settings(self, node):
+        return False
+
+
+class _Mean(Constants):
+    """Nodes are taken to do to a mean what they do to each pixel."""
+
+    def _of_image(self, node, found, channels):
+        return found.mean[channels]
