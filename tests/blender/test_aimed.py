@@ -98,6 +98,7 @@ def off_under_a_sun(extension, scene, tool, form, towards, samples, pictures=1):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
@@ -150,6 +151,7 @@ CONES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("lamp", CONES)
@@ -183,6 +185,7 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
     assert math.hypot(error, other) < 0.008 * drawn
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_small_lamp_before_a_large_one(extension, empty):
     """The lobe of the large one gives light of the small one, which drawn directions hardly ever
@@ -219,6 +222,7 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
     assert error < 0.02 * alone
 
 
+@pytest.mark.long
 @pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["phong", "max_phong", "glossy_reflector"])

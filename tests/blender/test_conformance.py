@@ -48,6 +48,7 @@ def keep(found):
         writer.writerows(found)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda c: c.name)
 def test_closure_samples_what_it_evaluates_and_evaluates_what_we_define(rows, case):

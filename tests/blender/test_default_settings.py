@@ -77,6 +77,7 @@ def blocks(picture, index):
     return part.reshape(side, BLOCK, side, BLOCK).mean((1, 3)).ravel()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_every_model_in_a_new_file(extension, new_file, few_of):
     """What *Add > Shader > brdfc* gives has nothing to say, and is right: under a new file's lamp,

@@ -213,6 +213,7 @@ def test_shaders_are_short(extension_zip, subtests):
                 assert 0 < found < most
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_every_choice_reaches_the_shader(extension, empty, subtests):
     """Each choice of a parameter gives a picture of its own, that of its index: the script node's
@@ -1250,6 +1251,7 @@ def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
             assert hashlib.sha256(text.encode()).hexdigest() == stated
 
 
+@pytest.mark.long
 def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):
     """They are measured at the model's default parameters, which a pack cut to a scene lacks."""
     names = ("sampled", "fitted", "twin")

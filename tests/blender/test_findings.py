@@ -141,6 +141,7 @@ def test_no_scene_node_or_plan_is_an_error_that_says_so(extension, empty, given)
 # ---- lamps that materials do not aim at ----------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(extension, empty):
     material = ball(extension, empty, "radziszewski_alda")  # which has no base to show them

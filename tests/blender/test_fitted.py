@@ -60,6 +60,7 @@ def fitted(tool, name, wi, wo):
     return read_csv(text)[1]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_sun_on_a_fitted_form(lean, tool):
     """Every pair is within 1e-3 of the largest value of what the tool says of the closures."""
@@ -100,6 +101,7 @@ def test_furnace_of_a_fitted_form(lean, tool):
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
     """They turn from the viewer at the rims of smooth meshes, where closures of opposite signs turn
@@ -161,6 +163,7 @@ def along_sliders(extension):
     return cases
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_forms_of_the_extension_along_their_sliders(extension, tool):
     """A shader serves all values of one number and of what f is a polynomial of: of two materials,
@@ -283,6 +286,7 @@ def show(meter, texels):
     meter.mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv.ravel())
 
 
+@pytest.mark.long
 def test_a_textured_colour_under_a_sun(textured, tool):
     """The sum that the tool says for a white one, times the texel, to 1e-3 of its largest value."""
     rng = np.random.default_rng(6)

@@ -260,6 +260,7 @@ def _says(row):
     return f"{row['model']} {row['choices']}: {row['quantity']}{at}: {errors}"
 
 
+@pytest.mark.long
 def test_text_says_what_was_recorded(rows):
     """Cycles against the recording with OSL's arithmetic. Where a formula amplifies rounding, the
     last bit of a constant counts too: as much as it costs between float and double."""

@@ -397,6 +397,7 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
     assert not wrong, wrong
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", WITH_MARKS)
 def test_highlights(extension, empty, tool, kind):
     stage = highlights.Stage(empty, WIDE_CASES if kind == "half below the horizon" else CASES)

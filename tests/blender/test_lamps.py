@@ -1142,6 +1142,7 @@ def test_images_of_another_file_with_the_same_name(extension, ball, empty, tmp_p
         assert axes(slot)[:, 2] == pytest.approx(directions[number], abs=5e-3)
 
 
+@pytest.mark.long
 def test_lamps_that_are_not_normalised(extension, ball, empty):
     """Their energy is for a size of 1."""
     helpers.add_camera(empty)

@@ -133,6 +133,7 @@ def test_catalogues_and_what_is_said_of_each_material(extension, library, made, 
             assert np.abs(shown - meant).max() < 0.01
 
 
+@pytest.mark.long
 def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty):
     def buttons():
         layout = helpers.Layout()
@@ -160,6 +161,7 @@ def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty
     assert sorted(item.name for item in libraries) == sorted(before) and library.is_current()
 
 
+@pytest.mark.long
 @pytest.mark.full
 def test_the_program_is_started_as_blender_expects_it(library, monkeypatch, tmp_path):
     """As a module Blender has no program: this one takes its options as the manual says, and runs
@@ -307,6 +309,7 @@ def test_undo_of_a_drag(extension, made, empty):
     assert_aims_at(extension, bpy.data.materials["Brushed Steel"], bpy.data.objects["Key"])
 
 
+@pytest.mark.long
 def test_every_material_is_as_the_same_one_made_by_hand(extension, library, made, empty, subtests):
     for entry in library.entries():
         with subtests.test(entry.name):

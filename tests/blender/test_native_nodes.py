@@ -59,6 +59,7 @@ def start(extension, kind, p, normals, samples, bounces, **options):
     return Goniometer(scene, material, normals, samples, **options)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_node_under_a_sun(extension, tool, fresnel, case):
     kind, p = CASES[case]

@@ -128,6 +128,7 @@ def difference(a, b):
     )
 
 
+@pytest.mark.long
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_a_white_world(extension, model, values):
@@ -156,6 +157,7 @@ def test_lamps(extension, model, values, light):
     assert noise < 2.0
 
 
+@pytest.mark.long
 def test_noise_under_a_rectangle(extension):
     """What its cone does not cover is not left to random rays, of which few meet it."""
 

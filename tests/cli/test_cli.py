@@ -254,10 +254,12 @@ def test_every_option_that_is_a_number_is_checked_as_one():
 
 @pytest.mark.parametrize("command", commands())
 def test_a_number_that_is_none_is_named(command):
-    for option, kind in numbers_of(command).items():
+    for index, (option, kind) in enumerate(numbers_of(command).items()):
         many = int(kind.split(" x ")[1]) if " x " in kind else 1
         wrong = ["nan", "-inf", "1e999", "0x10", ""]
         wrong += ["1.5", "1" + "0" * 30] if kind.startswith("INTEGER") else []
+        # One type reads all of them, so each option is tried with some of what that refuses.
+        wrong = wrong[index % 3 :: 3]
         for value in wrong:
             done = run(command, f"{option}={','.join([value] * many)}")
             if value == "":  # CLI11 says that itself
