@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds a Blender scene from a resolved scene file, the one that the reference renderer reads.
+"""Builds a Blender scene from a resolved scene file, which the reference renderer reads as well.
 
-`brdfc scene S.json --out DIR` writes DIR/scene.json, in which every shape is a mesh of arrays and
+`brdfc scene S.json --out DIR` writes DIR/scene.json, where every shape is a mesh of arrays and
 every procedural picture a file. Units and conventions are Blender's: metres, watts, z up.
 """
 
@@ -15,12 +15,12 @@ from mathutils import Euler, Matrix, Vector
 
 from . import api, automatic, color, lamps, nodes, pack
 
-#: Representation name that stands for Blender's own Glossy node, to compare run times with.
+#: Representation name of Blender's own Glossy node, with which run times are compared.
 GLOSSY = "glossy"
 
 
 class _View:
-    """A JSON value that knows where it lies, so that an error can name file and key."""
+    """A JSON value that knows its file and key, for error messages."""
 
     def __init__(self, value, file, path=""):
         self.value, self.file, self.path = value, file, path
@@ -109,7 +109,7 @@ def _array(view, columns):
 def build_mesh(name, vertices, triangles, normals=None, uvs=None):
     """Mesh datablock from arrays: (n, 3) float, (m, 3) int, and per vertex (n, 3) and (n, 2).
 
-    Normals are kept in single precision, as given. Without them the triangles are flat.
+    Normals are stored in single precision, unchanged. Without them the triangles are flat.
     """
     triangles = np.ascontiguousarray(triangles, np.int32)
     mesh = bpy.data.meshes.new(name)
@@ -125,7 +125,7 @@ def build_mesh(name, vertices, triangles, normals=None, uvs=None):
         layer.uv.foreach_set("vector", np.ascontiguousarray(uvs, np.float32)[triangles].ravel())
     mesh.update(calc_edges=True)
     if normals is not None:
-        # Blender's other way to store custom normals rounds them to 16 bits.
+        # Blender's other way to store custom normals would round them to 16 bits.
         attribute = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
         attribute.data.foreach_set("vector", np.ascontiguousarray(normals, np.float32).ravel())
         mesh.update()
@@ -133,7 +133,7 @@ def build_mesh(name, vertices, triangles, normals=None, uvs=None):
 
 
 def _mesh_arrays(shape):
-    """What build_mesh() takes, from the files that a shape names."""
+    """The arguments of build_mesh(), from the files that a shape names."""
     if shape.get("type").text() != "mesh" or not shape.has("vertices"):
         raise shape.error("a mesh of arrays; resolve the scene first")
     vertices = _array(shape.get("vertices"), 3)
@@ -156,7 +156,7 @@ def _transform(view):
     view = view.get("transform")
     translate = view.get("translate").vector() if view.has("translate") else Vector()
     degrees = view.get("rotate_degrees").numbers(3) if view.has("rotate_degrees") else [0] * 3
-    scale = view.color_or("scale", [1.0] * 3)  # one number or three
+    scale = view.color_or("scale", [1.0] * 3)  # a single number, or three
     rotation = Euler([math.radians(d) for d in degrees], "XYZ").to_matrix().to_4x4()
     return Matrix.Translation(translate) @ rotation @ Matrix.Diagonal((*scale, 1.0))
 
@@ -169,7 +169,7 @@ def _link(scene, name, data, matrix):
 
 
 def _aimed(position, direction, up=None):
-    """Matrix of something that looks along its own -z."""
+    """Matrix of an object that looks along its own -z."""
     back = -direction.normalized()
     up = up if up is not None else Vector((0, 0, 1))
     if back.cross(up).length < 1e-6 * up.length:
@@ -194,7 +194,7 @@ def _camera(scene, view):
     direction = view.get("look_at").vector() - position
     if direction.length == 0:
         raise view.get("look_at").error("another point than the camera's position")
-    # No clipping worth the name: the reference renderer has none.
+    # In effect no clipping: the reference renderer has none.
     data.clip_start, data.clip_end = 1e-4, 1e6
     up = view.get("up").vector() if view.has("up") else None
     scene.camera = _link(scene, "Camera", data, _aimed(position, direction, up))
@@ -216,14 +216,14 @@ def _light(scene, index, view):
         direction = view.get("direction").vector()
     if kind == "point":
         data.shadow_soft_size = view.number_or("radius", 0.0)
-        data.use_soft_falloff = False  # a sphere of light, not Blender's softened one
+        data.use_soft_falloff = False  # a spherical light; Blender would soften it
     elif kind == "sun":
         data.energy = view.get("irradiance").number()
         data.angle = math.radians(view.number_or("angle_degrees", 0.0))
     else:
         size = view.get("size")
         sizes = size.numbers(2) if isinstance(size.value, list) else [size.number()] * 2
-        data.shape = "RECTANGLE" if kind == "area" else "ELLIPSE"  # size: diameters
+        data.shape = "RECTANGLE" if kind == "area" else "ELLIPSE"  # sizes are diameters
         data.size, data.size_y = sizes
     up = view.get("up").vector() if view.has("up") else None
     lamp = _link(scene, f"{kind}{index}", data, _aimed(position, direction, up))
@@ -231,11 +231,12 @@ def _light(scene, index, view):
 
 
 def _load_image(path, space="auto"):
-    """The picture; `auto`: floats are linear, integers sRGB, as in the reference renderer."""
+    """Loads an image. `auto`: floats are linear, integers sRGB, as in the reference renderer."""
     image = bpy.data.images.load(str(path), check_existing=True)
     linear = image.is_float if space == "auto" else space == "linear"
     if linear:
-        # As it is; what that is called differs between configurations of OpenColorIO.
+        # Data is not converted; the name of that colour space depends on the OpenColorIO
+        # configuration.
         image.colorspace_settings.is_data = True
     else:
         color.set_srgb(image)
@@ -265,7 +266,7 @@ def _environment(scene, view):
         picture.image = _load_image(view.get("image").file_path())
         picture.interpolation = "Linear"
         tree.links.new(picture.outputs["Color"], background.inputs["Color"])
-        # As fine as the picture; the automatic choice spends seconds on a map of 4096 x 2048.
+        # As fine as the picture; the automatic choice takes seconds for a map of 4096 x 2048.
         world.cycles.sampling_method = "MANUAL"
         world.cycles.sample_map_resolution = min(max(picture.image.size[0], 256), 4096)
     elif view.has("color"):
@@ -275,7 +276,7 @@ def _environment(scene, view):
 
 
 def _exponents(values):
-    """A Phong exponent along and across the tangent for Blender's Glossy node."""
+    """Phong exponents along and across the tangent for Blender's Glossy node."""
     for u, v in (("nu", "nv"), ("e", "e"), ("n", "n")):
         if u in values and v in values:
             return values[u], values[v]
@@ -283,10 +284,10 @@ def _exponents(values):
 
 
 def glossy_material(name, values):
-    """A material of Blender's own Glossy node, as like a model's values as it can be.
+    """A material of Blender's own Glossy node, as similar to a model's values as possible.
 
-    It is the yardstick for run times, and the same node that artists have without the extension.
-    Exponents n become the roughness of Ashikhmin and Shirley's distribution, (2 / (n + 2))^(1/4).
+    It is the yardstick for run times: the node that artists have without the extension. An exponent
+    n becomes the roughness that matches Ashikhmin and Shirley's distribution, (2 / (n + 2))^(1/4).
     """
     color = next((v for v in values.values() if isinstance(v, tuple)), (0.8, 0.8, 0.8))
     exponents = (float(n) if isinstance(n, int | float) else 100.0 for n in _exponents(values))
@@ -295,7 +296,7 @@ def glossy_material(name, values):
     return native_material(name, GLOSSY, like, "ASHIKHMIN_SHIRLEY")[0]
 
 
-#: Blender's own nodes that can stand in for a model, by representation: type, name of the colour.
+#: Blender's own nodes that can replace a model, by representation: node type, name of the colour.
 NATIVE = {
     GLOSSY: ("ShaderNodeBsdfAnisotropic", "Color"),
     "principled": ("ShaderNodeBsdfPrincipled", "Base Color"),
@@ -304,9 +305,10 @@ NATIVE = {
 
 
 def native_material(name, kind, fitted, distribution="GGX"):
-    """A material of one of Blender's own nodes, and the node. `fitted`: what script/native_nodes.py
-    found: colour, widths of the lobe along and across the tangent (0 for a mirror), rotation in
-    radians, and for some kinds edge (a colour), ior and metallic."""
+    """A material of one of Blender's own nodes; returns the material and the node.
+
+    `fitted`: the result of script/native_nodes.py: colour, lobe widths along and across the tangent
+    (0 for a mirror), rotation in radians, and for some kinds edge (a colour), ior and metallic."""
     material = bpy.data.materials.new(f"{name} ({kind})")
     tree = nodes.empty_tree(material)
     bsdf, color = NATIVE[kind]
@@ -322,12 +324,12 @@ def native_material(name, kind, fitted, distribution="GGX"):
     turns = fitted["rotation"] / (2 * math.pi)
     node.inputs["Roughness"].default_value = (ax * ay) ** 0.25
     if ax != ay and kind == GLOSSY:
-        # Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the other way round below 0.
+        # In Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the reverse for a < 0.
         ratio = math.sqrt(ax / ay)
         node.inputs["Anisotropy"].default_value = 1 - ratio if ratio <= 1 else 1 / ratio - 1
         node.inputs["Rotation"].default_value = turns
     elif ax != ay:
-        # Cycles: ay = (1 - 0.9 a) ax, along the tangent only.
+        # In Cycles: ay = (1 - 0.9 a) ax; the lobe is always wider along the tangent.
         if ax < ay:
             ax, ay, turns = ay, ax, turns + 0.25
         of = "Anisotropic" if kind == "principled" else "Anisotropy"
@@ -342,7 +344,7 @@ def native_material(name, kind, fitted, distribution="GGX"):
 
 
 def _object_tangent(tree, node):
-    """The frame of this project: the object's z axis along the surface."""
+    """The tangent of this project: the object's z axis along the surface."""
     axis = tree.nodes.new("ShaderNodeVectorTransform")
     axis.vector_type, axis.convert_from, axis.convert_to = "VECTOR", "OBJECT", "WORLD"
     axis.inputs["Vector"].default_value = (0, 0, 1)
@@ -361,7 +363,8 @@ def _texture(view):
 
 
 def _lambert(name, view):
-    """A material of Blender's Diffuse node, which is Lambert's model: for packs without that."""
+    """A material of Blender's Diffuse node, which equals Lambert's model, for packs without
+    that."""
     material = bpy.data.materials.new(name)
     tree = nodes.empty_tree(material)
     node = tree.nodes.new("ShaderNodeBsdfDiffuse")
@@ -435,11 +438,10 @@ def _material(name, view, representation, native):
 
 
 def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8, osl=True):
-    """Settings under which Cycles computes the light transport integral, and nothing else.
+    """Settings under which Cycles computes the light transport integral and nothing else.
 
-    Linear float EXR, samples spread evenly over the square of a pixel, on the CPU, OSL on or off;
-    no filter glossy, clamping, denoising, adaptive sampling, light threshold, guiding or
-    approximation.
+    Linear float EXR, box-filtered pixels, CPU, OSL on or off; no filter glossy, clamping,
+    denoising, adaptive sampling, light threshold, guiding or approximation.
     """
     cycles = scene.cycles
     if osl:
@@ -467,7 +469,8 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8, osl=True):
         "diffuse_bounces": max_bounces,
         "glossy_bounces": max_bounces,
         "transmission_bounces": max_bounces,
-        # To Cycles a lamp that a ray passes is a transparent surface; beyond the limit it is lost.
+        # To Cycles a lamp that a ray passes is a transparent surface; beyond this limit the ray is
+        # lost.
         "transparent_max_bounces": 1024,
         "min_light_bounces": 0,
         "min_transparent_bounces": 0,
@@ -497,11 +500,11 @@ def apply_clean_settings(scene, samples=64, seed=1, max_bounces=8, osl=True):
 def load_scene(path, representation=None, name=None, native=None, osl=True):
     """Makes a scene with clean settings from a resolved scene file, and makes it the active one.
 
-    `representation` overrides that of every material: auto, exact, sampled, or "glossy",
-    "principled" or "metallic" for Blender's own nodes. `native`: what script/native_nodes.py
-    fitted, by material and node; only Glossy can do without. `osl`: whether Open Shading Language
-    is on, without which "auto" is Blender's own nodes. Returns the bpy scene. Raises ValueError
-    naming file and key.
+    `representation` overrides that of every material: auto, exact, sampled and so on, or "glossy",
+    "principled" or "metallic" for Blender's own nodes. `native`: the nodes that
+    script/native_nodes.py fitted, by material and node; only "glossy" works without. `osl`: whether
+    Open Shading Language is on; without it "auto" is Blender's own nodes. Returns the bpy scene.
+    Raises ValueError naming file and key.
     """
     path = Path(path)
     try:
@@ -539,7 +542,7 @@ def load_scene(path, representation=None, name=None, native=None, osl=True):
         key: _material(key, entry, representation, native or {})
         for key, entry in view.get("materials").items()
     }
-    # Objects of equal shape and material share a mesh, which Cycles then stores once.
+    # Objects of equal shape and material share a mesh, so that Cycles stores it once.
     meshes = {}
     for index, entry in view.get("objects").items():
         shape = entry.get("shape")
