@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes one table of the rows that the conditions' tests measured in each version of Blender."""
+"""Combines the results of the conditions' tests, measured in each Blender version, in one table."""
 
 import argparse
 import csv

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `brdfc build --explain` says of three scenes, in Markdown. Runs in the repository's root."""
+"""Writes the output of `brdfc build --explain` for three scenes as Markdown. Run it in the root."""
 
 import argparse
 import itertools

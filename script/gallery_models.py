@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A page a model: three balls under a lamp in Blender and by the reference renderer, lobes, albedo.
+"""Makes a page for each model: three balls in Blender and the reference renderer, lobes, albedo.
 
     python script/gallery_models.py scenes MODELS.json OUT-FOLDER     writes OUT/ball-MODEL.json
     python script/gallery_models.py pages MODELS.json REPORT-FOLDER PAGES-FOLDER
 
-MODELS.json is what `brdfc list --json` prints. The pages take pictures from what
-`script/demo_render.py` rendered of those scenes and `brdfc report` measured; a model that was not
-rendered keeps its page. Formulas are those of the Python package `brdfc`, which must be importable.
-Nothing here names a model: values to show come from the schema.
+MODELS.json is the output of `brdfc list --json`. The pages use the pictures and measurements that
+`script/demo_render.py` and `brdfc report` made of those scenes; models that were not rendered keep
+their pages. Plots use the Python package `brdfc`, which must be importable. No model is named here:
+the parameter values to show come from the schema.
 """
 
 import json

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles' devices make of the models; script/gpu runs it, once a device.
+"""Measures how Cycles' devices render the models; script/gpu runs it once per device.
 
-Needs `bpy` with NumPy, and beside it the files that script/gpu puts there: this machine may have
-neither the tool nor a network. `expect` computes what is measured against, with the tool; `measure`
-renders on one device and adds to a file of JSON after each step, so that what was measured before a
-crash is kept; `compare` prints tables of such files.
+Needs `bpy` with NumPy, and the files that script/gpu puts beside this one: the machine may have
+neither the tool nor a network. `expect` computes the expected values, with the tool. `measure`
+renders on one device and adds to a JSON file after each step, so that results survive a crash.
+`compare` prints tables of such files.
 """
 
 import argparse

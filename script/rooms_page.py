@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rooms of the code: what generator/CMakeLists.txt says of them, what their files include, and
-both as a page with a drawing."""
+"""Makes the page about the rooms of the code: the description of each room in
+generator/CMakeLists.txt, what its files include, and a drawing of both."""
 
 import itertools
 import re
