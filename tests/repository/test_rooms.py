@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rooms include what they link, which is above them; the page that draws them is that of now."""
+"""Each room includes only rooms that it links, and that are above it; the page that draws them is
+up to date."""
 
 import re
 from pathlib import Path
