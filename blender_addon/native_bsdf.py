@@ -168,7 +168,7 @@ def matte(wi, wo, color, roughness):
     t = (wi * wo).sum(-1) - nl * nv
     t = np.where(t > 0, t / np.maximum(np.maximum(nl, nv), 1e-9), t)
     mean = a * np.pi + (2 * np.pi - 5.6) / 3 * b
-    # OSL clamps all colours of a Diffuse node to 1. Files are made without OSL.
+    # Only this term clamps the colour. With OSL on, all terms do; but new files have OSL off.
     held = _of_facets(color)
     again = held**2 * (mean / (1 - mean)) / (1 - held * (1 - mean)) / np.pi
     lost = (1 - a * np.pi - b * _grooves(nv)) * (1 - a * np.pi - b * _grooves(nl))

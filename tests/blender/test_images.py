@@ -164,8 +164,8 @@ def test_a_bias_of_one_percent_or_one_in_a_thousand_is_found(
 ):
     """The power of the test: it accepts the pictures as rendered, and rejects brightened ones."""
     materials = {"lambert": {"model": "lambert", "representation": "exact"}}
-    # No bounce, so that the sky behind the lamp, which to Cycles is a transparent bounce, would be
-    # missing.
+    # With 0 bounces the test also detects a sky that is lost behind the lamp, which is a
+    # transparent bounce to Cycles.
     content = scene(materials, max_bounces=0, spp=8192)
     content["camera"]["height"] = 1.2  # nothing but the sphere
     content["environment"] = {"color": [0.5, 0.6, 0.7]}
