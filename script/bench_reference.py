@@ -86,7 +86,7 @@ def run_brdfc(brdfc, folder, args):
     out = folder / "brdfc.exr"
     command = [brdfc, "render", folder / "scene.json", "--out", out]
     command += ["--threads", args.threads, "--spp"]
-    # With CPU times, the tracing time is what further samples take.
+    # For CPU times, the time with one sample, which includes loading, is subtracted.
     ready = cpu_seconds([*command, 1]) if args.cpu else 0
     seconds = cpu_seconds([*command, args.spp + 1 if args.cpu else args.spp]) - ready
     import mitsuba as mi

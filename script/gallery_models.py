@@ -277,7 +277,7 @@ def draw_albedo(np, plt, model, formulas, out):
             for v in values_of(parameter)
         ]
         spread = max(abs(c - curves[0][1]).max() for _, c in curves)
-        if parameter is axis or spread > 0.03:  # what changes nothing of it has no panel
+        if parameter is axis or spread > 0.03:  # no panel for a parameter with little effect
             panels.append((parameter, curves))
         if len(panels) == PANELS:
             break

@@ -175,10 +175,10 @@ def measure_facets(folder, modules, mode, form):
         lit = (which == i) & (wi[:, 2] > 1e-3)
         f = np.array(e["f"])
         row = {"model": e["model"], "values": e["values"], "form": forms[i]}
-        if f.sum() > 0:  # of mirrors a sun without an angle shows nothing
+        if f.sum() > 0:  # 0 for mirrors, which don't show a sun without an angle
             error = np.sort(np.abs(picture[lit] - f).sum(1))
-            # A sampled direction's lobe contains the sun by chance, once in 1e5 samples: one facet
-            # in thirty.
+            # About once in 1e5 samples, a sampled direction's lobe contains the sun, which affects
+            # one facet in thirty.
             row["off"] = float(error[: len(error) - len(error) // 30].sum() / f.sum())
             row["worst_facet"] = float(error[-1] / f.sum() * len(f))
         row["finite"] = bool(np.isfinite(picture[lit]).all())
@@ -342,7 +342,7 @@ def measure(folder, mode, out, tiny):
     for case in ball_cases(mode, tiny):
         try:
             row = measure_ball(modules, mode, case, size, samples)
-        except Exception as error:  # what else there is to measure
+        except Exception as error:  # continues with the next case
             row = {"model": case[0], "form": case[2], "lamps": case[3], "error": repr(error)}
         result["balls"].append(row)
         keep()

@@ -576,7 +576,7 @@ def main():
         missing = [job for job in jobs if is_missing(job, measured)]
         failed += run(missing, measure, measured, options, cache, options.processes)
         if not options.no_costs:
-            # In one process, because others beside it would affect the times.
+            # In a single process, because parallel processes would affect the times.
             timed = list(cost_jobs(jobs, costs, options))
             failed += run(timed, time_forms, costs, options, cache, 1)
 

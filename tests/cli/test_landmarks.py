@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Suffern's rotated rays on docs/gallery/landmarks.md: compared with quadrature, and the effect of
-the rotation."""
+"""Suffern's turned rays on docs/gallery/landmarks.md: compared with quadrature, and the effect of
+turning."""
 
 import landmarks
 import numpy as np
