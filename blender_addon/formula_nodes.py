@@ -303,7 +303,7 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
-#: What a shading point reads from a lamp slot, and what it computes from it.
+#: Outputs of the group that computes how a slot's lamp is seen from the shading point.
 _SEEN = [
     ["towards", "VECTOR"],
     ["drop", "FLOAT"],

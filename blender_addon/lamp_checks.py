@@ -156,8 +156,8 @@ def _others_lamps(node):
 
 
 def _not_aimed(node, count, scene):
-    """Examines the lamps that a node with `count` slots does not aim at: returns what is lost, and
-    what is noisy, by reason, where much of the light is concerned."""
+    """Yields findings about the lamps that a node with `count` slots does not aim at: lamps whose
+    light is lost, and, by reason, lamps that are noisy and bright enough to matter."""
     group = _others_lamps(node)
     elsewhere = lamps.elsewhere(group.library) if group is not None else None
     found = lamps.seen(scene, group)
