@@ -8,7 +8,7 @@ them values, links, animation and drivers.
 Undo needs care. Blender calls handlers after it has recorded an undo step; and on undo it assumes
 that data shared by two steps is unchanged. A group that a handler filled after the step was
 recorded may therefore point to data that undo frees. So groups filled by a handler are emptied
-before an undo step, and filled again after it.
+before undo and redo, and filled again afterwards.
 """
 
 from bpy.app.handlers import persistent
