@@ -14,8 +14,10 @@ from .warnings import checks, console
 
 
 def _refuse_beside_another():
-    """An extension that is cut to a scene has the menus and operators of the whole one: the second
-    of them would take the first one's away."""
+    """Refuses to register beside another installed brdfc extension.
+
+    A lean extension, cut to one scene, registers the same menus and operators as the full one;
+    whichever is disabled first would unregister the other's."""
     other = getattr(bpy.types, ui.MATERIAL_PT_brdfc.__name__, None)
     if other is not None and other.__module__ != ui.__name__:
         package = other.__module__.removesuffix(".ui").removesuffix(".panels")

@@ -83,7 +83,7 @@ def models():
 
 
 def _checked(model_name, representation, given):
-    """The form to use, and the values in canonical form."""
+    """Returns the form to use and the parameter values in canonical form."""
     given = dict(given)
     fixed = pack.fixed(model_name)
     checked = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
@@ -95,7 +95,7 @@ def _checked(model_name, representation, given):
 def prepare_material(material):
     """Gives a material the settings that its models need; returns a sentence for each change.
 
-    Raises ValueError for a linked material, as do all that change one.
+    Raises ValueError for a linked material, as every function here does that changes a material.
     """
     editable.check(expected.material(material))
     return bump_correction.prepare(material)
@@ -104,10 +104,12 @@ def prepare_material(material):
 def new_material(model, representation="auto", **parameters):
     """Makes a material of one model. Parameters that are not given take their default.
 
-    A material of "auto" follows the settings of the scene: where Open Shading Language does not
-    run, it is made of Blender's own nodes. Raises ValueError for an unknown model, representation
-    or parameter, or a value that is out of range; CompileError when Cycles can't compile the
-    shader. Nothing is left in the file then.
+    A material whose representation is "auto" follows the settings of the scene: where Open Shading
+    Language does not run, it consists of Blender's own nodes.
+
+    Raises ValueError for an unknown model, representation or parameter and for a value out of
+    range, and CompileError when Cycles can't compile the shader. After an error nothing is left in
+    the file.
     """
     form, values = _checked(model, representation, parameters)
     representation = "auto" if representation == "auto" else form
@@ -129,7 +131,7 @@ def new_material(model, representation="auto", **parameters):
 
 
 def _the_node(material):
-    """The one node of this extension."""
+    """The only model node of a material."""
     expected.material(material)
     ours = nodes.group_nodes(material)
     if len(ours) != 1:
@@ -144,7 +146,7 @@ def _the_node(material):
 
 
 def set_parameters(material, **parameters):
-    """Sets parameters of a material with one model. All are checked before one is changed.
+    """Sets parameters of a material with one model. All values are checked before any is changed.
 
     Raises ValueError as new_material does, and for a parameter that a link controls.
     """
@@ -172,11 +174,11 @@ def _set(node, what, parameters):
 
 
 def set_kernel(group, curve):
-    """Draws the kernel of a group node of `lossless` as a Float Curve node has it.
+    """Sets the kernel of a `lossless` group node to the curve of a Float Curve node.
 
-    The curve's x from 0 to 1 is the distance u from 0 to 3, y the height relative to the largest.
-    Raises ValueError for another node, and where a height is not positive or too small beside the
-    largest; nothing is changed then.
+    x from 0 to 1 on the curve is the distance u from 0 to 3; y is the height relative to the
+    largest. Raises ValueError for a node of another model, and where a height is not positive or
+    too small beside the largest; in that case nothing is changed.
     """
     if not nodes.is_ours(expected.node(group)) or nodes.identity(group)[0] != kernel.MODEL:
         raise ValueError(
@@ -192,15 +194,18 @@ def set_kernel(group, curve):
 
 
 def set_substance(material, substance, node=None, thickness=None):
-    """Gives a material of one model, or one node of it, the parameters of a metal, glass or liquid
-    of measured refractive index, in the working space of the file: n and k by channel, or the
-    colour that it reflects from above, as the model has them; what k absorbs inside, which is exact
-    after `thickness`, in metres (0.01). The others stay.
+    """Gives a material the parameters of a metal, glass or liquid with measured refractive index.
+
+    The material must have one model, or `node` names the model node. The values are in the working
+    space of the file: n and k by channel, or the colour reflected at normal incidence, whichever
+    parameters the model has, and the absorption inside, which is exact at `thickness` metres (0.01
+    by default). All other parameters keep their values.
 
     `substance`: one of substances(), or a file NAME.csv as refractiveindex.info exports it. Returns
-    the parameters that were set; what was assumed of a file is printed. Raises ValueError for
-    another name, a file that can't be read, naming line and what was expected, a model without such
-    parameters, and a thickness of what absorbs nothing; nothing is changed then.
+    the parameters that were set, and prints the assumptions made about a file. Raises ValueError
+    for an unknown name, for a file that can't be read (with the line and what was expected), for a
+    model without such parameters, and for a thickness where nothing is absorbed; in that case
+    nothing is changed.
     """
     from .packs import optical
 
@@ -214,14 +219,14 @@ def set_substance(material, substance, node=None, thickness=None):
 
 
 def substances():
-    """What set_substance() knows, by name: label, source, n and k."""
+    """The substances that set_substance() accepts by name: label, source, n and k of each."""
     from .brdfc import optics
 
     return optics.substances()
 
 
 def get_parameters(material):
-    """Values of the parameters that no link controls, of a material with one model."""
+    """The parameter values of a material with one model, except those that a link controls."""
     node = _the_node(material)
     model_name, _ = nodes.identity(node)
     values = {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
@@ -241,11 +246,11 @@ def _prepare_all():
 
 
 def update_materials():
-    """Gives the models of the open file that another version of the extension made the shaders of
-    this one; values, links and forms stay.
+    """Updates model nodes of the open file whose shaders another version of the extension made.
 
-    Returns an Update: `count` of nodes, `refusals` and `notes`, sentences. A node that would lose
-    something stays as it is and is named there.
+    Values, links and forms stay. Returns an Update with the `count` of updated nodes and two lists
+    of sentences, `refusals` and `notes`. A node whose update would lose something is left as it is
+    and named in `refusals`.
     """
     result = update.update()
     _prepare_all()
@@ -253,19 +258,21 @@ def update_materials():
 
 
 def plan_conversion(materials, limit=convert.LIMIT):
-    """For each Diffuse, Glossy, Principled or Glass node of these materials that is shown: which
-    model comes nearest, with which values, and what part of the light that misplaces; or why none
-    does, as where it would misplace more than `limit`. Nothing is changed. Returns [convert.Plan],
-    with line() in words; the error of what has no model near is infinite."""
+    """Finds the nearest model for each visible Diffuse, Glossy, Principled or Glass node.
+
+    Returns [convert.Plan]; line() describes a plan in words. A plan has the model, its values and
+    the fraction of the light that the replacement misplaces; or, where no model comes within
+    `limit`, the reason for the refusal. If no model comes near at all, the error is infinite.
+    Changes nothing."""
     limit = expected.number(limit)
     return [p.within(limit) for p in convert.plan(expected.each(expected.material, materials))]
 
 
 def convert_materials(plans):
-    """Puts the models of plan_conversion() in place of the nodes; links stay. Returns how many.
+    """Replaces nodes by the models of plan_conversion(); links stay. Returns the number of nodes.
 
-    The nodes of before stay in the materials, unlinked, for convert_back(). Raises ValueError where
-    a node is not what the plan was made of any more, CompileError; nothing is changed then.
+    The original nodes stay in the materials, unlinked, for convert_back(). Raises ValueError where
+    a node has changed since the plan was made, and CompileError; in both cases nothing is changed.
     """
     plans = expected.each(functools.partial(expected.plan, convert.Plan), plans)
     count = convert.apply(plans)
@@ -276,32 +283,36 @@ def convert_materials(plans):
 
 
 def convert_back(material):
-    """Puts Blender's own nodes back; where the ones of before are gone, the model's twin. Returns
-    how many; ValueError where there is neither."""
+    """Restores the original nodes; where they were deleted, uses the model's twin instead.
+
+    Returns the number of nodes restored. Raises ValueError where there is neither."""
     return convert.restore(expected.material(material))
 
 
 def add_albedo(material):
-    """Gives the node of a material with one model its Albedo output: what the surface reflects of a
-    white world. Where that takes large tables nodes are made without, so that files stay small.
+    """Adds the Albedo output to the node of a material with one model.
 
-    Raises ValueError for a lean node, and for one of another version of the extension.
+    The output is the fraction of a uniform white environment's light that the surface reflects.
+    Models whose albedo needs large tables are added without it, to keep files small. Raises
+    ValueError for a lean node, and for one made by another version of the extension.
     """
     nodes.add_albedo(_the_node(material))
 
 
 def add_library():
-    """Makes the library of ready-made materials, anew if there is one, and names it in the
-    preferences, so that the Asset Browser shows it. Takes seconds: another Blender makes it.
+    """Builds the library of ready-made materials and registers it in the preferences.
 
-    Returns how many materials it has. Raises LibraryError; nothing is changed then.
+    The Asset Browser shows it from then on. An existing library is rebuilt. Takes seconds, as a
+    second Blender builds it. Returns the number of materials. Raises LibraryError; in that case
+    nothing is changed.
     """
     return library.Making().wait()
 
 
 def remove_library():
-    """Takes that library out of the preferences and deletes it; materials that files have of it
-    stay. Returns whether there was one."""
+    """Unregisters the library and deletes its files; materials already in files stay.
+
+    Returns whether there was one."""
     return library.remove()
 
 
@@ -315,25 +326,26 @@ def albedo(model, cos_theta_o, **parameters):
 
 
 def used_materials():
-    """How the open file uses the models, by material: as `materials` of a scene file has it.
+    """The models that the open file uses, by material, in the format of `materials` in a scene
+    file.
 
-    A parameter that a link controls, a curve animates or a driver sets is {"varies": True}. A
-    material with several model nodes has an entry for each, MATERIAL/NODE.
+    A parameter that is linked, animated or driven is {"varies": True}. A material with several
+    model nodes has an entry for each, named MATERIAL/NODE.
     """
     return {name: use.entry for name, use in usage.uses().items()}
 
 
 def _beside(path):
-    """Where a file is written that then takes the place of `path`."""
+    """A temporary file beside `path`, which is then renamed to it."""
     return path.with_name(f".{path.name}.{os.getpid()}")
 
 
 def write_materials(path):
-    """Writes used_materials(), and which lamps have no size, for `brdfc build --materials`, which
-    makes a pack of just that.
+    """Writes the file for `brdfc build --materials`, which makes a pack of only what it lists.
 
-    Returns how many there are. Raises ValueError if there is none, OSError if the file can't be
-    written, as one that another program has open on Windows; an older file is then as it was.
+    The file holds used_materials() and which lamps have no size. Returns the number of materials.
+    Raises ValueError if there are none, and OSError if the file can't be written (on Windows, if
+    another program has it open); an existing file is unchanged then.
     """
     materials = used_materials()
     if not materials:
@@ -351,24 +363,25 @@ def write_materials(path):
         )
         raise PermissionError(said) from failed
     except OSError as failed:
-        # Its own text names the file beside, which nobody asked for.
+        # The error's own text names the temporary file, which means nothing to the user.
         raise OSError(say("{file} can't be written", more=failed.strerror, file=path)) from failed
     finally:
-        # What is in the way of writing is so of removing, and nothing to be told twice.
+        # Whatever prevented writing also prevents removing; one error message is enough.
         with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
     return len(materials)
 
 
 def start_plan(error=None, time=None, fit=False):
-    """Starts the program brdfc on a plan for the open file; a lean.Job, whose result is the Plan.
+    """Starts the program brdfc on a plan for the open file. Returns a lean.Job that yields the
+    Plan.
 
-    `error` in percent and `time` in units of Blender's Glossy node let it choose the forms: 5 or
-    "5%", 1.2 or "1.2x". What is linked, animated or driven stays an input of the lean shaders. With
-    `fit` aimed forms get closures fitted to these materials for a base, which takes seconds to
-    minutes a material and leaves less noise under skies and images.
-    Nothing is changed. Raises ValueError for another budget and where no material has a model,
-    PlanError without the program.
+    Given `error` (in percent: 5 or "5%") or `time` (in units of Blender's Glossy node: 1.2 or
+    "1.2x"), brdfc chooses the forms. Linked, animated and driven parameters stay inputs of the lean
+    shaders. With `fit`, aimed forms use closures fitted to these materials as their base: this
+    takes seconds to minutes per material, and lowers the noise under skies and images.
+    Changes nothing. Raises ValueError for an invalid budget and where no material has a model, and
+    PlanError if the program is missing.
     """
     budget = lean.budget(error, time)
     used = {
@@ -382,10 +395,10 @@ def start_plan(error=None, time=None, fit=False):
 
 
 def plan(error=None, time=None, fit=False):
-    """What the open file needs of the extension, as the program brdfc says: a lean.Plan, with
-    lines() in words and `explanation` as `brdfc build --explain` prints it, for bake().
+    """Runs the program brdfc on the open file and returns the lean.Plan for bake().
 
-    As start_plan(), and waits for the program. Raises PlanError where it refuses.
+    lines() gives the plan in words, `explanation` the output of `brdfc build --explain`. Takes the
+    arguments of start_plan() and waits for the result. Raises PlanError if brdfc refuses.
     """
     job = start_plan(error, time, fit)
     try:
@@ -395,54 +408,55 @@ def plan(error=None, time=None, fit=False):
 
 
 def bake(made):
-    """Gives every material groups that hold what the open file needs and no more: as plan() made.
+    """Gives every material the lean groups of a plan, which hold only what the open file needs.
 
-    Returns how many nodes have one now; switch_representation() goes back to the extension's own.
-    Raises ValueError where values, links, animation, forms or lamps are not those that the plan was
-    made for, which is also so once it has been baked; CompileError; PlanError where brdfc is of
-    another version than the extension. The file is then as it was.
+    Returns the number of nodes that now have a lean group; switch_representation() restores the
+    extension's own. Raises ValueError where values, links, animation, forms or lamps have changed
+    since the plan was made (also after the plan has been baked), CompileError, and PlanError where
+    brdfc and the extension differ in version. After an error the file is as it was.
     """
     return start_bake(made).wait()
 
 
 def start_bake(made):
-    """The same as a lean.Job, a model a step. Until the last one the file is as it was."""
+    """The same as a lean.Job, one model per step. The file changes in the last step only."""
     return lean.Baking(expected.plan(lean.Plan, made), _prepare_all)
 
 
 def see_lamps(scene):
-    """Tells the materials that aim at lamps where those of a scene are. The extension does so by
-    itself where something changes; painted environment images and suns it looks at here alone.
+    """Updates the lamp list that aimed materials read, from the lamps of a scene.
 
-    Returns every lamp as a Lamp: name, slot from 1 or None, irradiance at the subject by which
-    they are ranked, and why one is left out.
+    The extension does this by itself after changes; but painted environment images and their suns
+    are examined here only. Returns every lamp as a Lamp: its name, its slot (from 1, or None), its
+    irradiance at the subject, by which lamps are ranked, and why it was left out.
     """
     return lamps.see(expected.scene(scene))
 
 
 def warnings(material, scene):
-    """Everything that keeps a material from rendering as its models say. Changes nothing.
+    """Everything that keeps a material from rendering as its models specify. Changes nothing.
 
-    Returns an empty list when the material has no group of this extension.
+    Returns an empty list if the material has no group of this extension.
     """
     return checks.warnings(expected.material(material), expected.scene(scene))
 
 
 def scene_warnings(scene):
-    """What keeps any material of this extension from rendering in a scene, and what of a scene Open
-    Shading Language spoils."""
+    """What keeps every material of this extension from rendering correctly in a scene, and which
+    other parts of the scene Open Shading Language would spoil."""
     return checks.scene_warnings(expected.scene(scene))
 
 
 def follow_settings(scene):
-    """Has materials of "auto" follow the settings of a scene. The extension does so by itself when
-    a user changes them, and before pictures; scripts that change settings and then ask warnings()
-    have nothing else that tells it. Raises CompileError."""
+    """Adapts materials of the form "auto" to the settings of a scene. Raises CompileError.
+
+    The extension does so by itself when a user changes settings, and before each render. A script
+    that changes settings and then asks for warnings() must call this function in between."""
     automatic.follow(expected.scene(scene))
 
 
 def enable_osl(scene):
-    """Turns OSL on for a scene, with what it needs. Returns a sentence for each change made.
+    """Turns OSL on for a scene, with the settings it requires. Returns a sentence for each change.
 
     Raises RuntimeError when this Blender has no OSL.
     """
@@ -452,18 +466,19 @@ def enable_osl(scene):
 
 
 def enlarge_lamps(scene):
-    """Gives the lamps of a scene that are too small to be met by chance, by drawn directions and
-    aimed forms that have no slot left, a size: 1 cm, or 0.02 rad of a sun. They shine as before.
+    """Enlarges lamps that are too small for random rays to hit and have no slot in aimed forms.
 
-    Returns (names of those, names of the lamps of another file, which stay as they are).
+    They become 1 cm large, suns 0.02 rad, and emit as much light as before. Returns two lists of
+    names: the enlarged lamps, and the lamps of other files, which stay as they are.
     """
     return lamp_checks.enlarge(expected.scene(scene))
 
 
 def make_local(material):
-    """Makes a material that is linked from another file, or is a library override, this file's own,
-    with the groups that it is made of, so that it can be changed and aims at this file's lamps.
-    Returns the local one, which linked objects do not have."""
+    """Makes a linked material or a library override local to this file, with its node groups.
+
+    It can then be edited, and aims at this file's lamps. Returns the local material; linked objects
+    keep the linked one."""
     expected.material(material)
     if editable.refusal(material):
         material = material.make_local()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lean materials: groups of shaders that hold no more than the open file needs.
+"""Lean materials: shader groups that hold only what the open file needs.
 
-What can be left out the program brdfc knows, which the extension does not contain; see program().
+The program brdfc decides what can be left out. It is not part of the extension; see program().
 """
 
 import contextlib
@@ -24,17 +24,18 @@ from .groups import nodes, usage
 from .packs import pack
 from .warnings import lamp_checks
 
-#: Forms that a budget does not choose: they are for who asks for them.
+#: Forms that a budget never chooses; users can still ask for them.
 ASKED_FOR = ("twin", "nodes")
 
 
 class PlanError(RuntimeError):
-    """The program brdfc is missing, of another version, or refused to plan."""
+    """The program brdfc is missing, has another version, or refused to plan."""
 
 
 def program():
-    """Path of brdfc: of the extension's preferences, of the environment variable BRDFC_TOOL, found
-    on the PATH, or where pip puts programs for the Python that runs. Raises PlanError."""
+    """Path of the program brdfc. Looked for in the extension's preferences, the environment
+    variable BRDFC_TOOL, the PATH, and where pip installs programs for the running Python. Raises
+    PlanError."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
     named = getattr(addon.preferences, "program", "") if addon and addon.preferences else ""
     for what, path in (
@@ -43,7 +44,8 @@ def program():
     ):
         if not path:
             continue
-        # By name in a folder: so "brdfc" finds brdfc.exe on Windows with every version of Python.
+        # Searches a folder by name, so "brdfc" finds brdfc.exe on Windows in all versions of
+        # Python.
         folder, name = os.path.split(path)
         if found := shutil.which(name, path=folder or None):
             return found
@@ -60,8 +62,8 @@ def program():
 
 
 def budget(error, time):
-    """(percent or None, units of Blender's Glossy node or None), as numbers or as the program takes
-    them: 5, "5" or "5%", 1.2, "1.2" or "1.2x". Raises ValueError."""
+    """Parses a budget into (percent or None, units of Blender's Glossy node or None). Accepts the
+    program's notation: 5, "5" or "5%"; 1.2, "1.2" or "1.2x". Raises ValueError."""
     percent = _number(error, "%")
     if error is not None and not (percent is not None and 0 <= percent <= 100):
         raise ValueError(f"error: expected percent from 0 to 100, as 5 or '5%', got {error!r}")
@@ -81,9 +83,9 @@ def _number(given, unit):
 
 
 def needs(materials):
-    """Content of a file for `brdfc build --materials`: `materials` as those of a scene file, and
-    what of the lamps of the open file its forms hang on: which have no size, and how many there
-    are to aim at."""
+    """Content of the file for `brdfc build --materials`. `materials`: as in a scene file. Includes
+    the facts about lamps that the forms depend on: which have no size, and how many can be aimed
+    at."""
     found = {"materials": materials}
     if sizeless := lamp_checks.sizeless_lamps():
         found["sizeless_lamps"] = sizeless
@@ -93,20 +95,20 @@ def needs(materials):
 
 
 class Planning(ProgramJob):
-    """The program brdfc at work on a Plan, beside Blender."""
+    """Runs the program brdfc to make a Plan, while Blender stays usable."""
 
     failure = PlanError
 
     def __init__(self, used, error=None, time=None, fit=False):
-        """`used`: {name: usage.Use}. `error` and `time` as budget() has them leave the form open;
-        without one each keeps its own. `fit`: aimed forms get closures fitted to the materials for
-        a base. Raises PlanError."""
+        """`used`: {name: usage.Use}. With `error` or `time`, as for budget(), brdfc chooses the
+        forms; without them each material keeps its own. `fit`: aimed forms use closures fitted to
+        the materials as their base. Raises PlanError."""
         options = [] if error is None else ["--error", f"{error:.17g}"]
         options += [] if time is None else ["--time", f"{time:.17g}x"]
         materials = {name: use.entry | {"representation": use.form} for name, use in used.items()}
         if options:
             materials = {name: _open(entry) for name, entry in materials.items()}
-        # Lean groups have one form, that of the file's settings.
+        # Lean groups have a single form, chosen for the settings of the file.
         options += ["--osl-only", *(["--fit"] if fit else [])]
         self._program = program()
         asked = needs(materials)
@@ -133,7 +135,7 @@ class Planning(ProgramJob):
         return Plan(self._used, self._materials, self._lamps, explanation, self._folder)
 
     def _share(self, log):
-        """Of the models that the program says it has begun."""
+        """The fraction of models that, by its log, the program has begun."""
         counted = re.findall(r"^brdfc build: (\d+)/(\d+) ", log, re.M)
         return int(counted[-1][0]) / max(int(counted[-1][1]), 1) if counted else 0.0
 
@@ -144,10 +146,10 @@ def _open(entry):
 
 
 class Plan:
-    """What a pack of the open file alone holds, and the pack.
+    """What a pack for the open file alone contains, and the pack itself.
 
-    `materials`: what it was made for, by name, as `materials` of a scene file has it, forms that
-    the budget leaves open being "auto". `explanation`: as `brdfc build --explain` prints it.
+    `materials`: the materials it was made for, by name, as `materials` in a scene file; the form is
+    "auto" where the budget may choose. `explanation`: the output of `brdfc build --explain`.
     """
 
     def __init__(self, used, materials, lamps_, explanation, folder):
@@ -156,8 +158,8 @@ class Plan:
         self.pack = Path(folder.name) / "brdfc_shaders"
 
     def nodes(self):
-        """{name: group node} in the open file. Raises ValueError where that is not what the plan
-        was made for any more."""
+        """{name: group node} in the open file. Raises ValueError if the file has changed since the
+        plan was made."""
         found = usage.check(self._used)
         forms = {form["form"] for model in self.explanation["models"] for form in model["forms"]}
         if "aimed" in forms and (count := lamps.count()) != self._lamps:
@@ -172,7 +174,7 @@ class Plan:
         return {name: use.node for name, use in found.items()}
 
     def lines(self):
-        """What is taken and left out, and what that saves, in words."""
+        """What the pack contains, what it leaves out and what that saves, in words."""
         out = []
         for model in self.explanation["models"]:
             names = ", ".join(model["materials"])
@@ -181,7 +183,7 @@ class Plan:
                 known = choice["cost"] is not None
                 cost = f"{choice['cost']:.2f} x" if known else say("cost not measured")
                 taken = say("taken") if choice["taken"] else say("not taken")
-                # Why, and what is left out, are the program's words, which are English.
+                # The reason and the parts left out are the program's own text, which is in English.
                 out.append(
                     say(
                         "    {form}, {cost}: {taken}, {why}",
@@ -211,12 +213,12 @@ class Plan:
 
 
 class Baking(Job):
-    """Puts the lean groups of a Plan into the materials; values and links stay. The result is how
-    many nodes have one now. Steps raise ValueError where the file has changed since the plan was
-    made, PlanError, CompileError, PackError."""
+    """Puts the lean groups of a Plan into the materials; values and links stay. The result is the
+    number of nodes that now have a lean group. Steps raise ValueError where the file has changed
+    since the plan was made, PlanError, CompileError and PackError."""
 
     def __init__(self, plan, afterwards):
-        """`afterwards` is called when all is in place."""
+        """`afterwards` is called when all groups are in place."""
         self._plan, self._afterwards = plan, afterwards
         self._made, self._steps = [], self._work()
 
@@ -239,13 +241,13 @@ class Baking(Job):
             self._made = []
 
     def _work(self):
-        """A group a step, and then all of them at once into their nodes."""
+        """Makes one group per step, then puts all of them into their nodes at once."""
         before, groups = pack.manifest(), {}
         albedo = {name: nodes.uses_albedo(node) for name, node in self._plan.nodes().items()}
         for name, entry in self._plan.materials.items():
             groups[name] = self._group(entry, albedo[name], before)
             yield len(groups) / len(albedo)
-        found = self._plan.nodes()  # which may have changed meanwhile
+        found = self._plan.nodes()  # the file may have changed meanwhile
         for name, node in found.items():
             if (has := nodes.uses_albedo(node)) != albedo[name]:
                 groups[name] = self._group(self._plan.materials[name], has, before)
@@ -266,20 +268,21 @@ class Baking(Job):
                         own=before["generator"],
                     )
                 )
-            # What varies is None to pack.refusal().
+            # pack.refusal() expects None for parameters that vary.
             given = {k: None if v == usage.VARIES else v for k, v in entry["parameters"].items()}
             model = entry["model"]
             form = pack.resolve(model, entry["representation"], given)
             known = set(bpy.data.node_groups)
             group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
-        # The list of lamps, which may be new as well, goes with the last group that reads it.
+        # The list of lamps may be new as well; it is removed with the last group that reads it.
         self._made += [group] if group not in known else []
         return group
 
 
 @contextlib.contextmanager
 def _taken(folder):
-    """Another pack in place of the extension's, for a moment: panels are drawn between two."""
+    """Uses another pack in place of the extension's for a moment; panels are never drawn
+    meanwhile."""
     whole = pack.root
     pack.use(folder)
     try:

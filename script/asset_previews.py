@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders what the Asset Browser shows of the library's materials, with the extension installed as
-a person would. Runs in a Python that has the `bpy` module; see script/assets.
+"""Renders the previews of the library's materials for the Asset Browser.
 
-Each is a ball on a tiled floor under a lamp from the upper left, a small one beside the camera, and
-a sky. A picture whose material and scene are those of made.csv is not rendered again.
+Installs the extension as a user would. Runs in a Python that has the `bpy` module; see
+script/assets. Each preview shows a ball on a tiled floor under a sky, with a lamp at the upper left
+and a small one beside the camera. Previews whose material and scene match made.csv are not rendered
+again.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One picture of all previews of the library's materials, with their names and models."""
+"""Makes one picture of all previews of the library's materials, with their names and models."""
 
 import argparse
 import json

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""CPU time of every form of every model, in units of Blender's own Glossy node.
+"""Measures the CPU time of every form of every model, in units of Blender's own Glossy node.
 
-Runs in a Python that has `bpy`. A sphere under a sky is rendered with each model's default
-parameters, all forms of a model in turns in one process, so that what else the machine does meets
-them alike, and in several processes, because times of one differ from those of the next by more
-than they differ within it; the cost of a form is the median over all repetitions of its sampling
-time divided by that of the Glossy node. Forms made of a fit come from a pack of these very
-materials. Aimed forms, and the Glossy node beside them, have a point lamp besides the sky: without
-lamps they have less to do. Prints CSV, a model's rows as soon as they are measured.
+Runs in a Python that has `bpy`. Renders a sphere under a sky with each model's default parameters.
+All forms of a model take turns in one process, so that other load on the machine affects them
+equally. Several processes are used, because times vary more between processes than within one. The
+cost of a form is the median over all repetitions of its sampling time divided by that of the Glossy
+node. Forms that need a fit come from a pack for these very materials. For aimed forms, and for the
+Glossy node they are compared with, a point lamp is added to the sky: without lamps they would have
+less to compute. Prints CSV; the rows of a model appear as soon as they are measured.
 """
 
 import argparse

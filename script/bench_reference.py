@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths per second of `brdfc render` beside Mitsuba 3 on the same triangles, lamp and camera.
+"""Compares `brdfc render` with Mitsuba 3, in paths per second: same triangles, lamp and camera.
 
     python script/bench_reference.py [--brdfc build/brdfc] [--json out.json]
 
-Needs the Python packages mitsuba and numpy, and for Mitsuba's llvm_ad_rgb an LLVM library that it
-can use (19 works, 14 does not; DRJIT_LIBLLVM_PATH chooses one). The scene is grey Lambert
-everywhere: a sphere of 32,512 triangles and two boxes on a floor under a rectangular lamp; both
-renderers take the same number of samples with the same path depth and both sample lamp and BRDF.
-The means of the two pictures are compared, so that nobody wins by leaving something out. Every
-renderer gets the same number of threads and the best of several runs counts; --cpu takes CPU time,
-which other work on the machine lengthens less. Exit status 1: the pictures disagree.
+Needs the Python packages mitsuba and numpy. Mitsuba's llvm_ad_rgb also needs a compatible LLVM
+library (19 works, 14 does not; DRJIT_LIBLLVM_PATH selects one). In the scene everything is grey and
+diffuse: a sphere of 32,512 triangles and two boxes on a floor under a rectangular lamp. Both
+renderers use the same number of samples and the same path depth, and sample both lamp and BRDF. The
+means of the two pictures are compared, to make sure that neither renderer computes less. All
+renderers use the same number of threads, and the best of several runs counts. --cpu measures CPU
+time, which is affected less by other load on the machine. Exit status 1: the pictures differ.
 """
 
 import argparse
@@ -86,7 +86,7 @@ def run_brdfc(brdfc, folder, args):
     out = folder / "brdfc.exr"
     command = [brdfc, "render", folder / "scene.json", "--out", out]
     command += ["--threads", args.threads, "--spp"]
-    # With CPU times, the tracing time is what further samples take.
+    # For CPU times, the time with one sample, which includes loading, is subtracted.
     ready = cpu_seconds([*command, 1]) if args.cpu else 0
     seconds = cpu_seconds([*command, args.spp + 1 if args.cpu else args.spp]) - ready
     import mitsuba as mi

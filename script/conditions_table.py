@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes one table of the rows that the conditions' tests measured in each version of Blender."""
+"""Combines the results of the conditions' tests, measured in each Blender version, in one table."""
 
 import argparse
 import csv
@@ -12,26 +12,29 @@ from markdown_table import heading, line
 INTRODUCTION = """\
 # What settings and scenes do to the forms
 
-Made by `script/conditions`. Each row changes one thing in a clean scene, a grid of grooves under a
-sun and a bright sky, so that light bounces; a cell is what that does to the mean radiance of a
-form, with its standard error. Bold is what exceeds 2 % and 5 standard errors; there the panel warns
-if that is said. Forms stand for all of their kind: closures with a mirror, alone, with a ramp;
-drawn directions with a mirror, of an anisotropic model, alone; fits with facets, of lobes alone;
-aimed forms with a base of facets, without one, with a mirror, with a base of ramps, told of the
-scene's lamps. `coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and Glossy
-nodes are there to compare with. `tests/blender/test_every_fit.py` holds fitted forms and twins of
-every model to the same.
+Made by `script/conditions`. Each row changes one thing in a clean scene: a grid of grooves, in
+which light bounces, under a sun and a bright sky. A cell is the resulting change in the mean
+radiance of a form, with its standard error. It is bold if it exceeds 2 % and 5 standard errors;
+"panel warns" follows if the panel warns of it. The forms represent all others of their kind: exact
+forms with a mirror, without one, and with a ramp; sampled forms with a mirror, of an anisotropic
+model, and without either; fits with microfacets, and with other lobes only; aimed forms with a base
+of microfacets, without a base, with a mirror, and with a base of ramps, which have the scene's
+lamps in their slots. `coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and
+Glossy nodes are included for comparison. `tests/blender/test_every_fit.py` measures the same for
+fitted forms and twins of every model.
 
-Of the tilted normals (by the mesh's own, by the Normal input, by that with Bump Map Correction on)
-the worst of three views is shown: what is lost of all that the model reflects, of Blender's own
-nodes of their colour. It is bold where it is not what the model's own rays lose below the surface.
-Passes: mean difference from the model's albedo, median angle from the true normal, largest
-difference of the picture and the sum of its light groups. "lamp without shadows" is a sun overhead,
-"lamp without multiple importance" one 1 rad wide, each compared with the same sun as it should be;
-"lamp linked elsewhere" adds a sun that shines on something else, "nine lamps for one" puts nine
-suns of a ninth of the light where one was. "sun without size" compares the median cells of drawn
-directions, which meet that lamp as rare, bright dots, and other forms with a sun 0.02 wide; it
-leaves out exact forms with a mirror, which by its nature does not show it.
+Tilted normals are those of the mesh, those of the input Normal, and the latter with Bump Map
+Correction on. The cell is the worst of three views: the fraction lost of all the light that the
+model reflects, or that Blender's own nodes of this colour reflect. It is bold if it differs from
+what the model's own rays lose below the surface.
+Passes: mean difference from the model's albedo, median angle from the true normal, and largest
+difference between the picture and the sum of its light groups. "lamp without shadows" is a sun
+overhead, and "lamp without multiple importance" a sun 1 rad wide; each is compared with the same
+sun with the setting on. "lamp linked elsewhere" adds a sun that is linked to another object only.
+"nine lamps for one" replaces the sun by nine suns, each with a ninth of its light. "sun without
+size": forms that sample directions show such a lamp as rare bright dots, so their median cells are
+compared; other forms are compared with a sun 0.02 wide. Exact forms with a mirror are omitted
+there, as a mirror can't show a lamp without a size.
 """
 
 

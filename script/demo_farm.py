@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where tasks run: here, one after the other, or on the workers of a Dask scheduler. Both take
-tasks, also while others run, and give back each with its record."""
+"""Runs tasks: on this machine, one after the other, or on the workers of a Dask scheduler.
+
+Both ways accept new tasks while others run, and return each task with its record."""
 
 import heapq
 import itertools

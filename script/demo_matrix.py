@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the report renders: scenes x versions of Blender x seeds, each in every form, as tasks.
+"""Lists the tasks of the report: scenes x versions of Blender x seeds, each in every form.
 
-A scene has one reference and one pack cut to it. In Blender a task is a seed of one scene in one
-version: all forms in turns, in one process. The report divides the CPU times of such pictures by
-each other, so they have to be of one machine at one time. Seeds may be rendered anywhere.
+Each scene has one reference picture and one pack cut to it. A task in Blender is one seed of a
+scene in one version: all forms take turns in one process. The report divides the CPU times of these
+pictures by one another, so they must be measured on one machine at the same time. Different seeds
+may run anywhere.
 """
 
 import os

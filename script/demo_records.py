@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records of tasks as runs.json, the report's input, which generator/report/report.h describes."""
+"""Combines records of tasks in runs.json, the input of the report; see
+generator/report/report.h."""
 
 import shutil
 from pathlib import Path

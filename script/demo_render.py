@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders scenes in Blender, in every form, and by the reference renderer; leaves a runs.json each.
+"""Renders scenes in Blender, in every form, and with the reference renderer; writes their
+runs.json.
 
-For scenes/NAME.json it fills OUT/NAME with the resolved scene, the reference, an EXR for every form
-and seed, and runs.json (described in generator/report/report.h); for Blenders other than 4.5
-OUT-VERSION/NAME. Tasks run one after the other or, with --scheduler, on the workers of a farm. What
-was rendered before from the same inputs by the same programs is kept, task by task.
+For scenes/NAME.json, the folder OUT/NAME (OUT-VERSION/NAME for Blender versions other than 4.5)
+gets the resolved scene, the reference picture, an EXR for each form and seed, and runs.json
+(described in generator/report/report.h). Tasks run one after the other or, with --scheduler, on the
+workers of a farm. Results of earlier runs with the same inputs and programs are kept, task by task.
 
-demo_matrix.py says what is rendered, demo_tasks.py what a task is, demo_farm.py where it runs,
-demo_records.py what is made of it.
+demo_matrix.py lists the tasks, demo_tasks.py defines a task, demo_farm.py runs tasks, and
+demo_records.py combines their records.
 """
 
 import argparse

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A task of the report: one command, what it needs, and the record that it leaves.
+"""A task of the report: a command, its inputs, and the record of its results.
 
-Workers of a farm are sent this file as it is, so it takes the standard library alone. A record is
-written last, by the machine that ran the command: whoever finds one with the right key need not run
-it again, also where the program that wanted it was stopped meanwhile.
+Workers of a farm receive this file itself, so it uses only the standard library. The machine that
+runs the command writes the record last. If a record with the right key exists, the task need not
+run again, even if the program that started it was stopped in between.
 """
 
 import hashlib

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pages of the site that are files of the repository's root, and what keeps links right in both.
+"""Adds pages from the repository's root to the site, and adapts links for it.
 
-A file of the root links to docs/NAME.md, which is NAME.md in the site. Pages of docs/ link only to
-one another: what they link to outside would be missing in the site, and the pages made here are
-missing where docs/ is read in the repository. A path in `code` names such files instead.
+A file in the root links to docs/NAME.md, which is NAME.md in the site. Pages in docs/ link only to
+one another: files outside would be missing in the site, and pages added here would be missing when
+docs/ is read in the repository. Such files are named by a path in `code` instead.
 """
 
 import logging

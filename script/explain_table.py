@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `brdfc build --explain` says of three scenes, in Markdown. Runs in the repository's root."""
+"""Writes the output of `brdfc build --explain` for three scenes as Markdown. Run it in the root."""
 
 import argparse
 import itertools
@@ -22,20 +22,21 @@ SCENES = {
 INTRODUCTION = """\
 # What a build leaves out, and why: three scenes
 
-Made by `script/explain` of what the commands below print as JSON. An arrow leads from the whole
-extension to that of the scene alone: in a scene's first table from the form that a material gets
-without a budget to the one taken, in its second from the whole shader of the form taken, which has
-all parameters and draws up to eight directions, to the one that the scene gets. Where there is no
-arrow both are the same.
+Made by `script/explain` from the JSON that the commands below print. An arrow leads from the whole
+extension to the one cut to the scene. In the first table of a scene it leads from the form that a
+material gets without a budget to the one that is chosen. In the second it leads from the whole
+shader of the chosen form, which has all parameters and samples up to eight directions, to the
+shader for the scene. Without an arrow both are the same.
 
-- Costs are those of [what each form takes](tables/forms.md), measured by model and form with
-  default parameters: they change where the form does, and do not tell what folding saves. Errors
+- Costs are those in [what each form takes](tables/forms.md), measured for each model and form with
+  default parameters: they change with the form, but do not include the savings by constants. Errors
   are measured with the scene's parameters.
-- Bytes and statements are those of a shader's text, for all combinations of choices that it has,
-  statements without the library; operations are the most that one combination executes. Floats are
-  those of the tables of albedo and fit, of which a shader has the ones it reads.
+- Bytes and statements are those of a shader's text, for all of its combinations of choices, and
+  statements without the library; operations are the largest number that one combination executes.
+  Floats are those of the tables of albedo and fit that the shader reads.
 - A fit is made for the scene's parameters, so there is no other shader to compare with.
-- A colour that is folded into a table makes three of one, a channel each: bytes or floats may grow.
+- If a constant colour is folded into a table, the table becomes three, one for each channel: bytes
+  or floats may increase.
 """
 
 SIZES = {

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mean HDR-FLIP of every picture of a report's scenes, as flip.json in each scene's folder.
+"""Computes the mean HDR-FLIP of every picture of a report, as flip.json in each scene's folder.
 
-Runs in an environment with OpenImageIO and flip-evaluator, which hold the published implementation
-of P. Andersson et al.: Visualizing and Communicating Errors in Rendered Images, Ray Tracing Gems
-II, 2021. `brdfc report` shows the numbers.
+Runs in an environment with OpenImageIO and flip-evaluator, the published implementation of P.
+Andersson et al.: Visualizing and Communicating Errors in Rendered Images, Ray Tracing Gems II,
+2021. `brdfc report` shows the numbers.
 """
 
 import argparse

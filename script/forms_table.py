@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pages in Markdown with tables about the forms of models: closures, error and cost of every form
-of every model with its default parameters; and by the view what fits and twins are off by."""
+"""Writes pages with tables about the forms of models: closures, error and cost of every form with
+the model's default parameters, and the errors of fits and twins by view."""
 
 import argparse
 import csv

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether every scene still loads and renders, and as bright in Blender as by the reference
-renderer: small pictures, one of each, in the form that `auto` takes.
+"""Checks that every scene loads and renders, equally bright in Blender and the reference renderer.
 
     python script/gallery_check.py --tool TOOL --python PYTHON --extension ZIP --out DIR SCENE...
 
-Two pictures of one scene differ by noise alone, so the spread of their difference over the pixels
-tells how far its mean may be from 0. Where it is further, and further than the stated error of the
-scene's forms, the check fails: exit status 1.
+Renders one small picture of each scene with either renderer, in the form that `auto` selects. The
+two pictures of a scene should differ by noise alone, so the spread of their difference over the
+pixels gives the standard error of its mean. The check fails (exit status 1) if the mean differs by
+more than that allows, and by more than the stated error of the scene's forms.
 """
 
 import argparse

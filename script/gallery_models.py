@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A page a model: three balls under a lamp in Blender and by the reference renderer, lobes, albedo.
+"""Makes a page for each model: three balls in Blender and the reference renderer, lobes, albedo.
 
     python script/gallery_models.py scenes MODELS.json OUT-FOLDER     writes OUT/ball-MODEL.json
     python script/gallery_models.py pages MODELS.json REPORT-FOLDER PAGES-FOLDER
 
-MODELS.json is what `brdfc list --json` prints. The pages take pictures from what
-`script/demo_render.py` rendered of those scenes and `brdfc report` measured; a model that was not
-rendered keeps its page. Formulas are those of the Python package `brdfc`, which must be importable.
-Nothing here names a model: values to show come from the schema.
+MODELS.json is the output of `brdfc list --json`. The pages use the pictures and measurements that
+`script/demo_render.py` and `brdfc report` made of those scenes; models that were not rendered keep
+their pages. Plots use the Python package `brdfc`, which must be importable. No model is named here:
+the parameter values to show come from the schema.
 """
 
 import json
@@ -277,7 +277,7 @@ def draw_albedo(np, plt, model, formulas, out):
             for v in values_of(parameter)
         ]
         spread = max(abs(c - curves[0][1]).max() for _, c in curves)
-        if parameter is axis or spread > 0.03:  # what changes nothing of it has no panel
+        if parameter is axis or spread > 0.03:  # no panel for a parameter with little effect
             panels.append((parameter, curves))
         if len(panels) == PANELS:
             break

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pages of pictures, a page a paper, from what `script/demo_render.py` rendered and `brdfc report`
-measured: of each scene Blender's picture, the reference and their difference side by side.
+"""Makes the gallery: one page per paper, with pictures of Blender and the reference renderer.
 
     python script/gallery_pages.py REPORT-FOLDER PAGES-FOLDER COMMAND
 
-COMMAND is what a reader types for the same pages, of all scenes. Sections of scenes that were
-not rendered this time stay as they are.
+Each scene is shown by Blender's picture, the reference and their difference, side by side, from the
+results of `script/demo_render.py` and `brdfc report`. COMMAND is the command, shown to readers,
+that makes these pages of all scenes. Sections of scenes that were not rendered this time stay as
+they are.
 """
 
 import json

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles' devices make of the models; script/gpu runs it, once a device.
+"""Measures how Cycles' devices render the models; script/gpu runs it once per device.
 
-Needs `bpy` with NumPy, and beside it the files that script/gpu puts there: this machine may have
-neither the tool nor a network. `expect` computes what is measured against, with the tool; `measure`
-renders on one device and adds to a file of JSON after each step, so that what was measured before a
-crash is kept; `compare` prints tables of such files.
+Needs `bpy` with NumPy, and the files that script/gpu puts beside this one: the machine may have
+neither the tool nor a network. `expect` computes the expected values, with the tool. `measure`
+renders on one device and adds to a JSON file after each step, so that results survive a crash.
+`compare` prints tables of such files.
 """
 
 import argparse
@@ -180,10 +180,10 @@ def measure_facets(folder, modules, mode, form):
         lit = (which == i) & (wi[:, 2] > 1e-3)
         f = np.array(e["f"])
         row = {"model": e["model"], "values": e["values"], "form": forms[i]}
-        if f.sum() > 0:  # of mirrors a sun without an angle shows nothing
+        if f.sum() > 0:  # 0 for mirrors, which don't show a sun without an angle
             error = np.sort(np.abs(picture[lit] - f).sum(1))
-            # A sampled direction's lobe contains the sun by chance, once in 1e5 samples: one facet
-            # in thirty.
+            # About once in 1e5 samples, a sampled direction's lobe contains the sun, which affects
+            # one facet in thirty.
             row["off"] = float(error[: len(error) - len(error) // 30].sum() / f.sum())
             row["worst_facet"] = float(error[-1] / f.sum() * len(f))
         row["finite"] = bool(np.isfinite(picture[lit]).all())
@@ -347,7 +347,7 @@ def measure(folder, mode, out, tiny):
     for case in ball_cases(mode, tiny):
         try:
             row = measure_ball(modules, mode, case, size, samples)
-        except Exception as error:  # what else there is to measure
+        except Exception as error:  # continues with the next case
             row = {"model": case[0], "form": case[2], "lamps": case[3], "error": repr(error)}
         result["balls"].append(row)
         keep()

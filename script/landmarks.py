@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the papers say of their models in words, as curves: drawn with the Python package `brdfc`.
+"""Plots what the papers state about their models in words, with the Python package `brdfc`.
 
     python script/landmarks.py crescents CHOICE FILE.json   a scene, with that choice of `below`
     python script/landmarks.py page TOOL PICTURES DOCS      DOCS/gallery/landmarks.md, its pictures
 
-TOOL is the program brdfc. PICTURES holds the reference renderer's mirror.png and lose.png of those
-scenes.
+TOOL is the program brdfc. PICTURES contains mirror.png and lose.png, which the reference renderer
+made of those scenes.
 """
 
 import io

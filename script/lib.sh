@@ -6,10 +6,10 @@ ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 BUILD=$ROOT/build
 ENVS=$ROOT/.env
 TOOL=$BUILD/brdfc
-# The one of the tools' environment, because the first in PATH may be any version.
+# The oiiotool of the tools' environment, because the first in PATH may be any version.
 OIIOTOOL=$ENVS/tools/bin/oiiotool
 
-# An inherited PYTHONPATH or virtual environment would leak packages into ours (and break bpy's own).
+# An inherited PYTHONPATH or virtual environment would leak packages into ours (and break that of bpy).
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
 export PYTHONNOUSERSITE=1
 

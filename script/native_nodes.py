@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user would take instead: Blender's own nodes, fitted to the models of scenes.
+"""Fits Blender's own nodes to the models of scenes, as users would use them instead.
 
 Writes JSON: {SCENE: {"key": ..., "materials": {MATERIAL: {NODE: parameters}}}} for the nodes
-glossy, principled and metallic, which scene_loader.native_material builds. Materials that let light
-through are left out. What the file has of the same scenes and program is kept.
+glossy, principled and metallic, which scene_loader.native_material builds. Transmissive materials
+are left out. Existing fits for the same scenes and program are kept.
 
-A fit minimises the squares of f cos(theta_i) over light directions, each view weighted alike. The
-nodes' lobe is `brdfc closure ggx`, their Fresnel term that of `brdfc albedo fresnel_dielectric`;
-what Cycles makes of the parameters is tested in tests/blender/test_native_nodes.py. A model whose
-specular part is an ideal mirror gets roughness 0.
+A fit minimises the squared error of f cos(theta_i) over light directions, with equal weight for
+each view. The nodes' lobe is `brdfc closure ggx`, their Fresnel term `brdfc albedo
+fresnel_dielectric`; tests/blender/test_native_nodes.py tests that Cycles interprets the parameters
+likewise. If the specular part of a model is an ideal mirror, the node gets roughness 0.
 """
 
 import argparse

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the form of nodes costs and how noisy it is; script/nodes runs it.
+"""Measures cost and noise of the form made of Blender's nodes; script/nodes runs it.
 
-Needs `bpy`. Cycles itself says how many words its list of instructions has and how many floats of
-its stack are taken: its log, which GLOG_v=3 has it write, is read from standard error. CPU time is
-user time, for which the forms take turns in one process; the least of several counts. Scenes and
-the unit of noise are those of script/noise.
+Needs `bpy`. Cycles reports the number of words in its instructions and of floats on its stack in
+its log, which GLOG_v=3 enables and which is read from stderr. The CPU time is user time; forms take
+turns in one process, and the minimum of several runs counts. Scenes and the unit of noise are those
+of script/noise.
 """
 
 import argparse
@@ -31,8 +31,8 @@ def set_up(condition, case, form, size):
 
 
 def instructions(condition, case):
-    """Words of SVM, and floats of its stack at most, of the material of nodes; (0, 0) where Cycles
-    does not say."""
+    """Number of SVM words, and largest number of floats on SVM's stack, for the material made of
+    nodes; (0, 0) if Cycles does not report them."""
     scene, _ = set_up(condition, case, NODES, 8)
     with tempfile.TemporaryFile() as sink:
         saved = os.dup(2)
@@ -49,7 +49,8 @@ def instructions(condition, case):
 
 
 def seconds(condition, turns, repeat, size, samples):
-    """User seconds of each (case, form), the least of several, less what a picture takes anyway."""
+    """User seconds of each (case, form): the minimum of several runs, minus the fixed time of a
+    picture."""
     taken = {turn: [] for turn in turns}
     for _ in range(repeat):
         for turn in turns:

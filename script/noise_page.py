@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of what script/noise_table.py measures."""
+"""Makes the page of the measurements by script/noise_table.py."""
 
 import math
 import statistics

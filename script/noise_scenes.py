@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scenes in which script/noise_table.py measures noise: a ball on a floor under one kind of
-light each, with the settings of a new file of Blender but for what settings() says.
+"""The scenes in which script/noise_table.py measures noise: a ball on a floor, each under one kind
+of light, with the settings of a new Blender file except for those in settings().
 
-Needs `bpy`. Lamps are about as bright as each other: a white matte surface that faces one has a
-radiance near 1.
+Needs `bpy`. Lamps have similar brightness: a white diffuse surface that faces one has a radiance of
+about 1.
 """
 
 import dataclasses

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise and CPU time of every form of every model under many kinds of light, in units of Blender's
-own Glossy node in the same scene.
+"""Measures noise and CPU time of every form of every model under many kinds of light, in units of
+Blender's own Glossy node in the same scene.
 
-Runs in a Python that has `bpy`. The scenes are those of script/noise_scenes.py, the page is
-that of script/noise_page.py. Noise is the
-variance between pictures of several seeds, so it needs no truth; only what it is divided by does,
-for which the steadiest form of the model serves. What is measured is kept beside the pictures, by
-the contents of the extension, so that a run that was stopped goes on.
+Runs in a Python that has `bpy`. The scenes are in script/noise_scenes.py, the page is made by
+script/noise_page.py. Noise is the variance between pictures with different seeds, so it needs no
+reference picture. Only the mean that it is divided by does: it is taken from the model's form with
+the least noise. Measurements are stored beside the pictures, keyed by the contents of the
+extension, so that an interrupted run can be continued.
 """
 
 import argparse
@@ -576,7 +576,7 @@ def main():
         missing = [job for job in jobs if is_missing(job, measured)]
         failed += run(missing, measure, measured, options, cache, options.processes)
         if not options.no_costs:
-            # In one process, because others beside it would affect the times.
+            # In a single process, because parallel processes would affect the times.
             timed = list(cost_jobs(jobs, costs, options))
             failed += run(timed, time_forms, costs, options, cache, 1)
 

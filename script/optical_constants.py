@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes data/optical/: refractive indices over the visible spectrum, a file a substance.
+"""Writes data/optical/: refractive indices over the visible spectrum, one file per substance.
 
     python3 script/optical_constants.py CHECKOUT
 
 CHECKOUT: a clone of https://github.com/polyanskiy/refractiveindex.info-database, whose data are in
-the public domain (CC0 1.0). Tables are taken as they are, from the wavelength before the visible
-ones to the one behind; what is given as a formula is sampled every 10 nm. Files are as the site
-exports them, under two lines: what it is, and who measured it.
+the public domain (CC0 1.0). Tables are copied unchanged, from the last wavelength before the
+visible range to the first one after it; formulas are sampled every 10 nm. The files have the site's
+export format, preceded by two lines: the substance, and who measured it.
 """
 
 import re

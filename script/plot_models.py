@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Three plots of reflection models, drawn with the Python package `brdfc` (docs/python.md).
+"""Makes three plots of reflection models with the Python package `brdfc` (docs/python.md).
 
     python3 script/plot_models.py plots.png
 
-A furnace: what a surface reflects of a white world, over the view. A lobe: f cos in the plane of
-incidence. A comparison: two models with slopes of the same spread, and how far apart they are.
+A furnace test: the albedo over the view angle. A lobe: f cos in the plane of incidence. A
+comparison: two models with the same spread of slopes, and their difference.
 """
 
 import sys

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel's plots of five materials side by side, as docs/plots.png has them, and how long those
-of each model take, and of its forms that have a curve of their own:
+"""Draws the panel's plots of five materials side by side, as in docs/plots.png. Prints the time
+that the plots of each model take, and of each form with a curve of its own:
 
 .env/blender-4.5/bin/python script/plots.py build/brdfc_shaders-VERSION.zip docs/plots.png
 """

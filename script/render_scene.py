@@ -1,21 +1,23 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders resolved scenes in Blender, headless, with the extension installed as a person would.
+"""Renders resolved scenes in Blender without a window, with the extension installed as by a user.
 
-Runs in a Python that has the `bpy` module. One job from the command line, or several from a file,
-whose repetitions take turns so that their run times can be compared:
+Runs in a Python that has the `bpy` module. Takes one job from the command line or several from a
+file. Repetitions of several jobs take turns, so that their run times can be compared:
 
     python script/render_scene.py --extension ZIP --scene DIR/scene.json --out OUT.exr
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
 "repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ..., "osl": ...},
-...]; all but scene and out are optional and default to the options of the command line. "native"
-names a file with a scene's materials of script/native_nodes.py; "pack" a folder that `brdfc build`
-wrote, whose models the extension takes instead of its own; "timed" false leaves out the render with
-one sample that tells sampling from compiling; "osl" false turns Open Shading Language off. "out"
-may also be a .png or .jpg, as "view", a view transform of Blender's, shows it.
-Prints a JSON list with a record a job on stdout; progress goes to stderr. Exit status 2: bad
+...]; all but scene and out are optional, and default to the options of the command line.
+
+"native" names a file with a scene's materials from script/native_nodes.py. "pack" is a folder that
+`brdfc build` wrote, whose models are used instead of the extension's own. "timed" false omits the
+additional render with one sample, which separates sampling from compiling. "osl" false turns Open
+Shading Language off. "out" may also be a .png or .jpg, shown with the view transform "view".
+
+Prints a JSON list with a record per job on stdout, and progress on stderr. Exit status 2: wrong
 usage or input.
 """
 

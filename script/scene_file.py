@@ -11,7 +11,7 @@ from mathutils import Euler, Matrix, Vector
 
 
 class View:
-    """A JSON value that knows where it lies, so that an error can name file and key."""
+    """A JSON value that knows its file and key, for error messages."""
 
     def __init__(self, value, file, path=""):
         self.value, self.file, self.path = value, file, path
@@ -100,7 +100,7 @@ def array(view, columns):
 def build_mesh(name, vertices, triangles, normals=None, uvs=None):
     """Mesh datablock from arrays: (n, 3) float, (m, 3) int, and per vertex (n, 3) and (n, 2).
 
-    Normals are kept in single precision, as given. Without them the triangles are flat.
+    Normals are stored in single precision, unchanged. Without them the triangles are flat.
     """
     triangles = np.ascontiguousarray(triangles, np.int32)
     mesh = bpy.data.meshes.new(name)
@@ -116,7 +116,7 @@ def build_mesh(name, vertices, triangles, normals=None, uvs=None):
         layer.uv.foreach_set("vector", np.ascontiguousarray(uvs, np.float32)[triangles].ravel())
     mesh.update(calc_edges=True)
     if normals is not None:
-        # Blender's other way to store custom normals rounds them to 16 bits.
+        # Blender's other way to store custom normals would round them to 16 bits.
         attribute = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
         attribute.data.foreach_set("vector", np.ascontiguousarray(normals, np.float32).ravel())
         mesh.update()
@@ -124,7 +124,7 @@ def build_mesh(name, vertices, triangles, normals=None, uvs=None):
 
 
 def mesh_arrays(shape):
-    """What build_mesh() takes, from the files that a shape names."""
+    """The arguments of build_mesh(), from the files that a shape names."""
     if shape.get("type").text() != "mesh" or not shape.has("vertices"):
         raise shape.error("a mesh of arrays; resolve the scene first")
     vertices = array(shape.get("vertices"), 3)
@@ -147,7 +147,7 @@ def transform(view):
     view = view.get("transform")
     translate = view.get("translate").vector() if view.has("translate") else Vector()
     degrees = view.get("rotate_degrees").numbers(3) if view.has("rotate_degrees") else [0] * 3
-    scale = view.color_or("scale", [1.0] * 3)  # one number or three
+    scale = view.color_or("scale", [1.0] * 3)  # a single number, or three
     rotation = Euler([math.radians(d) for d in degrees], "XYZ").to_matrix().to_4x4()
     return Matrix.Translation(translate) @ rotation @ Matrix.Diagonal((*scale, 1.0))
 
@@ -160,7 +160,7 @@ def link(scene, name, data, matrix):
 
 
 def _aimed(position, direction, up=None):
-    """Matrix of something that looks along its own -z."""
+    """Matrix of an object that looks along its own -z."""
     back = -direction.normalized()
     up = up if up is not None else Vector((0, 0, 1))
     if back.cross(up).length < 1e-6 * up.length:
@@ -185,7 +185,7 @@ def camera(scene, view):
     direction = view.get("look_at").vector() - position
     if direction.length == 0:
         raise view.get("look_at").error("another point than the camera's position")
-    # No clipping worth the name: the reference renderer has none.
+    # In effect no clipping: the reference renderer has none.
     data.clip_start, data.clip_end = 1e-4, 1e6
     up = view.get("up").vector() if view.has("up") else None
     scene.camera = link(scene, "Camera", data, _aimed(position, direction, up))
@@ -207,14 +207,14 @@ def light(scene, index, view):
         direction = view.get("direction").vector()
     if kind == "point":
         data.shadow_soft_size = view.number_or("radius", 0.0)
-        data.use_soft_falloff = False  # a sphere of light, not Blender's softened one
+        data.use_soft_falloff = False  # a spherical light; Blender would soften it
     elif kind == "sun":
         data.energy = view.get("irradiance").number()
         data.angle = math.radians(view.number_or("angle_degrees", 0.0))
     else:
         size = view.get("size")
         sizes = size.numbers(2) if isinstance(size.value, list) else [size.number()] * 2
-        data.shape = "RECTANGLE" if kind == "area" else "ELLIPSE"  # size: diameters
+        data.shape = "RECTANGLE" if kind == "area" else "ELLIPSE"  # sizes are diameters
         data.size, data.size_y = sizes
     up = view.get("up").vector() if view.has("up") else None
     lamp = link(scene, f"{kind}{index}", data, _aimed(position, direction, up))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds a Blender scene from a resolved scene file, the one that the reference renderer reads.
+"""Builds a Blender scene from a resolved scene file, which the reference renderer reads as well.
 
-`brdfc scene S.json --out DIR` writes DIR/scene.json, in which every shape is a mesh of arrays and
+`brdfc scene S.json --out DIR` writes DIR/scene.json, where every shape is a mesh of arrays and
 every procedural picture a file. Units and conventions are Blender's: metres, watts, z up.
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from scene_file import View, build_mesh, camera, light, link, mesh_arrays, transform
 
-#: Representation name that stands for Blender's own Glossy node, to compare run times with.
+#: Representation name of Blender's own Glossy node, with which run times are compared.
 GLOSSY = "glossy"
 
 
@@ -25,14 +25,14 @@ def _image_node(tree, image):
 
 
 def _exponents(values):
-    """A Phong exponent along and across the tangent for Blender's Glossy node."""
+    """Phong exponents along and across the tangent for Blender's Glossy node."""
     for u, v in (("nu", "nv"), ("e", "e"), ("n", "n")):
         if u in values and v in values:
             return values[u], values[v]
     return 0.0, 0.0
 
 
-#: Blender's own nodes that can stand in for a model, by representation: type, name of the colour.
+#: Blender's own nodes that can replace a model, by representation: node type, name of the colour.
 NATIVE = {
     GLOSSY: ("ShaderNodeBsdfAnisotropic", "Color"),
     "principled": ("ShaderNodeBsdfPrincipled", "Base Color"),
@@ -41,7 +41,7 @@ NATIVE = {
 
 
 def _object_tangent(tree, node):
-    """The frame of this project: the object's z axis along the surface."""
+    """The tangent of this project: the object's z axis along the surface."""
     axis = tree.nodes.new("ShaderNodeVectorTransform")
     axis.vector_type, axis.convert_from, axis.convert_to = "VECTOR", "OBJECT", "WORLD"
     axis.inputs["Vector"].default_value = (0, 0, 1)
@@ -67,11 +67,12 @@ class SceneLoader:
         return import_module(f"{self.package}.{name}")
 
     def _load_image(self, path, space="auto"):
-        """The picture; `auto`: floats are linear, integers sRGB, as in the reference renderer."""
+        """Loads an image. `auto`: floats are linear, integers sRGB, as in the reference."""
         image = bpy.data.images.load(str(path), check_existing=True)
         linear = image.is_float if space == "auto" else space == "linear"
         if linear:
-            # As it is; what that is called differs between configurations of OpenColorIO.
+            # Data is not converted; the name of that colour space depends on the OpenColorIO
+            # configuration.
             image.colorspace_settings.is_data = True
         else:
             self.color.set_srgb(image)
@@ -93,7 +94,7 @@ class SceneLoader:
             picture.image = self._load_image(view.get("image").file_path())
             picture.interpolation = "Linear"
             tree.links.new(picture.outputs["Color"], background.inputs["Color"])
-            # As fine as the picture; the automatic choice spends seconds on a map of 4096 x 2048.
+            # As fine as the picture; the automatic choice takes seconds for a map of 4096 x 2048.
             world.cycles.sampling_method = "MANUAL"
             world.cycles.sample_map_resolution = min(max(picture.image.size[0], 256), 4096)
         elif view.has("color"):
@@ -102,10 +103,10 @@ class SceneLoader:
             raise view.error("an environment with color or image; resolve the scene first")
 
     def glossy_material(self, name, values):
-        """A material of Blender's own Glossy node, as like a model's values as it can be.
+        """A material of Blender's own Glossy node, as similar to a model's values as possible.
 
-        It is the yardstick for run times, and the node that artists have without the extension.
-        Exponents n become the roughness of Ashikhmin and Shirley's distribution,
+        It is the yardstick for run times: the node that artists have without the extension. An
+        exponent n becomes the roughness that matches Ashikhmin and Shirley's distribution,
         (2 / (n + 2))^(1/4).
         """
         color = next((v for v in values.values() if isinstance(v, tuple)), (0.8, 0.8, 0.8))
@@ -115,9 +116,11 @@ class SceneLoader:
         return self.native_material(name, GLOSSY, like, "ASHIKHMIN_SHIRLEY")[0]
 
     def native_material(self, name, kind, fitted, distribution="GGX"):
-        """A material of one of Blender's own nodes, and the node. `fitted`: what
-        script/native_nodes.py found: colour, widths of the lobe along and across the tangent (0 for
-        a mirror), rotation in radians, and for some kinds edge (a colour), ior and metallic."""
+        """A material of one of Blender's own nodes; returns the material and the node.
+
+        `fitted`: the result of script/native_nodes.py: colour, lobe widths along and across the
+        tangent (0 for a mirror), rotation in radians, and for some kinds edge (a colour), ior and
+        metallic."""
         material = bpy.data.materials.new(f"{name} ({kind})")
         tree = self.nodes.empty_tree(material)
         bsdf, color = NATIVE[kind]
@@ -133,13 +136,12 @@ class SceneLoader:
         turns = fitted["rotation"] / (2 * math.pi)
         node.inputs["Roughness"].default_value = (ax * ay) ** 0.25
         if ax != ay and kind == GLOSSY:
-            # Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the other way round
-            # below 0.
+            # In Cycles: ax = r^2 (1 - a), ay = r^2 / (1 - a) for a > 0, and the reverse for a < 0.
             ratio = math.sqrt(ax / ay)
             node.inputs["Anisotropy"].default_value = 1 - ratio if ratio <= 1 else 1 / ratio - 1
             node.inputs["Rotation"].default_value = turns
         elif ax != ay:
-            # Cycles: ay = (1 - 0.9 a) ax, along the tangent only.
+            # In Cycles: ay = (1 - 0.9 a) ax; the lobe is always wider along the tangent.
             if ax < ay:
                 ax, ay, turns = ay, ax, turns + 0.25
             of = "Anisotropic" if kind == "principled" else "Anisotropy"
@@ -163,7 +165,8 @@ class SceneLoader:
         return self._load_image(view.get("image").file_path(), space)
 
     def _lambert(self, name, view):
-        """A material of Blender's Diffuse node, which is Lambert's model, for packs without it."""
+        """A material of Blender's Diffuse node, which equals Lambert's model, for packs without
+        that."""
         material = bpy.data.materials.new(name)
         tree = self.nodes.empty_tree(material)
         node = tree.nodes.new("ShaderNodeBsdfDiffuse")
@@ -243,11 +246,10 @@ class SceneLoader:
         return material
 
     def apply_clean_settings(self, scene, samples=64, seed=1, max_bounces=8, osl=True):
-        """Settings under which Cycles computes the light transport integral, and nothing else.
+        """Settings under which Cycles computes the light transport integral and nothing else.
 
-        Linear float EXR, samples spread evenly over the square of a pixel, on the CPU, OSL on or
-        off; no filter glossy, clamping, denoising, adaptive sampling, light threshold, guiding or
-        approximation.
+        Linear float EXR, box-filtered pixels, CPU, OSL on or off; no filter glossy, clamping,
+        denoising, adaptive sampling, light threshold, guiding or approximation.
         """
         cycles = scene.cycles
         if osl:
@@ -275,8 +277,8 @@ class SceneLoader:
             "diffuse_bounces": max_bounces,
             "glossy_bounces": max_bounces,
             "transmission_bounces": max_bounces,
-            # To Cycles a lamp that a ray passes is a transparent surface; beyond the limit it is
-            # lost.
+            # To Cycles a lamp that a ray passes is a transparent surface; beyond this limit the
+            # ray is lost.
             "transparent_max_bounces": 1024,
             "min_light_bounces": 0,
             "min_transparent_bounces": 0,
@@ -305,11 +307,11 @@ class SceneLoader:
     def load_scene(self, path, representation=None, name=None, native=None, osl=True):
         """Makes a scene with clean settings from a resolved scene file: the active scene.
 
-        `representation` overrides that of every material: auto, exact, sampled, or "glossy",
-        "principled" or "metallic" for Blender's own nodes. `native`: what script/native_nodes.py
-        fitted, by material and node; only Glossy can do without. `osl`: whether Open Shading
-        Language is on, without which "auto" is Blender's own nodes. Returns the bpy scene. Raises
-        ValueError naming file and key.
+        `representation` overrides that of every material: auto, exact, sampled and so on, or
+        "glossy", "principled" or "metallic" for Blender's own nodes. `native`: the nodes that
+        script/native_nodes.py fitted, by material and node; only "glossy" works without. `osl`:
+        whether Open Shading Language is on; without it "auto" is Blender's own nodes. Returns the
+        bpy scene. Raises ValueError naming file and key.
         """
         path = Path(path)
         try:
@@ -347,7 +349,7 @@ class SceneLoader:
             key: self._material(key, entry, representation, native or {})
             for key, entry in view.get("materials").items()
         }
-        # Objects of equal shape and material share a mesh, which Cycles then stores once.
+        # Objects of equal shape and material share a mesh, so that Cycles stores it once.
         meshes = {}
         for index, entry in view.get("objects").items():
             shape = entry.get("shape")

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of error against run time, of what script/noise, script/bench and script/forms measured.
+"""Makes the page of error against run time, from measurements by script/noise, script/bench and
+script/forms.
 
     python script/time_page.py DOCS COSTS.csv [PICTURES.md]
 
 Reads DOCS/noise.csv and DOCS/tables/forms.md and writes DOCS/time.md, time-noise.png and
-time-error.png. PICTURES.md is the part that script/time_pictures.py wrote; without it the page
-keeps the part that it has.
+time-error.png. PICTURES.md is the part that script/time_pictures.py wrote; without it, the page
+keeps its current one.
 """
 
 import csv

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of equal CPU time: one model in every form, and Blender's own node.
+"""Makes pictures of equal CPU time: one model in every form, and Blender's own Glossy node.
 
     python script/time_pictures.py scene - OUT            OUT/ball.json
-    python script/time_pictures.py jobs COSTS.csv OUT     OUT/jobs.json, of what native_nodes.py
-                                                          fitted, OUT/fitted.json
+    python script/time_pictures.py jobs COSTS.csv OUT     OUT/jobs.json, with the fits that
+                                                          native_nodes.py wrote to OUT/fitted.json
     python script/time_pictures.py page OUT DOCS          DOCS/time-pictures.png, OUT/pictures.md
 
-Samples are those of the time that the Glossy node takes for SPP, by the costs that script/bench
-measured; so noise is what that time is good for on any machine.
+The numbers of samples take as much time as SPP samples of the Glossy node, by the costs that
+script/bench measured. So the noise is what any machine reaches in that time.
 """
 
 import csv

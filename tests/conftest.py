@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-# What the tool makes is made in each run, whatever earlier ones have left in the user's cache.
+# Each run computes results anew, whatever earlier ones left in the user's cache.
 os.environ["BRDFC_CACHE"] = ""
 #: script/evidence runs every case of the tests that are marked `sample`.
 EVERY_CASE = os.environ.get("BRDFC_EVIDENCE") == "all"
@@ -16,9 +16,9 @@ def evenly(cases, count):
 
 
 def few_of(cases, count):
-    """So many of a test's cases as a list, evenly chosen with the first and the last;
-    script/evidence runs all. For what a test renders in one picture: cases that are tests of their
-    own are marked `sample`."""
+    """This many of a test's cases, chosen evenly and including the first and the last;
+    script/evidence runs all. For cases that are rendered in one picture; cases that are separate
+    tests are marked `sample`."""
     cases = list(cases)
     return cases if EVERY_CASE else evenly(cases, min(count, len(cases)))
 
@@ -37,7 +37,7 @@ def pytest_addoption(parser):
     )
 
 
-# After -m has left out what is marked: among what is left there are then as many.
+# After -m has deselected by marks, so that this many remain.
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config, items):
     few = config.getoption("few")

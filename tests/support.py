@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of the built tool share."""
+"""Shared by tests of the built tool."""
 
 import json
 import os
@@ -7,17 +7,17 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Absolute: some tests run it elsewhere.
+#: Absolute, as some tests run it in another folder.
 TOOL = str(Path(os.environ.get("BRDFC_TOOL", ROOT / "build" / "brdfc")).resolve())
 LISTED = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
 MODELS = [model["name"] for model in LISTED]
-#: The colour configuration that the tool brings, and its working spaces.
+#: The colour configuration of the tool, and its working spaces.
 CONFIG = ROOT / "data" / "color" / "config.ocio"
 SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
 
 
 def run(*arguments, config=None):
-    """The tool, with another colour configuration than its own if one is given."""
+    """Runs the tool, optionally with another colour configuration."""
     environment = {k: v for k, v in os.environ.items() if k != "OCIO"}
     if config:
         environment["OCIO"] = str(config)
@@ -26,7 +26,7 @@ def run(*arguments, config=None):
 
 
 def scene(**changes):
-    """A scene of one sphere; a change of None removes the key."""
+    """A scene of one sphere; a change to None removes the key."""
     content = {
         "name": "s",
         "description": "a sphere",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions that Blender calls when something happens: {name in bpy.app.handlers: function}."""
+"""Registers functions as Blender's handlers: {name in bpy.app.handlers: function}."""
 
 import bpy
 

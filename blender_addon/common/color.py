@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of the open file, by Blender's own conversions.
+"""Colour spaces of the open file, by Blender's own conversions.
 
-The working space is the scene_linear of Blender's OpenColorIO configuration, or from Blender 5 on
-what the file chose. Blender converts one colour at a time; matrices and the curve of sRGB are made
-of that for many.
+The working space is the role scene_linear of Blender's OpenColorIO configuration; from Blender 5 on
+a file can choose another. As Blender converts one colour at a time, matrices and the sRGB curve are
+sampled from it and then applied to whole arrays.
 """
 
 import functools
@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Color
 
-#: What sRGB is called by Blender, and by the configurations of ACES 1.3, 2.0 and before.
+#: Names of sRGB in Blender and in the configurations of ACES 1.3, 2.0 and earlier.
 _SRGB = (
     "sRGB",
     "sRGB - Texture",
@@ -20,11 +20,11 @@ _SRGB = (
     "Utility - sRGB - Texture",
 )
 
-#: Values of sRGB at which its curve is taken: those of eight bits, and three between any two.
+#: sRGB values at which the curve is sampled: all 8-bit values, and three between each two.
 _ENCODED = np.linspace(0, 1, 4 * 255 + 1)
 
 
-#: Linear Rec.709 of the linear colours of each working space that scene files may name; white stays
+#: Matrices from the working spaces that scene files may name to linear Rec.709; white maps to
 #: white.
 _TO_REC709 = {
     "Linear Rec.709": np.eye(3),
@@ -41,7 +41,7 @@ def working_space():
     """The name of the working space."""
     if hasattr(bpy.data, "colorspace"):
         return bpy.data.colorspace.working_space
-    # Before 5.0 there is no name, but the matrices that Blender makes of the configuration.
+    # Before 5.0 the space has no name: it is recognized by its matrix.
     own = _matrix("from_scene_linear_to_rec709_linear", None)
     for name, known in _TO_REC709.items():
         if np.allclose(own, known, atol=2e-3):
@@ -50,8 +50,9 @@ def working_space():
 
 
 def set_srgb(image):
-    """Has an image read as sRGB, by the name that the OpenColorIO configuration has for it.
-    ValueError that lists its spaces if it has none."""
+    """Marks an image as sRGB, by the name that the OpenColorIO configuration uses.
+
+    Raises ValueError with the list of its spaces if it has none."""
     settings = image.colorspace_settings
     known = settings.bl_rna.properties["name"].enum_items.keys()
     for name in _SRGB:
@@ -64,16 +65,17 @@ def set_srgb(image):
 
 
 def set_view(settings, name):
-    """The view transform of that name; where the display has none, its default stays."""
+    """Selects a view transform by name; the default stays if the display has no such view."""
     try:
         settings.view_transform = name
-    except TypeError:  # names of views are not those of the class, but of the display
+    except TypeError:  # the views depend on the display, not on the class
         pass
 
 
 def set_working_space(name):
-    """Makes a space of that name the working space of the open file. What is in it keeps its look.
-    ValueError that lists the names, or says which Blender has a choice."""
+    """Makes a space the working space of the open file; existing content keeps its look.
+
+    Raises ValueError with the list of names, or with the Blender version that offers a choice."""
     if working_space() in (name, f"{name} (sRGB)"):
         return
     if not hasattr(bpy.data, "colorspace"):
@@ -82,7 +84,7 @@ def set_working_space(name):
             f"{name!r} needs Blender 5.0 or later"
         )
     known = bpy.data.colorspace.bl_rna.properties["working_space"].enum_items.keys()
-    if f"{name} (sRGB)" in known:  # as configurations of ACES call Rec.709
+    if f"{name} (sRGB)" in known:  # the name of Rec.709 in ACES configurations
         name = f"{name} (sRGB)"
     if name not in known:
         raise ValueError(f"expected one of {', '.join(known)}, got {name!r}")
@@ -91,7 +93,7 @@ def set_working_space(name):
 
 @functools.lru_cache(maxsize=8)
 def _matrix(conversion, _space):
-    """What a linear conversion of Blender's makes of the colours of the working space: (3, 3)."""
+    """Matrix (3, 3) of one of Blender's linear conversions, on colours of the working space."""
     return np.array([getattr(Color(axis), conversion)() for axis in np.eye(3)]).T
 
 
@@ -103,37 +105,38 @@ def _converted(colors, conversion):
 
 @functools.cache
 def _decoded():
-    """_ENCODED in linear light: of grey, which is the same in every working space."""
+    """_ENCODED in linear light. It is sampled with greys, which are equal in all working spaces."""
     return np.array([Color((v, v, v)).from_srgb_to_scene_linear()[1] for v in _ENCODED])
 
 
 def to_xyz(rgb):
-    """CIE XYZ, white D65, of linear colours (..., 3) of the working space."""
+    """CIE XYZ with white D65, from linear colours (..., 3) of the working space."""
     return _converted(np.asarray(rgb, float), "from_scene_linear_to_xyz_d65")
 
 
 def from_xyz(xyz):
-    """Linear colours of the working space, of X, Y, Z (..., 3) over those of a perfect reflector,
-    which becomes 1, 1, 1."""
+    """Linear colours of the working space from X, Y, Z (..., 3), relative to a perfect reflector,
+    which is 1, 1, 1."""
     absolute = np.asarray(xyz, float) * to_xyz([1, 1, 1])
     return absolute @ np.linalg.inv(_matrix("from_scene_linear_to_xyz_d65", working_space())).T
 
 
 def luminance(rgb):
-    """Y of linear colours (..., 3) of the working space, 1 of white, in the precision of theirs."""
+    """Luminance Y (white is 1) of linear colours (..., 3) of the working space, in their
+    precision."""
     return _converted(rgb, "from_scene_linear_to_xyz_d65")[..., 1]
 
 
 def from_srgb(colors):
-    """Colours (..., 3) of sRGB in [0, 1] in linear light, with the primaries of sRGB."""
+    """Linearizes sRGB colours (..., 3) in [0, 1]; the primaries stay those of sRGB."""
     return np.interp(colors, _ENCODED, _decoded())
 
 
 def from_rec709(rgb):
-    """Linear colours (..., 3) of the working space, of linear ones with the primaries of sRGB."""
+    """Converts linear colours with the primaries of sRGB to the working space, (..., 3)."""
     return _converted(rgb, "from_rec709_linear_to_scene_linear")
 
 
 def to_screen(rgb):
-    """Linear colours (..., 3) of the working space as sRGB has them, in [0, 1]."""
+    """Converts linear colours (..., 3) of the working space to sRGB, clamped to [0, 1]."""
     return np.interp(_converted(rgb, "from_scene_linear_to_rec709_linear"), _decoded(), _ENCODED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which materials and trees of the open file keep a change when the file is saved."""
+"""Tells which materials and node trees of the open file are saved with it when they change."""
 
 import bpy
 
@@ -7,15 +7,15 @@ from .i18n import say
 
 
 def named(block):
-    """The material that a tree is part of, for such a tree has no name of its own."""
+    """The material that owns a node tree, as such a tree has no name of its own; else the block."""
     if not block.is_embedded_data:
         return block
     return next((m for m in bpy.data.materials if m.node_tree == block), block)
 
 
 def refusal(*blocks):
-    """Why a change to one of these materials or trees would be gone in the saved file; None where
-    it stays."""
+    """Why a change to one of these materials or trees would be lost on saving; None if it is
+    kept."""
     for block in map(named, blocks):
         if block.library is not None:
             file = block.library.filepath
@@ -23,8 +23,8 @@ def refusal(*blocks):
                 "{name!r} is linked from {file}: Make Local first", name=block.name, file=file
             )
         if (override := block.override_library) is not None:
-            # Tried in Blender 4.5 to 5.2: of a material's override a file keeps which group a node
-            # has, and neither values of sockets, links and new nodes nor settings of Cycles.
+            # Tested in Blender 4.5 to 5.2: of an overridden material, a file keeps which group a
+            # node has, but no socket values, links, new nodes or settings of Cycles.
             file = override.reference.library.filepath
             return say(
                 "{name!r} is a library override of {file}, and changes to its nodes would not be "
@@ -36,11 +36,11 @@ def refusal(*blocks):
 
 
 def stays(*blocks):
-    """Whether there is no refusal()."""
+    """Whether refusal() finds no objection."""
     return refusal(*blocks) is None
 
 
 def check(*blocks):
-    """Raises ValueError where there is a refusal()."""
+    """Raises ValueError with the text of refusal(), if there is one."""
     if why := refusal(*blocks):
         raise ValueError(why)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What scripts hand to api: anything but what a function takes is a ValueError with a sentence."""
+"""Type checks of the arguments of api: a wrong type raises a ValueError with a sentence."""
 
 from numbers import Real
 
@@ -31,12 +31,12 @@ def number(given):
 
 
 def plan(kind, given):
-    """A plan of a class; there are two."""
+    """A plan of the given class: there are two classes of that name."""
     return _of(kind, given, say("Expected a plan, got {given!r}", given=given))
 
 
 def each(check, given):
-    """What can be gone through, of things that pass a check, as a list."""
+    """Checks each element of an iterable and returns them as a list."""
     try:
         found = list(given)
     except TypeError:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words that people see, and their translations by Blender. Works without bpy, then in English.
+"""Texts of the interface and their translation by Blender. Without bpy, texts stay English.
 
-translations/LOCALE.json holds what each text is in a language: {English: translation}.
-Labels and tooltips of classes and properties Blender looks up by itself. What is put together here
-is a Sentence, which is English to scripts and logs and is translated where it is shown.
+translations/LOCALE.json holds the texts of a language: {English: translation}. Blender itself looks
+up the labels and tooltips of classes and properties. Texts composed here are Sentences: English in
+scripts and logs, translated where they are shown.
 """
 
 import json
@@ -11,16 +11,16 @@ from pathlib import Path
 
 from . import extension
 
-#: Contexts under which Blender looks texts up: those of operators and their buttons, and all else.
+#: Blender's translation contexts: that of operators and their buttons, and the default one.
 CONTEXTS = ("Operator", "*")
 FOLDER = extension.ROOT / "translations"
 
 
 class Sentence(str):
-    """English text, made of a template with {names} and of values, some of which may be Sentences.
+    """English text made from a template with {names} and values, some of which may be Sentences.
 
-    `more`: what whoever looks for the cause wants to know, in English; part of the text for
-    scripts, and behind the sentence where people see it. Sentences among the values pass theirs on.
+    `more`: technical details, in English. Scripts get them as part of the text; the interface shows
+    them apart from the sentence. Sentences among the values pass on their own details.
     """
 
     def __new__(cls, template, more="", **values):
@@ -34,7 +34,7 @@ class Sentence(str):
         return (self.template, self.more), self.values
 
     def shown(self, look_up):
-        """Without `more`; look_up(English) gives a text in the user's language."""
+        """The text without `more`; look_up(English) returns a text in the user's language."""
         return _filled(self.template, self.values, look_up)
 
 
@@ -47,12 +47,13 @@ def _filled(template, values, look_up=lambda english: english):
 
 
 def say(template, more="", **values):
-    """A Sentence; the template is a literal, for the test of the catalogues reads the sources."""
+    """Makes a Sentence. The template must be a literal: the test of the catalogues reads the
+    sources."""
     return Sentence(template, more, **values)
 
 
 def button(text):
-    """The text of a button, for Blender to look up when it draws it."""
+    """Marks the text of a button, which Blender looks up when it draws the button."""
     return text
 
 
@@ -71,21 +72,21 @@ def _shown(kind, text):
 
 
 def iface(text):
-    """A Sentence as the interface shows it; any other text as it is."""
+    """A Sentence translated for the interface; any other text unchanged."""
     return _shown("iface", text)
 
 
 def tip(text):
-    """The same for a tooltip."""
+    """The same for tooltips."""
     return _shown("tip", text)
 
 
 def rpt(text):
-    """The same for a report."""
+    """The same for reports."""
     return _shown("rpt", text)
 
 
-#: Names of forms that people see, where they are not those of scripts.
+#: Display names of forms, where they differ from the names in scripts.
 _FORM_NAMES = {
     "auto": say("Automatic"),
     "nodes": say("Formula Nodes"),
@@ -94,18 +95,19 @@ _FORM_NAMES = {
 
 
 def form_name(form):
-    """The name of a form in sentences; its template is the text of its button."""
+    """The display name of a form; its template is the text of its button."""
     return _FORM_NAMES.get(form) or Sentence(form.capitalize())
 
 
 def of_error(error):
-    """What an error says, as a Sentence or a text, and what is behind it: ("...", "...")."""
+    """The text of an error, as a Sentence if it is one, and its technical details: ("...",
+    "...")."""
     text = error.args[0] if error.args else ""
     return (text, text.more) if isinstance(text, Sentence) else (str(error), "")
 
 
 def catalogues(folder=FOLDER):
-    """{locale: {(context, English): translation}}, as Blender takes them."""
+    """{locale: {(context, English): translation}}, the format that Blender's translations take."""
     found = {}
     for path in sorted(Path(folder).glob("*.json")):
         texts = json.loads(path.read_text(encoding="utf-8"))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work beside the interface: in steps, or by another program. No bpy in here."""
+"""Long work that does not block the interface: in steps or in another program. Independent of
+bpy."""
 
 import contextlib
 import subprocess
@@ -10,37 +11,38 @@ from .i18n import say
 
 
 class Job:
-    """Work in steps, between which Blender stays alive. What is wrong is raised by step(); the file
-    is then as it was, as it is after cancel()."""
+    """Work in steps, between which Blender stays responsive. step() raises the errors; after an
+    error, as after cancel(), the file is as it was."""
 
     result = None
 
     def step(self):
-        """Does a part of the work; returns the share that is done, None once `result` is there."""
+        """Does a part of the work; returns the fraction done, or None when `result` is set."""
         raise NotImplementedError
 
     def cancel(self):
-        """Gives up; may be called at any time, also twice."""
+        """Gives up. May be called at any time, and repeatedly."""
 
     def wait(self):
-        """All of it at once; returns the result."""
+        """Runs all steps; returns the result."""
         while self.step() is not None:
             pass
         return self.result
 
 
 class ProgramJob(Job):
-    """Another program at work, in a temporary folder that is gone once the job gives up."""
+    """Runs another program, in a temporary folder that is removed when the job is cancelled."""
 
     #: Seconds that step() waits for the program.
     PATIENCE = 0.05
-    #: What is raised where something is wrong.
+    #: The exception class of this job's errors.
     failure = RuntimeError
 
     def _open_folder(self, prefix, files=()):
-        """Makes the folder, with texts by name, and returns its path. Raises `failure`."""
+        """Makes the folder with these files (text by name) and returns its path. Raises
+        `failure`."""
         try:
-            # On Windows a scanner may still read what is to be removed.
+            # On Windows a virus scanner may still hold files that are to be removed.
             self._folder = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
             folder = Path(self._folder.name)
             for name, text in dict(files).items():
@@ -54,8 +56,8 @@ class ProgramJob(Job):
         return folder
 
     def _start(self, command, output=None):
-        """Starts the program; what it prints goes into the log, or to a file where one is given
-        and errors alone into the log. Raises OSError, and the folder is gone then."""
+        """Starts the program. Its output goes to the log; if a file is given for stdout, only
+        stderr does. Raises OSError after removing the folder."""
         try:
             with contextlib.ExitStack() as files:
                 log = files.enter_context(self._log_file.open("wb"))
@@ -65,7 +67,7 @@ class ProgramJob(Job):
                     stdin=subprocess.DEVNULL,
                     stdout=said,
                     stderr=log,
-                    # Windows opens no console beside Blender.
+                    # Keeps Windows from opening a console window.
                     creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
                 )
         except OSError:
@@ -76,7 +78,7 @@ class ProgramJob(Job):
         return self._log_file.read_text(encoding="utf-8", errors="replace")
 
     def _last_words(self, status):
-        """Of a program that failed."""
+        """The last output of a program that failed."""
         return (self._log().strip().splitlines() or [f"exit status {status}"])[-1]
 
     def step(self):
@@ -90,11 +92,11 @@ class ProgramJob(Job):
         return None
 
     def _share(self, log):
-        """How much is done, from 0 to 1, by what the program has said."""
+        """The fraction done, from 0 to 1, judging by the program's log."""
         raise NotImplementedError
 
     def _ended(self, status):
-        """The result, once the program has ended with this exit status. Raises `failure`."""
+        """The result, when the program has ended with this exit status. Raises `failure`."""
         raise NotImplementedError
 
     def cancel(self):

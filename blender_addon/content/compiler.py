@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiles shaders by the OSL compiler that Cycles brings, and finds out what went wrong."""
+"""Compiles shaders with the OSL compiler in Cycles, and collects its error messages."""
 
 import contextlib
 import os
@@ -14,14 +14,14 @@ from ..packs import pack
 
 
 class CompileError(RuntimeError):
-    """Cycles could not compile a shader, or compiled it to something else than expected."""
+    """Cycles could not compile a shader, or the result differs from what was expected."""
 
 
 def _find_oslquery():
-    """Makes the `oslquery` module importable, which Cycles needs to find a script's sockets.
+    """Makes the `oslquery` module importable, by which Cycles reads a script's sockets.
 
-    Blender proper has it on its path. The bpy wheel has not: there it lies in the folder of
-    site-packages that ships with the wheel.
+    The Blender application has it on its path. The bpy wheel does not: there it lies in the
+    site-packages folder that ships with the wheel.
     """
     try:
         import oslquery  # noqa: F401
@@ -30,10 +30,10 @@ def _find_oslquery():
     except ImportError:
         pass
     root = Path(bpy.utils.resource_path("LOCAL"))
-    # On Windows without a folder of the version.
+    # The folder's name has no version on Windows.
     layouts = ("python/lib/python3.*/site-packages", "python/lib/site-packages")
     added = [str(p) for layout in layouts for p in root.glob(layout)]
-    # At the end, so that what the interpreter already has keeps its priority.
+    # Appended at the end, so that installed modules take precedence.
     sys.path.extend(p for p in added if p not in sys.path)
     try:
         import oslquery  # noqa: F401
@@ -49,7 +49,7 @@ def _find_oslquery():
 
 @contextlib.contextmanager
 def _captured_stderr():
-    """Collects what native code prints: the OSL compiler reports errors nowhere else."""
+    """Captures stderr of native code: the OSL compiler reports errors nowhere else."""
     lines = []
     try:
         saved = os.dup(2)
@@ -68,7 +68,7 @@ def _captured_stderr():
 
 
 def compile_script(script_node, text, what):
-    """Has a script node run a text; `what` is that to people. Raises CompileError."""
+    """Compiles a text in a script node; `what` names it in messages. Raises CompileError."""
     import cycles.osl
 
     if not pack.osl_available():
@@ -76,7 +76,7 @@ def compile_script(script_node, text, what):
     _find_oslquery()
     reports = []
     with _captured_stderr() as console:
-        # Under Cycles the assignment compiles by itself; under another engine it does nothing.
+        # Under Cycles the assignment already compiles; under other engines it does not.
         script_node.script = text
         if not script_node.bytecode:
             cycles.osl.update_script_node(

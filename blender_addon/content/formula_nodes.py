@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A model's formulas as Blender's own Math nodes, which Cycles runs on every device.
+"""Builds a model's formulas from Blender's own Math nodes, which Cycles runs on every device.
 
-The tool writes formulas as lists of operations, the extension's nodes/*.json; here they become node
-groups, and are wired to the frame of the surface, to lamps and to the closures that carry what
-they give: one Toon BSDF for each lamp, one for a random direction, and for ideal reflection and
-refraction Blender's own nodes.
+The tool writes formulas as lists of operations, in the extension's nodes/*.json. Here each list
+becomes a node group. The groups are wired to the surface frame, to the lamps and to the closures
+that carry the result: a Toon BSDF for each lamp, one for a random direction, and Blender's own
+nodes for ideal reflection and refraction.
 """
 
 import hashlib
@@ -16,21 +16,21 @@ import bpy
 from . import kept_groups, svm_constants
 from .wiring import Wiring
 
-#: Custom property of the group of a part: hash of what it computes. Equal parts share a group.
+#: Custom property of a part's group: hash of its operations. Equal parts share one group.
 PART = "brdfc_part"
 _SOCKETS = {
     "FLOAT": "NodeSocketFloat",
     "VECTOR": "NodeSocketVector",
     "SHADER": "NodeSocketShader",
 }
-#: The one operation on vectors that gives a number.
+#: The only vector operation with a scalar result.
 _DOT = "V_DOT_PRODUCT"
-#: Operations of a group, at most.
+#: Maximum number of operations in a group.
 _STEP = 60
 
 
 class _Formula:
-    """Adds the nodes of one list of operations."""
+    """Adds the nodes for a list of operations."""
 
     def __init__(self, wiring, inputs):
         self.w, self.inputs = wiring, inputs
@@ -83,7 +83,7 @@ def _find(digest, among=None):
 
 
 def _appended(digest):
-    """The group of a part as it was kept, or None. Of equal parts the file's own remain."""
+    """The kept group of a part, or None. If the file already has an equal part, that one stays."""
     made = kept_groups.append(digest)
     wanted = _find(digest, made)
     own = [group for group in bpy.data.node_groups if group not in made]
@@ -97,8 +97,8 @@ def _appended(digest):
 
 
 def _group(title, content, inputs, outputs, fill, kept=False):
-    """The group that has this content, which the file may have. `inputs` and `outputs`: names and
-    kinds; fill(wiring, inputs by name) returns outputs by name. `kept`: see kept_groups."""
+    """Finds or makes the group with this content. `inputs` and `outputs`: names and kinds;
+    fill(wiring, inputs by name) returns the outputs by name. `kept`: see kept_groups."""
     content = [kept_groups.version(), content]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
     if group := _find(digest) or (_appended(digest) if kept else None):
@@ -121,7 +121,7 @@ def _group(title, content, inputs, outputs, fill, kept=False):
 
 
 def _instance(w, group, inputs, label):
-    """Adds a group to a tree; its outputs by name."""
+    """Adds a group node to a tree; returns its outputs by name."""
     node = w.node("ShaderNodeGroup")
     node.node_tree = group
     node.label = label
@@ -131,8 +131,8 @@ def _instance(w, group, inputs, label):
 
 
 def _steps(data):
-    """A long list of operations as several short ones, each of which takes what those before it
-    give: Blender looks at a whole tree whenever it is linked."""
+    """Splits a long list of operations into short ones, each taking the results of those before it:
+    Blender's time for each new link grows with the size of the tree."""
     operations = data["operations"]
     kinds = dict(data["inputs"])
     for index, (kind, *_) in enumerate(operations):
@@ -159,7 +159,7 @@ def _steps(data):
 
 
 def _part_group(title, data):
-    """The group of a part."""
+    """The node group of a part."""
     inputs = data["inputs"]
     outputs = [output[:2] for output in data["outputs"]]
     if len(data["operations"]) <= _STEP:
@@ -185,7 +185,7 @@ def _part_group(title, data):
 
 
 class _Parts:
-    """Parts of a model, as nodes of its group."""
+    """The parts of a model, which add themselves as nodes to its group."""
 
     def __init__(self, wiring, parts, title, constants):
         """`constants`: the outputs of svm_constants.add_values()."""
@@ -195,25 +195,26 @@ class _Parts:
         return name in self.data
 
     def add(self, name, **inputs):
-        """Adds a part; its outputs by name. `inputs`: numbers and outputs by name."""
+        """Adds a part; returns its outputs by name. `inputs`: numbers and outputs by name."""
         group = _part_group(f"{self.title}: {name}", self.data[name])
         return _instance(self.w, group, self.constants | inputs, name)
 
     def inputs(self, name):
-        """Names and kinds of what a part takes."""
+        """Names and kinds of a part's inputs."""
         return {name: kind for name, kind in self.data[name]["inputs"]}
 
     def on(self, wiring, found):
-        """The same parts, for another tree, among whose inputs these are."""
+        """The same parts in another tree, whose group inputs are `found`."""
         constants = {name: found[name] for name in svm_constants.VALUES if name in found}
         return _Parts(wiring, self.data, self.title, constants)
 
 
 class _Surface:
-    """What the shading point looks like: frame, viewer, random numbers."""
+    """The shading point: its frame, the view direction and the random numbers."""
 
     def __init__(self, w, parts, geometry, normal, tangent):
-        """`tangent`: an output that is 0 where that of the object is meant; None: any will do."""
+        """`tangent`: an output that is 0 where the object's own tangent is meant; None if any
+        tangent will do (isotropic)."""
         self.w = w
         self.place, self.view = geometry.outputs["Position"], geometry.outputs["Incoming"]
         self.true_normal = geometry.outputs["True Normal"]
@@ -237,7 +238,7 @@ class _Surface:
         self.wo = parts.add("raise", wo=self.local(self.view))
 
     def _frame(self, tangent):
-        """As brdfc_frame() in OSL: a tangent of length 0 asks for the object's z axis."""
+        """As brdfc_frame() in OSL: a tangent of length 0 stands for the object's z axis."""
         w = self.w
 
         def axis(direction):
@@ -265,7 +266,7 @@ class _Surface:
         return _local(self.w, vector, self.axes)
 
     def world(self, vector):
-        """A vector of the frame in the world's axes."""
+        """Transforms a vector from the surface frame to world space."""
         w = self.w
         total = None
         for part, axis in zip(w.separate(vector), self.axes, strict=True):
@@ -275,12 +276,12 @@ class _Surface:
 
 
 def _local(w, vector, axes):
-    """A vector in a frame."""
+    """Transforms a vector into a frame."""
     return w.combine(*(w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes))
 
 
 def _random(w, surface, index):
-    """Three numbers in [0, 1), as brdfc_random() in OSL."""
+    """Three random numbers in [0, 1), as brdfc_random() in OSL."""
 
     def noise(vector, number):
         node = w.node("ShaderNodeTexWhiteNoise", noise_dimensions="4D")
@@ -294,7 +295,7 @@ def _random(w, surface, index):
 
 
 def _direction(w, u, v):
-    """One of all directions, each as likely as the others."""
+    """A uniformly distributed direction on the sphere."""
     height = w.math("MULTIPLY_ADD", u, 2.0, -1.0)
     turn = w.math("MULTIPLY", v, 2 * math.pi)
     across = w.math("SQRT", w.math("SUBTRACT", 1.0, w.math("MULTIPLY", height, height)))
@@ -302,7 +303,7 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
-#: What a shading point sees of a slot, and what it makes of it.
+#: Outputs of the group that computes how a slot's lamp is seen from the shading point.
 _SEEN = [
     ["towards", "VECTOR"],
     ["drop", "FLOAT"],
@@ -322,12 +323,12 @@ _AXES = [
     ["half_across", "FLOAT"],
     ["half_along", "FLOAT"],
 ]
-#: Farther than two directions are apart.
+#: Larger than the angle between any two directions.
 _FAR = 4.0
 
 
 def _seen_group(parts):
-    """The group that makes of a slot the cone that its lamp fills."""
+    """The group that computes the cone of directions towards a slot's lamp."""
     vectors = (*_SLOT, "at", "view", "normal")
 
     def fill(w, found):
@@ -341,8 +342,8 @@ def _seen_group(parts):
 
 
 def _point_of(w, towards, drop, anywhere, u):
-    """A direction within the cone, each as likely as the others. `anywhere`: a random direction,
-    to whose side it is tilted."""
+    """A uniformly distributed direction within the cone. `anywhere`: a random direction that
+    decides the azimuth."""
     beside = w.vector("NORMALIZE", w.vector("CROSS_PRODUCT", towards, anywhere))
     fallen = w.math("MULTIPLY", u, drop)
     cosine = w.math("SUBTRACT", 1.0, fallen)
@@ -351,8 +352,8 @@ def _point_of(w, towards, drop, anywhere, u):
 
 
 def _lamp_group(parts):
-    """The group that makes of a cone the closure that carries what the model gives there. Nothing
-    of it is computed where the factor `lit` is 0."""
+    """The group that makes a lamp's closure, which carries the model's value in its cone. Cycles
+    skips its computations where the factor `lit` is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
     numbers = ("drop", "chord", "flat", "lit", "room", "whole", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
@@ -380,10 +381,11 @@ def _lamp_group(parts):
 
 
 def _keep_apart(w, lamps, widest):
-    """Finds out which lamps are shown by a closure, and how wide that may be made: of two whose
-    cones overlap the earlier one, which is wider, is left to random directions.
+    """Decides which lamps get a closure, and how wide each may be. If two cones overlap, the lamp
+    with the earlier slot, which is the wider one, is left to random directions.
 
-    From the last slot to the first, so that what empty ones give, which Cycles knows, comes first.
+    Goes from the last slot to the first, so that the empty slots, which are constant to Cycles,
+    come first.
     """
     for lamp in lamps:
         lamp["taken"] = w.mix(lamp["active"], -_FAR, lamp["reach"])
@@ -408,12 +410,12 @@ def _keep_apart(w, lamps, widest):
 
 
 def wire(tree, data, normal, tangent, parameters, slots, title):
-    """Adds the nodes of a model, as a group; returns outputs by name: its BSDF and, where closures
-    of Blender's own are all of it, its Albedo.
+    """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
+    the model consists of Blender's own closures only.
 
-    `data` is what nodes/*.json has; `normal` and `tangent` outputs that are 0 where the surface's
-    own are meant; `parameters`: outputs or numbers by name; `slots`: four outputs for each lamp;
-    `title` begins the names of the groups that are made.
+    `data`: contents of nodes/*.json. `normal` and `tangent`: outputs that are 0 where the surface's
+    own are meant. `parameters`: outputs or numbers by name. `slots`: four outputs for each lamp.
+    `title`: prefix of the names of the new groups.
     """
     kinds = {name: kind for part in data["parts"].values() for name, kind in part["inputs"]}
     kinds |= dict.fromkeys(data["bounds"], "FLOAT")
@@ -439,7 +441,7 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
 
 
 def _wired(w, data, normal, tangent, parameters, slots, title):
-    """The nodes of a model, as outputs by name; see wire()."""
+    """Adds the nodes of a model; returns outputs by name, see wire()."""
     geometry = w.node("ShaderNodeNewGeometry")
     constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
@@ -459,7 +461,7 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
             if closure["kind"] != "refraction":
                 shaders.append(w.bsdf(closure["kind"], colour, surface.normal))
                 continue
-            # The node takes the inverse on the inner side.
+            # On the inside, the node takes the reciprocal.
             ior = colours[closure["ior"]]
             inverse = w.math("DIVIDE", 1.0, ior)
             ior = w.mix(surface.backfacing, ior, inverse)
@@ -471,8 +473,8 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
             total = colour if total is None else w.vector("ADD", total, colour)
         return {"BSDF": w.sum(shaders), "Albedo": total}
     lamps = []
-    # All that a shading point draws is made of the same numbers: its closures add up, so none has
-    # to be independent of another.
+    # All closures of a shading point are sampled with the same numbers: they are added up, so they
+    # need not be independent.
     given |= {f"u_{i}": number for i, number in enumerate(surface.drawn)}
     if slots:
         given |= parts.add("once", **given)
@@ -492,15 +494,16 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
 
 
 def _rest(w, parts, surface, given, lamps, narrow):
-    """The closure of the drawn direction, which carries all light that lamps' closures do not."""
+    """The closure of the sampled direction, which carries all light that the lamps' closures do
+    not."""
     drawn = parts.add("draw", **given)
     ray = surface.world(drawn["wi"])
     height = w.vector("DOT_PRODUCT", ray, surface.true_normal, output="Value")
-    # Rays leave hairs on all sides.
+    # Rays can leave hairs in every direction.
     hidden = w.math(
         "MULTIPLY", w.math("LESS_THAN", height, 0.0), w.math("SUBTRACT", 1.0, surface.strand)
     )
-    # From the last slot on, as in _keep_apart().
+    # From the last slot to the first, as in _keep_apart().
     met = 0.0
     for lamp in reversed(lamps):
         inside = parts.add("met", **{"at": surface.place, "ray": ray} | lamp)["met"]
@@ -513,7 +516,7 @@ def _rest(w, parts, surface, given, lamps, narrow):
 
 
 def numbers(constants):
-    """Those of the values of parameters that formulas may take: no choices."""
+    """The parameter values that formulas take as numbers, that is, all but choices."""
     return {name: value for name, value in constants.items() if not isinstance(value, str)}
 
 
@@ -525,6 +528,6 @@ def _unused():
 
 
 def remove_unused_parts():
-    """Takes the groups of parts out of the file that no model has."""
+    """Removes the part groups that no model uses from the file."""
     while group := _unused():
         bpy.data.node_groups.remove(group)

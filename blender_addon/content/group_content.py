@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the node group of a model holds: script nodes, or Blender's own, with the sockets of the
-model's parameters, lamps and what stands in where scripts do not run. nodes.py makes and keeps the
-groups themselves.
+"""Fills the node group of a model: with script nodes or Blender's own nodes, the sockets of
+parameters and lamps, and the nodes that stand in where scripts do not run. nodes.py creates and
+manages the groups themselves.
 """
 
 import json
@@ -17,23 +17,24 @@ from .wiring import Wiring
 TAG = pack.TAG
 OUTPUTS = {"BSDF": "SHADER", "Albedo": "RGBA"}
 ALBEDO = "Albedo"
-#: What the tag of a group says of its scripts.
+#: Entries of a group's tag that describe its scripts.
 _OF_SCRIPTS = ("script_inputs", "albedo_apart", "albedo_inputs", "stands_in")
 _SOCKET_TYPES = {"number": "VALUE", "color": "RGBA", "choice": "INT"}
 
 
 def is_native(group):
-    """Whether a group of this extension is made of Blender's own nodes, without a script."""
+    """Whether a group of this extension consists of Blender's own nodes, without a script."""
     return "script_inputs" not in group[TAG]
 
 
 def has_albedo_script(model_name, representation):
-    """Whether the Albedo output of a form is a script of its own, which a group has if asked."""
+    """Whether a form's Albedo output needs a script of its own, which a group has on request
+    only."""
     return pack.representation(model_name, representation).get("albedo_shader") is not None
 
 
 def expected_inputs(model_name, representation):
-    """Identifiers of the script node's inputs and the types of their sockets."""
+    """Identifiers of the script node's inputs, with the types of their sockets."""
     inputs = {
         p["name"]: _SOCKET_TYPES[p["kind"]]
         for p in pack.socket_parameters(model_name, representation).values()
@@ -44,7 +45,8 @@ def expected_inputs(model_name, representation):
 
 
 def _lamp_inputs(model_name, representation):
-    """Inputs of a form that the shared group of lamps feeds; a form may have fewer slots."""
+    """A form's inputs that the shared group of lamps feeds; a form may have fewer slots than
+    that."""
     slots = pack.representation(model_name, representation).get("lamps") or 0
     if slots > lamps.SLOTS:
         raise pack.PackError(
@@ -55,7 +57,7 @@ def _lamp_inputs(model_name, representation):
 
 
 def scripts(group):
-    """The script node that gives the closure, and the one of the Albedo output, if it has one."""
+    """The script node of the closure, and that of the Albedo output if there is one."""
     found = [n for n in group.nodes if n.bl_idname == "ShaderNodeScript"]
     albedo = next((n for n in found if n.name == ALBEDO), None)
     others = (n for n in found if n.name not in (ALBEDO, stand_in.NODE))
@@ -80,14 +82,14 @@ def _script_problem(script, inputs, outputs):
 def script_problem(group):
     """What is wrong with a group's script nodes, or None.
 
-    A shader that fails to compile raises nothing in Cycles: it leaves a node without sockets.
+    Cycles raises no error when a shader fails to compile: the node is left without sockets.
     """
     if is_native(group):
         return None
     tag = group[TAG]
     script, albedo = scripts(group)
     inputs, albedo_inputs = dict(tag["script_inputs"]), tag.get("albedo_inputs")
-    # Files of older versions have both outputs in one script, as have forms of small tables.
+    # Groups of older versions, and forms with small tables, have one script for both outputs.
     alone = tag.get("albedo_apart", False)
     outputs = {n: k for n, k in OUTPUTS.items() if not alone or n != ALBEDO}
     if problem := _script_problem(script, inputs, outputs):
@@ -109,23 +111,23 @@ def _add_outputs(group, outputs):
 
 
 def _start_group(group, outputs):
-    """Output sockets, and the nodes that stand for the group's inputs and outputs."""
+    """Adds the output sockets, and the group's input and output nodes."""
     _add_outputs(group, outputs)
     return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
 
 
 def outputs_of(model_name, representation, albedo):
-    """Names of the outputs of a form of scripts; `albedo` as in ensure_group()."""
+    """Names of the outputs of a script form; `albedo` as in ensure_group()."""
     apart = has_albedo_script(model_name, representation)
     return [name for name in OUTPUTS if albedo or not apart or name != ALBEDO]
 
 
 def fill_with_nodes(group, model_name, representation, source, twin_group):
-    """Forms of Blender's own nodes have the sockets of the others; what a twin looks like does not
-    hang on a tangent. `twin_group`: that of the model's twin, or None."""
+    """Fills a group with a form of Blender's own nodes. Its sockets are those of the other forms;
+    but a twin has no use for a tangent. `twin_group`: the group of the model's twin, or None."""
     data = json.loads(source)
     label = pack.model(model_name)["label"]
-    # A twin's sockets keep the identifiers that files have: outputs come first.
+    # Outputs come first, so that a twin's sockets keep the identifiers that existing files have.
     _add_outputs(group, OUTPUTS if representation == "twin" else ())
     group_input = group.nodes.new("NodeGroupInput")
     group_input.location = (-300, 0)
@@ -169,7 +171,7 @@ def fill_with_nodes(group, model_name, representation, source, twin_group):
 
 
 def _relays(group, interface, parameters):
-    """An output within the group for each of these parameters."""
+    """An output inside the group for each of these parameters."""
     found = {}
     for name, parameter in parameters.items():
         relay = group.nodes.new("NodeReroute")
@@ -180,9 +182,9 @@ def _relays(group, interface, parameters):
 
 
 def fill_with_form(group, model_name, native, with_osl, group_of):
-    """Fills a group that takes the place of another form with Blender's own nodes: those of the
-    form `native`; where a choice is one that it lacks, the model's twin. Sockets stay.
-    `group_of`: makes the group of a form, or finds it."""
+    """Fills a group with the form `native` of Blender's own nodes, in place of another form. For
+    choices that this form lacks, the group shows the model's twin. Sockets stay. `group_of`: finds
+    or makes the group of a form."""
     form = group_of(model_name, native)
     tag = group[TAG]
     _add_outputs(group, outputs_of(model_name, with_osl, tag["with_albedo"]))
@@ -205,13 +207,13 @@ def fill_with_form(group, model_name, native, with_osl, group_of):
 
 
 def _instance(group, inner, sources):
-    """The outputs, by name, of a group within another. `sources`: outputs by parameter."""
+    """Puts a group inside another; returns its outputs by name. `sources`: outputs by parameter."""
     inputs = {i: sources.get(name) for name, i in inner[TAG]["sockets"].items()}
     return stand_in.twin_of(group, inner, inputs)
 
 
 def _only_where(group, model_name, limits, sources, made, group_of):
-    """Outputs by name: `made` where choices are these, and those of the twin elsewhere."""
+    """Outputs by name: `made` where the choices have these values, those of the twin elsewhere."""
     w, chosen = Wiring(group), None
     for name, only in limits.items():
         index = pack.parameters(model_name)[name]["choices"].index(only)
@@ -224,7 +226,7 @@ def _only_where(group, model_name, limits, sources, made, group_of):
 
 
 def _add_lamps(group):
-    """The node that tells where the lamps are."""
+    """Adds the shared group that outputs the positions of the lamps."""
     shared = group.nodes.new("ShaderNodeGroup")
     shared.node_tree = lamps.ensure_group()
     shared.location = (-500, -400)
@@ -239,8 +241,8 @@ def _add_script(group, text, what):
 
 
 def fill_with_scripts(group, model_name, representation, texts, twin_group):
-    """`texts`: of the script and, where the Albedo output has one of its own that was asked for, of
-    that. `twin_group`: that of the model's twin, or None."""
+    """`texts`: of the script, and of the Albedo output's own script where that exists and was
+    requested. `twin_group`: the group of the model's twin, or None."""
     what = f"{model_name} ({representation})"
     apart = has_albedo_script(model_name, representation)
     outputs = outputs_of(model_name, representation, len(texts) > 1)

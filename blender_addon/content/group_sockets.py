@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Input sockets of node groups: one a parameter of the model, with range and tooltip."""
+"""Input sockets of node groups: one for each parameter of the model, with range and tooltip."""
 
 import bpy
 
@@ -8,7 +8,7 @@ from ..packs.pack import choice_label
 
 
 def _output(group_input, socket):
-    """The output of a group's input node that stands for a socket of the group."""
+    """The output of a group's input node for one of the group's sockets."""
     return next(s for s in group_input.outputs if s.identifier == socket.identifier)
 
 
@@ -27,7 +27,7 @@ def _range_text(parameter):
 
 
 def tooltip(parameter):
-    """Tooltip of a parameter's socket: its description and what it accepts."""
+    """Tooltip of a parameter's socket: its description and the accepted values."""
     doc = parameter["doc"].rstrip()
     doc += "" if doc.endswith((".", "!", "?")) or not doc else "."
     if parameter["kind"] == "number":
@@ -39,7 +39,8 @@ def tooltip(parameter):
 
 
 def has_menus():
-    """Whether shader groups can have menu sockets (from 5.0); a choice is a number before that."""
+    """Whether shader groups can have menu sockets (Blender 5.0 on); before, a choice is a
+    number."""
     return bpy.app.version >= (5, 0, 0)
 
 
@@ -80,8 +81,8 @@ def _number_socket(group, parameter):
     if parameter["kind"] == "color":
         color = (*parameter["default"], 1.0)
         return _socket(group, label, "NodeSocketColor", text, default_value=color)
-    # Blender holds a slider to a socket's range but accepts other typed numbers: that is
-    # the meaning of the soft range. Out of the accepted range, the panel warns.
+    # Blender limits a slider to a socket's range but accepts typed numbers outside it: just what
+    # the soft range means. Beyond the accepted range, the panel warns.
     low, high = parameter["soft_min"], parameter["soft_max"]
     settings = {"min_value": low, "max_value": high}
     if (low, high) == (0, 1) == (parameter["min"], parameter["max"]):
@@ -92,8 +93,8 @@ def _number_socket(group, parameter):
 
 
 def add_parameter(group, group_input, target, parameter, socket=None):
-    """Links the socket of a parameter, which is made unless it is given, to an input within the
-    group. Returns it."""
+    """Links a parameter's socket, which is made if not given, to an input inside the group. Returns
+    the socket."""
     is_choice, is_new = parameter["kind"] == "choice", socket is None
     if is_new:
         socket = (_choice_socket if is_choice else _number_socket)(group, parameter)
@@ -102,12 +103,12 @@ def add_parameter(group, group_input, target, parameter, socket=None):
         group.links.new(source, target)
         return socket
     _link_choice(group, source, target, parameter)
-    if is_new and has_menus():  # which knows its items by its link
+    if is_new and has_menus():  # a menu socket takes its items from its link
         socket.default_value = choice_label(parameter["default"])
     return socket
 
 
-#: Sockets of a group beside its model's parameters, and their tooltips.
+#: Sockets of a group besides its model's parameters, and their tooltips.
 VECTORS = {
     pack.NORMAL: "Shading normal; unlinked, the one of the surface",
     pack.TANGENT: "First axis of anisotropy; unlinked, the object's Z axis along the surface",
@@ -115,13 +116,13 @@ VECTORS = {
 
 
 def vector_socket(group, name, text):
-    # Without a value, an unlinked input keeps the shader's own default: the shading normal, and
-    # the frame that the shader builds for itself.
+    # Hidden value: unlinked, the input keeps the shader's default, which is the shading normal or
+    # the frame that the shader builds by itself.
     return _socket(group, name, "NodeSocketVector", text, hide_value=True)
 
 
 class Interface:
-    """Sockets of a group by name: made where the group lacks them, and linked to its nodes."""
+    """Sockets of a group by name: created if missing, and linked to the group's nodes."""
 
     def __init__(self, group, group_input, known):
         """`known`: identifiers of the sockets that the group has, by name."""
@@ -131,12 +132,12 @@ class Interface:
         self.sockets = {name: found[i] for name, i in known.items() if i in found}
 
     def parameter(self, name, target, parameter):
-        """Links a parameter to an input within the group."""
+        """Links a parameter to an input inside the group."""
         have = self.sockets.get(name)
         self.sockets[name] = add_parameter(self.group, self.group_input, target, parameter, have)
 
     def vector(self, name):
-        """The output within the group that has what is linked to one of VECTORS."""
+        """The output inside the group of one of the sockets in VECTORS."""
         if name not in self.sockets:
             self.sockets[name] = vector_socket(self.group, name, VECTORS[name])
         return _output(self.group_input, self.sockets[name])

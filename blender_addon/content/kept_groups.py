@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Node groups that were made once are kept in a folder of the user, as files of Blender.
+"""Caches finished node groups as .blend files in a folder of the user.
 
-To make a model's nodes takes about a second, since Blender looks at a whole tree for each node and
-each link; to append them from a file takes a hundredth of that. A file that is missing, damaged or
-of another version is as good as none: the group is made, and kept anew.
+Building a model's nodes takes about a second, as Blender examines the whole tree for each node and
+each link; appending them from a file takes a hundredth of that. If a file is missing, damaged or of
+another version, the group is built and cached again.
 """
 
 import functools
@@ -20,7 +20,7 @@ _ENDING = ".blend"
 
 @functools.cache
 def version():
-    """What tells nodes of this version of the extension from those of another: its sources."""
+    """Identifies the version of the extension that built the nodes: a hash of its sources."""
     digest = hashlib.sha256()
     for path in sorted(ROOT.rglob("*.py")):
         digest.update(path.read_bytes())
@@ -28,18 +28,18 @@ def version():
 
 
 def _folder():
-    """Path of the folder, made if it is missing. Raises OSError or ValueError."""
+    """Path of the cache folder, which is made if missing. Raises OSError or ValueError."""
     return Path(bpy.utils.extension_path_user(PACKAGE, path="nodes", create=True))
 
 
 def _name(digest):
-    # A later Blender may keep what an earlier one can't read.
+    # An earlier Blender may be unable to read the file of a later one.
     return f"{bpy.app.version_string.split()[0]}-{version()}-{digest}{_ENDING}"
 
 
 def append(digest):
-    """Appends what was kept under a digest: the node groups that came with it, none where nothing
-    was."""
+    """Appends the groups cached under a digest and returns them; an empty result if there are
+    none."""
     known, libraries = set(bpy.data.node_groups), set(bpy.data.libraries)
     try:
         path = _folder() / _name(digest)
@@ -50,14 +50,14 @@ def append(digest):
     except (OSError, ValueError, RuntimeError):
         return []
     finally:
-        # What was appended is the file's own, but Blender leaves where it came from.
+        # The groups are local now, but Blender keeps a reference to the library file.
         for library in [library for library in bpy.data.libraries if library not in libraries]:
             bpy.data.libraries.remove(library)
     return [group for group in bpy.data.node_groups if group not in known]
 
 
 def keep(group, digest):
-    """Keeps a node group with those that it is made of. What can't be written is not kept."""
+    """Caches a node group with the groups inside it; failures to write are ignored."""
     try:
         folder = _folder()
         name = _name(digest)

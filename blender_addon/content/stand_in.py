@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where Open Shading Language does not run, a model's twin stands in for its shader; or, for glass
-and ideal mirrors, the node of Blender's that is nearest.
+"""Replaces a shader where Open Shading Language does not run: by the model's twin or, for glass and
+ideal mirrors, by the nearest of Blender's nodes.
 
-EEVEE, and Cycles on devices or with settings that have no OSL, take the outputs of a script node
-for 0. So a script whose output is 1 tells where shaders run, and chooses between the two. OSL finds
-the constant before it renders: there what stands in takes no time.
+In EEVEE, and in Cycles on devices or with settings without OSL, the outputs of a script node are 0.
+So the output of a script that sets it to 1 tells whether shaders run, and selects one of the two.
+OSL folds this constant before rendering, so the stand-in takes no time there.
 """
 
 import bpy
 
-#: Name of the node that runs this, and of its output.
+#: Name of that script node, and of its output.
 NODE = "Runs"
-#: Name of the node that has a value in EEVEE alone.
+#: Name of the node whose value differs from 0 in EEVEE alone.
 EEVEE = "In EEVEE"
 _FILE = "brdfc_runs.osl"
 _SOURCE = """// SPDX-License-Identifier: GPL-3.0-or-later
@@ -23,9 +23,9 @@ shader brdfc_runs(output float Runs = 1)
 
 
 def new_text(name, content):
-    """A text that goes with its last user, as all else that a group is made of: Blender gives a new
-    text a fake user, and would keep it in the file for good. One that an undo has left without a
-    user is taken first."""
+    """A text that is deleted with its last user, like the other parts of a group: Blender gives new
+    texts a fake user, which would keep them in the file for good. A text that undo has left without
+    users is reused."""
     for found in bpy.data.texts:
         if found.library is None and found.users == 0 and found.as_string() == content:
             return found
@@ -37,20 +37,20 @@ def new_text(name, content):
 
 
 def texts():
-    """The file's own texts that are the script."""
+    """The local texts of the file that contain the script."""
     return [t for t in bpy.data.texts if t.library is None and t.as_string() == _SOURCE]
 
 
 def text():
-    """The script's text, of which a file has one."""
+    """The text with the script; a file has one."""
     for found in texts():
         return found
     return new_text(_FILE, _SOURCE)
 
 
 def keep_one_text():
-    """Copies of the text, which come with appended materials, give way. One that was appended is
-    kept, if there is one: Blender knows that and does not append it again."""
+    """Replaces copies of the text, which appended materials bring, by one. An appended copy is
+    preferred: Blender recognizes it and does not append it again."""
     found = sorted(texts(), key=lambda t: t.library_weak_reference is None)
     for other in found[1:]:
         other.user_remap(found[0])
@@ -59,8 +59,8 @@ def keep_one_text():
         found[0].name = _FILE
 
 
-#: Blender's nodes in place of models without a twin, which scatter nothing: a kind, and which
-#: parameters its sockets take.
+#: Blender's nodes for models without a twin, which scatter nothing: the kind, and the parameter for
+#: each socket.
 _NODES = {
     "glass": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
     "fresnel_dielectric": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
@@ -77,7 +77,7 @@ def has_node(model_name):
 
 def node_of(group, model_name, parameters, constants):
     """The outputs, by name, of the node that stands in for a model. `parameters`: outputs by name.
-    `constants`: values of the parameters that have no socket."""
+    `constants`: values of the parameters without a socket."""
     kind, given = _NODES[model_name]
     node = group.nodes.new(kind)
     if kind == "ShaderNodeBsdfMetallic":
@@ -112,16 +112,16 @@ def twin_of(group, twin, inputs):
 
 
 def add(group, script, outputs, instead):
-    """Returns outputs, by name, that are those of a shader where that runs, and else those of what
-    stands in, as far as both have them. script: a script node in the group that runs text()."""
+    """Returns outputs by name: the shader's where it runs, otherwise those of the stand-in, as far
+    as both have them. `script`: a script node in the group that runs text()."""
     script.name = script.label = NODE
     script.location = (0, 300)
     return choose(group, script.outputs[NODE], instead, outputs)
 
 
 def add_in_eevee(group, outputs, instead):
-    """Returns outputs, by name: in Cycles those given, and in EEVEE those of what stands in. Cycles
-    leaves a Shader to RGB node out, and what is linked to that keeps its own value."""
+    """Returns outputs by name: in Cycles the given ones, in EEVEE those of the stand-in. The switch
+    is a Shader to RGB node: Cycles ignores it, and the linked socket keeps its own value."""
     lit = group.nodes.new("ShaderNodeEmission")
     lit.inputs["Color"].default_value = (1, 1, 1, 1)
     lit.inputs["Strength"].default_value = 1.0
@@ -130,12 +130,13 @@ def add_in_eevee(group, outputs, instead):
     lit.location, seen.location = (-150, 300), (0, 300)
     group.links.new(lit.outputs[0], seen.inputs[0])
     mixed = choose(group, seen.outputs["Color"], outputs, instead)
-    # Formulas have no albedo of their own where directions are random: that of the twin.
+    # Formulas that use random directions have no albedo output: the twin's is used.
     return {**instead, **outputs, **mixed}
 
 
 def choose(group, chosen, at_0, at_1):
-    """Outputs by name: those of one where the output `chosen` is 0, of the other where it is 1."""
+    """Outputs by name: those of `at_0` where the output `chosen` is 0, those of `at_1` where it is
+    1."""
     at_0["BSDF"].node.location = (0, 200)
     made = {}
     for name in at_0.keys() & at_1.keys():
@@ -151,7 +152,7 @@ def choose(group, chosen, at_0, at_1):
             factor, first, second = (by_identifier[n] for n in names)
             made[name] = by_identifier["Result_Color"]
         mix.location = (150, -200 * len(made))
-        factor.default_value = 0.0  # where nothing chooses
+        factor.default_value = 0.0  # where nothing is linked
         group.links.new(chosen, factor)
         group.links.new(at_0[name], first)
         group.links.new(at_1[name], second)
@@ -159,10 +160,10 @@ def choose(group, chosen, at_0, at_1):
 
 
 def expected(group):
-    """The node that tells where shaders run, or None, its inputs and its outputs."""
+    """The node that tells where shaders run (or None), its inputs and its outputs."""
     return group.nodes.get(NODE), {}, {NODE: "VALUE"}
 
 
 def is_in(group):
-    """Whether something stands in for the shader of a group."""
+    """Whether a group has a stand-in for its shader."""
     return NODE in group.nodes

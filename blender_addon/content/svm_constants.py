@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What lists of operations become for Cycles' SVM to run them in less time.
+"""Rewrites lists of operations so that Cycles' SVM runs them faster.
 
-Up to Blender 5.1 SVM loads a constant for each of a Math node's three sockets that is not linked,
-whether the operation takes it or not: a product is two instructions, a sum with a constant three.
-So where an operation has a variant of three operands that one takes, with 0, 1 or -1 for the
-others, and these are linked to values that Cycles can't know beforehand.
+Up to Blender 5.1, SVM loads a constant for each of a Math node's three sockets that is not linked,
+used or not: a product takes two instructions, a sum with a constant three. So an operation is
+replaced by its variant with three operands, if there is one, whose additional operands 0, 1 or -1
+are linked to values that Cycles does not recognize as constant.
 """
 
-#: Names of the values that stand for constants, and what they are.
+#: Names and values of the constants.
 VALUES = {"constant_0": 0.0, "constant_1": 1.0, "constant_minus_1": -1.0}
 _ZERO, _ONE, _MINUS = VALUES
 
-#: What changes with the shading point, of the inputs of parts. What else they take may be a
-#: constant, of which Cycles folds an operation that has no such value.
+#: Inputs of parts that vary with the shading point. All others may be constant, and Cycles folds
+#: operations on constants only.
 VARYING = {
     "bend": ("true", "view", "normal", "strand"),
     "draw": ("wo", "u_0", "u_1", "u_2"),
@@ -24,7 +24,7 @@ VARYING = {
 
 
 def add_values(wiring, unknown):
-    """Adds the nodes of VALUES: {name: output}. `unknown`: an output that Cycles can't fold."""
+    """Adds nodes for VALUES: {name: output}. `unknown`: an output that Cycles can't fold."""
     return {n: wiring.math("MULTIPLY_ADD", unknown, 0.0, v) for n, v in VALUES.items()}
 
 
@@ -33,7 +33,7 @@ def _with_three(kind, operands):
     if kind == "MULTIPLY":
         return ["MULTIPLY_ADD", *operands, _ZERO]
     if kind == "ADD":
-        # The constant comes last.
+        # Puts the constant last.
         a, b = operands if isinstance(operands[0], str) else reversed(operands)
         return ["MULTIPLY_ADD", a, _ONE, b]
     if kind == "SUBTRACT" and isinstance(operands[1], str):
@@ -44,7 +44,7 @@ def _with_three(kind, operands):
 
 
 def prepared(name, part):
-    """A part of nodes/*.json as it is best for SVM."""
+    """A part of nodes/*.json, rewritten for SVM."""
     varies = set(VARYING.get(name, ()))
     operations, taken = [], set()
     for index, (kind, *operands) in enumerate(part["operations"]):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The twin of a model: Blender's own nodes, steered by tables over the view angle and a slider.
+"""Builds the twin of a model: Blender's own nodes, controlled by tables over the view angle and a
+slider.
 
-Runs where Open Shading Language does not: EEVEE, any GPU, render farms. What the nodes take is in
-the extension's twins/*.json, which the tool fits; how they are wired is here.
+A twin runs where Open Shading Language does not: EEVEE, any GPU, render farms. The tool fits its
+tables and writes them to the extension's twins/*.json; the wiring of the nodes is here.
 """
 
 import math
@@ -14,7 +15,7 @@ from .wiring import DISTRIBUTIONS, Wiring
 
 
 class _Curves:
-    """Tables of one row over the view: a curve node each."""
+    """Tables with a single row, over the view angle: a curve node each."""
 
     def __init__(self, wiring, data, cos_theta, place, name):
         self.wiring, self.cos_theta = wiring, cos_theta
@@ -24,8 +25,8 @@ class _Curves:
 
 
 class _Picture:
-    """Tables of several rows, one above the other and three beside each other as red, green and
-    blue: an image of numbers, which every engine looks up linearly between pixels."""
+    """Tables with several rows: a data image with the rows above one another and red, green and
+    blue side by side, which every engine interpolates linearly between pixels."""
 
     def __init__(self, wiring, data, cos_theta, place, name):
         self.wiring = wiring
@@ -43,7 +44,7 @@ class _Picture:
         self.image.alpha_mode = "NONE"
         self.image.pixels.foreach_set(pixels.ravel())
         self.image.pack()
-        # From the middle of the first pixel to that of the last.
+        # From the centre of the first pixel to the centre of the last.
         self.u = wiring.math("MULTIPLY_ADD", cos_theta, (width - 1) / width, 0.5 / width)
         self.v = wiring.math("MULTIPLY", place, (count - 1) / height)
         self.first, self.step = 0.5 / height, count / height
@@ -65,7 +66,7 @@ class _Picture:
 
 
 def _tables(data):
-    """All of them, each a list of rows."""
+    """All tables, each a list of rows."""
     for closure in data["closures"]:
         yield from (closure[key] for key in ("lean", "roughness", "spread") if key in closure)
         for channels in closure["weight"]:
@@ -75,7 +76,7 @@ def _tables(data):
 
 
 def _place(w, axis, value):
-    """Where a number lies on its slider, from 0 to 1 on the slider's scale."""
+    """Position of a number on its slider, from 0 to 1 on the slider's scale."""
     scale = {
         "linear": lambda x: x,
         "log": lambda x: w.math("LOGARITHM", x, math.e),
@@ -88,7 +89,7 @@ def _place(w, axis, value):
 
 
 def _polynomial(w, terms, colours):
-    """A sum of [times, powers of the colours]."""
+    """A sum of terms [factor, powers of the colours]."""
     total = None
     for times, powers in terms:
         part = (abs(times),) * 3
@@ -103,7 +104,7 @@ def _polynomial(w, terms, colours):
 
 
 class _Looked:
-    """Colours of tables by term and channel."""
+    """Colours looked up in tables, by term and channel."""
 
     def __init__(self, wiring, tables):
         self.wiring, self.tables = wiring, tables
@@ -125,11 +126,11 @@ class _Looked:
 
 
 def wire(tree, data, normal, parameters, name):
-    """Builds the nodes of a twin; returns the outputs that are its BSDF and its albedo.
+    """Builds the nodes of a twin; returns the outputs for its BSDF and its albedo.
 
-    `data` is what twins/*.json has; `normal` an output that is 0 where the surface's own is meant;
-    `parameters`: outputs by name. Those that `data` does not name multiply all but a mirror.
-    `name`: of the image that is made where tables run over a slider.
+    `data`: contents of twins/*.json. `normal`: an output that is 0 where the surface's own normal
+    is meant. `parameters`: outputs by name; those that `data` does not name multiply everything but
+    ideal mirror reflection. `name`: of the image for tables that depend on a slider.
     """
     w = Wiring(tree)
     axis, mixed = data["axis"], [parameters[n] for n in data["mixed"]]

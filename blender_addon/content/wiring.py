@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's own nodes, made and linked one by one: what trees of them are written with."""
+"""Helpers that add and link Blender's own nodes."""
 
-#: Of glossy nodes, by kind of closure.
+#: Distribution of glossy nodes by kind of closure.
 DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
 
 
 class Wiring:
-    """Adds nodes to a group and links what they are given.
+    """Adds nodes to a group and links their inputs.
 
-    Blender looks at the whole tree whenever something of it is set. So nothing is set to what it
-    is, and places are set together: call place_nodes() when all nodes are made.
+    Blender examines the whole tree at every change. So nothing is set that already has the right
+    value, and locations are set together: call place_nodes() when all nodes exist.
     """
 
     def __init__(self, tree):
@@ -25,16 +25,16 @@ class Wiring:
         return node
 
     def place_nodes(self):
-        """Places the nodes that were made column by column."""
+        """Arranges the new nodes in columns."""
         places = [0.0] * (2 * len(self.tree.nodes))
         self.tree.nodes.foreach_get("location", places)
         for count, index in enumerate(self.made):
             places[2 * index : 2 * index + 2] = 200 * (count // 20), -60 * (count % 20)
-        # This, too, looks at the tree, but once.
+        # Setting locations, too, makes Blender examine the tree, but this way only once.
         self.tree.nodes.foreach_set("location", places)
 
     def give(self, socket, value):
-        """A constant, or the output of another node."""
+        """Sets a socket to a constant, or links the output of another node to it."""
         if hasattr(value, "is_output"):
             self.tree.links.new(value, socket)
             return
@@ -58,7 +58,7 @@ class Wiring:
         return node.outputs[output]
 
     def curve(self, x, heights):
-        """The table of heights, evenly spaced over [0, 1] and linear between, at x."""
+        """Looks x up in a table of heights, evenly spaced over [0, 1] and linearly interpolated."""
         node = self.node("ShaderNodeFloatCurve")
         mapping, curve = node.mapping, node.mapping.curves[0]
         mapping.use_clip = False
@@ -93,7 +93,7 @@ class Wiring:
         return shaders[0]
 
     def mix(self, factor, at_0, at_1, vector=False):
-        """at_0 (1 - factor) + at_1 factor, of numbers or of vectors."""
+        """Interpolates numbers or vectors: at_0 (1 - factor) + at_1 factor."""
         kind = "Vector" if vector else "Float"
         node = self.node("ShaderNodeMix", data_type=kind.upper(), clamp_factor=False)
         by_identifier = {socket.identifier: socket for socket in (*node.inputs, *node.outputs)}
@@ -103,7 +103,7 @@ class Wiring:
         return by_identifier[f"Result_{kind}"]
 
     def scaled(self, vector, factor):
-        """A vector times a number. SVM takes half as long for it as for Vector Math's Scale."""
+        """A vector times a number. SVM runs this in half the time of Vector Math's Scale."""
         return self.mix(factor, (0.0, 0.0, 0.0), vector, True)
 
     def combine(self, x, y, z):
@@ -118,11 +118,11 @@ class Wiring:
         return list(node.outputs)
 
     def half(self, a, b):
-        """The direction halfway between two."""
+        """The normalized half vector of two directions."""
         return self.vector("NORMALIZE", self.mix(0.5, a, b, True))
 
     def toon(self, color, size, normal):
-        """A closure that is level within a cone about the mirror direction."""
+        """A closure that is constant within a cone about the mirror direction."""
         node = self.node("ShaderNodeBsdfToon", component="GLOSSY")
         self.give(node.inputs["Color"], color)
         self.give(node.inputs["Size"], size)
@@ -139,7 +139,7 @@ class Wiring:
         return node.outputs[0]
 
     def shown(self, factor, shader):
-        """A shader times a factor; where that is 0 what the shader needs is not computed."""
+        """A shader times a factor; where the factor is 0, Cycles skips the shader's inputs."""
         node = self.node("ShaderNodeMixShader")
         self.give(node.inputs[0], factor)
         self.give(node.inputs[2], shader)

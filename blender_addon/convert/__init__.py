@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of Blender's own nodes, as the model of this extension that comes nearest.
+"""Converts materials of Blender's own nodes to the nearest models of this extension.
 
 Nothing is changed before apply().
 """

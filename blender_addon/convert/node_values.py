@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a node of Blender's is to a conversion: its kind, what reaches its sockets, and why one is
-not converted."""
+"""Reads one of Blender's nodes for its conversion: its kind, its values, and why it can't be
+converted."""
 
 import functools
 
@@ -10,11 +10,11 @@ from ..common.i18n import Sentence, say
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values
 
-#: Roughnesses at which a model is to be near where a texture gives it.
+#: The roughnesses at which a model is fitted when a texture provides the roughness.
 ROUGHNESSES = (0.2, 0.5, 0.8)
-#: Colour at which the width is sought where nothing is known of what is linked.
+#: Colour at which the width is fitted if the linked colour is unknown.
 GREY = (0.5, 0.5, 0.5)
-#: Colours between which that one may lie: the error of a plan is a range.
+#: Such a colour may lie anywhere between these: a plan's error is then a range.
 DARK, BRIGHT = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 KINDS = {
@@ -23,7 +23,7 @@ KINDS = {
     "ShaderNodeBsdfPrincipled": "principled",
     "ShaderNodeBsdfGlass": "glass",
 }
-#: Nodes that stay beside models, for they do what models don't.
+#: Nodes that stay beside models, as they do what models can't.
 STAYING = {
     f"ShaderNode{name}"
     for name in (
@@ -31,7 +31,7 @@ STAYING = {
         "Script",
     )
 }
-#: Sockets that must keep the value at which they do nothing; no model has what they do.
+#: Sockets that must have the value at which they have no effect, as no model offers their effect.
 _OFF = {
     "Subsurface Weight": (0.0, "Subsurface"),
     "Transmission Weight": (0.0, "Transmission"),
@@ -40,8 +40,9 @@ _OFF = {
     "Thin Film Thickness": (0.0, "Thin Film"),
     "Thin Wall": (0.0, "Thin Wall"),
 }
-#: Sockets whose meaning is known here, by kind; what is set of others is a refusal. Those of
-#: subsurface, coat, sheen and thin film do nothing while that is off.
+#: Sockets that the conversion understands, by kind; any other socket with a changed value is a
+#: reason to refuse. Those of subsurface, coat, sheen and thin film have no effect while that is
+#: off.
 KNOWN_SOCKETS = {
     "diffuse": {"Color", "Roughness", "Normal", "Weight"},
     "glossy": {"Color", "Roughness", "Anisotropy", "Rotation", "Normal", "Tangent", "Weight"},
@@ -60,11 +61,11 @@ KNOWN_SOCKETS = {
         *("Emission Color", "Emission Strength"),
     },
 }
-#: The same of settings of the nodes themselves.
+#: The settings of nodes that the conversion understands.
 _KNOWN_SETTINGS = {"distribution", "subsurface_method"}
 
 
-#: Sockets of which importers and makers of materials often have an image that is one colour.
+#: Sockets to which importers and material generators often link an image of a single colour.
 _OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"}
 
 
@@ -88,8 +89,8 @@ def _held(socket):
 
 
 class Inputs:
-    """What reaches a node's sockets. Raises Refused for what varies in a way that no model
-    follows."""
+    """The values of a node's sockets. Raises Refused if one varies in a way that no model can
+    follow."""
 
     def __init__(self, node):
         self._node, self._moved = node, animation.moved(node)
@@ -100,24 +101,24 @@ class Inputs:
         return name in self._node.inputs
 
     def reaches(self, name):
-        """Whether the output of a node reaches a socket; the link to it may stay."""
+        """Whether the output of a node reaches a socket; such a link can be kept."""
         return shader_trees.is_driven(self._node.inputs[name])
 
     def constant(self, name):
-        """The value of a socket, also behind links; None where it is not constant."""
+        """The value of a socket, also through links; None if it is not constant."""
         if name not in self._found:
             values = self._values[name in _OFTEN_ONE_COLOR]
             self._found[name] = values.told(self._node.inputs[name])
         return self._found[name]
 
     def mean(self, name):
-        """The value, or its mean over images; None where neither is known."""
+        """The value, or its mean over images; None if neither is known."""
         known = self.constant(name)
         return shader_values.mean(self._node.inputs[name]) if known is None else known
 
     def follows(self, name):
-        """Whether a link gives a socket a value that is not constant. An animation of the socket
-        itself is refused, for it would end with the node."""
+        """Whether a socket is linked to a value that varies. An animated socket raises Refused, as
+        the animation would end with the node."""
         if self.constant(name) is not None:
             return False
         if self.reaches(name):
@@ -125,7 +126,7 @@ class Inputs:
         raise Refused(say("{socket} is animated", socket=Sentence(name)))
 
     def value(self, name, default=0.0):
-        """Of a socket that has to be constant."""
+        """The value of a socket that has to be constant."""
         if name not in self:
             return default
         if self.follows(name):
@@ -133,22 +134,23 @@ class Inputs:
         return self.constant(name)
 
     def colors(self, name):
-        """The colour at which a model is sought, and those at which its error is told."""
+        """The colour for which a model is fitted, and the colours for which its error is
+        computed."""
         if self.follows(name) and (known := self.mean(name)) is None:
             return GREY, (DARK, BRIGHT)
         known = tuple(max(c, 0.0) for c in self.mean(name))
         return known, (known,)
 
     def setting(self, name):
-        """Of the node itself."""
+        """A setting of the node itself."""
         if (self._node.as_pointer(), name) in self._moved:
             label = self._node.bl_rna.properties[name].name
             raise Refused(say("{socket} is animated", socket=Sentence(label)))
         return getattr(self._node, name)
 
     def check_unknown(self, known):
-        """Raises Refused for what is set of the sockets and settings that a later version of
-        Blender has added."""
+        """Raises Refused if sockets or settings are in use that a later version of Blender has
+        added."""
         for socket in self._node.inputs:
             if socket.name in known or not socket.enabled:
                 continue
@@ -166,7 +168,7 @@ class Inputs:
 
 
 def given_of(node, inputs):
-    """What all Natives of a node share, and the roughnesses that they have."""
+    """What all Natives of a node have in common, and their roughnesses."""
     kind = KINDS[node.bl_idname]
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS[kind])
@@ -200,13 +202,14 @@ def color_of(kind):
 
 
 def natives(node):
-    """The node as Native, at one roughness or, where that is linked, at several. Raises Refused."""
+    """The node as Natives: one, or several roughnesses if the roughness is linked. Raises
+    Refused."""
     given, roughnesses = given_of(node, Inputs(node))
     return [Native(**given, roughness=r) for r in roughnesses]
 
 
 def _stretch(inputs, kind):
-    """Width of the lobe along the tangent over that across it."""
+    """Ratio of the lobe's width along the tangent to that across it."""
     a = inputs.value("Anisotropic" if kind == "principled" else "Anisotropy")
     if a == 0:
         return 1.0
@@ -219,7 +222,7 @@ def _stretch(inputs, kind):
 
 
 def glows(inputs):
-    """Whether a Principled node shines by itself."""
+    """Whether a Principled node emits light."""
     names = ("Emission Color", "Emission Strength")
     for name in names:
         known = inputs.constant(name)
@@ -231,5 +234,5 @@ def glows(inputs):
 
 
 def is_transparent(inputs):
-    """Whether a Principled node lets something of what is behind it through."""
+    """Whether a Principled node is partly transparent (Alpha)."""
     return inputs.follows("Alpha") or inputs.constant("Alpha") < 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which model would stand in for a node, with which values and links, and how far it is off."""
+"""Chooses the model that replaces a node, with its values and links, and estimates the error."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -25,17 +25,17 @@ from .node_values import (
 )
 from .seen_node import SeenNode
 
-#: Error of a plan above which it is refused where no other limit is given.
+#: A plan with a larger error is refused, unless another limit is given.
 LIMIT = 0.35
 
 
 @dataclass(frozen=True)
 class Part:
-    """A model with its values, in place of a node or of the metal in one."""
+    """A model with its values that replaces a node, or the metallic part of one."""
 
     model: str = ""
     values: dict = field(default_factory=dict)
-    #: Parameter by the node's socket.
+    #: Parameters by socket of the node.
     links: dict = field(default_factory=dict)
     #: Parameters that follow a linked roughness: (name, factor, power, low, high).
     widths: tuple = ()
@@ -43,23 +43,24 @@ class Part:
 
 @dataclass(frozen=True)
 class Plan(Part):
-    """How a node of a material would be converted; or, with a `refusal`, why it would not."""
+    """How a node of a material would be converted; or the reason (`refusal`) why not."""
 
     material: object = None
     node: object = None
-    #: Part of the light that goes elsewhere, as a picture of lamps that are as wide as windows
-    #: shows; seen from 0.95 to 0.25 in cosine. Where it depends on what is linked, the largest.
-    #: Infinite with a refusal that knows of no model.
+    #: Fraction of the light that the model misplaces, in a picture lit by lamps as wide as windows,
+    #: averaged over view cosines from 0.95 to 0.25. If it depends on linked values, this is the
+    #: maximum. Infinite if the plan was refused without a model.
     error: float = math.inf
-    #: The smallest where it depends on what is linked.
+    #: The minimum, if the error depends on linked values.
     least_error: float = math.inf
-    #: The model of the metal in the node, mixed with the other by the node's Metallic.
+    #: The model for the node's metallic part, mixed with the other one by the node's Metallic.
     metal: Part | None = None
-    #: Whether an Emission node is added, and a Transparent one mixed in by the node's Alpha.
+    #: Whether an Emission node is added, and whether a Transparent node is mixed in by the node's
+    #: Alpha.
     glows: bool = False
     transparent: bool = False
     refusal: str = ""
-    #: What the plan was made of.
+    #: The state of the node when the plan was made.
     seen: SeenNode | None = None
 
     @property
@@ -67,7 +68,7 @@ class Plan(Part):
         return [self, self.metal] if self.metal else [self]
 
     def within(self, limit):
-        """The same, refused where its error is above a limit."""
+        """The same plan, refused if its error exceeds a limit."""
         if self.refusal or self.error <= limit:
             return self
         why = say(
@@ -88,7 +89,7 @@ class Plan(Part):
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
     def line(self):
-        """What becomes of the node, in words."""
+        """What the node becomes, in words."""
         of = {"material": self.material.name, "node": Sentence(self.node.bl_label)}
         if self.node.bl_idname == "ShaderNodeGroup":
             of["node"] = self.node.node_tree.name
@@ -113,7 +114,7 @@ def _plan_glass(material, node):
         raise Refused(say("no model is of rough glass"))
     if inputs.value("Thin Film Thickness") != 0:
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
-    # Blender's glass tints what it reflects and what it lets through.
+    # Blender's glass tints both reflected and transmitted light.
     error = sum(abs(1 - c) for c in color) / max(sum(color), 1e-6)
     values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
     links = {"ior": "IOR"}
@@ -121,8 +122,8 @@ def _plan_glass(material, node):
 
 
 def _is_shown(model, values):
-    """Whether a model with these values is what a scene shows: a pack that is cut to a scene may
-    lack it, and without Open Shading Language a twin stands in for some choices."""
+    """Whether a scene can show a model with these values: a pack cut to a scene may lack it, and
+    without OSL some choices are shown by a twin."""
     if model not in pack.model_names():
         return False
     form = pack.native_form(model)
@@ -132,7 +133,7 @@ def _is_shown(model, values):
 
 
 def _part(inputs, native, fit):
-    """The Part that a Fit to a node is; `native`: the first of those that it was fitted to."""
+    """The Part for a Fit to a node; `native`: the first Native of the fit."""
     color = color_of(native.kind)
     candidate, factor, width = fit.candidate, fit.factor, fit.candidate.width
     links = {name: color if s == "Color" else s for name, s in candidate.links.items()}
@@ -153,7 +154,7 @@ def _plan_node(material, node):
     _, colors = inputs.colors(color)
 
     def near(**other):
-        """The Part for what of the node has these values, and its Fit."""
+        """The Part for the node with these values changed, and its Fit."""
         looked = tuple(Native(**given | other, roughness=r) for r in roughnesses)
         fit = nearest(looked, colors, inputs.reaches(color), _is_shown)
         if fit is None:
@@ -190,15 +191,15 @@ def _plan_node(material, node):
 
 
 def _mixed(share, plain, metal):
-    """The error of a mix of (light, error) of both."""
+    """The error of a mixture of two parts, given (light, error) of each."""
     lights = (1 - share) * plain[0], share * metal[0]
     return (lights[0] * plain[1] + lights[1] * metal[1]) / max(sum(lights), 1e-9)
 
 
 def plan(materials):
-    """A Plan for each node of these materials that is Diffuse, Glossy, Principled or Glass and that
-    Cycles shows. Refused are other nodes that reflect, and groups that have one of the four inside,
-    for other materials may share these."""
+    """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials. Refused
+    are other reflecting nodes, and groups that contain one of the four, as other materials may
+    share the groups."""
     plans = []
     for material in materials:
         for node in _convertible(material):
@@ -219,7 +220,7 @@ def plan(materials):
 
 
 def _convertible(material):
-    """The nodes of a material that there is a Plan for, in the order of its tree."""
+    """The nodes of a material for which there is a Plan, in the order of its tree."""
     if material.node_tree is None:
         return []
     found = set()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A node of Blender's own as a plan of its conversion saw it."""
+"""The state of a Blender node when its conversion was planned."""
 
 import bpy
 
@@ -9,7 +9,7 @@ from ..trees import animation, shader_trees, shader_values
 
 
 def _settings(node):
-    """{(identifier, label): value} of all that decides what a node looks like."""
+    """{(identifier, label): value} of everything that affects the node's appearance."""
     moved, values = animation.moved(node), shader_values.Constants()
     settings = {("distribution", "Distribution"): getattr(node, "distribution", None)}
     for socket in node.inputs:
@@ -23,12 +23,12 @@ def _settings(node):
 
 class SeenNode:
     def __init__(self, material, node):
-        # Names too: of what is removed Blender tells nothing, or crashes.
+        # Remembers names as well: accessing a removed material or node fails or crashes Blender.
         self._material, self._of, self._name = material, material.name, node.name
         self._kind, self._settings = node.bl_idname, _settings(node)
 
     def now(self):
-        """The node. Raises ValueError where it is not as it was."""
+        """Returns the node. Raises ValueError if it has changed."""
         material = next((m for m in bpy.data.materials if m == self._material), None)
         tree = material.node_tree if material is not None else None
         node = tree.nodes.get(self._name) if tree is not None else None

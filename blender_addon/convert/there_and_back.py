@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts models in the places of nodes, and the nodes back."""
+"""Replaces nodes by models, and restores them."""
 
 from dataclasses import dataclass, replace
 
@@ -12,25 +12,25 @@ from ..trees import shader_trees, shader_values
 from .node_values import KINDS
 from .plans import Part
 
-#: Custom property of a group node: the name of the node that it stands in for.
+#: Custom property of a group node: the name of the node that it replaces.
 BEFORE = "brdfc_before"
-#: And whether Bump Map Correction was on then; without it an earlier version converted the node,
-#: which turned it off.
+#: Whether Bump Map Correction was on at that time. Missing if an earlier version converted the
+#: node: that version turned it off.
 CORRECTED = "brdfc_before_bump_map_correction"
-#: Of nodes that were added for it: the name of the group node.
+#: Custom property of the nodes that were added along with it: the name of the group node.
 HELPS = "brdfc_helps"
 
 
 def apply(plans):
-    """Puts the models into the materials: links stay, and the nodes of before, which nothing shows
-    any more, so that restore() finds them. Returns how many nodes were converted.
+    """Puts the models into the materials; returns the number of converted nodes.
 
-    All groups are made before anything is changed. Raises ValueError, also where a node is not
-    what the plan was made of any more, CompileError.
+    Links stay, and so do the original nodes, unlinked, for restore(). All groups are made before
+    anything is changed. Raises ValueError, also if a node has changed since the plan was made, and
+    CompileError.
     """
     wanted = [replace(p, node=p.seen.now()) for p in plans if not p.refusal]
     editable.check(*(p.material for p in wanted))
-    # What is linked may have any value.
+    # A linked parameter may take any value.
     made = [[_Made(part, _values(part)) for part in p.parts] for p in wanted]
     known = set(bpy.data.node_groups)
     try:
@@ -46,14 +46,14 @@ def apply(plans):
 
 @dataclass(frozen=True)
 class _Made:
-    """A Part, and its values as sockets take them."""
+    """A Part with the group of its model, and its values as sockets take them."""
 
     part: Part
     values: dict
 
     @property
     def known(self):
-        """The same, and None for what is linked."""
+        """The values, with None for linked parameters."""
         return self.values | dict.fromkeys(self.part.links)
 
 
@@ -62,7 +62,7 @@ def _values(part):
 
 
 def _source(socket):
-    """The output that is linked to a socket, if that has any effect."""
+    """The output that is linked to a socket, if the link has an effect."""
     if not shader_trees.is_driven(socket):
         return None
     return next(link.from_socket for link in socket.links if shader_trees.counts(link))
@@ -85,7 +85,7 @@ def _replace(p, parts):
 
 
 def _add(p, made):
-    """The group node of a model, with the links of the node that it stands in for."""
+    """The group node of a model, with the links of the node that it replaces."""
     tree, node = p.material.node_tree, p.node
     group = nodes.add_group_node(tree, made.part.model, values=made.known)
     group.location = node.location
@@ -105,7 +105,7 @@ def _add(p, made):
 
 
 def _joined(p, groups):
-    """The shader of what stands in for a node: its models, and what else of it they lack."""
+    """The shader that replaces a node: its models, and the node's effects that they lack."""
     shader, *metal = (group.outputs["BSDF"] for group in groups)
     if metal:
         shader = _mix(p, groups[0], "Metallic", shader, metal[0])
@@ -124,7 +124,7 @@ def _joined(p, groups):
 
 
 def _helper(p, group, kind):
-    """A node that helps a group to stand in for another node."""
+    """A node that is added along with a group to replace another node."""
     tree = p.material.node_tree
     count = sum(n.get(HELPS) == group.name for n in tree.nodes)
     helper = tree.nodes.new(kind)
@@ -142,7 +142,7 @@ def _mix(p, group, name, first, second):
 
 
 def _give(p, socket, name):
-    """What reaches a socket of the node that is replaced, for another socket."""
+    """Passes what reaches a socket of the replaced node on to another socket."""
     own = p.node.inputs[name]
     if source := _source(own):
         p.material.node_tree.links.new(source, socket)
@@ -152,7 +152,7 @@ def _give(p, socket, name):
 
 
 def _follow(tree, group, roughness, factor, power, low, high):
-    """factor * roughness^power, held to the range of the parameter."""
+    """Nodes for factor * roughness^power, clamped to the range of the parameter."""
     source = roughness
     for i, (operation, *operands) in enumerate(
         (
@@ -174,7 +174,7 @@ def _follow(tree, group, roughness, factor, power, low, high):
 
 
 def is_converted(node):
-    """Whether a node stands in for one of Blender's own."""
+    """Whether a node replaces one of Blender's own."""
     return nodes.is_ours(node) and BEFORE in node
 
 
@@ -184,15 +184,15 @@ def _before(group):
 
 
 def _outgoing(group, helpers):
-    """The links by which a group and the nodes that help it are shown."""
+    """The outgoing links of a group and of the nodes added along with it."""
     every = [group, *helpers]
     shaders = [s for node in every for s in node.outputs if s.type == "SHADER"]
     return [link for s in shaders for link in s.links if link.to_node not in every]
 
 
 def restore(material):
-    """Puts the nodes of before back, and the settings; where they are gone, the twin, which
-    Blender's own nodes are as well. Returns how many nodes were put back. Raises ValueError where
+    """Restores the original nodes and settings; where these nodes were deleted, uses the twin,
+    which also consists of Blender's own nodes. Returns the number of nodes. Raises ValueError if
     there is neither."""
     editable.check(material)
     if material.node_tree is None:
@@ -200,7 +200,7 @@ def restore(material):
     tree = material.node_tree
     pairs = [(n, _before(n)) for n in tree.nodes if is_converted(n)]
     for group, before in pairs:
-        if before is None:  # refused before anything is changed
+        if before is None:  # refuses before anything is changed
             others = [n for n in tree.nodes if n.get(HELPS) == group.name and nodes.is_ours(n)]
             for model in (group, *others):
                 pack.resolve(nodes.identity(model)[0], "twin", nodes.all_values(model))

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Has materials whose form is left to choose by itself follow the settings of the scene: a form of
-scripts where Open Shading Language runs, and one of Blender's own nodes where Cycles lacks it.
+"""Switches materials of the form "auto" when the scene's settings change: to a form of OSL scripts
+where Open Shading Language runs, and to a form of Blender's own nodes where it doesn't.
 
-What is exchanged is the content of the models' groups. Materials keep their nodes, and so values,
-links, animation and drivers. Blender calls handlers after a step of undo is recorded, and when it
-goes back takes what the step before has in common with it to be unchanged. So groups that were
-filled by a handler are emptied before a step back, for what they hold may be gone with it, and
-filled again afterwards.
+Only the contents of the models' groups are replaced. Materials keep their group nodes, and with
+them values, links, animation and drivers.
+
+Undo needs care. Blender calls handlers after it has recorded an undo step; and on undo it assumes
+that data shared by two steps is unchanged. A group that a handler filled after the step was
+recorded may therefore point to data that undo frees. So groups filled by a handler are emptied
+before undo and redo, and filled again afterwards.
 """
 
 from bpy.app.handlers import persistent
@@ -17,15 +19,16 @@ from ..common.i18n import of_error
 from ..packs import device
 from . import nodes
 
-#: Whether groups are being filled; the scene of which a picture is being made; session_uid of
-#: groups that were filled by a handler.
+#: _busy: whether groups are being filled. _rendering: the scene being rendered. Then the
+#: session_uid of the groups that a handler has filled.
 _busy = False
 _rendering = None
 _filled = set()
 
 
 def follow(scene=None):
-    """Has the groups of the file suit a scene, or that of the first window."""
+    """Adapts the automatic groups of the file to a scene, by default to that of the first
+    window."""
     global _busy
     if _busy or nodes.is_at_work():
         return
@@ -46,7 +49,7 @@ def follow(scene=None):
 def _quietly(scene=None):
     try:
         follow(scene)
-    except RuntimeError as error:  # CompileError and PackError: materials stay as they are
+    except RuntimeError as error:  # CompileError, PackError: materials stay as they are
         print(f"brdfc: {of_error(error)[0]}")
 
 
@@ -65,14 +68,14 @@ def _before_render(scene, *_):
 
 @persistent
 def _before_bake(*_):
-    """Blender calls no other handler before it bakes textures."""
+    """Baking textures calls no other handler."""
     if _rendering is None:
         _quietly()
 
 
 @persistent
 def _now(*_):
-    """A file was loaded or is to be saved, a picture is over."""
+    """After a file was loaded, before it is saved, and after a render."""
     global _rendering
     _rendering = None
     _quietly()

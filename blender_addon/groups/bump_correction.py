@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bump Map Correction of a material: off while a form needs that, else as its owner has it.
+"""Bump Map Correction of a material: off while one of its forms needs that, else the user's choice.
 
-Shaders bend normals themselves, as that setting does. It would also bend the normals of closures
-that lean, which fitted forms are made of; twins are better with it than without. Earlier versions
-turned it off for every form and did not record what it was.
+The shaders of brdfc correct bumped normals themselves, as that setting does. It would also bend the
+tilted normals of the closures that fitted forms consist of; twins are better with it on. Earlier
+versions turned it off for every form and did not record the user's choice.
 """
 
 from ..common.i18n import say
 from . import nodes
 
-#: Of a material: what the setting was before it was turned off.
+#: Custom property of a material: the setting before it was turned off.
 _BEFORE = "brdfc_bump_map_correction"
 CODE = "bump_correction"
 
@@ -20,8 +20,8 @@ def _is_needed_off(material):
 
 
 def prepare(material):
-    """Turns the setting off where a form needs that, and else back to what it was; returns a
-    sentence for each change."""
+    """Turns the setting off where a form needs that, and restores it otherwise; returns a sentence
+    for each change."""
     cycles = material.cycles
     if _is_needed_off(material):
         if not cycles.use_bump_map_correction:
@@ -36,13 +36,12 @@ def prepare(material):
 
 
 def recorded(material):
-    """What the owner of a material has the setting at."""
+    """The value that the user chose for the setting."""
     return bool(material.get(_BEFORE, material.cycles.use_bump_map_correction))
 
 
 def restore(material, value):
-    """Gives a material the setting of before its nodes were converted, but where a form still needs
-    it off."""
+    """Restores the setting from before a conversion, unless a form still needs it off."""
     material.cycles.use_bump_map_correction = value
     material.pop(_BEFORE, None)
     prepare(material)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials that are appended, or dragged from the Asset Browser, bring the groups that they are
-made of. Where the file has an equal one, that stays alone; the list of lamps is brought up to date.
+"""Replaces the groups that an appended or dragged material brings by equal groups of the file, and
+updates the list of lamps.
 
-Blender itself would have each drag add another copy where the file has a group of its own making.
+Blender itself would add another copy with each drag if the file has made its own group.
 """
 
 import bpy
@@ -14,8 +14,8 @@ from . import automatic, nodes
 
 
 def _brought(context):
-    """The groups of this extension that came because something else needs them. What was asked for
-    by name must stay: Blender hands it on."""
+    """The groups of this extension that were imported as dependencies. Those that the user asked
+    for by name must stay, as Blender goes on to use them."""
     return [
         item.id
         for item in context.import_items
@@ -36,7 +36,7 @@ def _after_import(context):
         lamps.follow()
         automatic.follow()
     if any(item.id_type == "NODETREE" for item in context.import_items):
-        # Some may have gone, as parts of what has become another form.
+        # Some may be gone already: the parts of a group that has changed its form.
         nodes.unite([group for group in bpy.data.node_groups if group.session_uid in known])
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Node groups around an OSL script node, and for twins around Blender's own nodes.
+"""Finds, makes and exchanges the node groups of models, around OSL script nodes or Blender's own.
 
-A group is made once per model, representation and version of the shader, and reused. Source and
-bytecode both lie inside the .blend, so a saved file renders where the extension is not installed.
+A group is made once for each model, representation and shader version, and then reused. The .blend
+holds both source and bytecode, so a saved file renders where the extension is not installed.
 """
 
 import contextlib
@@ -20,41 +20,40 @@ from ..packs.pack import choice_label
 from ..trees import animation, shader_trees
 
 TAG = pack.TAG
-#: In the tag of a group that suits itself to the scene: its form where that has Open Shading
-#: Language.
+#: Key in the tag of a group that adapts to the scene: the form it takes where OSL runs.
 AUTO = "auto"
 
 
 def empty_tree(owner):
-    """The node tree of a new material or world, without a node."""
-    if owner.node_tree is None:  # before 5.0 it starts without nodes
+    """The node tree of a new material or world, emptied."""
+    if owner.node_tree is None:  # before 5.0 there is none at first
         owner.use_nodes = True
     owner.node_tree.nodes.clear()
     return owner.node_tree
 
 
 def is_fitted(node):
-    """Whether the form of a group node is closures, or Blender's own, fitted to the model; others
-    reflect what the model does, on average."""
+    """Whether a group node's form approximates the model by fitted closures or nodes. Other forms
+    reproduce the model on average."""
     return identity(node)[1] in ("twin", "fitted")
 
 
 def source_text(group):
-    """The source of a group's shader, which the file holds; "" of a group that has lost it."""
+    """Source text of a group's shader, which the file holds; "" if it was deleted."""
     script, _ = group_content.scripts(group)
     return script.script.as_string() if script is not None and script.script else ""
 
 
 def is_ours(node):
-    """Whether a node is a group of this extension, also of another version of it."""
+    """Whether a node is a group of this extension, of whichever version."""
     tree = getattr(node, "node_tree", None)
     return node.bl_idname == "ShaderNodeGroup" and tree is not None and TAG in tree
 
 
 def find_group(model_name, representation, albedo=False, automatic=None):
-    """The group of the current version of a shader, if the file has a sound one; `albedo` as in
-    ensure_group. `automatic`: the form with Open Shading Language, of a group that suits itself to
-    the scene."""
+    """The group of the current version of a shader, if the file has an intact one; `albedo` as in
+    ensure_group. `automatic`: the form to take where OSL runs, of a group that adapts to the
+    scene."""
     albedo = albedo and has_albedo_script(model_name, automatic or representation)
     digest = pack.digest(model_name, representation)
     for group in bpy.data.node_groups:
@@ -68,12 +67,12 @@ def find_group(model_name, representation, albedo=False, automatic=None):
 
 
 def is_sound(group):
-    """Whether a group has all that it was made with."""
+    """Whether nothing that a group was made with is missing."""
     return bool(group.nodes) and script_problem(group) is None
 
 
 def with_parts(groups):
-    """These groups, and those of this extension within them."""
+    """These groups, and the groups of this extension inside them."""
     found, new = set(), set(groups)
     while new:
         found |= new
@@ -82,10 +81,10 @@ def with_parts(groups):
 
 
 def unite(groups):
-    """Has groups that came from another file give way to equal ones of the open file."""
+    """Replaces groups that came from another file by equal ones of the open file."""
     stand_in.keep_one_text()
 
-    # Parts of others first: of all forms their twins, of automatic ones their forms.
+    # Inner groups first: twins are inside other forms, and forms inside automatic groups.
     def depth(group):
         return 2 if AUTO in group[TAG] else int(group[TAG]["representation"] != "twin")
 
@@ -94,7 +93,7 @@ def unite(groups):
 
 
 def _give_way(group):
-    """Puts the group of the open file that is equal in its place, if there is one."""
+    """Replaces a group by the equal one of the open file, if there is one."""
     tag = group[TAG].to_dict()
     for other in bpy.data.node_groups:
         same = other != group and other.library is None and TAG in other
@@ -105,18 +104,19 @@ def _give_way(group):
 
 
 def _let_go(group):
-    """Has the texts of a group, which older versions kept for good, go with their last user."""
+    """Removes the fake users of a group's texts, which older versions set, so that they are deleted
+    with their last user."""
     for text in (n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script):
         text.use_fake_user = False
 
 
 def ensure_group(model_name, representation="auto", baked=None, albedo=False, values=None):
-    """Node group of a model, made if the file has none. Raises ValueError, CompileError.
+    """Finds or makes the node group of a model. Raises ValueError, CompileError.
 
-    Nothing is left in the file when it fails. That of "auto" suits itself to the scene, where the
-    model has a form for that: see suit(). `values` of parameters tell which forms there are.
-    `baked`: hash of the extension that a pack of the open file alone, which pack.use() has taken,
-    stands in for. `albedo`: with the Albedo output, also where that takes a script of large tables.
+    Leaves nothing in the file on failure. A group of "auto" adapts to the scene if the model has a
+    form for that; see suit(). `values` of the parameters decide which forms are available. `baked`:
+    hash of the extension in whose place the pack of the open file is in use (see pack.use).
+    `albedo`: adds the Albedo output even if that takes a script with large tables.
     """
     if representation == "auto" and not baked:
         with_osl = pack.automatic(model_name, values)
@@ -128,7 +128,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
         return group
     with _new_group(model_name, representation, representation, albedo) as group:
         if baked:
-            # The pack will be gone.
+            # The pack of the file is gone when the group is examined later.
             entry = {
                 "of": baked,
                 "form": pack.representation(model_name, representation),
@@ -140,7 +140,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
 
 
 def _ensure_automatic(model_name, with_osl, albedo):
-    """Node group that suits itself to the scene; `with_osl`: its form where that has OSL."""
+    """The group that adapts to the scene; `with_osl`: its form where OSL runs."""
     native = pack.native_form(model_name)
     for form in (with_osl, native):
         if group := find_group(model_name, form, albedo, with_osl):
@@ -155,19 +155,19 @@ def _ensure_automatic(model_name, with_osl, albedo):
     return group
 
 
-#: Groups that are being made. Lamps are looked for then, and Blender calls handlers.
+#: Groups under construction: making them updates the lamps, which makes Blender call handlers.
 _unfinished = []
 
 
 def is_at_work():
-    """Whether a group is being made."""
+    """Whether a group is under construction."""
     return bool(_unfinished)
 
 
 @contextlib.contextmanager
 def _new_group(model_name, name, form, albedo):
-    """A new group with the sockets of a form, for the body to fill; where that raises, it and what
-    it was made of are taken out of the file again."""
+    """A new group with the sockets of a form, which the body of the with statement fills. If the
+    body raises, the group and its parts are removed from the file."""
     known = set(bpy.data.node_groups)
     parts = [name, *([ALBEDO] if albedo and has_albedo_script(model_name, form) else [])]
     title = f"{pack.model(model_name)['label']} ({', '.join(parts)})"
@@ -187,20 +187,19 @@ def _new_group(model_name, name, form, albedo):
         yield group
     except BaseException:
         remove_group(group)
-        remove_unused_groups(known)  # a twin that was made for it
+        remove_unused_groups(known)  # its twin, if one was made
         raise
     finally:
         _unfinished.pop()
 
 
 def _fill(group, model_name, representation, albedo):
-    """Makes the nodes of a form in a group. Raises CompileError; texts that were made are gone
-    then."""
+    """Makes the nodes of a form in a group. If it raises CompileError, it has removed its texts."""
     stem, source = pack.source(model_name, representation)
     sources = {stem: source}
     if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
         sources |= dict([of_albedo])
-    # Lean ones hold no more than a render needs.
+    # Lean groups hold only what a render needs.
     has_twin = "twin" in pack.model(model_name)["representations"]
     stands_in = representation != "twin" and "baked" not in group[TAG] and has_twin
     twin_group = ensure_group(model_name, "twin") if stands_in else None
@@ -225,14 +224,14 @@ def _remove_others(group, kept):
 
 
 def form_in_script(node):
-    """The form that says which values a node's sockets can have; of an automatic one that with
-    Open Shading Language."""
+    """The form that decides which values a node's sockets can have: of an automatic group, the form
+    for OSL."""
     tag = node.node_tree[TAG]
     return tag.get(AUTO, tag["representation"])
 
 
 def automatic_groups():
-    """Groups of this file that suit themselves to the scene."""
+    """The groups of this file that adapt to the scene."""
     return [g for g in bpy.data.node_groups if g.library is None and AUTO in g.get(TAG, ())]
 
 
@@ -240,16 +239,16 @@ def _is_current(group):
     tag = group[TAG]
     try:
         return tag["digest"] == pack.digest(tag["model"], tag["representation"])
-    except ValueError:  # a model or form that the installed version does not have
+    except ValueError:  # a model or form that the installed version lacks
         return False
 
 
 def suit(group, lacks_osl):
-    """Has an automatic group be the form that a scene with or without Open Shading Language can
-    render, if the installed version made it; sockets stay. Returns whether it was another. Raises
-    CompileError; it is then as it was."""
+    """Changes an automatic group to the form that a scene with or without OSL can render, if the
+    installed version made the group; sockets stay. Returns whether the form has changed. If it
+    raises CompileError, the group is as it was."""
     tag = group[TAG]
-    # Handlers ask at each change of the scene, and to tell the version takes a hash.
+    # Handlers call this at each change of the scene, and computing the version takes a hash.
     if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl:
         return False
     if not _is_current(group):
@@ -283,7 +282,7 @@ def _suit(group, form):
 
 
 def empty(group):
-    """Takes all nodes out of an automatic group; suit() makes them again."""
+    """Removes all nodes of an automatic group; suit() makes them again."""
     group.nodes.clear()
 
 
@@ -298,8 +297,8 @@ def add_group_node(tree, model_name, representation="auto", values=None):
 
 
 def identity(node):
-    """(model, representation) of a group node. Of an automatic one the form that it has now, for
-    its choices."""
+    """(model, representation) of a group node; of an automatic one the current form, which may
+    depend on its choices."""
     tag = node.node_tree[TAG]
     if _lacks_choice(node):
         return tag["model"], tag[AUTO]
@@ -307,13 +306,13 @@ def identity(node):
 
 
 def is_automatic(node):
-    """Whether a node has the form that the scene can render, whichever that is."""
+    """Whether a node adapts its form to the scene."""
     return AUTO in node.node_tree[TAG]
 
 
 def _lacks_choice(node):
-    """Whether an automatic node stands where there is no Open Shading Language, with a choice that
-    its form lacks there: its twin is shown."""
+    """Whether an automatic node, where OSL does not run, has a choice that its form lacks there, so
+    that its twin is shown."""
     tag = node.node_tree[TAG]
     if tag.get(AUTO, tag["representation"]) == tag["representation"]:
         return False
@@ -322,19 +321,19 @@ def _lacks_choice(node):
 
 
 def runs_anywhere(node):
-    """Whether what a node shows needs no Open Shading Language."""
+    """Whether the current form of a node needs no OSL."""
     return is_native(node.node_tree) and not _lacks_choice(node)
 
 
 def is_stood_in_for(node):
-    """Whether Blender's own nodes stand in for a node where its form does not run."""
+    """Whether Blender's own nodes replace a node where its form does not run."""
     inner = [n.node_tree[TAG]["representation"] for n in node.node_tree.nodes if is_ours(n)]
     has_twin = "twin" in inner
     return stand_in.is_in(node.node_tree) or (has_twin and _lacks_choice(node))
 
 
 def made_of(group):
-    """The group that has the nodes of a form: an automatic one may have another in it."""
+    """The group with the nodes of the form: an automatic group may hold another group."""
     if AUTO in group[TAG] and group[TAG][AUTO] != group[TAG]["representation"]:
         form = group[TAG]["representation"]
         inner = (n.node_tree for n in group.nodes if is_ours(n))
@@ -348,18 +347,19 @@ def is_baked(node):
 
 
 def made_by(node):
-    """Which version made a node's group, as "brdfc 1.2.3"; the first ones did not say."""
+    """The version that made a node's group, as "brdfc 1.2.3"; the first versions did not record
+    it."""
     return node.node_tree[TAG].get("made_by", "brdfc 0")
 
 
 def is_newer(node):
-    """Whether a later version than the installed one made a node's group."""
+    """Whether a version later than the installed one made a node's group."""
     return pack.version(made_by(node)) > pack.version(pack.manifest()["generator"])
 
 
 def manifest_entry(node):
-    """What the manifest says of a node's form, and its parameters by name; None where the group is
-    of another version of the extension."""
+    """The manifest's entry of a node's form, and the parameters by name; None if another version of
+    the extension made the group."""
     model_name, representation = identity(node)
     tag = node.node_tree[TAG]
     if is_baked(node):
@@ -372,7 +372,7 @@ def manifest_entry(node):
 
 
 def sockets(node):
-    """Input sockets of a group node by parameter name, and Normal, Tangent."""
+    """Input sockets of a group node by parameter name, and Normal and Tangent."""
     by_identifier = {s.identifier: s for s in node.inputs}
     return {
         name: by_identifier[identifier]
@@ -386,14 +386,15 @@ def _choices(node, name):
 
 
 def _only(node):
-    """Values of the parameters that a form has one value of; files of older versions lack them."""
+    """Parameters for which the form has a single value; groups of older versions do not list
+    them."""
     return pack.canonical(json.loads(node.node_tree[TAG].get("only", "{}")))
 
 
 def set_value(node, name, value):
     """Sets a socket to a value in the canonical form of pack.check_value."""
     socket = sockets(node).get(name)
-    if socket is None:  # there is one value
+    if socket is None:  # the form has a single value
         return
     if socket.type == "RGBA":
         value = (*value, 1.0)
@@ -405,8 +406,8 @@ def set_value(node, name, value):
 
 
 def get_value(node, name):
-    """Value of a socket in the same form; None where a node's output reaches it, and of a vector.
-    Links that Cycles ignores do not count."""
+    """Value of a socket in the same form; None for vectors, and if a node's output reaches the
+    socket. Links that Cycles ignores do not count."""
     socket = sockets(node).get(name)
     if socket is None:
         only = _only(node)
@@ -426,8 +427,8 @@ def get_value(node, name):
 
 
 def varying(node):
-    """Parameters of a group node that are not constant: what a link controls, a curve animates or a
-    driver sets. Links that Cycles ignores do not count."""
+    """Parameters of a group node that are not constant: linked, animated or driven. Links that
+    Cycles ignores do not count."""
     moved = animation.inputs(node)
     return {
         name
@@ -446,7 +447,7 @@ def _trees(tree, seen):
 
 
 def trees_within(node):
-    """The trees of a group node, nested groups included; those of this extension have none."""
+    """The trees inside a group node, nested groups included; none for groups of this extension."""
     trees = []
     if not is_ours(node):
         _trees(getattr(node, "node_tree", None), trees)
@@ -454,27 +455,27 @@ def trees_within(node):
 
 
 def all_nodes(owner):
-    """Every node of a material or world, those in nested groups included, but for what groups of
-    this extension hold."""
+    """Every node of a material or world, including those in nested groups, but not what groups of
+    this extension contain."""
     trees = []
     _trees(owner.node_tree, trees)
     return [node for tree in trees for node in tree.nodes]
 
 
 def group_nodes(material):
-    """Every group node of this extension in a material, nested groups included."""
+    """Every group node of this extension in a material, including those in nested groups."""
     return [node for node in all_nodes(material) if is_ours(node)]
 
 
 def shown_nodes(material):
-    """The same of those that Cycles shows: what is muted, lies behind links that are, or reaches no
-    active output is not among them."""
+    """The same, but only nodes that Cycles shows: not those that are muted, lie behind muted links
+    or reach no active output."""
     found = (shown.node for shown in shader_trees.shown(material))
     return list(dict.fromkeys(node for node in found if is_ours(node)))
 
 
 def make_local(tree):
-    """Makes the groups, scripts and images that a tree of this file is made of this file's own."""
+    """Makes local the groups, scripts and images that a local tree uses."""
     for node in tree.nodes:
         for name in ("node_tree", "script", "image"):
             inner = getattr(node, name, None)
@@ -485,19 +486,19 @@ def make_local(tree):
 
 
 def all_values(node):
-    """Value of each parameter by name, as get_value() has it."""
+    """The value of each parameter by name, as get_value() returns it."""
     choices = json.loads(node.node_tree[TAG]["choices"])
     names = dict.fromkeys((*choices, *_only(node), *sockets(node)))
     return {name: get_value(node, name) for name in names}
 
 
 def constants(node):
-    """The same, and None for what is varying()."""
+    """The same, with None for parameters that are varying()."""
     return all_values(node) | dict.fromkeys(varying(node))
 
 
 def remove_group(group):
-    """Takes a group out of the file, and its texts, images and twin, if nothing else has them."""
+    """Removes a group from the file, and its texts, images and twin if nothing else uses them."""
     texts = {n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script}
     images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage" and n.image}
     inner = {n.node_tree.session_uid for n in group.nodes if is_ours(n)}
@@ -509,14 +510,14 @@ def remove_group(group):
 
 
 def _clear_away(uids, texts):
-    """Takes what were parts of a group out of the file where nothing else has them: groups with
-    these session_uids, and texts."""
+    """Removes the parts of a group from the file if nothing else uses them: the groups with these
+    session_uids, and the texts."""
     trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
     used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
     for text in {*texts, *stand_in.texts()}:
         if text not in used:
             bpy.data.texts.remove(text)
-    # Those that go take what only they have with them.
+    # Removing a group may leave further ones without a user.
     while unused := [g for g in bpy.data.node_groups if g.session_uid in uids and g.users == 0]:
         remove_group(unused[0])
     formula_nodes.remove_unused_parts()
@@ -524,7 +525,7 @@ def _clear_away(uids, texts):
 
 
 def remove_unused_groups(kept=()):
-    """Takes every group of this extension that no node has out of the file, but for those."""
+    """Removes every group of this extension that no node uses, except those in `kept`."""
 
     def unused(group):
         ours = TAG in group and group.library is None
@@ -535,10 +536,10 @@ def remove_unused_groups(kept=()):
 
 
 def switch(node, representation):
-    """Puts another representation of the same model into a group node; values and links stay.
+    """Changes a group node to another form of the same model; values and links stay.
 
-    Raises ValueError, also where the file would not keep that, CompileError; the node is then as it
-    was.
+    Raises ValueError, also if the file would not keep the change, and CompileError; the node is
+    then as it was.
     """
     editable.check(node.id_data)
     model_name, _ = identity(node)
@@ -550,7 +551,7 @@ def switch(node, representation):
 
 
 def _exchange(node, group):
-    """Puts another group into a node; that of before goes where nothing else has it."""
+    """Puts another group into a node; the old one is removed if nothing else uses it."""
     before = node.node_tree
     replace_group(node, group)
     if before.users == 0 and before.library is None:
@@ -558,15 +559,15 @@ def _exchange(node, group):
 
 
 def uses_albedo(node):
-    """Whether something is linked to a group node's Albedo output."""
+    """Whether a group node's Albedo output is linked."""
     return ALBEDO in node.outputs and node.outputs[ALBEDO].is_linked
 
 
 def add_albedo(node):
-    """Gives a group node the Albedo output, if it lacks that; values and links stay.
+    """Adds the Albedo output to a group node if it lacks it; values and links stay.
 
-    Raises ValueError for one that lacks it and is not of the installed extension, and where the
-    file would not keep that; CompileError.
+    Raises ValueError if another version of the extension made the group, or the file would not keep
+    the change, and CompileError.
     """
     editable.check(node.id_data)
     if ALBEDO in node.outputs:
@@ -593,7 +594,7 @@ def add_albedo(node):
 
 def replace_group(node, group):
     """Puts another group of the same model into a group node; values, links and animation stay.
-    Animation of what the group has no socket of is muted."""
+    Animation of inputs that the new group lacks is muted."""
     if group == node.node_tree:
         return
     tree = node.id_data
@@ -618,7 +619,7 @@ def replace_group(node, group):
             tree.links.new(source, present[name]).is_muted = muted
     for name, target, muted in outgoing:
         tree.links.new(node.outputs[name], target).is_muted = muted
-    for curve, owner, name in animated:  # which knows sockets by their number
+    for curve, owner, name in animated:  # curves address sockets by index
         if name in present:
             animation.follow(curve, owner, present[name])
         else:

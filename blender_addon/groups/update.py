@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of another version of the extension, in a file that is opened with this one."""
+"""Updates materials that another version of the extension made, when their file is opened."""
 
 from dataclasses import dataclass
 
@@ -16,15 +16,15 @@ from . import nodes
 
 @dataclass(frozen=True)
 class Update:
-    """What update() did: how many nodes have this version's shaders now, and a sentence for each
-    that kept what it had, or that took another form."""
+    """The result of update(): the number of nodes that now have this version's shaders, and a
+    sentence for each node that kept its own or took another form."""
 
     count: int
     refusals: tuple
     notes: tuple
 
 
-#: What the update of the file that was opened last did, if the preferences ask for one.
+#: The Update of the file that was opened last, if the preferences ask for updates.
 last = None
 
 
@@ -53,14 +53,14 @@ def others():
     found = []
     for material in bpy.data.materials:
         for node in nodes.group_nodes(material):
-            # A group that several materials share has its node in each of them.
+            # The nodes of a group that several materials share would be found once per material.
             if nodes.manifest_entry(node) is None and node not in [n for _, n in found]:
                 found.append((material, node))
     return found
 
 
 def refusal(material, node):
-    """Why a node can't take this version's shader with all that it is set to; None if it can."""
+    """Why a node can't take this version's shader with all of its settings; None if it can."""
     model_name, _ = nodes.identity(node)
     for block in (material, node.id_data):
         if block.library is not None:
@@ -96,10 +96,10 @@ def refusal(material, node):
 
 
 def update():
-    """Gives every node of another version the shader of this one; values, links and form stay.
+    """Gives every node of another version the shader of this one; values, links and forms stay.
 
-    A form that is no more becomes "auto". What can't be kept is not lost: such a node stays as it
-    is, with its old shader, which goes on rendering. Returns an Update.
+    A form that no longer exists becomes "auto". Nothing is lost: a node whose settings can't be
+    kept stays as it is, and its old shader continues to render. Returns an Update.
     """
     count, refusals, notes = 0, [], []
     for material, node in others():

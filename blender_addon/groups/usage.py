@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the open file uses the models, and what has changed of that since."""
+"""Describes how the open file uses the models, and detects changes since an earlier description."""
 
 from dataclasses import dataclass
 
@@ -15,20 +15,21 @@ VARIES = {"varies": True}
 
 @dataclass(frozen=True)
 class Use:
-    """Of a model, by a node of a material."""
+    """The use of a model by a node of a material."""
 
     material: object
     node: object
-    #: As `materials` of a scene file has it.
+    #: As in `materials` of a scene file.
     entry: dict
-    #: The form that it has now, which the entry leaves open where it follows the scene.
+    #: The form it has now; the entry leaves it open if it follows the scene.
     form: str
-    #: Of its group: another one whenever the shader is.
+    #: Identifies the shader of its group; changes when that does.
     shader: tuple
 
 
 def _as_typed(value):
-    """0.9 for the float that is next to it, so that a value is again the one that was given."""
+    """Undoes the rounding of single precision, as 0.9 for the nearest float, so that the value is
+    again the one that was entered."""
     if isinstance(value, tuple):
         return [_as_typed(channel) for channel in value]
     return float(str(np.float32(value))) if isinstance(value, float) else value
@@ -53,8 +54,8 @@ def _use(material, node):
 
 
 def _names(material, node, alone):
-    """What a model of a material is called: groups inside it may have nodes of one name, and
-    materials of two files one name."""
+    """Unique names for the models of a material: groups in it may contain nodes of the same name,
+    and two files materials of the same name."""
     if alone:
         yield material.name
     yield f"{material.name}/{node.name}"
@@ -66,7 +67,7 @@ def _names(material, node, alone):
 
 
 def uses():
-    """{MATERIAL: Use} of the open file; of a material with several model nodes MATERIAL/NODE."""
+    """{MATERIAL: Use} of the open file; MATERIAL/NODE for a material with several model nodes."""
     found = {}
     for material in sorted(bpy.data.materials, key=lambda m: m.library is not None):
         ours = nodes.group_nodes(material)
@@ -83,7 +84,7 @@ def _shown(value):
 
 
 def _change(before, after):
-    """How a Use differs from what it was, in words; None where it does not."""
+    """How a Use has changed, in words; None if it has not."""
     if after is None:
         return say("there is no such model any more")
     old, new = before.entry, after.entry
@@ -107,7 +108,7 @@ def _change(before, after):
 
 
 def stale(material, what):
-    """What is raised where a plan is to be applied that was made of something else."""
+    """The exception for a plan that no longer matches the material."""
     return ValueError(
         say(
             "{material!r} has changed since the plan was made: {what}. Make a new plan",
@@ -118,7 +119,7 @@ def stale(material, what):
 
 
 def check(before):
-    """{name: Use} as it is now, where nothing of `before` has changed. Raises ValueError."""
+    """The current {name: Use}, if nothing in `before` has changed. Raises ValueError otherwise."""
     now = uses()
     for name, use in before.items():
         if what := _change(use, now.get(name)):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tells shaders where the lamps are: forms that aim closures at lamps read one shared node group.
 
-Its outputs, four vectors a slot, are constants to Cycles. What moves is driven without Python
-expressions, so a saved file renders and animates where neither the extension nor scripts may run.
-A list that is out of date costs noise, and the light of lamps without a size that it lacks: forms
-are right otherwise, whatever it says.
+Its outputs, four vectors per slot, are constants to Cycles. Moving lamps are followed by drivers
+without Python expressions; so a saved file renders and animates correctly even where the extension
+is not installed and scripts may not run. An outdated list causes noise, and loses the light of
+lamps without a size that are missing from it; apart from that, forms stay correct.
 """
 
 from .filling import count, current_scene, ensure_group, follow, limit_by, see, seen

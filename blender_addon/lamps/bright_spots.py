@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the small bright places of an environment picture."""
+"""Finds small bright spots in environment images."""
 
 import math
 
@@ -9,14 +9,15 @@ from .slots import SLOTS
 
 
 def _pixel_directions(u, v):
-    """Unit vectors (x, y, z) of an equirectangular picture; docs/cycles.md."""
+    """Unit vectors (x, y, z) of an equirectangular image; see docs/cycles.md."""
     phi, theta = (0.5 - u) * 2 * np.pi, (v - 0.5) * np.pi
     flat = np.cos(theta)
     return np.stack([flat * np.cos(phi), flat * np.sin(phi), np.sin(theta)], -1)
 
 
 def _reduced(luminance, limit):
-    """Means of blocks, so that no side is longer than the limit, and how large they are."""
+    """Averages blocks of pixels so that no side exceeds the limit; returns the result and the block
+    size."""
     step = max(1, math.ceil(max(luminance.shape) / limit))
     if step == 1:
         return luminance, 1
@@ -28,8 +29,8 @@ def _reduced(luminance, limit):
 
 
 def _connected(mask, start):
-    """The part of a mask, whose columns go round, that hangs together with a pixel; gaps of a few
-    pixels don't count."""
+    """The part of a mask, periodic in its columns, that is connected to a pixel; gaps of a few
+    pixels are bridged."""
     block = max(1, mask.shape[1] // 256)
     rows, columns = (np.arange(0, n, block) for n in mask.shape)
     coarse = np.logical_or.reduceat(np.logical_or.reduceat(mask, rows, 0), columns, 1)
@@ -46,20 +47,21 @@ def _connected(mask, start):
     return mask & whole[: mask.shape[0], : mask.shape[1]]
 
 
-#: Share of all light times radiance over its mean, from which a place is worth a lobe: drawn
-#: directions that meet it by chance make a variance of about that much, in squares of all light.
+#: Threshold of (fraction of all light) times (radiance over mean radiance) for a spot to get a
+#: lobe. This product is about the variance from random rays that hit the spot, in units of the
+#: squared total light.
 _WORTH = 0.2
-#: The full angle of the largest place: in wider ones light differs more from place to place, and
-#: drawn directions meet them.
+#: Largest full angle of a spot: in wider ones the light varies too much, and random rays hit them
+#: anyway.
 _WIDEST = math.radians(30)
 
 
 def find(luminance, count=SLOTS):
-    """The bright places of an equirectangular picture, (height, width), row 0 at the bottom:
+    """The bright spots of an equirectangular image, (height, width), row 0 at the bottom:
     [(direction, full angle, irradiance)], the brightest first.
 
-    A place has a radiance of 3 times the mean at its peak, is 30 degrees wide at most, does not
-    lie around a brighter one, and has a share of all light that is worth a lobe: 1 % where its
+    A spot has a peak radiance of at least 3 times the mean, is at most 30 degrees wide, does not
+    surround a brighter one, and holds enough of the light to be worth a lobe: 1 % where its
     radiance is 20 times the mean, 4 % at 5 times.
     """
     small, step = _reduced(luminance, 1024)
@@ -82,7 +84,7 @@ def find(luminance, count=SLOTS):
         place = _connected(left >= 0.1 * left[peak], peak)
         middle, angle = _disk(directions[place], light[place], pixel)
         wide = np.arccos(np.clip((directions[place] @ middle).min(), -1, 1))
-        # What lies around the place is its own glow.
+        # The surroundings of a spot are its own glow.
         left[directions @ middle > math.cos(min(wide + 2 * pixel, np.pi))] = 0
         left[place] = 0
         if wide < 8 * pixel:
@@ -96,18 +98,18 @@ def find(luminance, count=SLOTS):
 
 
 def _disk(directions, light, pixel):
-    """Middle and full angle of the disk that holds 95 % of the light of some pixels."""
+    """Centre and full angle of the disk that contains 95 % of the light of some pixels."""
     middle = light @ directions
     middle /= np.linalg.norm(middle)
     away = np.arccos(np.clip(directions @ middle, -1, 1))
     order = np.argsort(away)
     shares = np.cumsum(light[order])
     radius = away[order][np.searchsorted(shares, 0.95 * shares[-1])]
-    return middle, 2 * (radius + pixel)  # and a pixel, for interpolation
+    return middle, 2 * (radius + pixel)  # plus a pixel, for interpolation
 
 
 def _measured(luminance, direction, wide):
-    """Direction and full angle of a spot at the picture's own resolution."""
+    """Direction and full angle of a spot at the full resolution of the image."""
     height, width = luminance.shape
     theta = math.asin(np.clip(direction[2], -1, 1))
     rows = (np.array([theta - wide, theta + wide]) / np.pi + 0.5) * height
@@ -116,13 +118,13 @@ def _measured(luminance, direction, wide):
     v = (rows + 0.5) / height
     columns = np.arange(width)
     lean = max(math.cos(theta) - wide, 0.0)
-    if lean > wide:  # away from the poles a few columns hold it
+    if lean > wide:  # false near the poles, where it spans many columns
         around = (0.5 - math.atan2(direction[1], direction[0]) / (2 * np.pi)) * width
         half = math.ceil(wide / lean / (2 * np.pi) * width) + 1
         columns = np.arange(math.floor(around) - half, math.ceil(around) + half + 1) % width
         part = part[:, columns]
     directions = _pixel_directions(*np.meshgrid((columns + 0.5) / width, v))
-    # Of the place alone: elsewhere may be brighter.
+    # Only this spot: other pixels may be brighter.
     part = part * (directions @ direction > math.cos(wide))
     place = part >= 0.1 * part.max()
     light = part * np.cos((v - 0.5) * np.pi)[:, None]

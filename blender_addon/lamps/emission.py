@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much light lights and materials give, as their nodes and settings have it."""
+"""How much light lights and materials emit, according to their nodes and settings."""
 
 import math
 
@@ -11,7 +11,7 @@ from . import ies
 
 
 def animated(owner):
-    """Whether a data-block has animation of its own."""
+    """Whether a data-block is animated itself."""
     data = owner.animation_data
     return data is not None and bool(data.action or data.drivers or data.nla_tracks)
 
@@ -21,8 +21,8 @@ def _luminance(rgb):
 
 
 class _Level(shader_values.Current):
-    """What an input has at the current frame, about: what is not known, or differs from place to
-    place, counts as 1."""
+    """The approximate value of an input at the current frame; values that are unknown or vary over
+    the surface count as 1."""
 
     def _output(self, reached):
         try:
@@ -30,7 +30,7 @@ class _Level(shader_values.Current):
         except shader_values.Unknown:
             return 1.0
 
-    def _lightfalloff(self, node, output, of):  # others than quadratic falloff as at 1 m
+    def _lightfalloff(self, node, output, of):  # other kinds than quadratic: value at 1 m
         return of(node.inputs["Strength"])
 
     def _texies(self, node, output, of):
@@ -38,7 +38,7 @@ class _Level(shader_values.Current):
 
 
 def _strength(shown, names):
-    """Luminance that a node emits, by its sockets of colour and strength."""
+    """Luminance that a node emits, from its sockets of colour and strength."""
     shade, strength = (_Level().told(shown.node.inputs[n], shown.within) for n in names)
     return (1.0 if shade is None else _luminance(shade)) * (1.0 if strength is None else strength)
 
@@ -49,8 +49,8 @@ _EMITTERS = {
 }
 
 
-#: Nodes whose outputs are the same at every place of an object where their inputs are. Of others,
-#: such as textures and what later versions of Blender add, nothing is taken for granted.
+#: Nodes whose outputs are uniform over an object if their inputs are. All others, such as textures
+#: and nodes of later Blender versions, are assumed to vary.
 _SAME_EVERYWHERE = {
     f"ShaderNode{name}"
     for name in (
@@ -62,12 +62,12 @@ _SAME_EVERYWHERE = {
         *("ValToRGB", "Value", "VectorCurve", "VectorMath", "VectorRotate", "Wavelength"),
     )
 }
-#: Inputs by which nodes that join shaders do so.
+#: Inputs that control how a node combines shaders.
 _JOINTS = {"ShaderNodeMixShader": (0,), "ShaderNodeAddShader": ()}
 
 
 def _differs(socket, within, seen):
-    """Whether a value differs from place to place."""
+    """Whether a value varies over the object."""
     reached = shader_trees.reach(socket, within)
     if reached.output is None or reached.shown in seen or _is_other_side(reached.output):
         return False
@@ -82,7 +82,7 @@ def _is_other_side(output):
 
 
 def is_even(owner):
-    """Whether a light or a material emits the same at every place of it."""
+    """Whether a light or a material emits uniformly."""
     for shown in shader_trees.shown(owner):
         node = shown.node
         names = _JOINTS.get(node.bl_idname, ())
@@ -96,7 +96,7 @@ def is_even(owner):
 
 
 def _radiances(material):
-    """Of the nodes that emit, as far as the material shows them."""
+    """Radiance of each emitting node that the material shows."""
     return [
         _strength(shown, _EMITTERS[shown.node.bl_idname])
         for shown in shader_trees.shown(material)
@@ -105,25 +105,24 @@ def _radiances(material):
 
 
 def of_material(material):
-    """Radiance of a material that light sampling looks for, 0 of most."""
+    """Radiance of a material as far as Cycles' light sampling includes it; 0 for most."""
     return 0.0 if material.cycles.emission_sampling == "NONE" else sum(_radiances(material))
 
 
 def may_shine(material):
-    """Whether a material gives light, now or where it is animated; also one that light sampling
-    leaves out."""
+    """Whether a material emits, now or when animated, even if light sampling excludes it."""
     found = _radiances(material)
     return any(found) or bool(found and animated(material.node_tree))
 
 
 def sides(light):
-    """Names of the properties that are an area lamp's two sizes."""
+    """Names of the properties for the two sizes of an area lamp."""
     return "size", "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
 
 
 def _size(light):
-    """Area of a light, of a sun its solid angle: what the energy of one counts for each of that is
-    not normalised; 0 where it has no size."""
+    """Area of a light, or solid angle of a sun: what its power is multiplied by if it is not
+    normalized; 0 if it has no size."""
     if light.type == "SUN":
         return math.pi * math.sin(light.angle / 2) ** 2
     if light.type != "AREA":
@@ -133,8 +132,8 @@ def _size(light):
 
 
 def of_light(light):
-    """Energy of a light times its colour, negative as it is positive: closures aim at lamps that
-    take light as at others. Of a dark one that may light up, next to nothing."""
+    """Power of a light times its colour, as an absolute value: closures aim also at lamps of
+    negative power. For a dark lamp that may light up, a very small number."""
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
     if not light.normalize:
         power *= _size(light) or 1.0

@@ -8,7 +8,7 @@ import bpy
 from ..packs import device
 from . import scenes, shared_group, slots, world
 
-#: Numbers of a slot.
+#: Number of values in a slot.
 _SIZE = 3 * len(slots.PARTS)
 
 
@@ -17,9 +17,9 @@ def _by_slot(numbers):
 
 
 def _arranged(chosen, before):
-    """The chosen lamps in the order of slots. Wide ones come first: what the lobe of one gives
-    where a smaller one shines is taken off that one's (docs/aimed.md). Else each stays where it is
-    if the list has it already, so that a lamp more or less changes one slot."""
+    """Assigns the chosen lamps to slots. Wide lamps come first: the light of a wide lamp's lobe is
+    subtracted from the lobe of a smaller lamp in front of it (docs/aimed.md). Otherwise lamps keep
+    their slots, so that one more or less changes a single slot."""
     arranged, rest = [None] * slots.SLOTS, []
     for candidate in chosen:
         places = [i for i in range(min(len(chosen), len(before))) if arranged[i] is None]
@@ -30,7 +30,7 @@ def _arranged(chosen, before):
             arranged[kept] = candidate
     for candidate in rest:
         arranged[arranged.index(None)] = candidate
-    # Stable.
+    # sorted() is stable.
     return sorted(arranged[: len(chosen)], key=lambda c: -c.width)
 
 
@@ -56,7 +56,7 @@ def limit_of(scene):
 
 
 def device_changed(scene):
-    """Whether a scene has come to a device that limits lamps, or away from it, since last time."""
+    """Whether the scene's device has since changed to or from one that limits lamps."""
     return device.runs_on_optix(scene) != memory.on_optix
 
 
@@ -65,8 +65,8 @@ def _worth_aiming(survey):
 
 
 def _listed(survey, chosen, why=None):
-    """[slots.Lamp] of a survey, those that have a slot first; `why` others have none, where it is
-    not for want of room."""
+    """[slots.Lamp] of a survey, those with a slot first; `why` the others have none, if the reason
+    is not the number of slots."""
     taken = {id(c) for c in chosen}
     why = why or slots.too_many(len(chosen))
     placed = sorted(enumerate(chosen, 1), key=lambda item: -item[1].rank)
@@ -77,15 +77,16 @@ def _listed(survey, chosen, why=None):
     ]
 
 
-#: What the last look found, of the scene with that session_uid; whether the group is being filled.
+#: Result of the last survey and the session_uid of its scene; busy: whether the group is being
+#: filled.
 memory = SimpleNamespace(
     scene=None, survey=scenes.Survey(), lamps=[], limit=slots.SLOTS, on_optix=False, busy=False
 )
 
 
 def _survey(scene, depsgraph, subject=None):
-    """scenes.look() with the lamps of scenes whose pictures are parts of the scene's: Blender calls
-    handlers for the one alone. Each is ranked in its own."""
+    """scenes.look(), including the lamps of scenes that appear in the scene's pictures, because
+    Blender calls handlers for the main scene only. Lamps are ranked within their own scene."""
     survey = scenes.look(scene, depsgraph, subject)
     for other in scenes.shown_with(scene):
         known = [(c.name, c.values) for c in survey.candidates]
@@ -96,8 +97,8 @@ def _survey(scene, depsgraph, subject=None):
 
 
 def _fill(scene, depsgraph, subject=None, keep=True):
-    """Brings the shared group, if there is one, up to date; returns [slots.Lamp]. `keep`: lamps
-    stay in their slots where that is possible."""
+    """Updates the shared group, if there is one; returns [slots.Lamp]. `keep`: lamps keep their
+    slots where possible."""
     survey = _survey(scene, depsgraph, subject)
     limit = limit_of(scene)
     group = shared_group.the_one()
@@ -108,7 +109,7 @@ def _fill(scene, depsgraph, subject=None, keep=True):
         empty = (0.0,) * _SIZE
         wanted = [v for c in chosen for v in c.values] + [*empty] * (slots.SLOTS - len(chosen))
         for (socket, _), old, new in zip(sockets, now, wanted, strict=True):
-            # Only what changed: shaders are compiled anew otherwise, and handlers called again.
+            # Writes only what changed: each change recompiles shaders and calls handlers again.
             if not shared_group.same(old, new):
                 shared_group.write(socket, new)
     lamps = _listed(survey, chosen)
@@ -124,20 +125,20 @@ def current_scene():
 
 
 def _depsgraph(scene):
-    """The evaluated scene, brought up to date."""
+    """The evaluated scene, up to date."""
     layer = scene.view_layers[0]
     for window in bpy.context.window_manager.windows if bpy.context.window_manager else ():
         if window.scene == scene:
             layer = window.view_layer
             break
-    # A window's scene is up to date, and may be in use by the viewport while a picture is made.
+    # With a window the scene is up to date, and during a render the viewport may be using it.
     if bpy.app.background or layer.depsgraph is None:
         layer.update()
     return layer.depsgraph
 
 
 def ensure_group():
-    """The shared group, made and filled from the window's scene if the file has none."""
+    """The shared group; if the file has none, it is made and filled from the window's scene."""
     group = shared_group.find()
     if group is None:
         group = shared_group.make()
@@ -147,7 +148,7 @@ def ensure_group():
 
 
 def quietly(scene, depsgraph=None, **options):
-    """_fill() where handlers that it sets off find nothing to do."""
+    """_fill() with `busy` set, so that the handlers it triggers do nothing."""
     if memory.busy:
         return []
     memory.busy = True
@@ -158,21 +159,22 @@ def quietly(scene, depsgraph=None, **options):
 
 
 def follow():
-    """Brings the shared group, if the file has one, up to date with the window's scene."""
+    """Updates the shared group, if the file has one, from the window's scene."""
     if shared_group.find() is not None and (scene := current_scene()):
         quietly(scene)
 
 
 def see(scene):
-    """Fills the slots of the shared group from a scene and looks at environment images anew.
-    Returns every lamp of the scene as a slots.Lamp, those with a slot and bright ones first."""
+    """Fills the slots of the shared group from a scene, and examines environment images anew.
+    Returns every lamp of the scene as a slots.Lamp; those with a slot come first, then the
+    brightest."""
     world.forget_images()
     return quietly(scene, keep=False)
 
 
 def seen(scene, group=None):
-    """What the last look at a scene found: for panels, which change nothing. `group`: a shared
-    group of another file, for materials that are linked from there."""
+    """Result of the last survey of a scene, for panels, which must not change anything. `group`: a
+    shared group of another file, for materials that are linked from there."""
     looked = memory.scene == scene.session_uid
     if looked and group is None:
         return memory.lamps
@@ -186,6 +188,6 @@ def seen(scene, group=None):
 
 
 def count():
-    """How many lamps there are to aim at, in the scene of the open file that has most."""
+    """The number of lamps to aim at, in the scene of the open file with the most."""
     surveys = [_survey(scene, _depsgraph(scene)) for scene in bpy.data.scenes]
     return max(len(_worth_aiming(survey)) for survey in surveys)

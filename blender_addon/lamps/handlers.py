@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the shared group current: what Blender calls when something changes."""
+"""Keeps the shared group up to date, through Blender's handlers."""
 
 import bpy
 from bpy.app.handlers import persistent
@@ -7,19 +7,19 @@ from bpy.app.handlers import persistent
 from ..common import app_handlers
 from . import emission, filling, meshes, shared_group, slots
 
-#: The scene of which a picture is being made.
+#: The scene being rendered.
 _rendering = None
 
 
 def _concerns(update, scene):
-    """Whether an update of the dependency graph may change what belongs into the slots."""
+    """Whether an update of the dependency graph may change the contents of the slots."""
     item, survey = update.id, filling.memory.survey
     if isinstance(item, bpy.types.Object):
         if item.type == "LIGHT":
             moved = update.is_updated_transform and not update.is_updated_geometry
             if not moved:
                 return True
-            # Drivers follow it; what they can't follow or what is ranked needs another look.
+            # Drivers follow transforms, unless their kind changes; a new ranking needs a survey.
             kind = survey.kinds.get(item.original.name_full)
             return (
                 slots.transform_kind(item.matrix_world) != kind
@@ -45,7 +45,7 @@ def _concerns(update, scene):
             known > 0 and emission.is_even(item.original) != even
         )
     if isinstance(item, bpy.types.NodeTree):
-        # Materials come with an update of their own.
+        # Materials report their own updates.
         return scene.world is not None and item.original == scene.world.node_tree
     return isinstance(
         item, bpy.types.Light | bpy.types.World | bpy.types.Scene | bpy.types.Collection
@@ -53,8 +53,8 @@ def _concerns(update, scene):
 
 
 def _is_limited_anew(updates, scene):
-    """Whether materials can aim at another number of lamps than before. Counting takes a while:
-    only where the device is another, or a material or setting may be."""
+    """Whether the number of lamps that materials can aim at may have changed. Counting takes time,
+    so this looks only at changes of the device, a material or a setting."""
     kinds = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
     if not filling.device_changed(scene) and not any(isinstance(u.id, kinds) for u in updates):
         return False
@@ -63,7 +63,7 @@ def _is_limited_anew(updates, scene):
 
 @persistent
 def _after_update(scene, depsgraph):
-    # The picture of another scene must not lose its lamps to the window's.
+    # While another scene renders, its lamps must not be replaced by those of the window's scene.
     if (
         filling.memory.busy
         or _rendering
@@ -79,7 +79,7 @@ def _after_update(scene, depsgraph):
     if not limited and not any(_concerns(update, scene) for update in updates):
         return
     structural = any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
-    # A scene alone tells what was selected; objects come with what else changes.
+    # An update of the scene alone is a change of selection; other changes also report objects.
     if structural and len(updates) == 1 and not limited:
         return
     filling.quietly(scene, depsgraph, subject=None if structural else filling.memory.survey.subject)
@@ -104,7 +104,7 @@ def _before_render(scene, *_):
 
 @persistent
 def _now(*_):
-    """A file was loaded or is to be saved, an undo or a picture is over."""
+    """After a file was loaded, before it is saved, after an undo, and after a render."""
     global _rendering
     _rendering = filling.memory.scene = None
     filling.follow()
@@ -125,10 +125,10 @@ _HANDLERS = {
 
 
 def register():
-    """Has Blender call the handlers."""
+    """Registers the handlers."""
     app_handlers.register(_HANDLERS)
 
 
 def unregister():
-    """Takes them away again."""
+    """Unregisters them."""
     app_handlers.unregister(_HANDLERS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much light an IES Texture lets through."""
+"""Evaluates IES Textures: how much light they let through."""
 
 import functools
 import math
@@ -7,13 +7,13 @@ from pathlib import Path
 
 import bpy
 
-#: What Cycles makes of a candela: watts of a lamp over the intensity of one of 1 W.
+#: Cycles' conversion of a candela: radiant power of a lamp over the intensity of a lamp of 1 W.
 _OF_CANDELA = 0.0706650768394
 
 
 @functools.lru_cache(maxsize=64)
 def _peak(text):
-    """The largest of a file's candelas; None where it is no IES file."""
+    """The largest candela value of an IES file; None if the text is not one."""
     _, tilt, rest = text.partition("TILT=")
     numbers = []
     for word in rest.partition("\n")[2].replace(",", " ").split():
@@ -26,12 +26,12 @@ def _peak(text):
     if rest.startswith("INCLUDE"):
         if len(numbers) < 2:
             return None
-        # Geometry, a count, and as many angles and factors.
+        # Skips the TILT data: the geometry, a count, and that many angles and factors.
         numbers = numbers[2 + 2 * int(numbers[1]) :]
     if not tilt or len(numbers) < 13:
         return None
     factor, vertical, horizontal = numbers[2], int(numbers[3]), int(numbers[4])
-    factor *= numbers[10] * numbers[11]  # of the ballast
+    factor *= numbers[10] * numbers[11]  # ballast factors
     candelas = numbers[13 + vertical + horizontal :]
     return factor * max(candelas[: vertical * horizontal], default=0.0)
 
@@ -47,7 +47,6 @@ def _text(node):
 
 
 def level(node):
-    """The most that the Fac output of an IES Texture is in any direction, where its Strength is 1;
-    1 of what can't be read."""
+    """Maximum over directions of an IES Texture's Fac output at Strength 1; 1 if unreadable."""
     peak = _peak(_text(node))
     return 1.0 if peak is None else _OF_CANDELA * peak

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which objects place copies of what shines: by their type of instancing, by particles and by
-geometry nodes."""
+"""Finds objects that place instances of light sources: by object instancing, particles or geometry
+nodes."""
 
 import bpy
 
 from . import meshes
 
-#: How deep collections of instances of collections are looked into.
+#: Maximum depth of nested collection instances.
 _DEPTH = 4
 
 
 def _inputs_of(modifier):
-    """Values of the inputs of geometry nodes."""
+    """Values of the inputs of a geometry nodes modifier."""
     if hasattr(modifier, "properties"):  # since 5.2
         inputs = modifier.properties.inputs
         return [getattr(getattr(inputs, key), "value", None) for key in inputs.keys()]
@@ -19,15 +19,15 @@ def _inputs_of(modifier):
 
 
 class Instancers:
-    """Looks at objects one by one, and at each collection and node tree once. `emitting`: the
-    materials that shine."""
+    """Examines objects one at a time, and each collection and node tree only once. `emitting`: the
+    emissive materials."""
 
     def __init__(self, emitting):
         self._emitting = set(emitting)
         self._collections, self._trees = {}, {}
 
     def places(self, item, depth=0):
-        """Whether an object places copies of lamps or of what has a material that shines."""
+        """Whether an object places instances of lamps or of emissive objects."""
         if item.instance_type == "COLLECTION":
             if self._collection(item.instance_collection, depth):
                 return True
@@ -66,14 +66,14 @@ class Instancers:
         if collection is None:
             return False
         if collection not in self._collections:
-            self._collections[collection] = False  # while it is looked into
+            self._collections[collection] = False  # the answer while it is being examined
             self._collections[collection] = any(
                 self._shines(item, depth) for item in collection.all_objects
             )
         return self._collections[collection]
 
     def _any(self, values, depth):
-        """Whether one of some values is an object or collection of what shines."""
+        """Whether one of these values is an emissive object or a collection that contains one."""
         for value in _blocks(values):
             if isinstance(value, bpy.types.Object) and self._shines(value, depth):
                 return True
@@ -82,8 +82,8 @@ class Instancers:
         return False
 
     def _tree(self, tree, depth):
-        """Whether geometry nodes name what shines, make instances, and name a material that
-        shines."""
+        """Whether a geometry node tree refers to a light source, makes instances, or assigns an
+        emissive material."""
         if tree not in self._trees:
             self._trees[tree] = (False, False, False)
             found = made = painted = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's lights as lamps: those of a scene, and copies that other objects place."""
+"""Blender's lights as lamps: those of a scene, and instances that other objects place."""
 
 import math
 
@@ -7,17 +7,17 @@ import numpy as np
 
 from . import emission, slots
 
-#: Lamps that shine on something else than the subject still come before none.
+#: Rank factor of lamps that do not shine on the subject: low, but above 0.
 _ASIDE = 0.01
 
 
 def is_lamp(light):
-    """Whether a light gives light of its own, or takes it."""
+    """Whether a light emits light, or takes it by a negative power."""
     return not (light.type == "AREA" and light.cycles.is_portal) and emission.of_light(light) > 0
 
 
 def shines(item):
-    """Whether an object is a lamp that pictures show."""
+    """Whether an object is a lamp that is visible in renders."""
     return (
         item.type == "LIGHT"
         and (not item.hide_render or emission.animated(item))
@@ -26,21 +26,21 @@ def shines(item):
 
 
 def is_sizeless(light):
-    """Whether no drawn direction meets a light."""
+    """Whether random rays can't hit a light."""
     if light.type == "SUN":
         return light.angle == 0
     return light.type in {"POINT", "SPOT"} and light.shadow_soft_size == 0
 
 
 def has_importance(light):
-    """Whether Multiple Importance is on: only then does Cycles show a light to drawn directions."""
+    """Whether Multiple Importance is on: without it Cycles hides a light from random rays."""
     return light.cycles.use_multiple_importance_sampling
 
 
 def _values(light, item, matrix):
     place, turn, scale = slots.placed(item, matrix)
-    # The lobe carries all of what drawn directions do not meet, or not behind other objects; the
-    # shaders know it by the sign.
+    # A negative sign tells the shaders that random rays do not hit the lamp, or not behind other
+    # objects, so that the lobe must carry all of its light.
     sign = 1.0 if has_importance(light) and light.use_shadow else -1.0
     if light.type == "SUN":
         angle = slots.Driven(light, "angle", sign)
@@ -61,7 +61,7 @@ def _values(light, item, matrix):
 
 
 def _irradiance(light, matrix):
-    """Irradiance of a lamp at points that face it; see docs/cycles.md for powers."""
+    """Irradiance of a lamp at points that face it; see docs/cycles.md for units of power."""
     power = emission.of_light(light)
     if light.type == "SUN":
         return lambda points: np.full(len(points), power)
@@ -94,8 +94,8 @@ def _looks(light, matrix):
 
 
 def candidate_of(item, name, light, matrix):
-    """A light that stands where `matrix` says: followed by drivers where `item` is its object, None
-    where it is a copy."""
+    """A light at the position in `matrix`. If `item` is its object, drivers follow it; None for an
+    instance."""
     values = _values(light, item, matrix)
     return slots.Candidate(
         name,
@@ -104,13 +104,13 @@ def candidate_of(item, name, light, matrix):
         _looks(light, matrix),
         sizeless=is_sizeless(light),
         met=has_importance(light) and not is_sizeless(light),
-        # A scaled spot has a cone that is none, which the shaders don't know.
+        # A non-uniformly scaled spot has no circular cone, which shaders can't represent.
         uneven=not emission.is_even(light) or (light.type == "SPOT" and slots.is_stretched(matrix)),
     )
 
 
 def instances(depsgraph):
-    """A candidate for each light that an object places."""
+    """A candidate for each light that an object instances."""
     for instance in depsgraph.object_instances:
         item = instance.object
         if not instance.is_instance or item.type != "LIGHT" or item.hide_render:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that emit as lamps: flat ones as a rectangle or an ellipse, others as the ball around
-them, where they look like one."""
+"""Emissive objects as lamps: flat ones as a rectangle or an ellipse; others as their bounding ball,
+if they resemble one."""
 
 import math
 from dataclasses import dataclass
@@ -11,26 +11,26 @@ from mathutils import Matrix, Vector, geometry
 from ..common.i18n import say
 from . import emission, slots
 
-#: A lobe covers the whole ball around a mesh, and within it the model and what is seen of the lamp
-#: are averaged apart. So a mesh must fill its ball, as a cube does, or look small; one that looks
-#: large must be a ball, and a wide one is met by drawn directions. Angular radii in radians.
+#: A lobe covers the whole bounding ball of a mesh, and averages the model and the visible part of
+#: the lamp separately. So a mesh must fill its ball well, as a cube does, or look small; a mesh
+#: that looks large must be a ball; and wide ones are left to random rays. Angular radii in radians.
 _FILLS_BALL, _IS_BALL = 0.5, 0.95
 _LOOKS_SMALL, _LOOKS_LARGE, _LOOKS_WIDE = 0.03, 0.3, 0.4
-#: The same of a rectangle and of an ellipse: what part of the rectangle around it a flat mesh must
-#: fill, and how thick it may be for its lesser side.
+#: The same for rectangles and ellipses: the fraction of its bounding rectangle that a flat mesh
+#: must fill, and its maximum thickness relative to the shorter side.
 _FILLS_RECTANGLE, _FILLS_ELLIPSE, _THICK = 0.95, 0.7, 0.1
-#: Types of objects that have faces.
+#: Object types that have faces.
 TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
 def _evaluated(item, depsgraph):
-    """The object whose data has the faces: in Edit Mode Blender's evaluated one has none."""
+    """The object whose data has the faces; in Edit Mode that is not Blender's evaluated object."""
     return item.evaluated_get(depsgraph) if depsgraph is not None and item.mode != "EDIT" else item
 
 
 def _own_materials(item):
-    """Materials of the faces of an evaluated object, or of what geometry nodes make an instance of,
-    in the order of their indices."""
+    """Materials of the faces of an evaluated object or of an instance from geometry nodes, by
+    index."""
     found = [s.material for s in item.material_slots]
     if item.type == "MESH" and len(item.data.materials) > len(found):
         found = list(item.data.materials)
@@ -38,8 +38,7 @@ def _own_materials(item):
 
 
 def materials_of(item, depsgraph):
-    """Materials of an object's faces, in the order of their indices, with those that geometry nodes
-    give it."""
+    """Materials of an object's faces by index, including those that geometry nodes assign."""
     if item.type == "MESH" and any(m.type == "NODES" for m in item.modifiers):
         found = _evaluated(item, depsgraph).data.materials
         return [m.original if m is not None else None for m in found]
@@ -48,22 +47,22 @@ def materials_of(item, depsgraph):
 
 @dataclass(frozen=True)
 class _Shape:
-    """What of an object shines."""
+    """The emissive part of an object."""
 
-    points: np.ndarray  # (n, 3), in its own space
-    triangles: np.ndarray  # (m, 3), of these points; none of what is no mesh or too large a one
+    points: np.ndarray  # (n, 3), in object space
+    triangles: np.ndarray  # (m, 3), of these points; empty if not a mesh, or too large a one
     radiance: float
     uneven: bool
 
     def ball(self):
-        """Middle and radius of a ball that holds it."""
+        """Centre and radius of a bounding ball."""
         low, high = self.points.min(0), self.points.max(0)
         middle = (low + high) / 2
         return middle, float(np.sqrt(((self.points - middle) ** 2).sum(-1).max()))
 
 
 def _shape(own, materials, emitting):
-    """The _Shape of an evaluated object by the materials of its faces; None of what does not shine
+    """The _Shape of an evaluated object, given the materials of its faces; None if it does not emit
     or has no points. `emitting`: radiance by material."""
     glowing = set(materials) & set(emitting)
     if not glowing:
@@ -77,7 +76,7 @@ def _shape(own, materials, emitting):
 
 
 def _lit(own, materials, emitting):
-    """Points and triangles of an object's faces that shine; see _Shape."""
+    """Points and triangles of an object's emissive faces; see _Shape."""
     mesh = own.data
     none = np.empty((0, 3), np.int32)
     if own.type != "MESH" or len(mesh.vertices) == 0 or len(mesh.vertices) > 200000:
@@ -100,9 +99,9 @@ def _lit(own, materials, emitting):
 
 
 def _flat(points, areas):
-    """A flat mesh as a lamp: its kind, middle, axes as rows, the last across it, and two sizes;
-    None of what is not flat, or neither a rectangle nor an ellipse. In the world's space; `areas`:
-    see _areas()."""
+    """A flat mesh as a lamp: its kind, centre, axes as rows (the normal last), and two sizes; None
+    if it is not flat, or neither a rectangle nor an ellipse. In world space; `areas`: see
+    _areas()."""
     if len(areas) == 0:
         return None
     across = areas[(areas**2).sum(-1).argmax()]
@@ -110,7 +109,7 @@ def _flat(points, areas):
     if not size > 0:
         return None
     across = across / size
-    # Each side of something thin by itself.
+    # Front and back of a thin box are counted separately.
     area = max(np.maximum(side * areas @ across, 0).sum() for side in (1, -1))
     frame = np.array(Vector(across).to_track_quat("Z", "Y").to_matrix()).T
     flat = (points - points[0]) @ frame.T
@@ -130,7 +129,7 @@ def _flat(points, areas):
             continue
         filled = area / (width * height)
         if kind == slots.ELLIPSE:
-            # No corner may reach out of it.
+            # No corner may lie outside the ellipse.
             away = ((places - middle)[:, :2] / ((high - low)[:2] / 2)) ** 2
             fits = filled >= _FILLS_ELLIPSE and away.sum(-1).max() < 1.05
         else:
@@ -141,13 +140,14 @@ def _flat(points, areas):
 
 
 def _areas(points, triangles):
-    """Normals of triangles that are as long as these are large."""
+    """Normals of triangles, whose lengths are the triangles' areas."""
     edges = points[triangles[:, 1:]] - points[triangles[:, :1]]
     return np.cross(edges[:, 0], edges[:, 1]) / 2
 
 
 def _outermost(places):
-    """Points, (n, 2), without most of those inside: the first along each of many directions."""
+    """Removes most interior points from (n, 2): keeps the outermost one in each of many
+    directions."""
     if len(places) <= 200:
         return places
     angles = np.arange(360) * np.pi / 180
@@ -156,26 +156,26 @@ def _outermost(places):
 
 
 def _main_axis(places):
-    """Angle of the axis along which points, (n, 2), lie farthest apart."""
+    """Angle of the axis along which points, (n, 2), have their largest extent."""
     covariance = np.cov(places.T)
     return math.atan2(2 * covariance[0, 1], covariance[0, 0] - covariance[1, 1]) / 2
 
 
 def candidate_of(item, emitting, matrix, depsgraph):
-    """An object that emits, as a ball or a flat lamp; None where none of its faces does."""
+    """An emissive object as a ball or a flat lamp; None if none of its faces emits."""
     own, materials = _evaluated(item, depsgraph), materials_of(item, depsgraph)
     shape = _shape(own, materials, emitting)
     return _candidate(item, item.name, shape, matrix) if shape is not None else None
 
 
-#: Copies that are looked at one by one, those that give most light.
+#: Number of instances that are examined one by one; the brightest are chosen.
 _COPIES = 4 * slots.SLOTS
 
 
 def instances(depsgraph, emitting, subject, sources):
-    """A candidate for each copy that an object places of one that shines, where they are many of
-    those that give most light, and one for all others. `subject`: points of it, (n, 3). Adds the
-    names of what is copied to `sources`."""
+    """A candidate for each emissive instance; if there are many, one each for the brightest and a
+    single one for all others. `subject`: its points, (n, 3). Adds the names of instanced objects to
+    `sources`."""
     shapes, found = {}, []
     for instance in depsgraph.object_instances:
         item = instance.object
@@ -216,8 +216,8 @@ def instances(depsgraph, emitting, subject, sources):
 
 
 def _candidate(item, name, shape, matrix):
-    """What shines, where `matrix` says: followed by drivers where `item` is its object, None where
-    it is a copy."""
+    """An emissive shape at the position in `matrix`. If `item` is its object, drivers follow it;
+    None for an instance."""
     points, radiance, uneven = shape.points, shape.radiance, shape.uneven
     world = points @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
     areas = _areas(world, shape.triangles)
@@ -228,7 +228,7 @@ def _candidate(item, name, shape, matrix):
     low, high = points.min(0), points.max(0)
     centre = Vector((low + high) / 2)
     radius = float(np.sqrt(((points - np.array(centre)) ** 2).sum(-1).max()))
-    # Every point lies within the radius times the largest scale of the centre.
+    # Every point lies within the radius times the largest scale around the centre.
     scales = [abs(s) for s in matrix.to_scale()]
     largest = max(range(3), key=lambda i: scales[i])
     place, size = matrix @ centre, radius * scales[largest]
@@ -249,7 +249,7 @@ def _candidate(item, name, shape, matrix):
     candidate = slots.Candidate(name, values, irradiance, looks, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
     if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
-        extent = 0.0  # it is open: part of a ball
+        extent = 0.0  # an open surface: only part of a ball
 
     def judge(points):
         distance = np.sqrt(((points - middle) ** 2).sum(-1)).min()
@@ -264,7 +264,7 @@ def _candidate(item, name, shape, matrix):
 
 
 def _sheet(name, radiance, kind, middle, frame, sizes):
-    """A flat mesh, which shines on both sides, as a lamp that shines on the side of the subject."""
+    """A flat mesh, which emits on both sides, as a lamp that emits towards the subject."""
     area = sizes[0] * sizes[1] * (1 if kind == slots.RECTANGLE else math.pi / 4)
 
     def irradiance(points):
@@ -276,7 +276,7 @@ def _sheet(name, radiance, kind, middle, frame, sizes):
     candidate = slots.Candidate(name, (), irradiance, looks)
 
     def judge(points):
-        # Lamps shine along their own -z.
+        # Lamps emit along their own -z.
         z = -frame[2] * (1 if ((points - middle) @ frame[2]).mean() > 0 else -1)
         axes = Matrix((frame[0], np.cross(z, frame[0]), z)).transposed()
         turn = axes.to_quaternion()

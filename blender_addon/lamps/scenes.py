@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks a scene over for lamps, and ranks them by their light where the camera looks."""
+"""Finds the lamps of a scene, and ranks them by their irradiance where the camera looks."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,23 +11,23 @@ from mathutils import Vector
 from ..common.i18n import say
 from . import emission, instancers, lights, meshes, slots, world
 
-#: Angular radius from which it counts that a lamp's light differs over it: what a lobe carries is
-#: the mean of the model over the lamp.
+#: Above this angular radius, uneven emission of a lamp matters: a lobe carries the mean of the
+#: model over the lamp.
 _LOOKS_UNEVEN = 0.05
-#: Radius over distance from which shaders leave a lamp to drawn directions (kNearest of
+#: Ratio of radius to distance from which shaders leave a lamp to random rays (kNearest in
 #: generator/forms/aimed.h).
 _LOOKS_TOO_WIDE = 0.85
 
 
 @dataclass
 class Survey:
-    """What a scene holds, and what of it a handler must know to tell a change."""
+    """The lamps of a scene, and what handlers must know to recognize a change."""
 
     candidates: list = field(default_factory=list)
-    emission: dict = field(default_factory=dict)  # of materials, by name
-    uneven: set = field(default_factory=set)  # names of those that emit unlike from place to place
-    glowing: set = field(default_factory=set)  # names of objects that emit
-    instancers: set = field(default_factory=set)  # names of objects that place what shines
+    emission: dict = field(default_factory=dict)  # radiance of materials, by name
+    uneven: set = field(default_factory=set)  # names of materials that emit unevenly
+    glowing: set = field(default_factory=set)  # names of emissive objects
+    instancers: set = field(default_factory=set)  # names of objects that instance lamps
     kinds: dict = field(
         default_factory=dict
     )  # slots.transform_kind() of the lamps' transforms, by name
@@ -35,7 +35,7 @@ class Survey:
 
 
 def _rendered(scene, found=None):
-    """Objects that the scene's pictures show, of its background sets too."""
+    """Objects that are visible in the scene's renders, including those of background sets."""
     found = {} if found is None else found
 
     def walk(layer):
@@ -48,7 +48,7 @@ def _rendered(scene, found=None):
             walk(child)
 
     for layer in [v for v in scene.view_layers if v.use] or scene.view_layers:
-        # None in 5.2, of a scene that was made a moment ago.
+        # In 5.2 it is None for a scene that was just created.
         if layer.layer_collection is not None:
             walk(layer.layer_collection)
     if scene.background_set is not None:
@@ -57,13 +57,13 @@ def _rendered(scene, found=None):
 
 
 def lamps_of(scene):
-    """Objects of the lamps that the scene's pictures show."""
+    """The lamp objects that are visible in the scene's renders."""
     return [item for item in _rendered(scene) if lights.shines(item)]
 
 
 def _subject(scene, shown, matrices):
-    """Points by which lamps are ranked: centres of the four meshes that are nearest to the camera
-    and in its view, else of all meshes."""
+    """Points at which lamps are ranked: the centres of the four meshes nearest to the camera and in
+    its view, or else of all meshes."""
     if not shown:
         return np.zeros((1, 3))
     boxes = [o.bound_box for o in shown]
@@ -75,7 +75,7 @@ def _subject(scene, shown, matrices):
         to = centres - np.array(matrix.translation)
         depth = to @ -np.array(matrix.col[2].to_3d().normalized())
         aside = np.sqrt(np.maximum((to**2).sum(-1) - depth**2, 0))
-        # A cone around the frame; what is larger than the frame has its centre elsewhere.
+        # A cone around the camera frame; an object larger than the frame has its centre elsewhere.
         if data.type == "ORTHO":
             seen = aside < 0.75 * data.ortho_scale
         else:
@@ -88,7 +88,7 @@ def _subject(scene, shown, matrices):
 
 
 def shown_with(scene):
-    """Other scenes whose pictures are parts of a scene's: by its compositor and its sequencer."""
+    """Other scenes that appear in a scene's renders, through its compositor and sequencer."""
     found = []
 
     def walk(tree, seen):
@@ -109,7 +109,8 @@ def shown_with(scene):
 
 
 def look(scene, depsgraph, subject=None):
-    """A Survey of a scene. `subject`: points of an earlier one, which need no looking for."""
+    """A Survey of a scene. `subject`: points of an earlier survey, so that they need not be
+    determined."""
     survey = Survey(subject=subject)
 
     def matrices(item):
@@ -122,7 +123,7 @@ def look(scene, depsgraph, subject=None):
     for item in _rendered(scene):
         kind = item.type
         if item.parent is not None and item.parent.instance_type in {"VERTS", "FACES"}:
-            continue  # its copies alone are shown
+            continue  # only its instances are rendered
         if kind == "LIGHT":
             if lights.shines(item):
                 matrix = matrices(item).copy()
@@ -155,7 +156,7 @@ def look(scene, depsgraph, subject=None):
             candidate.judge(survey.subject)
         candidate.rank = float(np.mean(candidate.irradiance(survey.subject)))
         angle = float(np.mean(candidate.looks(survey.subject)))
-        if not math.isfinite(candidate.rank + angle):  # of a mesh with broken points
+        if not math.isfinite(candidate.rank + angle):  # a mesh with invalid coordinates
             candidate.rank = angle = 0.0
         candidate.width = round(math.log2(max(angle, 1e-4)))
         if candidate.uneven and angle > _LOOKS_UNEVEN and candidate.met and not candidate.why:

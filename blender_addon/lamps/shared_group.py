@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The node group that all shaders share: makes and finds it, reads and writes its numbers."""
+"""The node group shared by all shaders: creates and finds it, reads and writes its numbers."""
 
 import math
 
@@ -7,7 +7,7 @@ import bpy
 
 from . import slots
 
-#: Name of the shared group, and the custom property that tells it from another of that name.
+#: Name of the shared group, and the custom property that identifies it.
 GROUP = "brdfc Lamps"
 TAG = "brdfc_lamps"
 
@@ -30,7 +30,7 @@ def make():
 
 
 def is_shared(group):
-    """Whether a node group is a shared group, of the open file or another."""
+    """Whether a node group is a shared group, of the open file or of another."""
     return TAG in group
 
 
@@ -47,17 +47,17 @@ def find():
 
 
 def remove_unused():
-    """Takes the shared group out of the file when no shader has it."""
+    """Removes the shared group from the file when no shader uses it."""
     for group in _own():
         if group.users == 0:
             bpy.data.node_groups.remove(group)
 
 
 def the_one():
-    """The shared group; copies, which come with appended materials, give way to it.
+    """The shared group. Copies, which appended materials bring, are replaced by it.
 
-    One that was appended is kept, if there is one: Blender knows it as that of its library, and
-    appends neither it nor what hangs on it again.
+    If one of them was appended, that one is kept: Blender recognizes it, and appends neither it nor
+    its dependencies again.
     """
     group = next((g for g in _own() if g.library_weak_reference is not None), find())
     copies = [other for other in _own() if other != group]
@@ -70,7 +70,7 @@ def the_one():
 
 
 def sockets(group):
-    """[(socket, data path)] of the numbers of all slots, twelve a slot."""
+    """[(socket, data path)] of the numbers of all slots, twelve per slot."""
     found = []
     for name in slots.part_names(slots.SLOTS):
         for index, socket in enumerate(group.nodes[name].inputs):
@@ -79,8 +79,8 @@ def sockets(group):
 
 
 def written(group):
-    """What the group's numbers are now: floats and slots.Driven; None for a driver of
-    someone else."""
+    """The current numbers of the group: floats and slots.Driven; None for a driver that the
+    extension did not make."""
     curves = {}
     if group.animation_data is not None:
         curves = {curve.data_path: curve for curve in group.animation_data.drivers}
@@ -106,15 +106,15 @@ def _read(curve):
 
 
 def _add_driver(socket):
-    """A driver of a socket's value that is the mean of its one variable, and so computes without
-    Python: a file is right where scripts are not allowed to run. Its curve and the variable."""
+    """Adds a driver to a socket's value: the average of a single variable, which needs no Python,
+    so that files work where scripts are not allowed to run. Returns its curve and the variable."""
     curve = socket.driver_add("default_value")
     curve.driver.type = "AVERAGE"
     return curve, curve.driver.variables.new()
 
 
 def write(socket, value):
-    """Gives a socket a float, or the driver of a slots.Driven."""
+    """Sets a socket to a float, or gives it the driver for a slots.Driven."""
     socket.driver_remove("default_value")
     if not isinstance(value, slots.Driven):
         socket.default_value = value
@@ -132,13 +132,13 @@ def write(socket, value):
         target.id_type, target.id = value.of.id_type, value.of
         target.data_path = value.path
     if (value.factor, value.added) != (1.0, 0.0):
-        # 4.5 gives a driver's curve this modifier, later versions two keys on the diagonal.
+        # 4.5 gives a driver's curve this modifier; later versions give it two keys on the diagonal.
         modifier = curve.modifiers[0] if curve.modifiers else curve.modifiers.new("GENERATOR")
         modifier.coefficients = (value.added, value.factor)
 
 
 def same(a, b):
-    """Whether two numbers are one to a socket; see written()."""
+    """Whether a socket can't tell two numbers apart; see written()."""
     if isinstance(a, slots.Driven) or isinstance(b, slots.Driven):
         return (
             isinstance(a, slots.Driven)
@@ -152,5 +152,5 @@ def same(a, b):
 
 
 def all_same(a, b):
-    """The same of two sequences of equal length."""
+    """The same for two sequences of equal length."""
     return all(map(same, a, b))

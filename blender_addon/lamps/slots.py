@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a slot of the shared group holds of a lamp: twelve numbers, some of them driven."""
+"""The twelve numbers that describe a lamp in a slot of the shared group; some may be driven."""
 
 import math
 from dataclasses import dataclass
@@ -10,30 +10,30 @@ from mathutils import Matrix, Vector
 
 from ..common.i18n import say
 
-#: How many lamps the shared group holds.
+#: Number of lamps in the shared group.
 SLOTS = 8
-#: Vectors of a slot, each followed by the slot's number from 1.
+#: Names of a slot's vectors, to which the slot's number, from 1, is appended.
 PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
-#: What a slot may hold, in the numbers of the shaders (osl/brdfc.osl.in, brdfc_lamp).
+#: Kinds of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp).
 EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 
 
 def part_names(count):
-    """Names of the outputs of the first slots, which are those of the shaders' inputs."""
+    """Names of the outputs for the first `count` slots, which are also the shaders' inputs."""
     return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
 
 
 def by_slot(parts):
-    """What part_names() has in one list, a list for each slot."""
+    """Splits a list in the order of part_names() into one list per slot."""
     return [parts[i : i + len(PARTS)] for i in range(0, len(parts), len(PARTS))]
 
 
-#: Why a lamp is left out that drawn directions meet.
+#: Why a lamp that random rays hit is left out.
 NO_NEED = say("so large or near that random rays meet it often")
 
 
 def too_many(slots):
-    """Why a lamp is left out that others outshine."""
+    """Why a lamp is left out when others are brighter."""
     if not slots:
         return say("no room for it")
     return say("fainter than the {count} that a material has room for", count=slots)
@@ -48,9 +48,9 @@ def elsewhere(library):
 
 @dataclass(frozen=True)
 class Lamp:
-    """A lamp of a scene: its slot from 1, or None and why; its irradiance at the subject, which is
-    an estimate to rank lamps by; whether it has no size; whether drawn directions meet it, so that
-    more than slots show it."""
+    """A lamp of a scene: its slot from 1, or None and the reason; its estimated irradiance at the
+    subject, by which lamps are ranked; whether it has no size; and whether random rays hit it, so
+    that it is visible even without a slot."""
 
     name: str
     slot: int | None
@@ -62,8 +62,8 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Driven:
-    """A number that Blender keeps current: a channel of an object's transform in the world, or
-    a property of a data-block; times a factor, and something added."""
+    """A number that Blender keeps up to date: a world-space transform channel of an object, or a
+    property of a data-block, times a factor, plus a constant."""
 
     of: bpy.types.ID
     path: str
@@ -77,8 +77,8 @@ class Driven:
 
 @dataclass
 class Candidate:
-    """A lamp, the twelve numbers of its slot, irradiance(points), (n, 3) to (n,), and likewise
-    looks(points), the tangent of its angular radius."""
+    """A lamp with the twelve numbers of its slot; irradiance(points), (n, 3) to (n,); and
+    looks(points), the tangent of its angular radius seen from there."""
 
     name: str
     values: tuple
@@ -88,14 +88,14 @@ class Candidate:
     rank: float = 0.0
     width: int = 0  # doublings of its angular radius
     sizeless: bool = False
-    met: bool = True  # drawn directions meet it
-    uneven: bool = False  # its light is not the same all over it
-    #: Of a mesh: judge(points) sets values and `why` for a subject at these points, (n, 3).
+    met: bool = True  # random rays hit it
+    uneven: bool = False  # its emission is not uniform
+    #: For a mesh: judge(points) sets the values and `why`, given points (n, 3) of the subject.
     judge: object = None
 
 
 def looks_like(place, radius):
-    """looks() of what has a place and a radius."""
+    """looks() of a lamp with this position and radius."""
     middle = np.array(place)
 
     def looks(points):
@@ -105,17 +105,17 @@ def looks_like(place, radius):
 
 
 def looks_alike(angle):
-    """looks() of what lies in a direction and has this full angle."""
+    """looks() of a distant lamp with this full angle."""
     return lambda points: np.full(len(points), math.tan(angle / 2))
 
 
 def numbers(kind, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):
-    """The twelve numbers of a slot, in the order of PARTS. A kind may be a Driven one."""
+    """The twelve numbers of a slot, in the order of PARTS. The kind may be Driven."""
     return (*place, *turn, *scale, kind if isinstance(kind, Driven) else float(kind), *sizes)
 
 
 def turned(direction):
-    """Turn and last component of scale of a lamp that lies in a direction."""
+    """Turn, and last component of scale, of a distant lamp in this direction."""
     turn = Vector(direction).to_track_quat("Z", "Y")
     return (turn.x, turn.y, turn.z), turn.w
 
@@ -127,20 +127,20 @@ def is_sheared(matrix):
 
 
 def is_stretched(matrix):
-    """Whether a transform scales axes unlike."""
+    """Whether a transform scales its axes differently."""
     scales = [abs(s) for s in matrix.to_scale()]
     return max(scales) > 1.01 * min(scales)
 
 
 def transform_kind(matrix):
-    """What of a transform the drivers and lobes are chosen by: whether it mirrors, is oblique, and
-    scales axes unlike."""
+    """The properties of a transform on which drivers and lobes depend: mirrored, sheared, unevenly
+    scaled."""
     return matrix.is_negative, is_sheared(matrix), is_stretched(matrix)
 
 
 def _upright(matrix):
-    """A rotation with the lamp's own -z, and its x and y but for signs, which lamps have none of.
-    Of an oblique transform the direction is kept."""
+    """A rotation with the lamp's own -z; its x and y may be negated, as lamps are symmetric. For a
+    sheared transform the direction is kept."""
     x, _, z = (Vector(c) for c in matrix.to_3x3().transposed())
     z = z.normalized()
     x = (x - z * x.dot(z)).normalized()
@@ -148,7 +148,7 @@ def _upright(matrix):
 
 
 def placed(item, matrix):
-    """Place, turn, and scale of a lamp: driven where `item` is an object, else of the matrix."""
+    """Place, turn and scale of a lamp: driven if `item` is an object, otherwise from the matrix."""
     if item is None or is_sheared(matrix):
         turn = _upright(matrix)
         scale = matrix.to_scale()
@@ -165,8 +165,8 @@ def placed(item, matrix):
     turn = channels("ROT_X", "ROT_Y", "ROT_Z")
     scale = channels("SCALE_X", "SCALE_Y", "ROT_W")
     if matrix.is_negative:
-        # Blender's quaternion q of a mirrored transform is that of all axes turned round, so that
-        # -z would be +z. Half a turn about x, q i, sets that right; signs of x and y don't matter.
+        # For a mirrored transform, Blender's quaternion q has all axes reversed, so that -z would
+        # be +z. A half turn about x, q i, corrects this; the signs of x and y don't matter.
         turn = (Driven(item, "ROT_W"), Driven(item, "ROT_Z"), Driven(item, "ROT_Y", -1.0))
         scale = (*scale[:2], Driven(item, "ROT_X", -1.0))
     return place, turn, scale

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps of a world: suns of Sky Textures and bright spots of environment images."""
+"""Lamps of a world: the suns of Sky Textures and the bright spots of environment images."""
 
 import numpy as np
 from mathutils import Euler, Matrix, Vector
@@ -9,15 +9,15 @@ from ..common.i18n import say
 from ..trees import shader_trees, shader_values
 from . import bright_spots, emission, slots
 
-#: Types of Sky Texture that show a sun; NISHITA became two in 5.0.
+#: Types of Sky Texture that show a sun; NISHITA was split in two in 5.0.
 _SKIES_WITH_SUN = {"NISHITA", "SINGLE_SCATTERING", "MULTIPLE_SCATTERING"}
-#: Irradiance that a sun of a Sky Texture of strength and intensity 1 is ranked by: in
-#: daylight it outshines any lamp.
+#: Irradiance by which the sun of a Sky Texture of strength and intensity 1 is ranked: in daylight
+#: it outshines any lamp.
 _SKY_SUN_IRRADIANCE = 100.0
 
 
 def _turn_of(shown):
-    """How the direction of a ray becomes that of a texture, or None where that is not known."""
+    """How the direction of a ray is mapped to that of a texture, or None if that is unknown."""
     matrix = Matrix.Identity(3)
     reached = shown.reach(shown.node.inputs["Vector"])
     while reached.output is not None and reached.node.bl_idname == "ShaderNodeMapping":
@@ -51,12 +51,12 @@ def _turn_of(shown):
     return None
 
 
-#: Spots by image: a large picture takes half a second. Nothing tells when pixels are painted.
+#: Cached by image: a large one takes half a second. Painting raises no event.
 _spots = {}
 
 
 def forget_images():
-    """Has images looked at anew."""
+    """Clears the cache, so that images are examined anew."""
     _spots.clear()
 
 
@@ -72,8 +72,8 @@ def _image_spots(image):
         if image.channels < 3:
             pixels = pixels[..., :1].repeat(3, axis=-1)
         pixels = pixels[..., :3]
-        # Floats are in the working space already. Of bytes the curve is enough, to find what is
-        # bright.
+        # Float buffers are in the working space already. For bytes, undoing the sRGB curve is
+        # enough to find bright spots.
         if not image.is_float and not image.colorspace_settings.is_data:
             pixels = color.from_srgb(pixels)
         luminance = np.nan_to_num(np.maximum(color.luminance(pixels), 0), posinf=0.0)
@@ -82,8 +82,8 @@ def _image_spots(image):
 
 
 def _sky(node, strength):
-    """The sun of a Sky Texture. The dependency graph knows sockets of nodes and no other
-    properties: a driver would print errors and miss changes, so handlers keep it current."""
+    """The sun of a Sky Texture. The dependency graph knows node sockets but not other properties:
+    drivers of these would print errors and miss changes, so handlers keep them up to date."""
     name = say("sun of {node}", node=node.label or node.name)
     power = _SKY_SUN_IRRADIANCE * strength * node.sun_intensity
     turn = (node.sun_elevation, node.sun_rotation, 0.0)

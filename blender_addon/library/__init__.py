@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ready-made materials for the Asset Browser.
 
-materials.json lists them, once: by catalogue, each with its model, the values that are not the
-model's defaults, tags and a sentence; a model that none is made of is there with its defaults.
-The .blend is made of that on the user's machine when it is asked for, by a Blender without a window
-that runs build.py: so it is of the version of Blender and of the extension that use it.
+materials.json lists them by catalogue: each with its model, the values that differ from the model's
+defaults, tags and a sentence. Models that no listed material uses are added with their defaults.
+The .blend is made on the user's machine on request, by a second Blender without a window that runs
+build.py; so it matches the versions of Blender and of the extension that use it.
 """
 
 import contextlib
@@ -24,15 +24,15 @@ from ..common.jobs import ProgramJob
 from ..packs import pack
 
 _HERE = Path(__file__).parent
-#: What the library is called in the Asset Browser, and on top of its catalogues.
+#: Name of the library in the Asset Browser, and root of its catalogues.
 NAME = "brdfc"
-#: Says in the library's folder what made it.
+#: File in the library's folder that records what made it.
 STAMP = "brdfc.json"
 BLEND = "materials.blend"
 CATALOGS = "blender_assets.cats.txt"
-#: Catalogue of models that materials.json makes nothing of.
+#: Catalogue for models that materials.json does not use.
 _REST = "More Models"
-#: What a catalogue's identifier is made of with its path, so that it is the same ever after.
+#: Namespace of the UUIDs of catalogues: with the path it gives an identifier that never changes.
 _NAMESPACE = uuid.UUID("5a4df0f5-8f0c-4c53-9c0d-3f6f6a1e7b62")
 
 
@@ -42,7 +42,7 @@ class LibraryError(RuntimeError):
 
 @dataclass(frozen=True)
 class Entry:
-    """A material: its name, its catalogue's path below NAME, and what it is made of."""
+    """A material: its name, its catalogue's path below NAME, and what it is made from."""
 
     name: str
     catalog: str
@@ -50,23 +50,23 @@ class Entry:
     values: dict
     tags: tuple
     description: str
-    #: The metal, glass or liquid of measured refractive index that it is of, or None.
+    #: The metal, glass or liquid with measured refractive index that it represents, or None.
     substance: str | None = None
 
     @property
     def preview(self):
-        """Its picture, which script/assets renders."""
+        """Its preview image, which script/assets renders."""
         slug = re.sub(r"[^a-z0-9]+", "_", self.name.lower())
         return _HERE / "previews" / f"{slug}.jpg"
 
 
 def available():
-    """Whether this extension has a library: one that was cut to a scene has none."""
+    """Whether this extension has a library; one cut to a scene has none."""
     return (_HERE / "materials.json").is_file()
 
 
 def entries():
-    """[Entry] of all materials, by catalogue and name as they are listed. Raises LibraryError."""
+    """[Entry] of all materials, ordered by catalogue and name. Raises LibraryError."""
     path = _HERE / "materials.json"
     try:
         listed = json.loads(path.read_text(encoding="utf-8"))
@@ -100,7 +100,7 @@ def entries():
 
 
 def make(api, entry):
-    """A material of the open file, of an entry."""
+    """Makes the material of an entry in the open file."""
     material = api.new_material(entry.model, **entry.values)
     if entry.substance:
         api.set_substance(material, entry.substance)
@@ -108,13 +108,13 @@ def make(api, entry):
 
 
 def description(entry):
-    """What the Asset Browser says of a material: its sentence, and of its model the paper."""
+    """The material's description in the Asset Browser: its sentence and the model's paper."""
     model = pack.model(entry.model)
     return f"{entry.description}. {model['label']}: {model['paper']}"
 
 
 def tags(entry):
-    """Words by which the Asset Browser finds a material, beside those of its name."""
+    """Search words of a material in the Asset Browser, besides its name."""
     model = pack.model(entry.model)
     return tuple(dict.fromkeys([*entry.tags, model["look"], model["label"], pack.citation(model)]))
 
@@ -124,9 +124,9 @@ def catalog_id(catalog):
 
 
 def catalogs_text(found):
-    """Content of the file that names the catalogues of these entries."""
+    """Content of the file that defines the catalogues of these entries."""
     paths = {PurePosixPath(NAME, entry.catalog): None for entry in found}
-    # Also what they are in: Blender would add it, and take its own addition for unsaved changes.
+    # Includes parent catalogues: Blender would add them and then report unsaved changes.
     paths |= {parent: None for path in paths for parent in list(path.parents)[:-1]}
     lines = [
         (catalog_id(path.relative_to(NAME).as_posix()), str(path), str(path).replace("/", "-"))
@@ -136,17 +136,17 @@ def catalogs_text(found):
 
 
 def stamp():
-    """What a library that this extension makes says of itself."""
+    """What a library made by this extension records about itself."""
     return {"generator": pack.manifest()["generator"], "hash": pack.manifest()["hash"]}
 
 
 def folder():
-    """Where this extension's library is, which may not be made yet; uninstalling takes it away."""
+    """Folder of this extension's library, which may not exist yet; uninstalling removes it."""
     return Path(bpy.utils.extension_path_user(PACKAGE)) / "library"
 
 
 def registered():
-    """The library among those of the preferences, or None."""
+    """The library as registered in the preferences, or None."""
     for library in bpy.context.preferences.filepaths.asset_libraries:
         path = Path(bpy.path.abspath(library.path))
         if path == folder() or (path / STAMP).is_file():
@@ -155,7 +155,7 @@ def registered():
 
 
 def is_current():
-    """Whether the library of the preferences is of this extension."""
+    """Whether the registered library was made by this extension's version."""
     library = registered()
     if library is None:
         return False
@@ -167,7 +167,7 @@ def is_current():
 
 
 def _program():
-    """Blender's own, or "" where Blender is a Python module."""
+    """Path of Blender, or "" if Blender is a Python module."""
     return bpy.app.binary_path
 
 
@@ -180,9 +180,9 @@ def _command(target):
 
 
 class Making(ProgramJob):
-    """Makes the library and names it in the preferences; the result is how many materials it has.
+    """Makes the library and registers it in the preferences; the result is the number of materials.
 
-    Until the last step nothing is changed. Steps raise LibraryError.
+    Nothing is changed before the last step. Steps raise LibraryError.
     """
 
     failure = LibraryError
@@ -238,16 +238,16 @@ def _name_it():
 
 
 def _append_from(library):
-    """Has Blender append what is dragged, for a linked material's list of lamps can't be kept; and
-    where it can, as it could before 5.0, not append again what it has appended."""
+    """Makes Blender append materials that are dragged in, as the lamp list of a linked material
+    can't be updated; and, if possible (before 5.0), reuse what it has already appended."""
     for method in ("APPEND", "APPEND_REUSE"):
-        with contextlib.suppress(TypeError):  # the choices hang on more than the version
+        with contextlib.suppress(TypeError):  # which import methods exist varies
             library.import_method = method
 
 
 def remove():
-    """Takes the library out of the preferences, and its folder away; what was dragged into files
-    stays. Returns whether there was one."""
+    """Removes the library from the preferences and deletes its folder; materials that were dragged
+    into files stay. Returns whether there was one."""
     library = registered()
     if library is not None:
         bpy.context.preferences.filepaths.asset_libraries.remove(library)

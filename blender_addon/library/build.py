@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the library's files; run by a Blender of its own, whose file is of no use to anyone:
+"""Makes the library's files; run by a separate Blender, whose open file is discarded:
 
     blender --background --factory-startup --python build.py -- FOLDER
 
@@ -20,7 +20,7 @@ LICENSE = "GPL-3.0-or-later"
 
 
 def load_package():
-    """The extension that this file is of, under a name of its own."""
+    """Imports the extension that contains this file, under a name of its own."""
     root = Path(__file__).resolve().parent.parent
     spec = importlib.util.spec_from_file_location(
         "brdfc_at_work", root / "__init__.py", submodule_search_locations=[str(root)]
@@ -32,7 +32,7 @@ def load_package():
 
 
 def set_preview(material, path):
-    """Gives a material the picture of a file, which stays as it is."""
+    """Sets the preview of a material from an image file, which is left unchanged."""
     image = bpy.data.images.load(str(path))
     try:
         pixels = np.empty(len(image.pixels), np.float32)
@@ -80,4 +80,4 @@ if __name__ == "__main__":
     except Exception as error:
         print(f"{type(error).__name__}: {error}", flush=True)
         os._exit(1)
-    os._exit(0)  # all is written: there is nothing that Blender need clear away
+    os._exit(0)  # all is written: skips Blender's shutdown

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles' own Diffuse, Glossy and Principled nodes reflect, on NumPy arrays. No bpy in here.
+"""Evaluates Cycles' Diffuse, Glossy and Principled nodes on NumPy arrays. Independent of bpy.
 
-Directions are unit vectors (..., 3) in a frame whose z axis is the normal: wi to the light, wo to
-the viewer. Formulas are those of Cycles 4.5 to 5.2 (kernel/closure/bsdf_microfacet.h,
-bsdf_oren_nayar.h); tests/blender/test_convert.py holds them to what it renders.
+Directions are unit vectors (..., 3) in a frame whose z axis is the normal: wi points to the light,
+wo to the viewer. The formulas are those of Cycles 4.5 to 5.2 (kernel/closure/bsdf_microfacet.h,
+bsdf_oren_nayar.h); tests/blender/test_convert.py compares them with its renders.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-#: Cosines and weights of a mean over the hemisphere, of 2 mu d mu.
+#: Gauss-Legendre cosines and weights for means over the hemisphere, weighted by 2 mu.
 _MU, _SHARE = np.polynomial.legendre.leggauss(8)
 _MU = (_MU + 1) / 2
 _SHARE = _SHARE * _MU
@@ -18,21 +18,21 @@ _SHARE = _SHARE * _MU
 
 @dataclass(frozen=True)
 class Native:
-    """A node with its values. `kind`: diffuse, glossy or principled; colours are (r, g, b), which
-    may be above 1, where Cycles reflects more than there is."""
+    """A node with its values. `kind`: diffuse, glossy or principled. Colours are (r, g, b) and may
+    exceed 1; Cycles then reflects more light than arrives."""
 
     kind: str
     color: tuple
     roughness: float = 0.0
-    #: Ratio of the lobe's width along the tangent to that across it.
+    #: Ratio of the lobe's width along the tangent to its width across it.
     stretch: float = 1.0
     beckmann: bool = False
-    #: Whether light that facets send to and fro comes out at last: the distribution Multiscatter.
+    #: Whether the distribution is Multiscatter GGX, which adds interreflection between microfacets.
     multiscatter: bool = True
     metallic: float = 0.0
-    #: Reflectance of the dielectric, seen along the normal.
+    #: Reflectance of the dielectric interface at normal incidence.
     f0: float = 0.04
-    #: Of the Principled node's base.
+    #: Roughness of the diffuse base of a Principled node.
     diffuse_roughness: float = 0.0
 
     @property
@@ -46,18 +46,18 @@ class Native:
 
 
 def dielectric(f0, cosine):
-    """Fresnel's reflectance where that along the normal is f0."""
+    """Fresnel reflectance of a dielectric with reflectance f0 at normal incidence."""
     eta = (1 + f0**0.5) / (1 - f0**0.5)
     c = np.clip(cosine, 0, 1)
     g = np.sqrt(np.maximum(eta**2 - 1 + c**2, 0))
-    # Along the surface of what refracts nothing both are 0.
+    # Without refraction (IOR 1) at grazing angles both terms are 0.
     a = (g - c) / np.maximum(g + c, 1e-12)
     b = (c * (g + c) - 1) / np.maximum(c * (g - c) + 1, 1e-12)
     return 0.5 * a**2 * (1 + b**2)
 
 
 def _of_facets(color):
-    """The colour of a metal's facets, and of the light between grooves, Cycles holds to 1."""
+    """Cycles clamps the colour of metal microfacets and of multiple scattering to 1."""
     return np.minimum(color, 1)
 
 
@@ -67,7 +67,7 @@ def schlick(color, cosine):
 
 
 def mean_schlick(color):
-    """The mean of schlick() over all angles, by their cosines."""
+    """The cosine-weighted mean of schlick() over the hemisphere."""
     return (20 * _of_facets(color) + 1) / 21
 
 
@@ -81,7 +81,7 @@ def _shadow(w, alpha, beckmann):
 
 
 def distribution(h, alpha, beckmann):
-    """Of facets' normals, per solid angle and projected area."""
+    """Microfacet normal distribution D(h), per solid angle and projected area."""
     t = (h[..., 0] / alpha[0]) ** 2 + (h[..., 1] / alpha[1]) ** 2
     z2 = np.maximum(h[..., 2], 1e-9) ** 2
     if beckmann:
@@ -95,13 +95,13 @@ def half(wi, wo):
 
 
 def facets(wi, wo, alpha, beckmann=False):
-    """f cos(theta_i) of facets that reflect all."""
+    """f cos(theta_i) of microfacets with a reflectance of 1."""
     shadow = 1 + _shadow(wi, alpha, beckmann) + _shadow(wo, alpha, beckmann)
     return distribution(half(wi, wo), alpha, beckmann) / (4 * wo[..., 2] * shadow)
 
 
 def draw_facets(u, alpha, beckmann=False):
-    """Normals (n, 3) of facets, in proportion to distribution() cos, for numbers u (n, 2)."""
+    """Samples microfacet normals (n, 3) in proportion to D(h) cos, from numbers u (n, 2)."""
     r = np.sqrt(-np.log1p(-u[:, 0])) if beckmann else np.sqrt(u[:, 0] / (1 - u[:, 0]))
     phi = 2 * np.pi * u[:, 1]
     h = np.stack([alpha[0] * r * np.cos(phi), alpha[1] * r * np.sin(phi), np.ones_like(r)], -1)
@@ -114,8 +114,8 @@ def _numbers(count):
 
 
 def facet_albedo(wo, alpha, beckmann, reflectance=None):
-    """Share of the light that facets reflect, seen from wo (n, 3), and of what they take up on the
-    way nothing: (n,) or, as `reflectance` of the cosine at the facet has it, (n, ...)."""
+    """Directional albedo, seen from wo (n, 3), of microfacets without interreflection: (n,) if they
+    reflect everything; (n, ...) if `reflectance` gives their reflectance by the cosine."""
     h = draw_facets(_numbers(2048), alpha, beckmann)[None]
     w = wo[:, None]
     cosine = np.maximum((w * h).sum(-1), 0)
@@ -131,19 +131,20 @@ def facet_albedo(wo, alpha, beckmann, reflectance=None):
 
 
 def mean_facet_albedo(alpha):
-    """The mean over all views, by their cosines, of facet_albedo() of GGX."""
+    """The cosine-weighted mean of the GGX facet_albedo() over all views."""
     views = np.stack([np.sqrt(1 - _MU**2), np.zeros(len(_MU)), _MU], -1)
     return (facet_albedo(views, alpha, False) * _SHARE).sum()
 
 
 def sent_to_and_fro(average, mean, seen):
-    """What light between facets adds, as a factor. `average`: mean reflectance of a facet; `mean`
-    and `seen`: albedo of facets that reflect all, on average and from the viewer."""
+    """The factor by which multiple scattering between microfacets raises the albedo. `average`:
+    mean reflectance of a microfacet. `mean` and `seen`: albedo of microfacets that reflect
+    everything, averaged over views and from the viewer."""
     return 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
 
 
 def _multiscatter(wo, native, average):
-    """What to and fro between facets adds, as a factor (n, 3); `average`: mean reflectance."""
+    """The factor (n, 3) of multiple scattering; `average`: mean reflectance of a microfacet."""
     if not native.multiscatter or native.beckmann:
         return np.ones((len(wo), 3))
     seen = facet_albedo(wo, native.alpha, False)[:, None]
@@ -157,7 +158,7 @@ def _grooves(cosine):
 
 
 def matte(wi, wo, color, roughness):
-    """f cos(theta_i) of Cycles' rough matte surface, (n, 3)."""
+    """f cos(theta_i) of Cycles' rough diffuse surface (Oren-Nayar), (n, 3)."""
     color = np.asarray(color, np.float64)
     nl, nv = wi[..., 2], wo[..., 2]
     a = 1 / (np.pi + roughness * (np.pi / 2 - 2 / 3))
@@ -167,18 +168,18 @@ def matte(wi, wo, color, roughness):
     t = (wi * wo).sum(-1) - nl * nv
     t = np.where(t > 0, t / np.maximum(np.maximum(nl, nv), 1e-9), t)
     mean = a * np.pi + (2 * np.pi - 5.6) / 3 * b
-    # Under OSL a Diffuse node's colour is held to 1 as a whole; files are made without.
+    # Only this term clamps the colour. With OSL on, all terms do; but new files have OSL off.
     held = _of_facets(color)
     again = held**2 * (mean / (1 - mean)) / (1 - held * (1 - mean)) / np.pi
     lost = (1 - a * np.pi - b * _grooves(nv)) * (1 - a * np.pi - b * _grooves(nl))
-    # The second term has the colour in it already; Cycles multiplies both by it.
+    # The second term already contains the colour; Cycles multiplies both terms by it nevertheless.
     return nl[..., None] * ((a + b * t)[..., None] + again * lost[..., None]) * color
 
 
 def by_view(native, each):
-    """What the view alone decides, for each (k, 3) of Glossy and Principled: the share of the light
-    that a dielectric takes from its base (k,), and what to and fro between facets of metal adds, as
-    a factor (k, 3)."""
+    """The quantities of Glossy and Principled that depend on the view alone, for each view (k, 3):
+    the fraction of light that the dielectric interface keeps from the base, (k,), and the factor of
+    multiple scattering between metal microfacets, (k, 3)."""
     if native.is_mirror:
         return dielectric(native.f0, each[:, 2]), np.ones((len(each), 3))
     color = np.asarray(native.color, np.float64)
@@ -193,8 +194,8 @@ def by_view(native, each):
 
 
 def f_cos(native, wi, wo, views):
-    """f cos(theta_i), (n, 3), without an ideal mirror's part. `views`: the different wo (k, 3) and
-    which of them each is, (n,), as numpy.unique() gives them."""
+    """f cos(theta_i), (n, 3), without ideal mirror reflection. `views`: the distinct wo (k, 3), and
+    for each direction the index of its wo, (n,), as numpy.unique() returns them."""
     if native.kind == "diffuse":
         return matte(wi, wo, native.color, native.roughness)
     each, which = views
@@ -203,7 +204,7 @@ def f_cos(native, wi, wo, views):
 
 
 def f_cos_of_view(native, wi, wo, taken, scale):
-    """The same of Glossy and Principled, with by_view() of each wo."""
+    """The same for Glossy and Principled, given by_view() of each wo."""
     lobe = np.zeros(len(wi)) if native.is_mirror else facets(wi, wo, native.alpha, native.beckmann)
     lobe = lobe[:, None]
     color = np.asarray(native.color, np.float64)
@@ -217,8 +218,8 @@ def f_cos_of_view(native, wi, wo, taken, scale):
 
 
 def albedo(native, each, taken, scale):
-    """Share of the light, (k, 3), that a Principled node with a smooth base reflects, and with an
-    ideal mirror; by_view() of each (k, 3) is known."""
+    """Directional albedo (k, 3) of a Principled node with a smooth base, including ideal mirror
+    reflection, given by_view() of each view (k, 3)."""
     color = np.asarray(native.color, np.float64)
     plastic, metal = taken[:, None] + color * (1 - taken)[:, None], 0.0
     if native.is_mirror:
@@ -229,7 +230,7 @@ def albedo(native, each, taken, scale):
 
 
 def mirror(native, wo):
-    """Weight of the ideal mirror that a node without roughness has, (n, 3)."""
+    """Weight of the ideal mirror reflection of a node without roughness, (n, 3)."""
     if not native.is_mirror:
         return np.zeros((len(wo), 3))
     if native.kind == "glossy":

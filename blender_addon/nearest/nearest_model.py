@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which models may stand for a node of Blender's, and how near each comes. No bpy in here.
+"""Finds the model nearest to one of Blender's nodes, and its error. Independent of bpy.
 
-The width of a candidate is sought so that it misplaces least of the light of a point; how near it
-comes is told of lamps that are as wide as a window, under which a lobe's own shape shows as little
-as in most pictures. The formulas of the models come as NumPy with the extension.
+The width of a candidate's lobe is chosen to misplace the least light of a point lamp. Its error is
+then measured under lamps as wide as a window: they hide the exact shape of a lobe about as much as
+most pictures do. The models' formulas come with the extension as NumPy code.
 """
 
 import functools
@@ -16,34 +16,33 @@ import numpy as np
 
 from . import native_bsdf
 
-#: Views at which models are compared, as cosines, and directions of light for each.
+#: View cosines at which models are compared, and the number of light directions for each.
 VIEWS = (0.95, 0.75, 0.5, 0.25)
 DIRECTIONS = 256
-#: Standard deviation of the light of such a lamp, in radians, and how many there are about.
+#: Standard deviation of the light of a wide lamp, in radians, and the number of such lamps.
 LAMP, LAMPS = 0.1, 512
-#: Candidates are looked at closely whose error at a rough width is at most this times that of the
-#: nearest.
+#: A candidate is examined closely if its error at a roughly fitted width is at most this times the
+#: smallest one.
 _AS_NEAR = 1.1
-#: One of how many directions is enough to tell widths apart that are far from each other.
+#: While widths are still far apart, one direction in this many suffices to compare them.
 _FEW = 8
-#: Looks by parabolas at most, and how near to one before another tells nothing new of a width, as
-#: a logarithm.
+#: Limit of parabola steps, and the distance of log widths below which another step is of no use.
 _PARABOLAS, _NO_NEWS = 4, 0.02
-#: Of the narrowest lobe that directions are drawn for, as Cycles' alpha.
+#: Alpha (as in Cycles) of the narrowest lobe by which directions are sampled.
 _NARROWEST = 5e-4
 
 
 @dataclass(frozen=True)
 class Width:
-    """The parameter that says how wide a lobe is: in proportion to roughness^power."""
+    """The parameter that sets the width of a lobe, in proportion to roughness^power."""
 
     name: str
     low: float
     high: float
     power: float
-    #: About what it is over that power for most nodes.
+    #: Typical factor of roughness^power.
     usual: float = 1.0
-    #: Parameters of the same meaning across the tangent, and what stretch does to both.
+    #: The parameter for the width across the tangent, and the effect of stretch on both.
     across: str = ""
     stretched: float = 0.0
 
@@ -51,10 +50,10 @@ class Width:
 @dataclass(frozen=True)
 class Candidate:
     model: str
-    #: From the node's values: parameters, as pack.check_value takes them.
+    #: Computes the parameters, in the form of pack.check_value, from the node's values.
     values: Callable
     width: Width | None = None
-    #: Which of the node's sockets is which parameter.
+    #: The parameter that each of the node's sockets corresponds to.
     links: dict = field(default_factory=dict)
 
 
@@ -63,13 +62,14 @@ def _grey(color):
 
 
 def _mixed(native):
-    """Reflectance along the normal."""
+    """Reflectance at normal incidence of the mix of dielectric and metal."""
     m = native.metallic
     return tuple((1 - m) * native.f0 + m * c for c in native.color)
 
 
 def _base(native):
-    """Of the node's base, whose highlight leaves 1 - f0 to it, for a model that leaves less."""
+    """Colour of the node's base. Its interface leaves 1 - f0 of the light to it; this corrects for
+    a model that leaves less."""
     share = (1 - native.metallic) * (1 - native.f0)
     mixed = zip(native.color, _mixed(native), strict=True)
     return tuple(min(share * c / max(1 - m, 1e-6), 1.0) for c, m in mixed)
@@ -108,7 +108,7 @@ _MATTE = (
         for form in ("full", "qualitative")
     ),
 )
-#: An exponent at which a lobe shows what a mirror does.
+#: An exponent whose lobe is as narrow as a mirror reflection.
 _SHARP = 1e7
 _MIRRORS = (
     Candidate("lambertian_specular", lambda n: {"rd": 0.0, "rs": _grey(n.color)}),
@@ -119,7 +119,7 @@ _COATED = Candidate("coupled", lambda n: {"r0": n.f0, "rm": n.color}, None, {"rm
 
 
 def _polished(links, sharp=False):
-    """A highlight over a base that gives way to it."""
+    """A highlight over a base that receives only the light that the highlight leaves."""
     width = None if sharp else Width("nu", **_EXPONENT, across="nv", stretched=-1.0)
     narrow = {"nu": _SHARP, "nv": _SHARP} if sharp else {}
     return tuple(
@@ -139,8 +139,8 @@ def _polished(links, sharp=False):
 
 
 def candidates(native):
-    """What may stand for a node. A model without a highlight is none for a node that has one,
-    however little of the light that is."""
+    """The candidates for a node. A model without a highlight is no candidate for a node that has
+    one, however weak."""
     if native.kind == "diffuse" or (native.kind == "principled" and _mixed(native) == (0, 0, 0)):
         return _MATTE
     if native.is_mirror and native.kind == "glossy":
@@ -160,7 +160,8 @@ def candidates(native):
 
 
 class Directions:
-    """Views and directions of light that see a node's lobe, with weights of an integral over wi."""
+    """View and light directions by which a node is compared: samples of its lobe and of the cosine,
+    with MIS weights for integrals over wi."""
 
     def __init__(self, native):
         azimuths = (0.3,) if native.stretch == 1 else (0.2, 1.3)
@@ -180,7 +181,7 @@ class Directions:
         wi, wo, weight, which = [], [], [], []
         for k, w in enumerate(self.each):
             drawn = 2 * (h @ w)[:, None] * h - w
-            # A sample below the surface stands for none: it must not count as one either.
+            # Samples below the surface don't count: lobes reflect nothing to there.
             both = np.concatenate([flat, drawn])
             up = both[:, 2] > 1e-4
             both = both[up]
@@ -195,18 +196,18 @@ class Directions:
             which.append(np.full(len(both), k))
         self.wi, self.wo = np.concatenate(wi), np.concatenate(wo)
         self.weight, self.which = np.concatenate(weight), np.concatenate(which)
-        #: Where the rows of each view begin, and where those of the last end.
+        #: First row of each view, and the end of the last.
         self.starts = np.searchsorted(self.which, range(len(self.each) + 1))
 
     def light(self, f_cos):
-        """Integral over the directions of light by view, (k, 3)."""
+        """Integral over the light directions for each view, (k, 3)."""
         weighed = f_cos * self.weight[:, None]
         return np.stack([np.bincount(self.which, weighed[:, c]) for c in range(3)], -1)
 
     @functools.cached_property
     def _from_lamps(self):
-        """What part of the light of each direction, and of each view's mirror, is of which lamp:
-        (n, LAMPS) and (k, LAMPS)."""
+        """The fraction that each lamp has of the light of each direction, (n, LAMPS), and of the
+        mirror direction of each view, (k, LAMPS)."""
         i = np.arange(LAMPS) + 0.5
         z, phi = i / LAMPS, i * math.pi * (1 + math.sqrt(5))
         r = np.sqrt(1 - z * z)
@@ -217,30 +218,31 @@ class Directions:
             near = directions.astype(np.float32) @ lamps.T.astype(np.float32)
             near -= 1
             near /= np.float32(LAMP**2)
-            # Less is next to nothing, and much slower.
+            # Smaller values are negligible, and denormals would be much slower.
             np.exp(np.maximum(near, np.float32(-30), out=near), out=near)
             near /= near.sum(1, keepdims=True)
             parts.append(near)
         return parts
 
     def light_of_lamps(self, f_cos, mirror):
-        """The same with a mirror's part (k, 3), by view and lamp, (k, LAMPS, 3)."""
+        """Light by view and lamp, (k, LAMPS, 3), with mirror reflection of weight `mirror` (k,
+        3)."""
         of_lobe, of_mirror = self._from_lamps
         weighed = (f_cos * self.weight[:, None]).astype(np.float32)
         views = [slice(*ends) for ends in itertools.pairwise(self.starts)]
-        # Not by BLAS, whose threads wait for one another where others compute as well.
+        # einsum does not use BLAS, whose threads stall when other processes keep the cores busy.
         lobes = np.stack([np.einsum("nl,nc->cl", of_lobe[v], weighed[v]) for v in views])
         return lobes.swapaxes(1, 2) + of_mirror[:, :, None] * mirror[:, None]
 
 
 @functools.lru_cache(maxsize=8)
 def _directions(roughness, stretch):
-    """What several nodes may share, of some four megabytes."""
+    """Cached, as nodes may share them; each takes about four megabytes."""
     return Directions(native_bsdf.Native("glossy", (1.0, 1.0, 1.0), roughness, stretch))
 
 
 class Target:
-    """A node's light at its Directions."""
+    """A node's reflected light at its Directions."""
 
     def __init__(self, native):
         self.native, self.at = native, _directions(native.roughness, native.stretch)
@@ -251,7 +253,7 @@ class Target:
         self.total = self.at.light(self.f_cos) + self.mirror
 
     def _differences(self, model, values):
-        """Of the model from the node: f cos, and the mirror's part."""
+        """Model minus node: of f cos, and of the mirror reflection's weight."""
         from ..brdfc import model as formulas
 
         formula, at = formulas(model), self.at
@@ -262,14 +264,14 @@ class Target:
         return float((off.sum(1) / np.maximum(self.total.sum(1), 1e-9)).mean())
 
     def misplaced(self, model, values):
-        """Part of the light of points that the model sends elsewhere, mean over views and
+        """Fraction of the light of point lamps that the model misplaces, mean over views and
         channels."""
         f_cos, mirror = self._differences(model, values)
         return self._mean(self.at.light(np.abs(f_cos)) + np.abs(mirror))
 
     def roughly_misplaced(self, model, values):
-        """The same of few of the directions, in arbitrary units: enough to tell widths apart that
-        are far from each other."""
+        """The same from a subset of the directions, in arbitrary units, to compare widths that are
+        far apart."""
         from ..brdfc import model as formulas
 
         at, few = self.at, slice(None, None, _FEW)
@@ -277,13 +279,13 @@ class Target:
         return float((np.abs(f - self.f_cos[few]).sum(1) * at.weight[few]).sum())
 
     def error(self, model, values):
-        """The same of lamps as wide as windows, all around: what a picture of these shows."""
+        """The same under lamps as wide as windows, from all sides: the error that pictures show."""
         return self._mean(np.abs(self.at.light_of_lamps(*self._differences(model, values))).sum(1))
 
 
 def with_width(candidate, native, factor):
-    """Values of a candidate whose width is `factor` times the power of the roughness. No model's
-    colour is above 1."""
+    """Values of a candidate whose width is `factor` times the power of the roughness. Colours are
+    clamped to 1, as models require."""
     held = replace(native, color=tuple(min(c, 1.0) for c in native.color))
     values, width = dict(candidate.values(held)), candidate.width
     if width is None:
@@ -298,24 +300,25 @@ def with_width(candidate, native, factor):
 
 @dataclass(frozen=True)
 class Fit:
-    """The candidate that is nearest to nodes, and the factor of its width."""
+    """The candidate nearest to some nodes, and the factor of its width."""
 
     candidate: Candidate
     factor: float
-    #: (light, error) of the nodes at each colour that was asked for.
+    #: (light, error) for each of the requested node colours.
     found: tuple
-    #: Whether a link to the node's colour would be lost.
+    #: Whether the conversion would lose a link to the node's colour.
     lost: bool
 
 
 @functools.lru_cache(maxsize=256)
 def nearest(natives, colors, colored, has):
-    """The Fit to nodes that differ in roughness alone, a tuple, among the models and values that
-    has(model, values) is true of; with its error at nodes of other colours. `colored`: whether
-    something is linked to the colour, which a model without a parameter for it would lose. None
-    where no model is near."""
+    """The Fit to a tuple of nodes that differ only in roughness; None if no model comes near.
+
+    Considers the models and values for which has(model, values) is true. The Fit includes the
+    errors for nodes of other colours, `colors`. `colored`: whether the node's colour is linked; a
+    model without a colour parameter would lose that link."""
     native, targets, found = natives[0], [Target(n) for n in natives], []
-    # With another base the width of a model is about the same: it is sought once.
+    # The width hardly depends on the base, so it is fitted once for all of them.
     roughly, closely = {}, {}
     for candidate in candidates(native):
         if not has(candidate.model, candidate.values(native)):
@@ -346,27 +349,27 @@ def nearest(natives, colors, colored, has):
 
 
 def _light(targets):
-    """The light of nodes, mean over them."""
+    """The reflected light of nodes, averaged over them."""
     return float(np.mean([t.total.mean() for t in targets]))
 
 
 def _light_and_error(candidate, targets, factor, color):
-    """The light of nodes of another colour than these, and a candidate's error with the factor of
-    its width, mean over the nodes."""
+    """The light of the nodes in another colour, and a candidate's error for a factor of its width,
+    averaged over the nodes."""
     targets = [Target(replace(t.native, color=color)) for t in targets]
     return _light(targets), _mean(Target.error, candidate, targets, factor)
 
 
 def _mean(measure, candidate, targets, factor):
-    """Of a Target's method, over nodes that differ in roughness."""
+    """The mean of one of Target's methods over nodes that differ in roughness."""
     values = [with_width(candidate, t.native, factor) for t in targets]
     found = [measure(t, candidate.model, v) for t, v in zip(targets, values, strict=True)]
     return sum(found) / len(found)
 
 
 def _rough_width(candidate, targets):
-    """Three logarithms of the factor of a candidate's width: about where it misplaces least, and
-    one on each side; of one without a width thrice 0."""
+    """Three log factors of a candidate's width: near the minimum of the misplaced light, and one on
+    each side. All are 0 for a candidate without a width."""
     width = candidate.width
     if width is None:
         return 0.0, 0.0, 0.0
@@ -379,7 +382,7 @@ def _rough_width(candidate, targets):
     grid, step = np.linspace(ends.min(), ends.max(), 16, retstep=True)
     usual = math.log(width.usual)
     below, best, above = (off(x) for x in (usual - step, usual, usual + step))
-    # Where it is not about what it mostly is, all there are.
+    # Searches the whole range if the minimum is not near the typical value.
     best = usual if below > best < above else min(grid, key=off)
     low, high = max(best - step, grid[0]), min(best + step, grid[-1])
     best = _lowest(off, low, best, high)
@@ -387,7 +390,7 @@ def _rough_width(candidate, targets):
 
 
 def _factor(candidate, targets, between):
-    """The factor of the width that misplaces the least."""
+    """The width factor that misplaces the least light."""
     if candidate.width is None:
         return 1.0
     return math.exp(
@@ -396,13 +399,13 @@ def _factor(candidate, targets, between):
 
 
 def _lowest(off, low, best, high):
-    """Where a function is least between two ends, by parabolas through three points."""
+    """Minimizes a function between two ends, by parabolas through three points."""
     points = {x: off(x) for x in {low, best, high}}
     for _ in range(_PARABOLAS):
         middle = min(points, key=points.get)
         below, above = ([x for x in points if x < middle], [x for x in points if x > middle])
         if not below or not above:
-            # At an end: the function may be least beside it.
+            # At an end the minimum may lie right beside it.
             other = min(above) if above else max(below)
             x = (middle + other) / 2
         else:
@@ -414,8 +417,8 @@ def _lowest(off, low, best, high):
 
 
 def _vertex(points, a, b, c):
-    """Of the parabola through three points, of which the middle one, b, is the lowest; held away
-    from them, so that each look tells something."""
+    """Vertex of the parabola through three points of which the middle one, b, is the lowest. It is
+    kept away from the points, so that every evaluation adds information."""
     left, right = (b - a) * (points[b] - points[c]), (b - c) * (points[b] - points[a])
     x = b - 0.5 * ((b - a) * left - (b - c) * right) / min(left - right, -1e-30)
     wide, far = ((a, b), (b, c)), 0.1

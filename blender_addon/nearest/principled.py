@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Principled node that is nearest to a material. No bpy in here.
+"""Finds the Principled node nearest to a material. Independent of bpy.
 
-A node without coat, sheen and the like: roughness, metallic, IOR and base colour. The first three
-are searched on a grid, the colour follows from least squares; what is found is evaluated by the
-formulas of native_bsdf.py, and its error is that of these. A rough node is the nearest to a curve
-in the plane of incidence; a smooth one, which has an ideal mirror, to shares of the light over the
-angle of the view.
+The node has no coat, sheen and the like: only roughness, metallic, IOR and base colour. The first
+three are searched on a grid; the colour follows by least squares. Nodes are evaluated by the
+formulas of native_bsdf.py, and the error is that of these formulas. A rough node is fitted to a
+curve in the plane of incidence. A smooth node, which has ideal mirror reflection, is fitted to
+albedos over the view angle.
 """
 
 import dataclasses
@@ -17,14 +17,15 @@ import numpy as np
 from . import native_bsdf
 from .native_bsdf import Native
 
-#: What is searched. Roughness is searched again between its neighbours.
+#: The search grid. Roughness is refined between grid points.
 _ROUGHNESS = np.geomspace(1, 0.03, 28)
 _METALLIC = np.linspace(0, 1, 5)
-#: The first is that of which nothing is known, as of a metal.
+#: The first IOR is that of a node whose IOR is unknown, as for a metal.
 _IOR = np.array([1.5, 1.0, 1.2, 1.35, 1.8, 2.4, 3.5])
 _F0 = ((_IOR - 1) / (_IOR + 1)) ** 2
 
-#: Share of a curve's square that being in part a metal, or another IOR, must be worth.
+#: Fraction of a curve's square that a partly metallic node, or another IOR, must improve the fit
+#: by.
 _PLAIN = 2e-5
 
 
@@ -36,11 +37,11 @@ class Nearest:
     color: tuple
     #: f cos of the node over the angles of the curve, (N, 3).
     curve: np.ndarray
-    #: Part of the light from the incidence that lies elsewhere.
+    #: Fraction of the light from INCIDENCE that the node misplaces.
     error: float
-    #: Whether the base is let through: the input Transmission is 1.
+    #: Whether the base transmits: the input Transmission is 1.
     transmission: bool = False
-    #: Shares (3,) of light from the incidence that are ideally reflected and refracted.
+    #: Fractions (3,) of light from INCIDENCE that are ideally reflected and refracted.
     mirror: tuple = (0.0, 0.0, 0.0)
     refracted: tuple = (0.0, 0.0, 0.0)
 
@@ -51,7 +52,7 @@ class Nearest:
 
 @dataclass(frozen=True)
 class Shares:
-    """Parts of the light from some views that are ideally reflected, scattered and ideally
+    """Fractions of the light from some views that are ideally reflected, scattered, and ideally
     refracted: (..., 3) each."""
 
     mirror: np.ndarray
@@ -65,19 +66,19 @@ def _native(roughness, metallic, ior, color):
 
 
 def node_slice(native, wi, wo):
-    """f cos of a node for one direction wo (3,) and those of wi (N, 3)."""
+    """f cos of a node for one direction wo (3,) and directions wi (N, 3)."""
     views = wo[None], np.zeros(len(wi), int)
     return native_bsdf.f_cos(native, wi, np.broadcast_to(wo, wi.shape), views)
 
 
 def misplaced(found, curve, area):
-    """Part of a curve's (N, 3) area that in another one lies elsewhere; `area` is what each of its
-    angles stands for."""
+    """Fraction of the area of a curve (N, 3) that another curve misplaces; `area`: weight of each
+    angle."""
     return float((area @ np.abs(found - curve)).sum() / (area @ curve).sum())
 
 
 class Search:
-    """For curves over directions wi (N, 3) in the plane of wo, in the order of their angles."""
+    """Fits nodes to curves over directions wi (N, 3) in the plane of wo, sorted by angle."""
 
     def __init__(self, wi, wo, angles):
         self.wi, self.wo = wi, wo
@@ -87,7 +88,8 @@ class Search:
         self._base = np.maximum(wi[:, 2], 0) / np.pi
         self._edge = (1 - np.clip(cosine, 0, 1)) ** 5
         self._fresnel = np.stack([native_bsdf.dielectric(f0, cosine) for f0 in _F0])
-        # Albedos of facets: all of it, seen from wo and on average, and through each boundary.
+        # Albedos of microfacets: reflecting everything, from wo and on average; and with each IOR's
+        # Fresnel reflectance.
         knots = np.linspace(_ROUGHNESS[-1], 1, 12)
         seen, mean, taken = [], [], []
         for r in knots:
@@ -106,8 +108,9 @@ class Search:
         self._coarse = self._parts(_ROUGHNESS)
 
     def _parts(self, roughness):
-        """By roughness: curves that a node is a sum of, as rows, weighed by the root of the area
-        that each angle stands for; their products; albedos (seen, mean, those by index)."""
+        """For each roughness: the curves that a node is a linear combination of, as rows, weighted
+        by the square roots of the angles' areas; their scalar products; and albedos (from wo,
+        average, for each IOR)."""
         wo = np.broadcast_to(self.wo, self.wi.shape)
         rows = []
         for r in roughness:
@@ -120,23 +123,23 @@ class Search:
         return roughness, rows, rows @ rows.transpose(0, 2, 1), found
 
     def _around(self, roughness, factor, count):
-        """_parts() from a roughness times a factor to it over the factor."""
+        """_parts() for `count` values from roughness times factor to roughness over factor."""
         grid = roughness * np.geomspace(factor, 1 / factor, count)
         return self._parts(np.clip(grid, _ROUGHNESS[-1], _ROUGHNESS[0]))
 
     def _best(self, parts, curve, metallic, which):
-        """Roughness, metallic, index of refraction and colour with the least sum of squares, among
-        `metallic` and the indices `which` of _F0."""
+        """The roughness, metallic, index of IOR and colour with the least squared error, among
+        `metallic` and the indices `which` into _F0."""
         roughness, rows, products, albedos = parts
         onto = rows @ (curve * np.sqrt(self.area)[:, None])  # (roughness, rows, 3)
-        # Axes: roughness, index, metallic, channel.
+        # Axes: roughness, IOR, metallic, channel.
         seen, mean = (albedos[:, i, None, None, None] for i in (0, 1))
         taken = albedos[:, 2:][:, which, None, None]
         m = metallic[None, None, :, None]
         matte = (1 - m) * (1 - taken)
 
         def product(i, j):
-            """Of two rows, of which 3 stands for the boundary's."""
+            """Scalar product of two rows; row 3 stands for the dielectric highlight of each IOR."""
             if i != 3 and j != 3:
                 return products[:, i, j, None, None, None]
             at = 3 + which
@@ -150,7 +153,8 @@ class Search:
         def dot(a, b):
             return sum(x * y * product(i, j) for i, x in a.items() for j, y in b.items())
 
-        # The node is color * slope + rest. What facets send to and fro hangs on the colour: thrice.
+        # The node is color * slope + rest. Multiple scattering depends on the colour: three
+        # iterations.
         color = np.full((1, 1, 1, 3), 0.8)
         for _ in range(3):
             more = native_bsdf.sent_to_and_fro(native_bsdf.mean_schlick(color), mean, seen)
@@ -161,14 +165,15 @@ class Search:
         node = {i: color * slope.get(i, 0) + rest.get(i, 0) for i in range(4)}
         off = dot(node, node) - 2 * sum(x * along(i) for i, x in node.items())
         off = off.sum(-1)
-        # A curve in one plane leaves much open. Of nodes that are as near the plain one is taken.
+        # A curve in one plane fits many nodes nearly as well. Among those a plain node is
+        # preferred.
         plain = 4 * m[..., 0] * (1 - m[..., 0]) + (which != 0)[None, :, None]
         off = off + _PLAIN * np.sum(curve**2 * self.area[:, None]) * plain
         r, f, k = np.unravel_index(np.argmin(off), off.shape)
         return float(roughness[r]), float(metallic[k]), int(which[f]), color[r, f, k]
 
     def nearest(self, curve):
-        """The node that is Nearest to a curve (N, 3), which is not 0 everywhere."""
+        """The Nearest node to a curve (N, 3), which must not be 0 everywhere."""
         every, metallic = np.arange(len(_F0)), _METALLIC
         r, m, _, _ = self._best(self._coarse, curve, metallic, every)
         metallic = np.unique(np.clip(m + np.linspace(-0.25, 0.25, 11), 0, 1))
@@ -192,24 +197,24 @@ def _search(incidence, angles):
 
 
 def nearest_principled(curve, angles, incidence):
-    """The rough node that is Nearest to f cos (N, 3) at these angles, in radians, of light from the
-    angle -incidence, in degrees; None for a curve that is 0."""
+    """The rough node Nearest to f cos (N, 3) at these angles, in radians, for light from the angle
+    -incidence, in degrees; None for a curve that is 0."""
     if not curve.any():
         return None
     return _search(incidence, angles.tobytes()).nearest(curve)
 
 
-#: What is searched of smooth nodes, and then between neighbours.
+#: The search grid of smooth nodes, refined between its points.
 _SMOOTH_IOR = np.concatenate([[1.5], np.linspace(1, 4, 61)])
 _SMOOTH_METALLIC = np.linspace(0, 1, 21)
 
 
 def _smooth_best(shares, cosines, metallic, ior, through):
-    """Metallic, IOR and colour with the least sum of squares over the hemisphere."""
+    """The metallic, IOR and colour with the least squared error over the hemisphere."""
     m, eta = metallic[None, :, None], ior[:, None, None]
     taken = native_bsdf.dielectric(((eta - 1) / (eta + 1)) ** 2, cosines)
     edge = (1 - cosines) ** 5
-    # Either share of the node is color * slope + rest; axes: IOR, metallic, view.
+    # Both albedos of the node are color * slope + rest; axes: IOR, metallic, view.
     slopes = [m * (1 - edge) + 0 * taken, (1 - m) * (1 - taken)]
     rests = [(1 - m) * taken + m * edge, 0 * m * taken]
     wanted = [shares.mirror, shares.refracted if through else shares.scattered]
@@ -225,7 +230,7 @@ def _smooth_best(shares, cosines, metallic, ior, through):
 
 
 def _smooth(shares, cosines, through):
-    """The same of the smooth node whose Shares (V, 3) at these cosines of the view are nearest."""
+    """The same for the smooth node whose Shares (V, 3) at these view cosines come nearest."""
     metallic = np.zeros(1) if through else _SMOOTH_METALLIC
     m, eta, _ = _smooth_best(shares, cosines, metallic, _SMOOTH_IOR, through)
     if not through:
@@ -235,7 +240,7 @@ def _smooth(shares, cosines, through):
 
 
 def _smooth_node(curve, search, cosines, shares, here):
-    """The smooth node that is Nearest; its error is a share of all light, 0 to 2."""
+    """The smooth Nearest node; its error is a fraction of all light, from 0 to 2."""
     through = bool(shares.refracted.any())
     metallic, ior, color = _smooth(shares, cosines, through)
     native = _native(0.0, metallic, ior, tuple(float(c) for c in color))
@@ -254,16 +259,18 @@ def _smooth_node(curve, search, cosines, shares, here):
 
 
 def nearest(curve, angles, incidence, cosines, shares, here):
-    """The node that is Nearest to a material of f cos (N, 3) at these angles, in radians, of light
-    from the angle -incidence, in degrees; of Shares at these cosines of the view, and `here`, at
-    the incidence. None for what reflects nothing."""
+    """The node Nearest to a material; None if it reflects nothing.
+
+    `curve`: f cos (N, 3) of the material at `angles`, in radians, for light from the angle
+    -incidence, in degrees. `shares`: its Shares at the view `cosines`; `here`: at the angle of
+    incidence."""
     rough = nearest_principled(curve, angles, incidence)
     ideal = float(here.mirror.sum() + here.refracted.sum())
     if not ideal > 0:
         return rough
     search = _search(incidence, angles.tobytes())
     found = _smooth_node(curve, search, cosines, shares, here)
-    if rough:  # which lacks what is ideal
+    if rough:  # a rough node lacks ideal reflection
         off = ideal + float(here.scattered.sum()) * rough.error
         found = min(found, dataclasses.replace(rough, error=off), key=lambda node: node.error)
     return dataclasses.replace(found, error=found.error / (ideal + float(here.scattered.sum())))

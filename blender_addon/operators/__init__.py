@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators and preferences: a file a subject."""
+"""Operators and preferences, one file per subject."""
 
 import bpy
 

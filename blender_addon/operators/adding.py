@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that bring models into the file: a node, a material, a search."""
+"""Operators that add models to the file: as a node, as a material, or by search."""
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
@@ -74,7 +74,7 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
         return result
 
 
-#: Types of objects whose materials are surfaces. Those of Grease Pencil and volumes are others.
+#: Object types whose materials are surfaces, unlike those of Grease Pencil and volumes.
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD"}
 
 
@@ -91,7 +91,7 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         if target.type not in SURFACES:
             cls.poll_message_set(tip(say("Objects of this type show no surface of a material")))
             return False
-        # Which materials an overridden mesh has, a file keeps.
+        # The material slots of an overridden mesh are saved with the file.
         return target.data.is_editable or stays(cls, target.data)
 
     def execute(self, context):
@@ -100,19 +100,19 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         except ERRORS as error:
             return refused(self, error)
         target = context.object
-        target.active_material = material  # Blender makes a slot where there is none
+        target.active_material = material  # Blender adds a slot if there is none
         said = say("{material} assigned to {object}", material=material.name, object=target.name)
         self.report({"INFO"}, rpt(said))
         report_osl(self, nodes.group_nodes(material), context.scene)
         return {"FINISHED"}
 
 
-#: Blender keeps no reference to the texts of a list that is made when it is asked for.
+#: Keeps the texts alive: Blender holds no reference to the items of a dynamic list.
 _listed = []
 
 
 def models_as_items(_operator, _context):
-    """Every model as an item to choose: what its label, authors, title and year find."""
+    """Every model as an enum item, which the search finds by label, authors, title and year."""
     found = [
         (name, f"{entry['label']} ({entry['paper']})", entry["doc"])
         for name, entry in api.models().items()

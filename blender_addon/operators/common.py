@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators share: how they refuse, and whose material they are about."""
+"""Shared by operators: how they report errors, and which material they act on."""
 
 from ..common import editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
@@ -10,7 +10,7 @@ ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErr
 
 
 def refused(operator, error):
-    """Reports an error in a sentence; what is behind it goes into the Info editor before it."""
+    """Reports an error as a sentence; its details go to the Info editor first."""
     said, more = of_error(error)
     if more:
         operator.report({"INFO"}, more)
@@ -37,7 +37,8 @@ class ChangesActiveMaterial(OfActiveMaterial):
 
 
 def stays(operator, *blocks):
-    """Whether a change to these is saved with the file; where not, the greyed button says why."""
+    """Whether changes to these are saved with the file; if not, the disabled button explains
+    why."""
     if why := editable.refusal(*blocks):
         operator.poll_message_set(tip(why))
     return why is None
@@ -54,8 +55,8 @@ def model_node(material, name):
 
 
 class Long:
-    """An operator whose work is a jobs.Job: it goes on beside the interface, which shows how far it
-    is; Esc gives up, and then nothing is changed."""
+    """An operator whose work is a jobs.Job. It runs while the interface, which shows its progress,
+    stays usable; Esc cancels it, and then nothing is changed."""
 
     def begin(self, context, job):
         self.job = job
@@ -63,7 +64,7 @@ class Long:
         self.timer = manager.event_timer_add(0.1, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
-        self.tell(context, 0)  # before the first step: a user may want to cancel at once
+        self.tell(context, 0)  # before the first step, so that users can cancel at once
         return {"RUNNING_MODAL"}
 
     def tell(self, context, share):
@@ -94,7 +95,7 @@ class Long:
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Also what Blender calls when a window closes or a file is opened."""
+        """Blender calls this, too, when a window closes or a file is opened."""
         self.job.cancel()
         self.end(context)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that put models in place of Blender's own nodes, and back."""
+"""Operators that replace Blender's own nodes by models, and restore them."""
 
 import math
 
@@ -42,7 +42,7 @@ class BRDFC_OT_convert(Operator):
     def poll(cls, context):
         return bool(_selected_materials(context))
 
-    #: Of the dialog; None before it and after, where undo may have taken their nodes away.
+    #: Plans of the open dialog; None otherwise, as undo may have removed their nodes.
     _plans = None
 
     def _within(self):

@@ -79,7 +79,7 @@ class BRDFC_OT_bake(Long, _Budget, Operator):
     def finish(self, context, plan):
         BRDFC_OT_bake_plan.plan, BRDFC_OT_bake_plan.planned_with = plan, self.budget()
         bpy.ops.brdfc.bake_plan("INVOKE_DEFAULT", error=self.error, fit=self.fit)
-        return {"CANCELLED"}  # nothing is changed yet, so there is nothing to undo
+        return {"CANCELLED"}  # nothing has changed yet, so there is no undo step
 
     def execute(self, context):
         try:
@@ -96,7 +96,7 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
     bl_description = "Show what lean materials would hold, and bake them"
     bl_options = {"INTERNAL"}
 
-    plan, planned_with = None, None  # of the class: brdfc.bake leaves them here
+    plan, planned_with = None, None  # class attributes, which brdfc.bake sets
 
     @classmethod
     def poll(cls, context):
@@ -115,7 +115,7 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
     def execute(self, context):
         if self.budget() == self.planned_with:
             bpy.ops.brdfc.bake_apply("INVOKE_DEFAULT")
-        else:  # then another plan is to be seen first
+        else:  # another plan: shows it first
             bpy.ops.brdfc.bake("INVOKE_DEFAULT", error=self.error, fit=self.fit)
         return {"FINISHED"}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators on a material's model: its form, what is known of it, outputs, values."""
+"""Operators on a material's model: its form, details, outputs and values."""
 
 import functools
 
@@ -47,7 +47,7 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
             identity = nodes.identity(node)
             editable.check(node.id_data)
             for user in filter(editable.stays, materials):
-                # All are looked for before one is changed.
+                # All nodes are found before any is changed.
                 alike = [
                     other
                     for other in nodes.group_nodes(user)
@@ -207,13 +207,13 @@ class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
         return chosen[0]
 
 
-#: No name of a substance.
+#: An item that is not the name of a substance.
 _FILE = "FILE"
 
 
 @functools.cache
 def _substances(locale):
-    """Items of a menu in a language; Blender needs somebody to keep their texts."""
+    """Enum items in a language, cached because Blender needs their texts to stay alive."""
     known = api.substances().values()
     metals, others = ([s for s in known if s.conductor is kind] for kind in (True, False))
     rows = [(s.name, s.label, s.source) for s in (*metals, *others)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preferences, and operators for the library of materials that they add."""
+"""The preferences, and the operators for the library of materials in them."""
 
 from bpy.props import BoolProperty, StringProperty
 from bpy.types import AddonPreferences, Operator
@@ -58,7 +58,7 @@ class BRDFC_OT_remove_library(Operator):
 
 
 def draw_library(layout):
-    """Buttons for the library of materials, where this extension has one."""
+    """Buttons for the library of materials, if this extension has one."""
     if not library.available():
         return
     if library.registered() is None:

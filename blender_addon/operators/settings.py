@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that mend settings of scenes and materials, and look for lamps."""
+"""Operators that fix settings of scenes and materials, and that search for lamps."""
 
 from bpy.types import Operator
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Directional albedo from the generator's tables. No bpy in here.
+"""Directional albedo from the generator's tables. Independent of bpy.
 
-Per colour channel the albedo is a sum of terms, each interpolated in a grid and multiplied with the
-colours it names; the choices of a model select which terms.
+Per colour channel the albedo is a sum of terms. Each is interpolated in a table and multiplied by
+the colours that it names; the model's choices select which terms apply.
 """
 
 import bisect
@@ -14,7 +14,7 @@ _SCALES = {"linear": float, "log": math.log, "log1p": math.log1p}
 
 
 def _bracket(axis, value):
-    """Index of the lower knot and the weight of the upper one; ends clamp."""
+    """Index of the lower knot and weight of the upper one; values beyond the ends are clamped."""
     knots = axis["values"]
     value = min(max(value, knots[0]), knots[-1])
     upper = min(max(bisect.bisect_right(knots, value), 1), len(knots) - 1)
@@ -41,7 +41,7 @@ def _interpolate(grid, coordinates):
 
 
 def _combination(table, schema, values):
-    """Index of the choices, like the reading of an odometer whose last wheel turns fastest."""
+    """Index of a combination of choices in mixed radix: the last choice varies fastest."""
     index = 0
     for name in table["choices"]:
         choices = schema[name]["choices"]
@@ -50,16 +50,16 @@ def _combination(table, schema, values):
 
 
 def views(model_name):
-    """Cosines between which the tables are: of a pack cut to a scene those that occur there."""
+    """View cosines of the tables; a pack that is cut to a scene has only those that it needs."""
     return tuple(pack.model(model_name).get("view_cosines", (0, 1)))
 
 
 def albedo(model_name, values, cos_theta_o):
-    """Directional albedo (r, g, b) for a view cosine in (0, 1], mirror term included.
+    """Directional albedo (r, g, b) for a view cosine in (0, 1], including ideal reflection.
 
-    `values` has the model's parameters in the form of pack.check_value; what is missing takes its
+    `values` has the model's parameters in the form of pack.check_value; missing ones take their
     default. Raises ValueError for an unknown model, for one without a table, and for a view that
-    the table was cut of.
+    was cut from the table.
     """
     table, schema = pack.model(model_name).get("albedo"), pack.parameters(model_name)
     if table is None:

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kernel of a model as a curve draws it."""
+"""Reads the kernel of the model `lossless` from a curve."""
 
 from ..common.i18n import Sentence, say
 from . import pack
 
-#: The model whose kernel may be drawn, and its heights: equally far apart, the last at u = 3.
+#: The model with an editable kernel, and its heights at equidistant u, the last at u = 3.
 MODEL = "lossless"
 _HEIGHTS = ("h0", "h1", "h2", "h3")
 
 
 def heights(curve):
-    """The parameters of MODEL that are a Float Curve's heights over the largest.
+    """The parameters of MODEL from a Float Curve: its heights, relative to the largest.
 
     Raises ValueError for another node, and where a height is not positive or too small beside the
     largest.
@@ -24,7 +24,7 @@ def heights(curve):
             )
         )
     mapping = curve.mapping
-    mapping.initialize()  # a new curve can't be evaluated before
+    mapping.initialize()  # a new curve can't be evaluated before this
     places = [i / (len(_HEIGHTS) - 1) for i in range(len(_HEIGHTS))]
     found = [mapping.evaluate(mapping.curves[0], x) for x in places]
     lowest = pack.parameters(MODEL).get("h0", {"min": 0})["min"]

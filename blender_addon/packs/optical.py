@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Metals and glass of measured refractive index as parameters of a model, in the working space."""
+"""Measured refractive indices of metals and glass as model parameters, in the working space."""
 
 import math
 import os
@@ -10,8 +10,8 @@ from ..common import color
 from ..common.i18n import say
 from . import pack
 
-#: Roles of parameters in the manifest, and the values of a substance that they take, for what kind:
-#: True, conductors alone; False, all others alone.
+#: Roles of parameters in the manifest: how each follows from a substance, and for which kind of
+#: substance: True, only conductors; False, only others.
 _ROLES = {
     "index": (lambda s, v: s.index_d, False),
     "dispersion": (lambda s, v: s.dispersion, False),
@@ -21,20 +21,21 @@ _ROLES = {
 for _channel, _letter in enumerate("rgb"):
     _ROLES[f"index_{_letter}"] = (lambda s, v, c=_channel: v.n[c], None)
     _ROLES[f"extinction_{_letter}"] = (lambda s, v, c=_channel: v.k[c], None)
-#: Of those, what absorbs inside takes.
+#: The roles that describe absorption inside.
 _INSIDE = ("attenuation", "per_length")
 
 
 def can_have(model_name):
-    """Whether a model has parameters that say what its surface is made of."""
+    """Whether a model has parameters that describe its material."""
     return any("optical" in p for p in pack.parameters(model_name).values())
 
 
 def find(name):
-    """A substance of the extension, or of a file NAME.csv as refractiveindex.info exports it.
+    """Finds a substance of the extension, or reads a file NAME.csv as refractiveindex.info exports
+    it.
 
     Raises ValueError that names file, line and what was expected."""
-    from ..brdfc import optics  # NumPy's formulas, when they are first needed
+    from ..brdfc import optics  # NumPy's formulas are imported on first use
 
     if not isinstance(name, str | os.PathLike):
         raise ValueError(f"expected the name of a substance or a file NAME.csv, got {name!r}")
@@ -48,7 +49,8 @@ def find(name):
 
 
 def _absorption(model_name, substance, metres):
-    """Values by role; ValueError where there is nothing that a thickness could say."""
+    """Values by role. Raises ValueError if nothing is absorbed, so that a thickness means
+    nothing."""
     from ..brdfc import optics
 
     absorbs = not substance.conductor and substance.absorbs
@@ -81,8 +83,8 @@ def _absorption(model_name, substance, metres):
 
 
 def _value(role, kind, substance, values, of_inside):
-    """What a parameter of a role and a kind, number or color, is of a substance; None where it says
-    nothing of such a one."""
+    """The value of a parameter with this role and kind (number or color) for a substance; None if
+    the role does not apply to it."""
     if role in _INSIDE:
         return of_inside.get(role)
     value_of, conductors = _ROLES[role]
@@ -92,14 +94,14 @@ def _value(role, kind, substance, values, of_inside):
     return value_of(substance, values) if right_kind else None
 
 
-#: How far a number of a pack that is cut to a scene may be from a substance's to be the same one:
-#: Blender 4.5 has four digits of its working space, the tool more.
+#: Tolerance for comparing a substance with the fixed parameters of a pack that is cut to a scene:
+#: Blender 4.5 stores four digits of its working space, the tool more.
 _SAME = {"rel_tol": 2e-3, "abs_tol": 2e-4}
 
 
 def _check_fixed(model_name, substance, value_of):
-    """Raises ValueError where a pack that is cut to a scene has parameters of another substance and
-    no socket for them. `value_of` a role and a kind."""
+    """Raises ValueError if a pack that is cut to a scene has fixed parameters, without sockets, of
+    another substance. `value_of`: takes role and kind."""
     fixed = pack.fixed(model_name)
     other = []
     for name, role in pack.fixed_optical(model_name).items():
@@ -123,9 +125,9 @@ def _check_fixed(model_name, substance, value_of):
 
 
 def parameters(model_name, substance, thickness=None):
-    """The values of those parameters, by name. `thickness`: the metres after which absorption is
-    exact. Raises ValueError where the model has none for such a substance, or one is given where
-    nothing is absorbed, and where this extension has other values of them alone."""
+    """The values of those parameters by name. `thickness`: metres at which absorption is exact.
+    Raises ValueError if the model has no parameters for such a substance, if a thickness is given
+    but nothing is absorbed, and if this pack has fixed other values."""
     values = substance.values(color.from_xyz)
     of_inside = _absorption(model_name, substance, thickness)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The generated part of the extension: models, parameters, forms, tables. No bpy in here."""
+"""Reads the generated files of the extension: models, parameters, forms, tables. Independent of
+bpy."""
 
 import hashlib
 import json
@@ -13,16 +14,15 @@ from ..common import extension
 from ..common.i18n import form_name, say
 
 _INSTALLED = extension.ROOT
-#: Where models are read from; see use().
+#: Folder that models are read from; see use().
 root = _INSTALLED
 FORMAT = 1
-#: Another number whenever nodes.py or twin.py wires nodes in another way.
+#: To be increased when nodes.py or twin.py changes how it wires nodes.
 WIRING = 1
 
-#: Custom property of a node group: which model and representation it is, and its sockets'
-#: identifiers.
+#: Custom property of a node group: its model, its representation and its sockets' identifiers.
 TAG = "brdfc"
-#: Sockets that every group has beside the model's parameters.
+#: Sockets of every group, besides the model's parameters.
 NORMAL = "Normal"
 TANGENT = "Tangent"
 
@@ -35,8 +35,8 @@ class PackError(RuntimeError):
 
 
 def use(folder=None):
-    """Takes the models of another folder that `brdfc build` wrote, one cut to a scene for instance;
-    None: those of the extension itself."""
+    """Reads models from another folder that `brdfc build` wrote, for instance one cut to a scene;
+    None: from the extension's own."""
     global root
     root = _INSTALLED if folder is None else Path(folder)
     manifest.cache_clear()
@@ -45,7 +45,7 @@ def use(folder=None):
 
 @lru_cache(maxsize=1)
 def manifest():
-    """The manifest as a dict. Raises PackError when it is missing, damaged or of another format."""
+    """The manifest as a dict. Raises PackError if it is missing, damaged or of another format."""
     path = root / "manifest.json"
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -58,12 +58,12 @@ def manifest():
     return data
 
 
-#: Why there is no form but twins.
+#: Why only twins are available.
 NO_OSL = say("This Blender was built without Open Shading Language")
 
 
 def osl_available():
-    """Whether this build of Blender has Open Shading Language; that of Debian has not."""
+    """Whether this build of Blender has Open Shading Language; Debian's has not."""
     try:
         import _cycles
     except ImportError:  # outside of Blender
@@ -72,7 +72,7 @@ def osl_available():
 
 
 def version(generator):
-    """The numbers of "brdfc 1.2.3"; empty where there are none."""
+    """The numbers in "brdfc 1.2.3"; empty if there are none."""
     return tuple(int(n) for n in re.findall(r"\d+", generator))
 
 
@@ -90,7 +90,8 @@ def model(name):
 
 
 def by_look():
-    """{look: models' identifiers}, both as menus list them; without looks that no model has."""
+    """{look: identifiers of models}, both in the order of menus; looks without a model are left
+    out."""
     names = {look: [] for look in manifest()["looks"]}
     for name in model_names():
         names[model(name)["look"]].append(name)
@@ -98,8 +99,8 @@ def by_look():
 
 
 def citation(entry):
-    """Who wrote a model's paper, and when: "Oren, Nayar 1994", of a manifest entry. Raises
-    PackError for a paper that is not cited as "I. Name, J. Name: Title, Journal, year"."""
+    """Authors and year of a model's paper, from a manifest entry: "Oren, Nayar 1994". Raises
+    PackError if the paper is not cited as "I. Name, J. Name: Title, Journal, year"."""
     cited = re.match(r"([^:]+): .*?\b(1[5-9]\d\d|20\d\d)\b", entry["paper"])
     if cited is None:
         raise PackError(
@@ -111,7 +112,7 @@ def citation(entry):
 
 
 def same(value, only):
-    """Whether a socket, which is in single precision, holds a value."""
+    """Whether a socket, in single precision, holds this value."""
     if isinstance(only, str) or value is None:
         return value == only
     pairs = zip(value, only, strict=True) if isinstance(only, tuple) else [(value, only)]
@@ -119,7 +120,7 @@ def same(value, only):
 
 
 def refusal(model_name, name, values):
-    """Why these values exclude a form, which may exist for some values only; None if not."""
+    """Why a form that exists for some values only is not available for these; None if it is."""
     for key, only in form_values(model_name, name).items():
         if key in values and not same(values[key], only):
             got = values[key]
@@ -138,12 +139,12 @@ def refusal(model_name, name, values):
 
 
 def choice_label(identifier):
-    """An identifier as people read it."""
+    """Display text of an identifier."""
     return identifier.replace("_", " ").capitalize()
 
 
 def value_text(value):
-    """A value of a parameter as people read it."""
+    """Display text of a parameter's value."""
     if isinstance(value, str):
         return choice_label(value)
     if isinstance(value, tuple):
@@ -152,9 +153,8 @@ def value_text(value):
 
 
 def native_form(model_name):
-    """Name of the form that "auto" becomes where Open Shading Language does not run: made of
-    Blender's own nodes, and equal to the model at least for some of its choices. None: there is
-    none."""
+    """The form that "auto" takes where OSL does not run: made of Blender's own nodes and equal to
+    the model, at least for some of its choices. None if the model has no such form."""
     schema = parameters(model_name)
     for name, form in model(model_name)["representations"].items():
         limited = [schema[key]["kind"] for key in form["only"] if key in schema]
@@ -164,8 +164,8 @@ def native_form(model_name):
 
 
 def automatic(model_name, values=None, osl=True):
-    """Name of the form that "auto" becomes with or without Open Shading Language: the model's
-    preference, or the next form where `values` have one that the preferred form lacks."""
+    """The form that "auto" takes with or without OSL: the model's preferred one, or the next if
+    that does not support `values`."""
     entry, values = model(model_name), values or {}
     forms, native = entry["representations"], native_form(model_name)
     others = [n for n in forms if n != entry["auto"] and "nodes" not in forms[n]]
@@ -176,8 +176,8 @@ def automatic(model_name, values=None, osl=True):
 
 
 def resolve(model_name, representation, values=None):
-    """Name of the representation. Raises ValueError. "auto" becomes what automatic() says of this
-    build of Blender; whether a scene has Open Shading Language turned on is not looked at."""
+    """The representation to use. Raises ValueError. For "auto" it is automatic(), given whether
+    this build of Blender has OSL, whatever the scene's setting."""
     entry, values = model(model_name), values or {}
     name = representation
     if name == "auto":
@@ -208,8 +208,8 @@ def parameters(model_name):
 
 
 def unread(schema, values):
-    """Parameters that no formula reads under these choices, and are not at their default:
-    {name: a choice that makes it so}. A value that a link controls is None."""
+    """Parameters that differ from their default though no formula reads them under these choices:
+    {name: a choice that causes it}. The value of a linked parameter is None."""
     found = {}
     for name, parameter in schema.items():
         value, needs = values.get(name), parameter.get("needs", {})
@@ -221,33 +221,33 @@ def unread(schema, values):
 
 
 def fixed(model_name):
-    """Parameters that this pack was built without, and the values they have in it."""
+    """Parameters that this pack was built without, with the values that it assumes."""
     return canonical(model(model_name).get("fixed", {}))
 
 
 def fixed_optical(model_name):
-    """What those of them say of a substance that say any of it, as `optical` of parameters."""
+    """Those of them that describe a substance, as `optical` of parameters."""
     return model(model_name).get("fixed_optical", {})
 
 
 def canonical(found):
-    """Values of parameters as JSON has them, in the form of check_value()."""
+    """Converts parameter values from JSON to the form of check_value()."""
     return {name: tuple(v) if isinstance(v, list) else v for name, v in found.items()}
 
 
 def form_values(model_name, name):
-    """The only values that a form has of parameters of its model."""
+    """Parameters of the model for which a form supports one value only, with that value."""
     return canonical(model(model_name)["representations"][name]["only"])
 
 
 def constants(model_name, name):
-    """Values of the parameters for which a form has no socket, since this pack or the form has one
-    value of them alone."""
+    """Values of the parameters for which a form has no socket, because the pack or the form
+    supports one value only."""
     return fixed(model_name) | form_values(model_name, name)
 
 
 def form_choices(model_name, name):
-    """Identifiers of every choice as a form has them: one where the form exists for that alone."""
+    """Identifiers of all choices of a form; a single one where it exists for that one alone."""
     only = form_values(model_name, name)
     return {
         key: [only[key]] if key in only else p["choices"]
@@ -257,7 +257,7 @@ def form_choices(model_name, name):
 
 
 def socket_parameters(model_name, name):
-    """The parameters that a form shows: those that leave something to choose."""
+    """The parameters for which a form has a socket: those with more than one possible value."""
     only = form_values(model_name, name)
     return {
         key: p
@@ -280,20 +280,20 @@ def _file(relative):
 
 
 def is_native(model_name, name):
-    """Whether a form is made of Blender's own nodes and needs no Open Shading Language."""
+    """Whether a form consists of Blender's own nodes and needs no OSL."""
     return "nodes" in representation(model_name, name)
 
 
 def source(model_name, name):
-    """File stem and text of the OSL source, or of what Blender's own nodes take."""
+    """File stem and text of the OSL source, or of the data for Blender's own nodes."""
     entry = representation(model_name, name)
     path = _file(entry["nodes"] if is_native(model_name, name) else entry["shader"])
     return path.stem, path.read_text(encoding="utf-8")
 
 
 def albedo_source(model_name, name):
-    """The same of the script that computes the Albedo output, where that is one of its own: its
-    tables are large, and most materials do without. None elsewhere."""
+    """The same for the script of the Albedo output if it is separate: its tables are large, and
+    most materials do without it. Otherwise None."""
     file = representation(model_name, name).get("albedo_shader")
     if file is None:
         return None
@@ -303,13 +303,13 @@ def albedo_source(model_name, name):
 
 @cache
 def digest(model_name, name):
-    """Changes whenever the shader or the sockets of its group would. Panels ask for it at each
-    redraw: of the source, of up to a megabyte, the manifest has the hash."""
+    """A key that changes whenever the shader or its group's sockets change. Panels need it at each
+    redraw; so the manifest holds the hash of the source, which can be a megabyte."""
     form = representation(model_name, name)
     schema = [model(model_name)["parameters"], form["only"]]
     forms = model(model_name)["representations"]
     hashes = [WIRING, form["sha256"], form.get("albedo_sha256")]
-    if "twin" in forms and name != "twin":  # which stands in for it
+    if "twin" in forms and name != "twin":  # every other form contains it as a stand-in
         hashes.append(forms["twin"]["sha256"])
     text = json.dumps([*hashes, *schema], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Text of panels and dialogs in lines that fit: Blender does not wrap labels, it cuts them."""
+"""Wraps the text of panels and dialogs: Blender cuts long labels off instead of wrapping them."""
 
 import re
 import unicodedata
@@ -9,10 +9,10 @@ import bpy
 
 from ..common.i18n import iface
 
-#: Pixels at a resolution scale of 1: what a region has beside the text of a box in a panel, the
-#: strip of tabs of a sidebar, an icon, and the room that is taken where there is no region.
+#: Pixels at a resolution scale of 1: the margins beside a label in a panel's box, a sidebar's tabs,
+#: an icon, and the width assumed where there is no region.
 _MARGIN, _TABS, _ICON, _ROOM = 54, 22, 20, 250
-#: What no line of Japanese begins with.
+#: Characters that may not begin a line in Japanese.
 _CLOSING = "、。，．・：；！？）」』】…%ー々ァィゥェォッャュョぁぃぅぇぉっゃゅょ"
 
 
@@ -21,14 +21,14 @@ def _scale():
 
 
 def width(text):
-    """Pixels that a text takes in a panel."""
+    """Width of a text in a panel, in pixels."""
     points = bpy.context.preferences.ui_styles[0].widget.points
     blf.size(0, points * _scale())
     return blf.dimensions(0, text)[0]
 
 
 def room(icon=False):
-    """Pixels that the region which is drawn has for a line."""
+    """Width available to a line in the region being drawn, in pixels."""
     region, scale = bpy.context.region, _scale()
     if region is None:
         pixels = _ROOM * scale
@@ -38,8 +38,8 @@ def room(icon=False):
 
 
 def _pieces(text):
-    """The parts between which a line may be broken: words, and characters of East Asian width."""
-    # Not at spaces that hold words together, as before a per cent sign.
+    """The parts between which a line may break: words, and single East Asian characters."""
+    # Does not break at spaces that belong between two words, such as before a per cent sign.
     text = re.sub(rf" (?=[{re.escape(_CLOSING)}])", "\u00a0", text)
     for word in re.split(r"[ \t\n]+", text):
         piece = " "
@@ -54,7 +54,7 @@ def _pieces(text):
 
 
 def lines_of(text, pixels):
-    """A text in lines that are no wider than that, if its words allow, indented as it is."""
+    """Breaks a text into lines that fit a width where its words allow it; keeps the indentation."""
     margin = text[: len(text) - len(text.lstrip(" "))]
     lines, line = [], ""
     for piece in _pieces(text):
@@ -66,8 +66,8 @@ def lines_of(text, pixels):
 
 
 def wrapped(layout, text, icon="NONE", pixels=None):
-    """A label over several lines, of a Sentence or of a text that is not translated; as wide as
-    the region or as is said, at a resolution scale of 1."""
+    """A label over several lines, from a Sentence or untranslated text. `pixels`: the width at a
+    resolution scale of 1; by default that of the region."""
     known = room(icon != "NONE") if pixels is None else pixels * _scale()
     for line in lines_of(iface(text), known):
         layout.label(text=line, icon=icon, translate=False)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Render methods in plain words: what each is good for."""
+"""Descriptions of the render methods: what each is good for."""
 
 from ..common.i18n import say
 
-#: What each form means to who chooses one; "form" is the word of scripts for a render method.
+#: Tooltip of each form; "form" is the name in scripts, the interface says "render method".
 METHODS = {
     "auto": say(
         "Automatic: Exact or Aimed with Open Shading Language on, Formula Nodes with it off and on "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Plots: pictures of plots.py, kept as previews, which no file holds."""
+"""The panel Plots. It shows pictures of plots.py as previews, which are not saved in files."""
 
 import functools
 
@@ -14,14 +14,14 @@ from ..groups import nodes
 from ..packs import pack
 from .labels import wrapped
 
-#: Pictures that are kept; the oldest gives its place away.
+#: Number of cached pictures; the oldest is discarded.
 _KEPT = 16
 _previews = None
-_places = {}  # what is shown, to the name of a preview and its legend
+_places = {}  # values and form: name of the preview, legend
 
 
 def _values(node):
-    """A node's values by name, and the names of what a link controls."""
+    """A node's values by name, and the names of linked parameters."""
     model_name, _ = nodes.identity(node)
     values = dict(pack.fixed(model_name))
     values |= {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
@@ -29,13 +29,10 @@ def _values(node):
 
 
 def drawn(node):
-    """plots.draw() of a node's values, with what its form reflects, or without where that can't be
-    told: a file may hold forms of any version."""
-    from ..plotting import (  # NumPy's formulas, when they are first looked at
-        form_light,
-        plots,
-        shader_text,
-    )
+    """plots.draw() for a node's values, with its form's reflection if that can be determined: the
+    form may be of any version."""
+    # NumPy's formulas are imported on first use.
+    from ..plotting import form_light, plots, shader_text
 
     model_name, _ = nodes.identity(node)
     values, _ = _values(node)
@@ -47,8 +44,8 @@ def drawn(node):
 
 
 def picture(node):
-    """The preview of a node's values and its plots.Legend; drawn where the values are new. Raises
-    ValueError for a model that the extension does not have."""
+    """The preview for a node's values and its plots.Legend; drawn if the values are new. Raises
+    ValueError for a model that the extension lacks."""
     model_name, form = nodes.identity(node)
     values, _ = _values(node)
     key = (
@@ -67,7 +64,7 @@ def picture(node):
             name, _ = _places.pop(next(iter(_places)))
         preview = _previews[name]
         preview.image_size = pixels.shape[1::-1]
-        # Four bytes a pixel, as one integer.
+        # Packs the four bytes of a pixel into one integer.
         packed = np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)).view(np.int32)
         preview.image_pixels.foreach_set(packed.ravel())
         _places[key] = (name, legend)
@@ -80,7 +77,7 @@ def _percent(share):
 
 
 def _shares(color):
-    """One percentage, or one of red, green and blue."""
+    """One percentage, or three for red, green and blue."""
     texts = [f"{100 * share:.3g}" for share in color]
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
@@ -100,7 +97,7 @@ def _form_said(node, legend):
 
 
 def _legend(node, legend):
-    """Sentences, by what they are of: first the material itself."""
+    """The sentences of the legend by subject; the material itself comes first."""
     if legend.mirror is not None:
         shares = _shares(legend.mirror)
         yield say("Arrow above: an ideal mirror, {percent} % of the light", percent=shares)

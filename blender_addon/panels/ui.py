@@ -17,7 +17,7 @@ from ..warnings import checks
 from .labels import wrapped
 from .methods import METHODS
 
-#: Headings of menus by the looks that models declare.
+#: Menu headings for the looks that models declare.
 LOOKS = {
     "matte": say("Matte"),
     "glossy": say("Glossy"),
@@ -28,7 +28,7 @@ LOOKS = {
 
 
 def menu_label(name):
-    """A model's label and its paper's authors and year: what typing into a menu finds."""
+    """A model's label with its paper's authors and year, all of which the menu search finds."""
     entry = pack.model(name)
     return f"{entry['label']} ({pack.citation(entry)})"
 
@@ -39,7 +39,7 @@ def _draw_models(layout, operator):
         layout.separator()
         layout.label(text=iface(LOOKS[look]), translate=False)
         for name in names:
-            # The names are those of the papers, in every language.
+            # Names from the papers are not translated.
             item = layout.operator(operator, text=menu_label(name), translate=False)
             item.model = name
             item.representation = "auto"
@@ -76,14 +76,14 @@ def error_text(entry):
     error = entry["error"]
     if (off := error.get("relative_l1")) is not None:
         return percent(off)
-    # Drawn directions: what is measured is that nothing is lost.
+    # The form samples directions: the measurement shows that no energy is lost.
     if error.get("albedo") is not None:
         return say("none, only noise")
     return say("not measured")
 
 
 def error_line(form):
-    """The same as the panel has it, with what it is a part of."""
+    """The same for the panel, with the quantity that it is a fraction of."""
     error = error_text(form)
     if (form["error"].get("relative_l1") or 0) < ROUNDING:
         return say("Error: {error}", error=error)
@@ -91,18 +91,18 @@ def error_line(form):
 
 
 def percent(part):
-    """A part of the light in percent; rounding is not told from 0."""
+    """A fraction in percent; rounding errors count as 0."""
     if part < ROUNDING:
         return say("none")
     return say("{percent} %", percent=f"{100 * part:.2g}")
 
 
-#: Errors below this are rounding of single precision.
+#: Smaller errors are rounding errors of single precision.
 ROUNDING = 1e-5
 
 
 def details(node, form):
-    """What the panel leaves out of a node's form, a sentence a line."""
+    """What the panel omits about a node's form, one sentence per line."""
     error = form["error"]
     out = [
         say("{what}: {error}", what=what, error=percent(error[key]))
@@ -118,7 +118,7 @@ def details(node, form):
         )
         if error.get(key) is not None
     ]
-    if error.get("note"):  # the tool's words, with the place where the form is worst
+    if error.get("note"):  # the tool's text: where the error is largest
         out.append(error["note"].capitalize())
     out.append(say("Render time at equal samples: {cost}", cost=cost_text(node, form)))
     if form.get("closures"):
@@ -130,7 +130,7 @@ def cost_text(node, form):
     """Render time of a node's form in units of Blender's Glossy node."""
     if form["cost"] is None:
         return say("not measured")
-    # A form of other parameters, which a pack cut to a scene holds, has another one.
+    # In a pack cut to a scene, forms have fewer parameters, so their cost differs.
     cut = nodes.is_baked(node) or pack.fixed(nodes.identity(node)[0])
     times = f"{form['cost']:.2f}"
     if cut:
@@ -138,13 +138,13 @@ def cost_text(node, form):
     return say("{times} x Glossy", times=times)
 
 
-#: View angles in degrees at which the panel shows energy.
+#: View angles in degrees at which the panel shows the energy.
 ANGLES = (0, 45, 75, 85)
 
 
 def energy_text(node):
-    """Directional albedo for the current values at a few view angles that occur, or why there is
-    none."""
+    """Directional albedo for the current values at a few view angles that the pack covers, or the
+    reason why there is none."""
     model_name, _ = nodes.identity(node)
     values = {}
     for name, parameter in pack.parameters(model_name).items():
@@ -160,7 +160,7 @@ def energy_text(node):
             continue
         rgb = energy.albedo(model_name, values, cosine)
         luminance = color.luminance(np.array(rgb))
-        numbers.append(f"{angle}\u00b0\u00a0{luminance:.3f}")  # on one line
+        numbers.append(f"{angle}\u00b0\u00a0{luminance:.3f}")  # kept on one line
     return ", ".join(numbers) or say("not at a view angle of this scene")
 
 
@@ -196,7 +196,7 @@ def _draw_form(layout, node, form, scene, changes):
     wrapped(column, METHODS[representation])
     for refusal in refusals:
         wrapped(column, refusal)
-    # A button, for labels have no tooltip that could say what the number means.
+    # A button instead of a label, which could have no tooltip to explain the number.
     line = column.row()
     line.alignment = "LEFT"
     line.operator(
@@ -222,7 +222,7 @@ def _draw_values(layout, node):
 
 
 def draw_node(layout, node, scene):
-    """Model, form, error, cost, energy and values of one group node."""
+    """Shows model, form, error, cost, energy and values of a group node."""
     model_name, _ = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
     changes = editable.stays(node.id_data)
@@ -245,7 +245,7 @@ def draw_node(layout, node, scene):
 
 
 def draw_lamps(layout, material, scene):
-    """Which lamps the material's models aim at, where a model does."""
+    """Shows the lamps that the material's models aim at, if any of them does."""
     forms = [made[0] for n in nodes.group_nodes(material) if (made := nodes.manifest_entry(n))]
     slots = max((form.get("lamps") or 0 for form in forms), default=0)
     if slots == 0:
@@ -280,7 +280,7 @@ def draw_lamps(layout, material, scene):
 _DOWNLOAD = ("wm.url_open", button("Get Blender"), {"url": "https://www.blender.org/download/"})
 _ENLARGE = ("brdfc.enlarge_lamps", button("Give Lamps a Size"), {})
 _MAKE_LOCAL = ("brdfc.make_local", button("Make Local"), {})
-#: The button under a finding of each code: operator, text, properties.
+#: The button for findings of each code: operator, text, properties.
 BUTTONS = {
     "blender_version": _DOWNLOAD,
     "no_osl": _DOWNLOAD,
@@ -299,7 +299,7 @@ BUTTONS = {
 
 
 def _more(layout, said):
-    """A button for what is behind a sentence, where there is something."""
+    """A button for the details of a sentence, if it has any."""
     if more := getattr(said, "more", ""):
         row = layout.row()
         row.alignment = "LEFT"
@@ -307,7 +307,7 @@ def _more(layout, said):
 
 
 def draw_findings(layout, found):
-    """Findings, with buttons that mend what can be mended; what two say alike stands there once."""
+    """Shows findings with buttons to fix them; equal sentences appear once."""
     said, offered = set(), set()
     for finding in found:
         line = iface(finding.message)
@@ -326,7 +326,7 @@ def draw_findings(layout, found):
 
 
 def draw_material(layout, material, scene):
-    """Everything the panels show for a material: what makes the picture another one comes first."""
+    """The whole panel of a material, beginning with the findings that change the picture."""
     found = checks.warnings(material, scene)
     first = [f for f in found if f.severity == "ERROR" or f.code in checks.UNABLE]
     draw_findings(layout, first)

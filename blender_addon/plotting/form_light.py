@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a material's form reflects, where that is not its model: of a fitted form its shader, of a
-twin its nodes, as the open file has them, also where another version or a pack of the file's own
-made them."""
+"""Evaluates what a material's form reflects where this differs from its model: a fitted form by its
+shader, a twin by its nodes. Both are read from the open file, so they may come from another version
+or from a pack of the file's own."""
 
 import numpy as np
 
@@ -10,9 +10,10 @@ from . import shader_nodes, shader_text
 
 
 def lobes(node, values, wo):
-    """shader_text.Lobes of a group node of which nodes.is_fitted(), at these values of all
-    parameters, for viewers (k, 3), unit vectors above the surface. It and what it returns raise
-    shader_text.Unreadable."""
+    """shader_text.Lobes of a group node for which nodes.is_fitted() holds.
+
+    `values`: of all parameters; `wo`: unit vectors (k, 3) to the viewer, above the surface. This
+    function and the Lobes it returns raise shader_text.Unreadable."""
     group = node.node_tree
     if not nodes.is_native(group):
         return shader_text.lobes(nodes.source_text(group), values, wo)

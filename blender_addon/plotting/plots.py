@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of what a material's values do, drawn with the model's formulas on NumPy arrays.
+"""Draws plots of a material's values, by the model's formulas on NumPy arrays.
 
-Three, one above the other: the light that leaves in the plane of incidence, half of a circle, or
-all of it where light is let through; balls under a lamp; and the share of the light that is
-reflected over the angle of the view. Red, green and blue are drawn apart, and add up to white. The
-model is drawn in lines, the material's form in dots where it reflects other light, and the nearest
-Principled node in dashes. Of Blender nothing is known here but what its screen shows of a colour.
+A picture has three parts, one above the other: a polar plot of the light that leaves in the plane
+of incidence (a half circle, or a full one if light is transmitted); balls under a lamp; and the
+albedo over the view angle. Red, green and blue are separate curves, whose sum is white. The model
+is drawn as a solid line, the material's form as a dotted one where it differs, and the nearest
+Principled node as a dashed one. The only use of Blender here is its conversion of colours to the
+screen's.
 """
 
 import functools
@@ -19,41 +20,42 @@ from ..common import color
 from ..nearest import native_bsdf
 from ..nearest.principled import Nearest, Shares, misplaced, nearest
 
-#: Pixels across, of a ball, and of the key below it.
+#: Sizes in pixels: width of the picture, diameter of a ball, height of the legend's lines below it.
 SIZE, BALL, KEY = 324, 108, 10
-#: Rows of a picture, the lowest first.
+#: Rows of a picture, from the lowest up.
 CURVES, BALLS, ABOVE = slice(0, 104), slice(104, 222), slice(222, 384)
-#: The angle in degrees that light comes from, in the half circle.
+#: The angle of the incident light in the polar plot, in degrees.
 INCIDENCE = 45.0
-#: Samples of an albedo, of each way that a form's is sampled, and angles of their curves.
+#: Numbers of samples of a model's albedo and of a form's three sampling techniques, and of view
+#: angles.
 _SAMPLES, _FORM_SAMPLES, _VIEWS = 256, (128, 128, 256), 13
 _HALF = SIZE // 2
 _PAPER, _GRID, _INK = 0.13, 0.28, 0.55
-#: Dots of a form's curve: no colour that curves of red, green and blue add up to.
+#: Colour of a form's dotted curve: no sum of red, green and blue curves has it.
 _DOTS = np.array([1.0, 0.35, 0.75])
-#: Pixels from one dash or dot to the next, and which part of them is drawn.
+#: Period of dashes and dots in pixels, and the fraction of it that is drawn.
 _DASHED, _DOTTED = (9.4, 0.6), (6.8, 0.42)
-#: Pixels from a model's arrow to the node's.
+#: Distance in pixels between a model's arrow and the node's.
 _ASIDE = 5.0
 
 
 @dataclass(frozen=True)
 class Legend:
-    """What a picture shows beside the model's own light; None for what it does not."""
+    """What a picture shows besides the model's own light; None for what it does not show."""
 
-    #: Blender's own nodes whose lobes are nearest: the roughness of the Glossy node, and
+    #: The nearest of Blender's own nodes: the roughness of the Glossy node, and the Principled one.
     glossy: float | None = None
     principled: Nearest | None = None
-    #: Part of the half circle's light that the material's form sends elsewhere.
+    #: Fraction of the light in the half circle that the material's form misplaces.
     form: float | None = None
-    #: Shares (r, g, b) of light from INCIDENCE that are ideally reflected and refracted.
+    #: Fractions (r, g, b) of light from INCIDENCE that are ideally reflected and refracted.
     mirror: tuple | None = None
     refracted: tuple | None = None
 
 
 def values_in_range(model, values):
-    """Values as a node has them, whose last digit may lie beyond a range: sockets are floats. What
-    is None, as linked, or of no parameter is left out."""
+    """Clamps a node's values to their ranges: sockets are floats, so the last digit may be outside.
+    Drops values that are None (linked) and those that belong to no parameter."""
     known = {}
     for name, parameter in model.parameters.items():
         value = values.get(name)
@@ -71,28 +73,29 @@ def _slice(theta):
 
 
 def slice_of(model, values, theta):
-    """f cos for light from INCIDENCE at these angles, positive where it is reflected to: (N, 3)."""
+    """f cos for light from INCIDENCE, towards these angles (positive on the side of the mirror
+    direction): (N, 3)."""
     light = _slice(np.radians(-INCIDENCE))
     return model.eval(_slice(theta), light, **values) * np.cos(theta)[:, None]
 
 
 def glossy_slice(alpha, theta):
-    """The same of Blender's Glossy node, white, with GGX's distribution of that width: (N,). Width
-    is the node's roughness squared; the light of further reflections is left out."""
+    """The same for Blender's white Glossy node with the GGX distribution of this alpha, which is
+    the roughness squared; without multiple scattering: (N,)."""
     light = _slice(np.radians(-INCIDENCE))
     return native_bsdf.facets(_slice(theta), light, (alpha, alpha))
 
 
 @functools.cache
 def _glossy_slices():
-    """Roughnesses of the Glossy node, and their slices."""
+    """Roughness values of the Glossy node, and the slice of each."""
     roughness = np.linspace(0.05, 1, 39)
     return roughness, np.stack([glossy_slice(r * r, _angles()) for r in roughness])
 
 
 def nearest_glossy(curve):
-    """The roughness of the Glossy node whose slice has the shape nearest to a curve over _angles(),
-    and that slice, as high as fits best; nothing for a curve that is 0."""
+    """The roughness of the Glossy node whose slice comes nearest in shape to a curve over
+    _angles(), and that slice, scaled to fit; nothing for a curve that is 0."""
     if not curve.any():
         return None
     roughness, slices = _glossy_slices()
@@ -103,7 +106,7 @@ def nearest_glossy(curve):
 
 @functools.cache
 def _angles():
-    """Angles of the half circle, densest about the mirror direction, where lobes are narrow."""
+    """Angles of the half circle, densest around the mirror direction, where lobes are narrow."""
     even = np.linspace(-np.pi / 2, np.pi / 2, 361)
     near = np.radians(INCIDENCE) + np.geomspace(1e-4, 0.2, 60)[:, None] * np.array([-1, 1])
     return np.unique(np.concatenate([even, near.ravel(), [np.radians(INCIDENCE)]]))
@@ -111,8 +114,8 @@ def _angles():
 
 @functools.cache
 def _polar_grid(whole=False):
-    """Of the upper half's pixels the radius, 1 at the rim, and the angle; the first row is the
-    lowest. Then pixels of a radius. `whole`: a circle, not the upper half of one."""
+    """Polar coordinates of the pixels of the upper half, lowest row first: the radius (1 at the
+    rim) and the angle; then the radius in pixels. `whole`: of the full circle."""
     unit, middle = (0.47 * _HALF, 0.5 * _HALF) if whole else (0.94 * _HALF, 0.03 * _HALF)
     x, y = np.meshgrid(np.arange(SIZE) + 0.5 - _HALF, np.arange(_HALF) + 0.5 - middle)
     return np.hypot(x, y) / unit, np.arctan2(x, y), unit
@@ -120,7 +123,8 @@ def _polar_grid(whole=False):
 
 @functools.cache
 def _pixels_among_angles(whole):
-    """Where the angle of each pixel lies among _angles(): the one below, and how far beyond it."""
+    """Positions of the pixels' angles among _angles(): the index below, and the fraction beyond
+    it."""
     angles, (_, angle, _) = _angles(), _polar_grid(whole)
     below = np.clip(np.searchsorted(angles, angle) - 1, 0, len(angles) - 2)
     share = (angle - angles[below]) / (angles[below + 1] - angles[below])
@@ -128,21 +132,21 @@ def _pixels_among_angles(whole):
 
 
 def _in_pixels(curve, whole):
-    """A curve over _angles() at the angles of the pixels."""
+    """Interpolates a curve over _angles() to the angles of the pixels."""
     below, share = _pixels_among_angles(whole)
     return curve[below] + share * np.diff(curve)[below]
 
 
 def _line(curve, dash=None, whole=False):
-    """How much of each pixel a curve over _angles() covers, 0 to 1, in a line of two pixels.
-    `dash`: pixels from one dash to the next, and which part of them is drawn."""
+    """The coverage of each pixel, 0 to 1, by a curve over _angles() drawn two pixels wide. `dash`:
+    period in pixels, and the fraction of it that is drawn."""
     radius, angle, unit = _polar_grid(whole)
     at, slope = _in_pixels(curve, whole), _in_pixels(np.gradient(curve, _angles()), whole)
     off = np.abs(radius - at) / np.sqrt(1 + (slope / np.maximum(radius, 0.02)) ** 2)
-    # Steep flanks of a narrow lobe would draw a line beyond its tip.
+    # Without this limit, the steep flanks of a narrow lobe would extend the line beyond its tip.
     tip = curve.max() + 1.4 / unit
     ink = np.clip(1.8 - off * unit, 0, 1) * (radius < tip) * (np.abs(angle) <= np.pi / 2)
-    if dash:  # by the way along the curve, which on flanks is the radius
+    if dash:  # by the length of the curve: on flanks, the radius
         steps = np.hypot(np.diff(curve), 0.5 * (curve[1:] + curve[:-1]) * np.diff(_angles()))
         way = _in_pixels(np.concatenate([[0], np.cumsum(steps)]), whole)
         along = np.where(np.abs(slope) > radius, radius, way)
@@ -151,7 +155,7 @@ def _line(curve, dash=None, whole=False):
 
 
 def _draw_curves(picture, line, own, form, node):
-    """Draws curves (N, 3) of the model, and of its form and the Principled node or None."""
+    """Draws curves (N, 3) of the model, and of its form and the Principled node unless None."""
     for c in range(3):
         np.maximum(picture[..., c], line(own[:, c]), out=picture[..., c])
         if node is not None:
@@ -165,8 +169,8 @@ def _draw_curves(picture, line, own, form, node):
 
 
 def _draw_arrow(picture, direction, shares, whole, aside=0):
-    """An arrow from the middle to the rim, bright as far as the share of each channel. `aside`:
-    pixels beside that, for a dashed one without a head."""
+    """An arrow from the centre to the rim, whose brightness is each channel's share. `aside`:
+    offset in pixels, for a dashed arrow without a head."""
     radius, angle, unit = _polar_grid(whole)
     along, across = radius * np.cos(angle - direction), radius * np.sin(angle - direction)
     along, across = along * unit, np.abs(across * unit - aside)
@@ -186,12 +190,13 @@ def _complete(model, values):
 
 
 def _refraction(ior):
-    """The angle from the upper normal of light that goes on below."""
+    """The angle, from the upper normal, of the light refracted below the surface."""
     return np.pi - np.arcsin(np.clip(np.sin(np.radians(INCIDENCE)) / ior, 0, 1))
 
 
 def _draw_lobes(picture, own, form, node, whole):
-    """Draws curves of what is scattered, over the model's peak; returns what the legend says."""
+    """Draws curves of the scattered light relative to the model's peak; returns what the legend
+    says."""
     radius, angle, _ = _polar_grid(whole)
     peak = own.max()
     if not peak > 0:
@@ -223,7 +228,7 @@ def _polar(found, ior):
     from_light = np.abs(angle + np.radians(INCIDENCE)) * radius * unit < 0.9
     picture[from_light & (radius < 1)] = _INK
     said = _draw_lobes(picture, *found.slices, whole)
-    # What has no width is an arrow.
+    # Ideal reflection and refraction have no width, and are drawn as arrows.
     if here.mirror.any():
         _draw_arrow(picture, np.radians(INCIDENCE), here.mirror, whole)
         said["mirror"] = tuple(here.mirror.tolist())
@@ -239,8 +244,8 @@ def _polar(found, ior):
 
 @functools.cache
 def _ball():
-    """Where the ball is, and in each pixel of it the frame of its surface, its third axis last; the
-    first is the object's Z axis along the surface, as the shaders have it."""
+    """Mask of the ball, and for each of its pixels the surface frame, the normal last; the first
+    axis is the object's Z axis along the surface, as in the shaders."""
     x = ((np.arange(BALL) + 0.5) / BALL * 2 - 1) / 0.92
     x, y = np.meshgrid(x, x)
     on = x * x + y * y < 1
@@ -249,7 +254,7 @@ def _ball():
     t = up - n * (n @ up)[:, None]
     t = t / np.maximum(np.linalg.norm(t, axis=-1, keepdims=True), 1e-9)
     frame = np.stack([t, np.cross(n, t), n], axis=-2)
-    # From the upper left, and the viewer far away in front.
+    # The lamp is at the upper left; the viewer far away in front.
     lamp = np.array([-0.45, 0.6, 0.66])
     lamp = lamp / np.linalg.norm(lamp)
     wi, wo = frame @ lamp, frame @ np.array([0.0, 0.0, 1.0])
@@ -260,17 +265,19 @@ def _ball():
 
 
 def ball_light(scattered, mirror):
-    """What a ball sends to the viewer, of a lamp that gives a white matte surface that faces it 1,
-    and of a sky in what reflects like a mirror: linear RGB of the pixels of _ball(). `scattered`: f
-    cos, and `mirror`: weight of an ideal mirror, of these pixels."""
+    """Light from a ball to the viewer: linear RGB of the pixels of _ball().
+
+    The lamp gives a white diffuse surface that faces it a radiance of 1; ideal mirrors reflect a
+    sky. `scattered`: f cos of these pixels, `mirror`: their weight of ideal mirror reflection."""
     _, wi, _, sky = _ball()
     return np.pi * scattered * (wi[:, 2:] > 0) + mirror * sky
 
 
 @functools.cache
 def _rings():
-    """Pixels of the ball in groups of eight that are seen at one angle: their index among those of
-    _ball(), (k, 8); and wi (k, 8, 3) and wo (k, 3) in a frame that holds the viewer."""
+    """The ball's pixels in groups of eight with the same view angle: their indices among those of
+    _ball(), (k, 8), and wi (k, 8, 3) and wo (k, 3) in a frame whose xz plane contains the
+    viewer."""
     on, wi, wo, _ = _ball()
     number = np.zeros(on.shape, int)
     number[on] = np.arange(on.sum())
@@ -287,13 +294,13 @@ def _rings():
 
 
 def displayed(linear):
-    """Linear light as a screen has it; 1 becomes 0.8, what is brighter never quite white."""
+    """Maps linear light to the screen: 1 becomes 0.8, and brighter light never quite white."""
     return color.to_screen(1 - np.exp(-linear))
 
 
 def _balls(lights):
-    """Of the model, its form and the Principled node, or None: beside each other, with the line,
-    the dots and the dashes of their curves below."""
+    """Balls of the model, its form and the Principled node, side by side, unless None; below each
+    the line style of its curve."""
     picture = np.full((BALL + KEY, SIZE, 3), _PAPER)
     keys = (np.ones(3), 1.0, 1.0), (_DOTS, *_DOTTED), (np.full(3, 0.85), *_DASHED)
     shown = [(light, key) for light, key in zip(lights, keys, strict=True) if light is not None]
@@ -320,20 +327,22 @@ def _directions():
 
 
 def albedo_curve(model, values):
-    """The share of light that is reflected, at _VIEWS angles from 0 to 88 degrees: (_VIEWS, 3)."""
+    """The albedo at _VIEWS angles from 0 to 88 degrees: (_VIEWS, 3)."""
     return model.albedo(_views(), samples=_SAMPLES, **values)
 
 
 @functools.cache
 def _numbers():
-    """Of samples of the model, of facets and of a matte surface."""
+    """Random numbers for three sampling techniques: model, microfacets, cosine."""
     return np.split(sequence(sum(_FORM_SAMPLES)), np.cumsum(_FORM_SAMPLES)[:2])
 
 
 def _form_excess(model, values, scattered, width):
-    """The share of light that a form scatters beyond what the model does, (_VIEWS, 3). `scattered`:
-    its f cos for wi (_VIEWS, n, 3). By samples of the model, of facets of this width and of a matte
-    surface, each weighed by the density of all; they cancel where the two scatter the same."""
+    """How much more light a form scatters than the model, as a fraction of the incident light,
+    (_VIEWS, 3). `scattered`: the form's f cos for wi (_VIEWS, n, 3).
+
+    Estimated by MIS of three techniques: the model's sampling, GGX microfacets of alpha `width`,
+    and the cosine. The noise vanishes where the two scatter the same."""
     wo, (u, of_h, of_z) = _directions()[:, None], _numbers()
     drawn = model.sample(wo, u, **values)
     h = native_bsdf.draw_facets(of_h[:, 1:], (width, width))
@@ -356,8 +365,8 @@ def _form_excess(model, values, scattered, width):
 
 
 def _albedo(own, form, node):
-    """Over the view angle, 0 to 90 degrees, of the model, its form and the Principled node; the
-    line is 1, all of the light."""
+    """Albedo over the view angle from 0 to 90 degrees, of the model, its form and the Principled
+    node; the upper line is 1, all of the light."""
     height, margin, top = CURVES.stop - CURVES.start, 8, 1.15
     picture = np.full((height, SIZE, 3), _PAPER)
     across, along = SIZE - 2 * margin, height - 2 * margin
@@ -381,24 +390,23 @@ def _albedo(own, form, node):
 
 @dataclass(frozen=True)
 class Light:
-    """What is reflected: of the model, then of its form and of the nearest Principled node, None
-    where there is none to draw."""
+    """The reflected light: of the model, of its form and of the nearest Principled node; None for
+    what is not drawn."""
 
-    #: f cos over _angles(), (N, 3), of light from INCIDENCE.
+    #: f cos over _angles(), (N, 3), for light from INCIDENCE.
     slices: tuple
-    #: Shares of the light at _VIEWS angles, (_VIEWS, 3), ideally reflected and refracted included.
+    #: Albedos at _VIEWS angles, (_VIEWS, 3), including ideal reflection and refraction.
     albedos: tuple
-    #: ball_light().
+    #: Results of ball_light().
     balls: tuple
-    #: Of light from INCIDENCE, of the model.
+    #: The model's Shares for light from INCIDENCE.
     here: Shares
     near: Nearest | None
 
 
 def _of_form(model, values, form, shares, width):
-    """What a form scatters in the plane of incidence, its albedo, and its ball. All forms that are
-    fitted are the same about the normal: one view of each ring of the ball spares most of the work.
-    """
+    """A form's scattered light in the plane of incidence, its albedo, and its ball. As all fitted
+    forms are isotropic, one view for each ring of the ball spares most of the work."""
     index, lights, viewers = _rings()
     wo = np.concatenate([_slice(np.radians([-INCIDENCE])), _directions(), viewers])
     lobes = form(_complete(model, values), wo)
@@ -412,11 +420,11 @@ def _of_form(model, values, form, shares, width):
 
 
 def _of_node(near):
-    """The same of a Principled node."""
+    """The same for a Principled node."""
     native, wo = near.native, _directions()
     taken, scale = native_bsdf.by_view(native, wo)
     _, wi, viewers, _ = _ball()
-    # By the cosine, which falls from view to view.
+    # np.interp needs increasing cosines, but they decrease from view to view.
     at = [np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in (taken, *scale.T)]
     of_view = at[0], np.stack(at[1:], axis=-1)
     f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, *of_view) * (not near.transmission)
@@ -425,7 +433,7 @@ def _of_node(near):
 
 
 def light(model, values, form=None):
-    """The Light of a model at values_in_range(), and of what draw() has as `form`."""
+    """The Light of a model at values_in_range(), and of `form` as in draw()."""
     wo, here = _directions(), _slice(np.radians(-INCIDENCE))
     curve, albedo = slice_of(model, values, _angles()), albedo_curve(model, values)
     mirror, refracted = model.mirror(wo, **values), model.transmit(wo, **values)
@@ -444,11 +452,12 @@ def light(model, values, form=None):
 
 
 def draw(model_name, values, form=None):
-    """The picture of a model with a node's values: (rows, SIZE, 4), 0 to 1 as a screen shows it,
-    the first row the lowest; and its Legend. `form`: what gives shader_text.Lobes of a form that
-    reflects other light, as a function of complete values and viewers (k, 3).
+    """Draws the picture for a node's values.
 
-    Raises ValueError for a model that this extension does not have, and what `form` raises.
+    Returns an array (rows, SIZE, 4) of screen colours from 0 to 1, lowest row first, and its
+    Legend. `form`: for a form that differs from its model, a function that returns its
+    shader_text.Lobes, given complete values and viewers (k, 3). Raises ValueError for a model that
+    this extension lacks, and what `form` raises.
     """
     model = brdfc.model(model_name)
     known = values_in_range(model, values)

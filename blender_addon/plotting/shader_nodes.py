@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nodes of a twin, executed on NumPy arrays: what its group scatters.
+"""Evaluates the nodes of a twin on NumPy arrays, to find what its group scatters.
 
-It knows the nodes that twin.py wires; a file may hold others.
+Only nodes that twin.py uses are supported; a file may contain others.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ _VECTORS = {
 _DISTRIBUTIONS = {"GGX": "ggx", "BECKMANN": "beckmann"}
 
 
-#: Steps of the table that Blender reads a curve from.
+#: Resolution of the table by which Blender evaluates a curve.
 _CURVE_STEPS = 256
 
 
@@ -45,7 +45,8 @@ def _pixels(image):
 
 
 def _between(rows, at):
-    """Of rows at places, linear between their middles, 0 to 1 over all; the edge goes on."""
+    """Interpolates rows linearly. `at`, from 0 to 1, spans all rows; samples lie at the rows'
+    centres, and the ends are extended."""
     last = len(rows) - 1
     at = np.clip(at * len(rows) - 0.5, 0, last)
     below = np.asarray(at, int)
@@ -54,13 +55,13 @@ def _between(rows, at):
 
 
 class _Execution:
-    """Of a group, for viewers (3, k, 1); sockets are computed once. `given`: values of the group's
-    inputs by identifier. A vector's components come first; of a shader it is Lobes."""
+    """Evaluates a group for viewers (3, k, 1), each socket once. `given`: values of the group's
+    inputs by identifier. Vectors have their components first; the value of a shader is Lobes."""
 
     def __init__(self, group, given, wo):
         self._given, self._wo = given, wo
         self._pictures = {}
-        # A socket's own list of links is a search through those of the tree.
+        # NodeSocket.links searches all links of the tree, so a dictionary is built once.
         self._sources = {
             link.to_socket.as_pointer(): link.from_socket
             for link in group.links
@@ -69,7 +70,7 @@ class _Execution:
         self._known = {}
 
     def value(self, socket):
-        """Of an input."""
+        """The value of an input socket."""
         source = self._sources.get(socket.as_pointer())
         if source is None:
             return _constant(socket.default_value)
@@ -108,7 +109,7 @@ class _Execution:
 
     def _floatcurve(self, node, socket):
         mapping = node.mapping
-        mapping.initialize()  # of a file that was opened
+        mapping.initialize()  # needed for a file that was just opened
         places = np.linspace(0, 1, _CURVE_STEPS + 1)
         heights = [mapping.evaluate(mapping.curves[0], float(x)) for x in places]
         return np.interp(self.value(node.inputs["Value"]), places, heights)
@@ -141,14 +142,14 @@ class _Execution:
 
 
 def _constant(value):
-    """A number, or a vector or colour."""
+    """Converts a number, a vector or a colour."""
     return np.reshape(value[:3], (3, 1, 1)) if hasattr(value, "__len__") else value
 
 
 def lobes(group, given, wo):
     """Lobes of a group's BSDF for viewers (k, 3), unit vectors above the surface. `given`: numbers
-    and colours by the identifiers of the group's inputs. It and what it returns raise Unreadable.
-    """
+    and colours by the identifiers of the group's inputs. This function and the Lobes it returns
+    raise Unreadable."""
     try:
         (end,) = (node for node in group.nodes if node.bl_idname == "NodeGroupOutput")
         found = _Execution(group, given, np.transpose(wo)[:, :, None]).value(end.inputs["BSDF"])

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader of a fitted form, executed on NumPy arrays: what its closures add up to. No bpy here.
+"""Evaluates the OSL source of a fitted form on NumPy arrays: the sum of its closures. Independent
+of bpy.
 
-Of Open Shading Language it knows what such a shader is made of: tables, assignments of expressions,
-loops over a ramp, and closures. What those scatter are the generator's own formulas. The text may
-come from anybody's file: it can name nothing but its variables and the functions listed here.
+Only the parts of Open Shading Language that such shaders use are supported: tables, assignments of
+expressions, loops over a ramp, and closures. The closures are evaluated by the generator's own
+formulas. As the text may come from an untrusted file, it can access nothing but its own variables
+and the functions listed here.
 """
 
 import functools
@@ -16,10 +18,10 @@ from ..brdfc import _closures
 
 
 class Unreadable(ValueError):
-    """A text that is none of these shaders."""
+    """The text is not one of these shaders."""
 
 
-#: What goes wrong in one.
+#: Exceptions that evaluating an unsuitable text may raise.
 FAILURES = (
     *(ArithmeticError, AttributeError, LookupError),
     *(RecursionError, TypeError, ValueError),
@@ -29,7 +31,7 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[A-Za-z_]\w*)"
     r'|(?P<text>"\w*")|(?P<sign>[-+*/<?:(),\[\]]))'
 )
-#: Operators of two sides, those that bind least first.
+#: Binary operators in order of precedence, lowest first.
 _BINARY = (
     {"<": operator.lt},
     {"+": operator.add, "-": operator.sub},
@@ -43,12 +45,12 @@ _NOTHING = re.compile(r"(float|color|vector) [\w, ]+|brdfc_frame\(.*\)|")
 _STATEMENT = re.compile(
     r"(?:(?:float|int|color|vector|normal) )?(\w+)(?:\[(\w+)\])? ([*/]?=) (.*)", re.DOTALL
 )
-#: What is known before the first statement: the shader's own frame about the normal.
+#: Variables that exist before the first statement: the shader's frame about the normal.
 _FRAME = ("frame_n", "frame_t", "frame_b", "wo_x", "wo_y", "wo_z")
 
 
 class _Parser:
-    """Of expressions: functions of the variables, by name."""
+    """Parses expressions into functions of the variables (a dictionary by name)."""
 
     def __init__(self, text):
         self._tokens, at = [], 0
@@ -124,7 +126,7 @@ class _Parser:
             raise Unreadable(f"unexpected {token!r}")
         if self._next() == "(":
             arguments = self._arguments()
-            # Variables and functions have names of their own, as in the shader.
+            # As in the shader, variables and functions have separate namespaces.
             return lambda v: v[token + "("](*(argument(v) for argument in arguments))
         if self._next() == "[":
             self._take()
@@ -145,7 +147,7 @@ class _Parser:
 
 
 def _assignment(statement):
-    """A function that does what a statement says to the variables."""
+    """A function that executes an assignment on the variables."""
     match = _STATEMENT.fullmatch(statement)
     if match is None:
         raise Unreadable(f"unexpected {statement[:60]!r}")
@@ -172,18 +174,19 @@ def _loop(name, count, statement):
 
 @functools.lru_cache(maxsize=8)
 def _program(text):
-    """Tables and other arrays by name, and steps up to that which assigns BSDF."""
+    """Tables and other arrays by name, and the steps up to the assignment of BSDF."""
     body = text[text.find("\nshader ") :].partition("\n{\n")[2]
     body, assigned, sum_of_closures = body.partition("BSDF = ")
     if not assigned:
         raise Unreadable("expected a shader that assigns BSDF")
-    # How the normal is bent has no effect on a plot, whose shading normal is the surface's own.
+    # The bending of the normal does not matter for a plot, where the shading normal is the
+    # surface's.
     body = re.sub(r"vector shading_n = .*?(?=vector frame_t\b)", "", body, flags=re.S)
     body = re.sub(r"//[^\n]*", "", body + assigned + sum_of_closures.partition(";")[0] + ";")
     arrays = {name: np.fromstring(numbers, sep=",") for name, numbers in _TABLE.findall(body)}
     body = _TABLE.sub("", body)
     steps = []
-    # Parameters within their ranges stand in a block, which ends behind that.
+    # Parameters within their range are handled in a block, which is closed after that.
     while body := body.lstrip("{ \n"):
         if loop := _LOOP.match(body):
             steps.append(_loop(loop[1], int(loop[2]), loop[3]))
@@ -198,8 +201,8 @@ def _program(text):
 
 
 def _table(values, *sizes_and_positions):
-    """brdfc_table1 and its like: linear along each axis, positions run to its size less 1. Of
-    several points one position at most differs, the view's."""
+    """brdfc_table1 and the like: linear along each axis, with positions from 0 to the size less 1.
+    For arrays of points, at most one position, the view's, may vary."""
     count = len(sizes_and_positions) // 2
     sizes, positions = sizes_and_positions[:count], sizes_and_positions[count:]
     values, of_view = values.reshape([int(n) for n in sizes]), None
@@ -214,13 +217,13 @@ def _table(values, *sizes_and_positions):
 
 
 def _between(values, position):
-    """Linear along the first axis."""
+    """Linear interpolation along the first axis."""
     i = np.minimum(np.asarray(position, int), len(values) - 2)
     return values[i] + (values[i + 1] - values[i]) * (position - i)
 
 
 def vector(*components):
-    """Of three, (a, b) each or numbers: (3, a, b)."""
+    """Stacks three components, numbers or arrays (a, b): (3, a, b)."""
     return np.stack(np.broadcast_arrays(*(np.atleast_2d(x) for x in components)))
 
 
@@ -231,7 +234,7 @@ def _unit(v):
 _FUNCTIONS = {
     "atan": np.arctan,
     "backfacing": lambda: False,
-    # What is declared a colour may have been assigned a number.
+    # A variable declared as colour may have been assigned a number.
     "brdfc_max_component": lambda color: color.max(axis=0) if np.ndim(color) == 3 else color,
     "brdfc_table1": _table,
     "brdfc_table2": _table,
@@ -251,14 +254,14 @@ _FUNCTIONS = {
 
 
 def facets(wi, wo, kind, normal, tangent, along, across, *_):
-    """Those without a tangent, which is 0, are round."""
+    """Microfacet closure. A zero tangent means isotropic."""
     if not np.any(tangent):
         tangent = np.moveaxis(np.eye(3)[np.argmin(np.abs(normal), axis=0)], -1, 0)
     of_kind = {"ggx": _closures.ggx, "beckmann": _closures.beckmann}[kind]
     return of_kind(*wi, *wo, *normal, *tangent, along, across)
 
 
-#: Closures: f cos(theta_i) of directions and what is given, all with their components first.
+#: Closures: f cos(theta_i) by directions and arguments, each with the components first.
 _CLOSURES = {
     "diffuse": lambda wi, wo, n: _closures.diffuse(*wi, *wo, *n),
     "diffuse_ramp": lambda wi, wo, n, ramp: _closures.diffuse_ramp(*wi, *wo, *n, *ramp),
@@ -267,13 +270,13 @@ _CLOSURES = {
         *wi, *wo, *n, size, smooth
     ),
     "microfacet": facets,
-    # An ideal mirror is what ideal() tells.
+    # Ideal mirror reflection is evaluated by ideal().
     "reflection": lambda wi, wo, n: 0.0,
 }
 
 
 def _of_views(value, views):
-    """The part for some of all views of what a closure is given."""
+    """Selects some of the views from a closure's argument."""
     if isinstance(value, list | tuple):
         return [_of_views(x, views) for x in value]
     several = isinstance(value, np.ndarray) and value.ndim > 1 and value.shape[-2] > 1
@@ -281,17 +284,17 @@ def _of_views(value, views):
 
 
 class Lobes:
-    """What is scattered to some viewers: a sum of closures with weights. What the view decides is
-    in them; it is computed once for all lights."""
+    """The light scattered to some viewers, as a weighted sum of closures. What depends on the view
+    alone is computed once for all light directions."""
 
-    __array_ufunc__ = None  # a weight that is an array leaves the product to this class
+    __array_ufunc__ = None  # makes NumPy leave weight * Lobes to this class
 
     def __init__(self, wo, terms):
         self._wo, self._terms = wo, terms
 
     @classmethod
     def of(cls, wo, name, *given):
-        """Of one closure, for viewers (3, k, 1)."""
+        """Lobes of a single closure, for viewers (3, k, 1)."""
         return cls(wo, [(1.0, name, given)])
 
     def __add__(self, other):
@@ -312,21 +315,21 @@ class Lobes:
         return light
 
     def scattered(self, wi, views=slice(None)):
-        """f cos(theta_i), (k, n, 3), without an ideal mirror's part, for lights (k, n, 3), unit
-        vectors above the surface, and these of the viewers."""
+        """f cos(theta_i), (k, n, 3), without ideal mirror reflection, for light directions (k, n,
+        3), unit vectors above the surface, and the selected viewers."""
         wi, wo = np.moveaxis(wi, -1, 0), self._wo[:, views]
         values = (_CLOSURES[n](wi, wo, *_of_views(given, views)) for _, n, given in self._terms)
         return self._sum(views, np.broadcast_shapes(wi.shape, wo.shape)[1:], values)
 
     def ideal(self, views=slice(None)):
-        """Weight of an ideal mirror, (k, 3)."""
+        """Weight of ideal mirror reflection, (k, 3)."""
         values = (float(name == "reflection") for _, name, _ in self._terms)
         return self._sum(views, self._wo[0, views].shape, values)[:, 0]
 
 
 def lobes(text, values, wo):
     """Lobes of a shader for viewers (k, 3), unit vectors above the surface. `values`: numbers and
-    colours of its parameters. It and what it returns raise Unreadable."""
+    colours of its parameters. This function and the Lobes it returns raise Unreadable."""
     try:
         arrays, steps = _program(text)
         wo = np.transpose(wo)[:, :, None]

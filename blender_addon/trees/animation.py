@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What animates the sockets of a node: F-curves of actions and of NLA strips, and drivers."""
+"""Finds and moves the animation of node sockets: F-curves of actions and NLA strips, and
+drivers."""
 
 from ..common import editable
 
@@ -7,12 +8,13 @@ _VALUE = "default_value"
 
 
 def _owners(tree):
-    """Data-blocks whose animation can reach a tree: a material's own reaches its nodes too."""
+    """Data-blocks whose animation can reach a node tree: the tree and the material that owns it."""
     return dict.fromkeys((tree, editable.named(tree)))
 
 
 def _holders(data):
-    """What of a block's animation has an action: itself, and its NLA strips."""
+    """The parts of a block's animation data that have an action: the data itself and its NLA
+    strips."""
     holders, strips = [data], [strip for track in data.nla_tracks for strip in track.strips]
     while strips:
         holders.append(strip := strips.pop())
@@ -32,7 +34,7 @@ def _of_holder(holder):
 
 
 def _curves(owner):
-    """Each curve and driver of a block once."""
+    """Each F-curve and driver of a block, once."""
     data = owner.animation_data
     if data is None:
         return []
@@ -41,26 +43,28 @@ def _curves(owner):
 
 
 def _moves(node):
-    """(curve, its block, what it moves a property of, that property), also of other nodes."""
+    """Yields (curve, its data-block, the object it animates, the property's name), for every
+    node."""
     for owner in _owners(node.id_data):
         for curve in _curves(owner):
-            # Paths may name nodes and sockets or count them.
+            # A path may address nodes and sockets by name or by index.
             place, _, name = curve.data_path.rpartition(".")
             try:
                 found = owner.path_resolve(place) if place else None
-            except ValueError:  # of what is no more
+            except ValueError:  # the node or socket no longer exists
                 continue
             if hasattr(found, "as_pointer"):
                 yield curve, owner, found, name
 
 
 def value_of(socket):
-    """A socket's value, as moved() has it."""
+    """The key of a socket's value in the set that moved() returns."""
     return socket.as_pointer(), _VALUE
 
 
 def moved(node):
-    """{(pointer of the node or a socket, name of a property)} of what is animated or driven."""
+    """The animated or driven properties of a node: {(pointer of the node or socket, property
+    name)}."""
     own = {item.as_pointer() for item in (node, *node.inputs, *node.outputs)}
     found = {(item.as_pointer(), name) for c, _, item, name in _moves(node) if not c.mute}
     return {(pointer, name) for pointer, name in found if pointer in own}
@@ -74,14 +78,17 @@ def _of_inputs(node):
 
 
 def inputs(node):
-    """Identifiers of a node's input sockets that are animated or driven. Muted curves count: to
-    unmute one later must not be without effect."""
+    """Identifiers of the input sockets of a node that are animated or driven.
+
+    Muted curves count, so that unmuting one later still has an effect."""
     return {identifier for _, _, identifier in _of_inputs(node)}
 
 
 def hold(node):
-    """[(curve, its block, identifier)] of what animates or drives inputs of a node whose sockets
-    are about to have other numbers: Blender 5.2 changes paths by itself, and to wrong ones."""
+    """Records what animates a node's inputs before its sockets are renumbered.
+
+    Returns [(curve, its data-block, socket identifier)]. Blender 5.2 rewrites the paths by itself,
+    and gets them wrong."""
     for owner in _owners(node.id_data) if inputs(node) else ():
         data = owner.animation_data
         for holder in _holders(data) if data else ():
@@ -90,13 +97,14 @@ def hold(node):
 
 
 def follow(curve, owner, socket):
-    """Has a curve or driver animate a socket of a tree."""
+    """Redirects a curve or driver to a socket of a tree."""
     prefix = "" if owner == socket.id_data else "node_tree."
     curve.data_path = prefix + socket.path_from_id(_VALUE)
 
 
 def _make_own(owner, holder):
-    """Copies of a material share its action, and are to keep their paths."""
+    """Gives the owner an action of its own: copies of a material share one, whose paths must
+    stay."""
     action, slot = holder.action, holder.action_slot
     if slot is None or (action.library is None and all(user == owner for user in slot.users())):
         return

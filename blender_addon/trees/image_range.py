@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The darkest, brightest and mean values of images that textures show."""
+"""Minimum, maximum and mean of the images in textures."""
 
 import os
 from dataclasses import dataclass
@@ -9,37 +9,37 @@ import numpy as np
 
 from ..common import color
 
-#: About how many pixels a mean is taken of.
+#: Approximate number of pixels of which a mean is taken.
 _SAMPLES = 1 << 16
 
 
 @dataclass(frozen=True)
 class Range:
-    """Of red, green, blue, in linear light of the working space, and alpha: (4,) each."""
+    """Of red, green and blue, linear in the working space, and of alpha: (4,) each."""
 
     low: np.ndarray
     high: np.ndarray
     mean: np.ndarray
 
 
-#: Range by image: reading a large one takes half a second.
+#: Cached by image: reading a large one takes half a second.
 _known = {}
 
 
 def of(image):
-    """Range of an image; None where there is none, or it can't be told: a movie, a sequence, tiles,
-    a colour space other than sRGB and data."""
+    """Range of an image; None if there is no image, or if it can't be determined: for movies,
+    sequences, tiled images, and colour spaces other than sRGB and data."""
     if image is None or image.source not in {"FILE", "GENERATED"}:
         return None
     key = (image.session_uid, image.source, image.alpha_mode, image.colorspace_settings.name)
     key += (_version(image),)
-    if image.is_dirty or key not in _known:  # nothing tells when an image is painted again
+    if image.is_dirty or key not in _known:  # painting raises no event
         _known[key] = _read(image)
     return _known[key]
 
 
 def _version(image):
-    """Another one where the file of an image has changed."""
+    """A key that changes with the file of an image."""
     if image.packed_file is not None:
         return image.packed_file.size
     path = bpy.path.abspath(image.filepath, library=image.library)
@@ -71,7 +71,7 @@ def _range(image, pixels, is_float):
     if rows.shape[1] < 4 or image.alpha_mode == "NONE":
         alpha = np.ones((len(rows), 1))
     settings = image.colorspace_settings
-    if not is_float and not settings.is_data:  # Blender has floats in the working space already
+    if not is_float and not settings.is_data:  # float buffers are already in the working space
         if settings.name != "sRGB":
             return None
         rgb = color.from_rec709(color.from_srgb(rgb))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What reaches a socket: node trees as Cycles reads them.
+"""Follows links in node trees as Cycles does, to find what reaches a socket.
 
-Everything that reads the links of a material, a light or a world asks this module. Links that are
-muted or invalid do not count; reroutes and muted nodes pass on what they are given; groups are
-looked into, from their active output. Which value counts where nothing arrives was rendered in
-Blender 4.5, 5.0 and 5.2: tests/blender/test_trees.py holds this module to the pictures.
+Every module that reads the links of a material, light or world uses this one. Muted and invalid
+links are ignored; reroutes and muted nodes pass their input on; groups are entered through their
+active output. The value that applies where no link arrives was determined by rendering with Blender
+4.5, 5.0 and 5.2; tests/blender/test_trees.py compares this module with such pictures.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ import bpy
 from ..common.i18n import say
 from ..packs import pack
 
-#: Before 5.0, 0 is what reaches a socket whose reroute or muted node is given nothing; since then
-#: the socket has its own value.
+#: Before 5.0, a socket linked to a reroute or muted node without input gets 0; since then it has
+#: its own value.
 _ZERO = bpy.app.version < (5, 0, 0)
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A node, and the group nodes that it lies in, the outermost first."""
+    """A node, and the group nodes around it, outermost first."""
 
     node: object
     within: tuple = ()
@@ -33,12 +33,12 @@ class Shown:
 
 @dataclass(frozen=True)
 class Reached:
-    """What reaches an input socket: an `output` of a node, or else a value."""
+    """What reaches an input socket: either an `output` of a node or a value."""
 
     output: object = None
-    #: The group nodes that the node of the output lies in, the outermost first.
+    #: The group nodes around the output's node, outermost first.
     within: tuple = ()
-    #: Where there is no output: the input socket whose value counts; without one the value is 0.
+    #: If there is no output: the input socket whose value applies; if None, the value is 0.
     holder: object = None
 
     @property
@@ -51,7 +51,7 @@ class Reached:
 
 
 def shading(owner):
-    """The node tree that shades a light, material or world, or None."""
+    """The node tree that shades a light, material or world; None if nodes are off."""
     switch = owner.bl_rna.properties.get("use_nodes")
     if switch is None or getattr(switch, "is_deprecated", False) or owner.use_nodes:
         return owner.node_tree
@@ -59,12 +59,12 @@ def shading(owner):
 
 
 def nodes_off():
-    """What is said of a material that has nodes and does not use them."""
+    """The message for a material that has nodes but does not use them."""
     return say("Use Nodes is off in this material's settings: Blender shows none of its nodes")
 
 
 def _surface(tree):
-    """The socket that Cycles takes a tree's shader from, or None."""
+    """The socket that Cycles takes a tree's surface shader from, or None."""
     output = tree.get_output_node("CYCLES")
     if output is None or (_ZERO and output.mute):
         return None
@@ -79,12 +79,12 @@ def counts(link):
 
 def _link(socket):
     """The link that gives an input socket its value, or None."""
-    # A socket's links are a search through those of the tree.
+    # NodeSocket.links searches all links of the tree, so is_linked is tested first.
     return next(filter(counts, socket.links), None) if socket.is_linked else None
 
 
 def _group_end(group):
-    """The node that ends a group, or None."""
+    """The active output node of a group, or None."""
     ends = [n for n in group.nodes if n.bl_idname == "NodeGroupOutput"]
     end = next((n for n in ends if n.is_active_output), ends[0] if ends else None)
     return None if end is not None and _ZERO and end.mute else end
@@ -95,20 +95,20 @@ def _by_identifier(sockets, identifier):
 
 
 def _passes(node):
-    """The input of each output of a reroute or of a muted node; None of nodes that compute."""
+    """The input that each output passes on, for reroutes and muted nodes; None for other nodes."""
     if node.bl_idname == "NodeReroute":
         return {node.outputs[0]: node.inputs[0]}
-    # Blender 5 does not mute the ends of a group.
+    # Blender 5 does not mute the input and output nodes of a group.
     if node.mute and (_ZERO or node.bl_idname not in {"NodeGroupInput", "NodeGroupOutput"}):
         return {link.to_socket: link.from_socket for link in node.internal_links}
     return None
 
 
 def reach(socket, within=()):
-    """What reaches an input socket of a node that lies in the group nodes `within`: Reached.
+    """What reaches an input socket of a node inside the group nodes `within`: Reached.
 
-    Groups of models are not looked into, and an input of a group that is looked at by itself,
-    without the node that shows it, is an output of its Group Input node.
+    The groups of models are not entered. If a group is examined by itself, without the node that
+    uses it, its inputs are outputs of its Group Input node.
     """
     holder, seen = socket, set()
     while True:
@@ -139,8 +139,8 @@ def reach(socket, within=()):
 
 
 def _is_looked_into(node):
-    """Whether a node is a group, but for those of models, which are large and hold neither lamps
-    nor other materials."""
+    """Whether a node is a group to be entered. Groups of models are not: they are large and contain
+    neither lamps nor other materials."""
     tree = getattr(node, "node_tree", None)
     return isinstance(tree, bpy.types.NodeTree) and pack.TAG not in tree
 
@@ -151,8 +151,8 @@ def is_driven(socket):
 
 
 def upstream(socket, kind=None, within=()):
-    """[Shown] of every node that a socket hangs on, by sockets of one type if it is given. Nodes
-    that pass on what they are given are not among them, nor groups that are looked into."""
+    """[Shown] of every node that a socket depends on, optionally only through sockets of one type.
+    Reroutes, muted nodes and entered groups are not included."""
     found, waiting = {}, [reach(socket, within)]
     while waiting:
         reached = waiting.pop()
@@ -171,6 +171,6 @@ def shown_by(tree):
 
 
 def shown(owner):
-    """The same of a light, material or world; none where it does not use its nodes."""
+    """The same for a light, material or world; empty if it does not use its nodes."""
     tree = shading(owner)
     return shown_by(tree) if tree is not None else []

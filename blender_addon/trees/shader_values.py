@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Values that reach sockets where these are constant, or known on average.
+"""Computes the values of sockets where they are constant or their mean is known.
 
-It knows the nodes that importers and artists put in front of a material's sockets; what others make
-of their inputs is not known here.
+Supports the nodes that importers and artists usually place before a material's sockets; outputs of
+all other nodes are unknown.
 """
 
 import numpy as np
@@ -14,24 +14,23 @@ _WIDTH = {"RGBA": 3, "VECTOR": 3}
 
 
 class Unknown(Exception):
-    """A value that differs from place to place, is animated, or is made by a node that is not known
-    here."""
+    """The value varies over the surface, is animated, or comes from an unsupported node."""
 
 
 def constant(socket, within=()):
-    """The value of an input socket wherever its node is shown: a number or (r, g, b); None where it
-    differs from place to place, is animated, or is not known, as that of images. `within`: as
-    shader_trees.reach() has it."""
+    """The value of an input socket wherever its node is shown: a number or (r, g, b). None if it
+    varies over the surface, is animated or is unknown, as for images. `within`: as for
+    shader_trees.reach()."""
     return Constants().told(socket, within)
 
 
 def current(socket, within=()):
-    """The same at the current frame: animated values are those that Blender shows now."""
+    """The same at the current frame: animated values are the present ones."""
     return Current().told(socket, within)
 
 
 def mean(socket, within=()):
-    """The same, on average over the images that reach it."""
+    """The same, with images replaced by their mean."""
     return _Mean(images=True).told(socket, within)
 
 
@@ -40,7 +39,7 @@ def _plain(value):
 
 
 def _as_type(value, socket):
-    """As a socket of a type takes what is linked to it."""
+    """Converts a linked value to the type of the socket."""
     wide = socket.type in _WIDTH
     if wide and not np.ndim(value):
         return np.full(3, value, float)
@@ -79,7 +78,7 @@ _MATH = {
     "GREATER_THAN": lambda a, b, c: float(a > b),
     "ABSOLUTE": lambda a, b, c: abs(a),
 }
-#: What a colour b makes of a colour a, all of it.
+#: Result of blending a colour b onto a colour a with factor 1.
 _BLENDS = {
     "MIX": lambda a, b: b,
     "MULTIPLY": lambda a, b: a * b,
@@ -90,8 +89,8 @@ _BLENDS = {
 
 
 class Constants:
-    """constant() of several sockets, which looks for what animates a node once. `images`: whether
-    those that are one colour all over are constants, which takes reading them."""
+    """constant() for several sockets; looks up a node's animation only once. `images`: whether
+    images of a single colour count as constants, which requires reading them."""
 
     def __init__(self, images=False):
         self._moved, self._images = {}, images
@@ -217,7 +216,7 @@ class Constants:
     def _combinexyz(self, node, output, of):
         return np.array([of(s) for s in node.inputs])
 
-    # Of files before 5.0.
+    # Nodes of files before 5.0.
     _separatergb, _combinergb = _separatexyz, _combinexyz
 
     def _valtorgb(self, node, output, of):
@@ -231,7 +230,7 @@ class Constants:
         return self._of_image(node, found, slice(3) if output.name == "Color" else 3)
 
     def _of_image(self, node, found, channels):
-        # Where a picture ends there is nothing.
+        # Outside its borders, a clipped image is black.
         same = np.array_equal(found.low[channels], found.high[channels])
         if not same or node.extension == "CLIP":
             raise Unknown
@@ -239,7 +238,7 @@ class Constants:
 
 
 class Current(Constants):
-    """current() of several sockets."""
+    """current() for several sockets."""
 
     def _is_moved(self, node, what):
         return False
@@ -249,7 +248,7 @@ class Current(Constants):
 
 
 class _Mean(Constants):
-    """Nodes are taken to do to a mean what they do to each pixel."""
+    """Assumes that nodes treat a mean as they treat each pixel."""
 
     def _of_image(self, node, found, channels):
         return found.mean[channels]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What in a file or its settings would spoil a material of this extension."""
+"""Checks a file and its settings for whatever makes a material of this extension render wrong."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ from . import closure_pool, lamp_checks
 from .setting_checks import DECLARED, black_aovs, clamp_highlight, is_clamped_as_new
 
 BLENDER_MIN = (4, 5, 0)
-#: The run of these shaders on an OptiX device that is on record, in words; None: there is none.
+#: Description of the recorded run of these shaders on an OptiX device; None if there is none.
 OPTIX_RUN = None
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding: a stable code, "ERROR" (the picture is wrong) or "WARNING", and a sentence, which
-    may be an i18n.Sentence: English here, in the user's language where it is shown."""
+    """A problem that was found: a stable code, "ERROR" (the picture is wrong) or "WARNING", and a
+    sentence. The sentence may be an i18n.Sentence: English in scripts, translated where shown."""
 
     code: str
     severity: str
@@ -30,13 +30,13 @@ class Finding:
 
 
 def lamps_that_fit(scene):
-    """How many lamps the open file's materials can aim at on a scene's device, and the material
-    that leaves room for no more; None where none aims at lamps."""
+    """How many lamps the materials of the open file can aim at on a scene's device, and the
+    material that sets this limit; None where no material aims at lamps."""
     return closure_pool.lamps_that_fit(device.runs_on_optix(scene))
 
 
 def device_refusal(model_name, form, scene):
-    """Why a form of a model can't run on a scene's device; None where it can."""
+    """Why a form of a model can't run on a scene's device; None if it can."""
     size, room = pack.representation(model_name, form)["closure_bytes"], closure_pool.capacity()
     if size > room and device.runs_on_optix(scene):
         return say(
@@ -48,7 +48,7 @@ def device_refusal(model_name, form, scene):
 
 
 def _slot_findings(use, scene):
-    """Whether Cycles has room for a material's closures, and for those of lamps beside them."""
+    """Warns if Cycles lacks closure slots for a material, or for its lamps in addition."""
     most = closure_pool.most_slots()
     if use.slots > most:
         yield Finding(
@@ -76,7 +76,7 @@ def _slot_findings(use, scene):
 
 
 def _pool_findings(material, scene):
-    """Whether a material's closures fit what a scene's device has for them."""
+    """Warns if a material's closures exceed the memory that the device has for them."""
     use, room = closure_pool.of_material(material), closure_pool.capacity()
     yield from _slot_findings(use, scene)
     if not device.runs_on_optix(scene):
@@ -104,7 +104,7 @@ def _pool_findings(material, scene):
 
 
 def engine_name(scene):
-    """The render engine as people call it."""
+    """The display name of the render engine."""
     known = {"BLENDER_WORKBENCH": "Workbench"}
     return (
         "EEVEE" if device.is_eevee(scene) else known.get(scene.render.engine, scene.render.engine)
@@ -112,7 +112,7 @@ def engine_name(scene):
 
 
 def _by_twin(finding, ours):
-    """A finding that shaders do not run in a scene, where twins stand in for all of them."""
+    """The finding that shaders do not run in a scene where twins stand in for all of them."""
     off = [_twin_error(node) for node in ours]
     if None in off:
         said = say("{reason}: Blender's own nodes stand in", reason=finding.message)
@@ -126,13 +126,13 @@ def _by_twin(finding, ours):
 
 
 def _twin(node):
-    """Manifest entry of the twin of a node's model; None where there is none."""
+    """Manifest entry of the twin of a node's model; None if it has no twin."""
     made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
     return pack.model(model_name)["representations"].get("twin") if made else None
 
 
 def _twin_error(node):
-    """How far a node's twin is off; None where that is not known for its values."""
+    """Error of a node's twin; None if it is not known at the node's values."""
     entry = _twin(node)
     if not entry or pack.refusal(nodes.identity(node)[0], "twin", nodes.all_values(node)):
         return None
@@ -140,7 +140,7 @@ def _twin_error(node):
 
 
 def scene_warnings(scene):
-    """What keeps any form from rendering in a scene, or what its shaders' language spoils."""
+    """What prevents every form from rendering in a scene, and what OSL itself spoils there."""
     found = []
     if bpy.app.version < BLENDER_MIN:
         found.append(
@@ -210,12 +210,12 @@ def _of_another_version(material, node, label):
 
 
 def _of(label, sentence):
-    """A sentence about one node."""
+    """A sentence about one node, with the node's label."""
     return say("{node}: {what}", node=label, what=sentence)
 
 
 def node_warnings(node, material, scene):
-    """What is wrong with one group node of a material."""
+    """The problems of one group node of a material."""
     label = node.label or node.name
     found = []
     if problem := nodes.script_problem(node.node_tree):
@@ -233,7 +233,7 @@ def node_warnings(node, material, scene):
         value = nodes.get_value(node, name)
         if parameter["kind"] == "choice" or value is None:
             continue
-        # Sockets hold single precision: the limits must be compared in the same.
+        # Sockets hold single precision, so the limits are compared with a matching tolerance.
         slack = 1e-6 * max(abs(parameter["min"]), abs(parameter["max"]))
         low, high = parameter["min"] - slack, parameter["max"] + slack
         for number in value if parameter["kind"] == "color" else (value,):
@@ -268,7 +268,7 @@ def node_warnings(node, material, scene):
                 high=f"{axis['max']:g}",
             )
             found.append(Finding("out_of_fit", "WARNING", _of(label, said)))
-    # Measured: a sampled form comes out right, no less noisy, and half as slow again.
+    # Measured: a sampled form renders correctly, with the same noise, but takes half as long again.
     sampled = form and nodes.identity(node)[1] == "sampled" and not stood_in
     if sampled and scene.cycles.use_guiding:
         said = say("Path Guiding is on: it only costs time with the render method Sampled")
@@ -278,7 +278,8 @@ def node_warnings(node, material, scene):
     for code, severity, said in lamp_checks.of_node(node, form, scene):
         found.append(Finding(code, severity, _of(label, said)))
     for code in declared:
-        # Of nodes the lamps that they know are sampled, and a new scene has no other bright light.
+        # Formula nodes render their lamps by light sampling, and a new scene has no other bright
+        # light.
         if code == "clamp_indirect" and form.get("nodes") and is_clamped_as_new(scene):
             continue
         if code in DECLARED and (result := DECLARED[code](material, scene)):
@@ -286,12 +287,13 @@ def node_warnings(node, material, scene):
     return found
 
 
-#: Findings of a scene under which shaders do not run.
+#: Codes of the scene findings under which shaders do not run.
 UNABLE = {"no_osl", "engine", "osl_off", "device"}
 
 
 def of_scene(ours, scene):
-    """The findings of a scene for these nodes: Blender's own run anywhere."""
+    """The findings of a scene that concern these nodes; forms of Blender's own nodes run
+    anywhere."""
     scripted = [node for node in ours if not nodes.runs_anywhere(node)]
     found = scene_warnings(scene) if scripted else []
     takes_nodes = scene.render.engine == "CYCLES" or device.is_eevee(scene)
@@ -301,13 +303,13 @@ def of_scene(ours, scene):
 
 
 def is_stood_in(node, scene):
-    """Whether a twin is what a scene shows of a node."""
+    """Whether a scene shows a node's twin in its place."""
     return nodes.is_stood_in_for(node) and any(f.code in UNABLE for f in of_scene([node], scene))
 
 
 def why_not_run(material, scene):
-    """The findings that say why a material's shaders do not run in a scene: errors where they are
-    black, warnings where twins stand in."""
+    """The findings that explain why a material's shaders do not run in a scene: errors where they
+    render black, warnings where twins stand in for them."""
     ours = nodes.shown_nodes(material)
     return [f for f in of_scene(ours, scene) if f.code in UNABLE]
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts what materials take of the room that Cycles has for the closures of a shading point.
+"""Counts how much of Cycles' closure storage at a shading point a material takes.
 
-Everywhere that is a number of slots: a closure that finds none left is dropped, and its light with
-it. On OptiX it is also a number of bytes, and Cycles does not check whether they suffice. Sizes of
-models are the generator's (closures/closure.h, closures/closure_pool.h).
+On every device the number of closures is limited: one that finds no free slot is dropped, and its
+light is lost. On OptiX the number of bytes is limited as well, and Cycles does not check it. The
+sizes of the models' closures come from the generator (closures/closure.h, closures/closure_pool.h).
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from ..groups import nodes
 from ..packs import pack
 from ..trees import shader_trees
 
-#: Slots that Blender's own nodes take. (Cycles 4.5 to 5.2, kernel/osl/closures_setup.h and
-#: kernel/svm/closure.h: a closure takes one, and another for its Fresnel term.)
+#: Slots that Blender's own nodes take. In Cycles 4.5 to 5.2 (kernel/osl/closures_setup.h,
+#: kernel/svm/closure.h) a closure takes one, and a second one for its Fresnel term.
 _NATIVE_SLOTS = {
     "ShaderNodeMixShader": 0,
     "ShaderNodeAddShader": 0,
@@ -27,8 +27,7 @@ _NATIVE_SLOTS = {
     "ShaderNodeSubsurfaceScattering": 3,
     "ShaderNodeBsdfPrincipled": 3,
 }
-#: What a Principled node takes beside that where a socket has another value than this one, or a
-#: link.
+#: Additional slots of a Principled node for each socket that is linked or differs from this value.
 _PRINCIPLED_SLOTS = {
     "Metallic": (0.0, 2),
     "Transmission Weight": (0.0, 2),
@@ -41,9 +40,9 @@ _PRINCIPLED_SLOTS = {
 
 @dataclass(frozen=True)
 class Use:
-    """What the shaders of a material take: slots without lamps, and for each lamp; on OptiX bytes
-    of the models and what joins them, likewise, and whether there are other shaders, whose bytes
-    are not known."""
+    """What the shaders of a material take: closure slots without lamps and for each lamp; likewise
+    bytes on OptiX, of the models and of the nodes that combine them; and whether there are other
+    shaders, whose sizes are unknown."""
 
     slots: int
     slots_per_lamp: int
@@ -52,7 +51,7 @@ class Use:
     shared: bool
 
     def lamps(self, on_optix):
-        """How many lamps there is room for; None where nothing aims at lamps."""
+        """How many lamps there is room for; None if nothing aims at lamps."""
         if not self.slots_per_lamp:
             return None
         room = (most_slots() - self.slots) // self.slots_per_lamp
@@ -62,12 +61,12 @@ class Use:
 
 
 def capacity():
-    """Bytes of the pool."""
+    """Size of OptiX's closure memory in bytes."""
     return pack.manifest()["closure_pool"]["bytes"]
 
 
 def most_slots():
-    """How many slots Cycles has."""
+    """The number of closure slots in Cycles."""
     return pack.manifest()["closure_slots"]["most"]
 
 
@@ -84,13 +83,13 @@ def _native_slots(node):
 
 
 def _times(node):
-    """How often a node is added to the sum: once for each place that it is linked to."""
+    """How often a node contributes to the sum: once for each link from its output."""
     links = (link for s in node.outputs if s.type == "SHADER" for link in s.links)
     return max(sum(map(shader_trees.counts, links)), 1)
 
 
 def of_material(material):
-    """Use of a material, of what its output for Cycles hangs on."""
+    """The Use of a material: of all nodes that its output for Cycles depends on."""
     pool, a_lamp = pack.manifest()["closure_pool"], pack.manifest()["closure_slots"]["lamp"]
     joining = {"ShaderNodeMixShader": pool["mix"], "ShaderNodeAddShader": pool["add"]}
     slots, slots_per_lamp, size, per_lamp, shared = 0, 0, 0, 0, False
@@ -110,9 +109,9 @@ def of_material(material):
 
 
 def lamps_that_fit(on_optix):
-    """(count, material): how many lamps the materials that the open file uses can aim at, which
-    share one list: as many as the one that takes most has room for, and which that is. None where
-    no material aims at lamps."""
+    """(count, material): how many lamps the materials of the open file can aim at, and the material
+    that sets this limit. All materials share one list of lamps, so the largest material decides.
+    None if no material aims at lamps."""
     rooms = [
         (room, material)
         for material in bpy.data.materials

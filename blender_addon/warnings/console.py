@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Says on the console why models are black or stood in for: without a window there is no panel."""
+"""Prints why materials render black or by their twins: without a window no panel can say so."""
 
 from bpy.app.handlers import persistent
 
@@ -8,7 +8,7 @@ from . import checks
 
 
 def _materials(scene):
-    """Materials of a scene's objects, and of those that it places copies of."""
+    """Materials of a scene's objects, and of the objects that it instances."""
     left, objects = [*scene.objects], {}
     while left:
         item = left.pop()

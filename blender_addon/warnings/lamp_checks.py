@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of a scene's lamps spoils a material of this extension, or makes it noisy."""
+"""Checks the lamps of a scene for what makes a material of this extension wrong or noisy."""
 
 import bpy
 
@@ -7,22 +7,22 @@ from .. import lamps
 from ..common.i18n import say
 from ..groups import nodes
 
-#: Lamps below this size (metres, or radians for a sun) are hit by chance too rarely.
+#: Lamps below this size (metres; radians for a sun) are too rarely hit by random rays.
 SMALL_LIGHT = 0.01
 SMALL_SUN = 0.02
-#: Up to this size an ideal mirror shows them as dots. A new lamp of Blender, 0.1, is larger: with
-#: its 4,096 samples they change blocks of 8 x 8 pixels by less than 1 %.
+#: Up to this size, an ideal mirror shows lamps as dots. A new lamp in Blender is larger (0.1): with
+#: its 4,096 samples, blocks of 8 x 8 pixels differ by less than 1 %.
 SMALL_IN_MIRROR = 0.05
-#: Sizes are of single precision.
+#: Sizes are stored in single precision.
 _SLACK = 1e-6
-#: Part of the light of a scene's lamps below which a lamp's noise drowns in the others'.
+#: Fraction of the scene's light below which the noise of a lamp is invisible among the others.
 DIM = 0.05
-#: Part of the light of a scene's lamps that may be lost unsaid.
+#: Fraction of the scene's light that may be lost without a warning.
 UNSEEN = 0.01
 
 
 def sizes_of(light):
-    """Names of a light's properties that are its size."""
+    """Names of the properties that make up a light's size."""
     if light.type == "SUN":
         return ("angle",)
     if light.type == "AREA":
@@ -35,17 +35,17 @@ def _smallest(light):
 
 
 def least_size(light):
-    """The size from which drawn directions meet a light well enough."""
+    """The size from which random rays hit a light often enough."""
     return SMALL_SUN if light.type == "SUN" else SMALL_LIGHT
 
 
 def is_tiny(light):
-    """Whether drawn directions meet a light too rarely."""
+    """Whether random rays hit a light too rarely."""
     return _smallest(light) < least_size(light) * (1 - _SLACK)
 
 
 def _names(found):
-    """A few names of objects or lamps."""
+    """The names of a few objects or lamps, for a message."""
     names = found[0].name
     for item in found[1:3]:
         names = say("{lamps}, {lamp}", lamps=names, lamp=item.name)
@@ -55,7 +55,7 @@ def _names(found):
 
 
 def sizeless_lamps():
-    """Names of the lamps of the open file that pictures show and no drawn direction meets."""
+    """Names of the visible lamps of the open file that random rays can't hit."""
     return sorted(
         {
             item.name
@@ -67,9 +67,9 @@ def sizeless_lamps():
 
 
 def enlarge(scene):
-    """Gives the lamps of a scene that are too small the least size that drawn directions meet well
-    enough; how much light they give stays. Returns their names, and those of lamps that belong to
-    another file."""
+    """Enlarges the lamps of a scene that are too small for random rays to hit often enough; their
+    light stays the same. Returns the names of these lamps and of those that belong to another
+    file."""
     done, kept = [], []
     for item in lamps.lamps_of(scene):
         light = item.data
@@ -147,7 +147,8 @@ def _ray_visibility(scene):
 
 
 def _others_lamps(node):
-    """The shared group that a node of a linked material aims by, or None: that of this file."""
+    """The shared group that a node of a linked material reads its lamps from; None if it is this
+    file's own."""
     tree = node.node_tree
     if tree.library is None:
         return None
@@ -156,8 +157,8 @@ def _others_lamps(node):
 
 
 def _not_aimed(node, count, scene):
-    """Of the lamps that a node with `count` slots does not aim at: what is lost, and what is noisy
-    for each reason that much of the light has."""
+    """Yields findings about the lamps that a node with `count` slots does not aim at: lamps whose
+    light is lost, and, by reason, lamps that are noisy and bright enough to matter."""
     group = _others_lamps(node)
     elsewhere = lamps.elsewhere(group.library) if group is not None else None
     found = lamps.seen(scene, group)
@@ -205,8 +206,8 @@ def _not_aimed(node, count, scene):
 
 
 def _without_shadow(form, scene):
-    """Cycles' rays do not pass what stands before such a lamp, and so find none of its light there;
-    what light sampling finds does (docs/cycles.md)."""
+    """Warns of lamps that cast no shadow. Cycles' random rays stop at objects in front of such a
+    lamp and find none of its light there, while light sampling does (docs/cycles.md)."""
     found = [
         item
         for item in lamps.lamps_of(scene)
@@ -241,7 +242,8 @@ def _without_shadow(form, scene):
 
 
 def of_node(node, form, scene):
-    """(code, severity, sentence) of what is wrong with a scene's lamps for a group node's form."""
+    """(code, severity, sentence) of what is wrong with a scene's lamps for the form of a group
+    node."""
     if not form or scene.render.engine != "CYCLES":
         return
     if form.get("lamps"):

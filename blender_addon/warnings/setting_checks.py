@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of scenes and materials that spoil forms: the rules by which forms say so."""
+"""Rules for the settings of scenes and materials that spoil forms, as forms declare in the
+manifest."""
 
 import bpy
 import numpy as np
@@ -11,13 +12,14 @@ from ..lamps import emission
 from ..trees import shader_trees
 from . import lamp_checks
 
-#: Sampled forms draw random numbers from positions in single precision. Measured to fail where a
-#: pixel is about 1e-6 of the distance; an orthographic camera has no direction to help out.
+#: Sampled forms derive random numbers from positions in single precision. Measured: they fail where
+#: a pixel is about 1e-6 of the distance. With an orthographic camera the view direction does not
+#: vary to make up for it.
 FAR_PIXEL = 1e-5
-#: Below this, a clamp on indirect light shows in the highlights of Blender's own closures.
+#: A lower clamp on indirect light is visible in the highlights of Blender's own closures.
 LOW_CLAMP = 10
-#: A brighter one shows earlier: measured (script/conditions) under a sun of irradiance 3, in which
-#: a highlight of f cos = 14 loses 6 % of its light to a clamp at 10, and one of 2 nothing.
+#: Brighter highlights are clamped earlier. Measured (script/conditions) under a sun of irradiance
+#: 3: a clamp at 10 takes 6 % of the light of a highlight of f cos = 14, and nothing of one of 2.
 CLAMP_OF_HIGHLIGHT = 5
 
 
@@ -67,17 +69,17 @@ def _clamp_indirect(material, scene):
     )
 
 
-#: Watts and metres of a new lamp of Blender.
+#: Power and radius of a new lamp in Blender.
 NEW_LAMP = 1000, 0.1
-#: Nodes of a world of one colour.
+#: Nodes of a world with a uniform colour.
 _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
 
 
 def _is_lit_as_a_new_scene(scene):
-    """Whether point lamps no brighter than a new one of Blender and a world of one colour, not
-    brighter than white, are all that shines. Measured there with a floor (fresnel_conductor,
-    schlick, coupled, radziszewski_alda): a clamp at 10 takes nothing of the light, and Filter
-    Glossy at 1 changes blocks of 8 x 8 pixels by 0.6 % at most."""
+    """Whether the scene is lit only by point lamps no brighter than a new one of Blender, and by a
+    uniform world no brighter than white. Measured for such a scene with a floor (fresnel_conductor,
+    schlick, coupled, radziszewski_alda): a clamp at 10 takes no light, and Filter Glossy at 1
+    changes blocks of 8 x 8 pixels by at most 0.6 %."""
     watts, radius = NEW_LAMP
     found = [item.data for item in lamps.lamps_of(scene)]
     plain = nodes.all_nodes(scene.world) if scene.world else []
@@ -100,7 +102,8 @@ def _is_lit_as_a_new_scene(scene):
 
 
 def is_clamped_as_new(scene):
-    """Whether a clamp on indirect light takes nothing of a new scene's; or there is none."""
+    """Whether indirect light is not clamped, or the clamp takes nothing as the scene is lit like a
+    new one."""
     clamp = scene.cycles.sample_clamp_indirect
     return clamp == 0 or (clamp >= LOW_CLAMP and _is_lit_as_a_new_scene(scene))
 
@@ -162,12 +165,13 @@ def _filter_glossy(material, scene):
 
 
 def _shows_passes(scene):
-    """Whether passes that only denoisers read are kept, for people or the compositor."""
+    """Whether the passes for denoisers are also kept for users or the compositor."""
     return any(layer.cycles.denoising_store_passes for layer in scene.view_layers)
 
 
 def _albedo_passes(material, scene):
-    # Where only Cycles' own denoiser reads them, the picture is within 0.1 % of the one without.
+    # If only Cycles' own denoiser reads them, the picture is within 0.1 % of the one without
+    # passes.
     if _shows_passes(scene) or any(v.use_pass_diffuse_color for v in scene.view_layers):
         return (
             "WARNING",
@@ -179,7 +183,7 @@ def _albedo_passes(material, scene):
 
 
 def _albedo_passes_mirror(material, scene):
-    # Measured: from 5.2 the denoiser counts a part of a mirror beside drawn directions.
+    # Measured: from 5.2 on, the denoiser counts a mirror component beside sampled directions.
     return _albedo_passes(material, scene) if bpy.app.version >= (5, 2, 0) else None
 
 
@@ -208,8 +212,8 @@ def _leaning_facets(material, scene):
 
 
 def black_aovs(scene):
-    """Names of the AOVs of a scene that OSL leaves black: Cycles does not run the nodes then that
-    write them. Tried in Blender 4.5, 5.0 and 5.2 (tests/blender/test_findings.py)."""
+    """Names of the AOVs of a scene that are black with OSL, as Cycles does not run the nodes that
+    write them. Tested in Blender 4.5, 5.0 and 5.2 (tests/blender/test_findings.py)."""
     wanted = {aov.name for layer in scene.view_layers for aov in layer.aovs}
     if not wanted:
         return []
@@ -224,8 +228,8 @@ def black_aovs(scene):
     return sorted(wanted & written)
 
 
-#: What a form may declare itself sensitive to in the manifest. A rule returns
-#: (severity, message), or None where nothing is wrong.
+#: The settings that a form may declare itself sensitive to in the manifest. Each rule returns
+#: (severity, message), or None if nothing is wrong.
 DECLARED = {
     "bump_correction": _bump_correction,
     "path_guiding": _path_guiding,
@@ -245,7 +249,7 @@ DECLARED = {
 
 
 def clamp_highlight(node, form, scene):
-    """A clamp that shows in the highlight that a form has at the node's values."""
+    """Warns of a clamp that is visible in the highlight of a form at the node's values."""
     clamp, highlight = scene.cycles.sample_clamp_indirect, form["highlight"]
     bright = max(highlight["f_cos"])
     if highlight["name"]:

@@ -1,26 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ashikhmin and Shirley's anisotropic Phong model.
+// Ashikhmin and Shirley's anisotropic Phong model: a specular microfacet lobe with Schlick's Fresnel term over a
+// diffuse base that darkens towards grazing angles.
 //
-// M. Ashikhmin, P. Shirley: An Anisotropic Phong Light Reflection Model, 2000. Equations below are the paper's.
-// Specular eq. 16 with Schlick's Fresnel term eq. 11, diffuse eq. 14 or 12, their sum eq. 15, sampling eqs. 19, 20.
+// M. Ashikhmin, P. Shirley: An Anisotropic Phong Light Reflection Model, 2000. Equation numbers are those of the paper:
+// specular term eq. 16 with the Fresnel term eq. 11, diffuse term eq. 14 or 12, their sum eq. 15, sampling eqs. 19, 20.
 //
 // Erratum: eq. 18 is printed upside down; p(k2) = p_h(h) / (4 (k1.h)).
 //
-// Stable forms. The exponent (n_u (h.u)^2 + n_v (h.v)^2) / (1 - (h.n)^2) is 0/0 at h = n. With
-// s2 = (h.u)^2 + (h.v)^2 = 1 - (h.n)^2 the power is exp((n_u (h.u)^2 + n_v (h.v)^2) log(h.n) / s2), and
-// log(h.n) = log1p(-s2) / 2 keeps its digits however small s2 is. cos theta = (1 - xi)^(1/(e+1)) is taken
-// as 1 - cos theta = -expm1(log1p(-xi) / (e+1)) for the same reason. The tangent of eq. 19, infinite at
-// xi_1 = 1, is kept as a ratio of sine and cosine; over the full circle that is the paper's map of four quadrants.
+// Numerical stability. The exponent (n_u (h.u)^2 + n_v (h.v)^2) / (1 - (h.n)^2) is 0/0 at h = n. With
+// s2 = (h.u)^2 + (h.v)^2 = 1 - (h.n)^2, the power is exp((n_u (h.u)^2 + n_v (h.v)^2) log(h.n) / s2), where
+// log(h.n) = log1p(-s2) / 2 is precise for any small s2. For the same reason cos theta = (1 - xi)^(1/(e+1)) is computed
+// as 1 - cos theta = -expm1(log1p(-xi) / (e+1)). The tangent in eq. 19, which is infinite at xi_1 = 1, is kept as a
+// ratio of sine and cosine; over the full circle this equals the paper's mapping of four quadrants.
 //
-// diffuse = tabulated takes eq. 12 at its word: R(k) is the specular term's albedo, which has no closed form, and c
-// makes R_d = 1 lossless: f_d = R_d (1 - R(k1)) (1 - R(k2)) / (pi (1 - R_mean)), 1 - R_mean the mean of 1 - R over the
-// cosine. By eq. 11 R = R_s A + (1 - R_s) B, A the albedo for F = 1 and B that for F = (1 - k.h)^5. Tables, made from
-// sample() on first use, hold 1 - A and K = 1 - B / A, so that 1 - R is a sum of what is not negative:
+// The choice diffuse = tabulated evaluates eq. 12 literally: R(k) is the albedo of the specular term, which has no
+// closed form, and c makes the model lossless for R_d = 1:
+//   f_d = R_d (1 - R(k1)) (1 - R(k2)) / (pi (1 - R_mean)),
+// where 1 - R_mean is the cosine-weighted mean of 1 - R. By eq. 11, R = R_s A + (1 - R_s) B, where A is the albedo for
+// F = 1 and B the albedo for F = (1 - k.h)^5. Tables of 1 - A and K = 1 - B / A are made from sample() on first use.
+// With them 1 - R is a sum of non-negative terms:
 //   1 - R = R_s (1 - A) + (1 - R_s) [(1 - A) + A K].
-// Both depend on view and exponents through four numbers. A narrow lobe has slopes with the variances s_u^2, s_v^2 =
-// 1 / (n + 1) along the axes; what counts are its variances along and across the plane of incidence and the correlation
-// of the two. A cosine alone would not do: where the lobe begins to sink below the surface moves with the lobe's width.
-// Interpolation errs by at most 0.02 of the incident light, 0.003 on average; that is what R_d = 1 gains or loses.
+// A and K depend on the view and the exponents through four numbers. The slopes of a narrow lobe have the variances
+// s_u^2, s_v^2 = 1 / (n + 1) along the axes. What matters are the variances along and across the plane of incidence,
+// the correlation of these slopes, and how much of the lobe is below the surface. The cosine of the view can't replace
+// the last one, because the angle at which the lobe begins to reach below the surface depends on the lobe's width.
+// The interpolation error is at most 0.02 of the incident light, 0.003 on average; with R_d = 1 the model gains or
+// loses that much.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
 #include "tables/table.h"
@@ -28,30 +33,30 @@
 namespace brdfc {
 
 struct LobeTables {
-  std::shared_ptr<const Table> loss;      ///< 1 - A over the first four of LobeAtView
+  std::shared_ptr<const Table> loss;      ///< 1 - A over the first four members of LobeAtView
   std::shared_ptr<const Table> softness;  ///< K over sqrt(cosTheta), the square roots of the widths, correlation2
 };
 const LobeTables& lobe_tables();
 
-/// Cosine means over all views, over the two of MeanWidth.
+/// Cosine-weighted means over all views, as functions of the members of MeanWidth.
 struct MeanTables {
   std::shared_ptr<const Table> loss;   ///< of 1 - A
   std::shared_ptr<const Table> matte;  ///< of 1 - B
 };
 const MeanTables& mean_tables();
 
-/// The specular lobe as seen in the plane of incidence.
+/// The specular lobe relative to the plane of incidence.
 template <class T> struct LobeAtView {
-  T sunk;             ///< 0 where nothing of a narrow lobe is below the surface, 1 at the horizon
+  T sunk;             ///< 0 if no part of a narrow lobe is below the surface, 1 at the horizon
   T along2, across2;  ///< variances of its slopes along and across the plane
-  T correlation2;     ///< of the two, squared
+  T correlation2;     ///< squared correlation of the two slopes
   T cosTheta;
 
-  /// w above the surface, in the frame of the exponents.
+  /// `w` is above the surface, in the frame of the exponents.
   LobeAtView(const Vec3<T>& w, const T& nu, const T& nv) {
     const T su2 = T(1) / (nu + T(1)), sv2 = T(1) / (nv + T(1));
     const T x2 = w.x * w.x, y2 = w.y * w.y, sin2 = named("sin2Theta", x2 + y2);
-    // At the normal every plane is one of incidence.
+    // At normal incidence any plane contains the view.
     const T cosPhi2 = named("cosPhi2", select(sin2 > T(0), x2 / maximum(sin2, tiny<T>()), T(1)));
     const T sinPhi2 = select(sin2 > T(0), y2 / maximum(sin2, tiny<T>()), T(0));
     along2 = named("along2", su2 * cosPhi2 + sv2 * sinPhi2);
@@ -75,9 +80,9 @@ template <class T> struct LobeAtView {
   }
 };
 
-/// The lobe's width over all planes of incidence.
+/// The lobe's width, averaged over all planes of incidence.
 template <class T> struct MeanWidth {
-  T width;      ///< root of the mean variance of its slopes
+  T width;      ///< square root of the slopes' mean variance
   T roundness;  ///< 1 for equal exponents, 0 for a line
 
   MeanWidth(const T& nu, const T& nv) {
@@ -128,7 +133,7 @@ template <class T> struct AshikhminShirley {
                           "paper: eq. 14, which loses light; tabulated: eq. 12, which loses none at rd = 1"});
   }
 
-  /// The half vector in the turned frame.
+  /// The half vector in the rotated frame.
   HalfVector<T> half(const Vec3<T>& wi, const Vec3<T>& wo) const {
     HalfVector<T> k(wi, wo);
     k.h = rotate_z(k.h, cos(rotation), sin(rotation));
@@ -162,7 +167,7 @@ template <class T> struct AshikhminShirley {
     return p_h(k.h) / (T(4) * k.oh);
   }
 
-  /// What the specular term leaves, from 1 - A and 1 - B of a lobe or their means.
+  /// The light that the specular term leaves to the diffuse one, from 1 - A and 1 - B of a lobe or from their means.
   template <class Lobe> Rgb<T> rest(const Lobe& lobe) const {
     return rs * lobe.loss() + (Rgb<T>(T(1)) - rs) * lobe.matte();
   }
@@ -186,7 +191,7 @@ template <class T> struct AshikhminShirley {
     return rd * (Rgb<T>(T(1)) - rs) * (T(28) / (T(23) * pi<T>()) * fade(wi.z) * fade(wo.z));
   }
 
-  /// The diffuse term's albedo; the mean of the fade over the cosine is 23/28.
+  /// The diffuse term's albedo; the cosine-weighted mean of fade() is 23/28.
   Rgb<T> substrate_albedo(const Vec3<T>& wo) const {
     if (diffuse == Tabulated) return rd * named("rest_o", rest_at(wo));
     return rd * (Rgb<T>(T(1)) - rs) * fade(wo.z);
@@ -199,7 +204,7 @@ template <class T> struct AshikhminShirley {
     return select(above(wi, wo), f, Rgb<T>(T(0)));
   }
 
-  /// How often sample() takes the specular lobe.
+  /// The probability with which sample() chooses the specular lobe.
   T specular_share() const { return part == Specular ? T(1) : part == Diffuse ? T(0) : T(0.5); }
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -210,7 +215,7 @@ template <class T> struct AshikhminShirley {
     return select(above(wi, wo), p, T(0));
   }
 
-  /// Half vector with density p_h, eqs. 19 and 20, reflected to a direction by eq. 17.
+  /// Samples a half vector with the pdf p_h, eqs. 19 and 20, and reflects wo about it, eq. 17.
   Vec3<T> sample_specular(const Vec3<T>& wo, const T& u1, const T& u2) const {
     const T angle = T(2) * pi<T>() * u1;
     const T cu = sqrt(nv + T(1)) * cos(angle), cv = sqrt(nu + T(1)) * sin(angle);
@@ -231,7 +236,7 @@ template <class T> struct AshikhminShirley {
       return sample_if(above(wi, wo), wi, substrate(wi, wo) * pi<T>(), p);
     }
     if (part == Specular) {
-      // f cos / pdf leaves F min(1, cos_i / cos_o): the power cancels.
+      // f cos / pdf = F min(1, cos_i / cos_o): the power cancels.
       const Vec3<T> wi = sample_specular(wo, u.y, u.z);
       const HalfVector<T> k = half(wi, wo);
       const T ratio = wi.z / maximum(maximum(wi.z, wo.z), tiny<T>());
@@ -244,23 +249,25 @@ template <class T> struct AshikhminShirley {
     return sample_if(p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
-  /// Facets nearly as wide as the lobe, and eq. 14 exactly but for the steps of a ramp, or something like eq. 12.
+  /// Beckmann microfacets of about the lobe's width. For the diffuse term a ramp: exact for eq. 14 except for the
+  /// ramp's resolution, and an approximation for eq. 12.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const Rgb<T> none(T(0));
-    // Seen from above f cos falls as cos^(n + 3), facets fall 4 powers slower than their slopes' density; 5 serves
-    // wide lobes better than 7. Then both have the same peak by the ratio of the normalisations.
+    // At normal incidence f cos falls off as cos^(n + 3); microfacets fall off 4 powers more slowly than their slopes'
+    // density. 5 serves wide lobes better than 7. The ratio of the normalisations then gives both the same peak.
     const T au2 = named("au2", T(2) / (nu + T(5))), av2 = named("av2", T(2) / (nv + T(5)));
     const T size = sqrt((nu + T(1)) * (nv + T(1)) * au2 * av2) / T(2);
-    // What the lobe reaches towards the horizon.
+    // How far the lobe extends towards the horizon.
     const Vec3<T> k = rotate_z(wo, cos(rotation), sin(rotation));
     const T reach2 = named("reach2", au2 * sqr(k.x) + av2 * sqr(k.y));
     const Rgb<T> F = rs + (Rgb<T>(T(1)) - rs) * schlick_weight(lobe_height(wo.z, T(0.7) * reach2));
-    // Eq. 16 loses more there than facets do.
+    // Eq. 16 loses more light near the horizon than microfacets do.
     const Rgb<T> glossy = F * (size * wo.z / (wo.z + T(0.3) * sqrt(reach2)));
     Closure<T> matte(ClosureKind::DiffuseRamp, part == Specular ? none : substrate_albedo(wo));
     for (int i = 0; i < kRampSize; ++i) {
       const T c = T(i) / T(kRampSize - 1);
-      // Eq. 12's fade is Fresnel's and that of light lost to the lobe; both have the mean 1 over the cosine.
+      // For eq. 12 the fade is that of the Fresnel term and of the light lost to the lobe. Both fades have the
+      // cosine-weighted mean 1.
       const T faded = diffuse == Paper ? T(28. / 23) * fade(c) : T(21. / 20) * one_minus_schlick_weight(c);
       matte.ramp[std::size_t(i)] = Rgb<T>(faded * c);
     }
@@ -273,14 +280,15 @@ namespace {
 
 constexpr double kNarrowest = 1e-4;  // the width of a lobe with the largest exponents
 
-/// To so many digits, as a shader's text has them: what they leave off is less than a tenth of what interpolation does.
+/// Rounds to a number of digits, as printed in a shader's text. The rounding error is less than a tenth of the
+/// interpolation error.
 double rounded(double v, int digits) {
   if (v == 0) return 0;
   const double unit = std::pow(10, std::floor(std::log10(std::abs(v))) + 1 - digits);
   return std::round(v / unit) * unit;
 }
 
-/// A table of at(coordinates in [0, 1]) over even axes.
+/// A table of at(coordinates in [0, 1]) over evenly spaced axes.
 template <class F>
 std::shared_ptr<const Table> tabulate(const char* name, std::vector<TableAxis> axes, int precision, const F& at) {
   std::size_t count = 1;
@@ -296,10 +304,10 @@ std::shared_ptr<const Table> tabulate(const char* name, std::vector<TableAxis> a
   return make_table(name, std::move(axes), std::move(values));
 }
 
-/// A and B for a lobe with these slopes; the axes are turned so that u is the wider one.
+/// A and B for a lobe with these slopes; the axes are rotated so that u is the wider one.
 Rgb<double> specular_albedos(double along, double across, double correlation2, double cosTheta) {
   const double a2 = sqr(std::max(along, kNarrowest)), c2 = sqr(std::max(across, kNarrowest));
-  // s_u^2 and s_v^2 from their sum and product.
+  // s_u^2 and s_v^2 from their sum and their product.
   const double sum = a2 + c2, product = a2 * c2 * (1 - std::min(correlation2, 1 - 1e-6));
   const double apart = std::sqrt(std::max(0., sum * sum - 4 * product));
   const double su2 = (sum + apart) / 2, sv2 = product / su2;
@@ -312,7 +320,7 @@ Rgb<double> specular_albedos(double along, double across, double correlation2, d
   m.nu = 1 / su2 - 1;
   m.nv = 1 / sv2 - 1;
   m.part.index = AshikhminShirley<double>::Specular;
-  // Eqs. 19, 20 take out the power; the square crowds samples where half vectors lie low.
+  // Sampling by eqs. 19, 20 cancels the power; squaring the random number puts more samples at low half vectors.
   constexpr int kAngles = 24, kHeights = 24;
   Rgb<double> albedos(0);
   for (int i = 0; i < kAngles; ++i)
@@ -323,7 +331,7 @@ Rgb<double> specular_albedos(double along, double across, double correlation2, d
   return albedos;
 }
 
-/// Cosine mean of value(view) over all views.
+/// The cosine-weighted mean of value(view) over all views.
 template <class F> double mean_over_views(double width, double roundness, const F& value) {
   constexpr int kAzimuths = 16, kCosines = 64;
   const double w2 = sqr(std::max(width, kNarrowest)), apart = std::sqrt(1 - sqr(std::max(roundness, 1e-6)));

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Blinn's microfacet model with the cosine-power distribution of facets.
+// Blinn's microfacet model: V-shaped cavities with a cosine-power distribution of normals.
 //
 // J. Blinn: Models of Light Reflection for Computer Synthesized Pictures, SIGGRAPH 1977.
 // f = F D G / (4 (n.i)(n.o)), D = (e + 2) / (2 pi) (n.h)^e, G = min(1, 2 (n.h)(n.i) / (o.h), 2 (n.h)(n.o) / (o.h)).
 //
-// The paper leaves the constant of D open (its D is 1 at h = n) and folds the rest into k_s. Here D (n.h) integrates to
-// 1 and the factor 1/4 is that of the reflection's Jacobian, so that k_s = F is a reflectance, and k_s = 1 loses only
-// what the cavities block. (n.h)^e comes from 1 - (n.h)^2 = h_x^2 + h_y^2, which keeps its digits near the normal.
+// The paper leaves the normalisation of D open (its D is 1 at h = n) and includes all constants in k_s. Here D (n.h)
+// integrates to 1, and the factor 1/4 is the Jacobian of reflection. So k_s = F is a reflectance, and with k_s = 1 the
+// only loss is the light that the cavities block.
+//
+// Numerical stability: (n.h)^e is computed from 1 - (n.h)^2 = h_x^2 + h_y^2, which is precise near the normal.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/v_cavity.h"
@@ -60,7 +62,8 @@ template <class T> struct Blinn {
     return sample_if(above(wi, wo), wi, ks * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
   }
 
-  /// Gaussian slopes as wide as the power of the cosine, but for wide lobes, that much of which is lost, and as high.
+  /// Gaussian slopes with the width and height of the cosine power. Wide lobes, which lose light below the horizon, get
+  /// a smaller width.
   ClosureSum<T> base(const Vec3<T>&) const {
     const T scale = T(1) / (e + T(3));
     return {facets(ClosureKind::Beckmann, ks * ((e + T(2)) * scale), sqrt(T(2) * scale))};

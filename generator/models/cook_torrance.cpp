@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cook and Torrance's microfacet model with Beckmann's distribution of slopes.
+// Cook and Torrance's microfacet model: V-shaped cavities with Beckmann's distribution of slopes.
 //
 // R. Cook, K. Torrance: A Reflectance Model for Computer Graphics, ACM Transactions on Graphics 1(1), 1982.
 // f = F D G / (4 (n.i)(n.o)), D = exp(-tan^2 theta_h / m^2) / (pi m^2 (n.h)^4),
 // G = min(1, 2 (n.h)(n.i) / (o.h), 2 (n.h)(n.o) / (o.h)).
 //
-// Erratum: the paper divides by pi (n.i)(n.o) and its D lacks the pi, together four times as much light as there is
-// (D (n.h) must integrate to 1, the reflection's Jacobian is 1/4). F is Schlick's approximation from the reflectance f0
-// at normal incidence, where the paper solves f0 for a refractive index and takes Fresnel's equations: linear in f0,
-// which the tables of the albedo need.
+// Erratum: the paper divides by pi (n.i)(n.o), and its D lacks the pi; together that reflects four times too much light
+// (D (n.h) must integrate to 1, and the Jacobian of reflection is 1/4).
+//
+// F is Schlick's approximation with the reflectance f0 at normal incidence. The paper instead solves f0 for a
+// refractive index and uses the Fresnel equations. Schlick's F is linear in f0, as the tables of the albedo require.
 #include "model/base_terms.h"
 #include "model/v_cavity.h"
 
@@ -65,7 +66,7 @@ template <class T> struct CookTorrance {
     return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
   }
 
-  /// The same facets with another geometry term, and the Fresnel term of the lobe's middle.
+  /// The same microfacets with another geometry term, and the Fresnel term at the middle of the lobe.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T height = lobe_height(wo.z, T(0.7) * m * m * sin2_theta(wo));
     return {facets(ClosureKind::Beckmann, F(clamp01(T(1) - height)), m)};

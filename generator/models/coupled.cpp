@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The coupled matte/specular model: a smooth dielectric coat over a matte base that gets what the coat lets through.
+// The coupled matte/specular model: a smooth dielectric coat over a matte base, which receives the light that the coat
+// transmits.
 //
 // P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
-// Graphics 1997. Equations below are the paper's.
+// Graphics 1997. Equation numbers are those of the paper.
 // f = R_f(theta_o) delta + k R_m [1 - (1 - cos theta_i)^5] [1 - (1 - cos theta_o)^5] (eq. 5), Schlick's R_f (eq. 1).
 //
-// Erratum: k = 21 / (20 pi (1 - R_0)) of eq. 4 belongs with [1 - R_f(theta)][1 - R_f(theta')]; with eq. 5 as
-// printed, which has no (1 - R_0) factors, k is 21 (1 - R_0) / (20 pi). Then R_m = 1 loses nothing at any angle.
+// Erratum: k = 21 / (20 pi (1 - R_0)) of eq. 4 belongs with [1 - R_f(theta)][1 - R_f(theta')]. Eq. 5 as printed has no
+// factors (1 - R_0), so k is 21 (1 - R_0) / (20 pi). Then R_m = 1 loses no light at any angle.
 //
-// fresnel = dielectric inserts the full Fresnel equations and solves for k, as the paper suggests: f = k R_m T T' with
-// T = 1 - R_f and 1/k = 2 pi integral of T(c) c dc. The index of the coat is that whose reflectance at normal incidence
-// is R_0; with nu = 1 / index = (1 - sqrt R_0) / (1 + sqrt R_0) and g = index cos theta_t = sqrt(1 - nu^2 + nu^2 c^2),
+// The choice fresnel = dielectric uses the full Fresnel equations and solves for k, as the paper suggests:
+//   f = k R_m T T',  T = 1 - R_f,  1/k = 2 pi integral of T(c) c dc.
+// The refractive index of the coat follows from the reflectance R_0 at normal incidence. With
+// nu = 1 / index = (1 - sqrt R_0) / (1 + sqrt R_0) and g = index cos theta_t = sqrt(1 - nu^2 + nu^2 c^2),
 //   r_s = (1 - nu^2) / (nu c + g)^2,  r_p = (1 - nu^2) (c^2 (1 + nu^2) - nu^2) / (c + nu g)^2,
 //   T = nu That,  That = 2 c g [1 / (nu c + g)^2 + 1 / (c + nu g)^2],
-// without differences of like numbers from R_0 = 0 to 1. The constant comes from a table of S(nu) = 2 integral of That
-// c dc, made from That itself on first use: interpolation is off by at most 4e-7 of it, so is the albedo. S has the
-// slope of nu log nu at 0, hence knots at squares.
+// without cancellation from R_0 = 0 to 1. The constant is looked up in a table of S(nu) = 2 integral of That c dc,
+// which is integrated numerically on first use. The interpolation error is at most 4e-7, relative to S and to the
+// albedo. Near 0 the slope of S is that of nu log nu, so the knots are evenly spaced in sqrt(nu).
 //
-// Sampling eq. 6. The printed rational guess is good to 1.2 % absolutely but not relatively, and Newton from it
-// stalls near 0; below xi = 0.02 the start is c = t (1 + t/2), t = cbrt(2 xi / 7), from the leading terms of eq. 6.
+// Sampling inverts eq. 6. The paper's rational starting value has an absolute error of 1.2 %, but its relative error is
+// unbounded, and Newton's method converges slowly from it near 0. Below xi = 0.02 the start is c = t (1 + t/2),
+// t = cbrt(2 xi / 7), from the leading terms of eq. 6.
 #include <boost/math/quadrature/gauss.hpp>
 
 #include "model/sampling.h"
@@ -26,10 +29,10 @@
 
 namespace brdfc {
 
-/// S over sqrt(nu).
+/// S as a function of sqrt(nu).
 const std::shared_ptr<const Table>& table_of_S();
 
-/// The coat by Fresnel's equations.
+/// The coat with the full Fresnel equations.
 template <class T> struct FullCoat {
   T nu, w;  ///< w = 1 - nu^2
 
@@ -38,7 +41,7 @@ template <class T> struct FullCoat {
     nu = named("nu", (T(1) - s) / (T(1) + s));
     w = named("w", T(4) * s / sqr(T(1) + s));
   }
-  /// Cosines from here on; at 0 the formulas are 0/0 where nothing is reflected.
+  /// Keeps cosines above 0, where the formulas are 0/0 if nothing is reflected.
   static T guarded(const T& c) { return maximum(c, T(1e-15)); }
   T g(const T& c) const { return named("g", sqrt(w + sqr(nu * c))); }
 
@@ -65,7 +68,7 @@ const std::shared_ptr<const Table>& table_of_S() {
       FullCoat<double> coat(0);
       coat.nu = sqr(double(i) / (kKnots - 1));
       coat.w = (1 - coat.nu) * (1 + coat.nu);
-      // c = t^3 takes the root at the horizon away.
+      // The substitution c = t^3 removes the square root at the horizon.
       values.push_back(boost::math::quadrature::gauss<double, 30>::integrate(
           [&](double t) { return 6 * coat.That(t * t * t) * t * t * t * t * t; }, 0., 1.));
     }
@@ -92,7 +95,7 @@ template <class T> struct Coupled {
             .equations = "eqs. 1, 5, 6; k of eq. 4 mended; or the full Fresnel equations in eq. 3",
             .doc = "Polished surface: a mirror-like coat over a matte base, whose shares trade off with the angle.",
             .properties = {.lossless = true,
-                           .exact_sampling = false,  // for schlick it is exact
+                           .exact_sampling = false,  // exact for schlick
                            .specular_limit = "r0=1"},
             .params = {}};
   }
@@ -108,7 +111,7 @@ template <class T> struct Coupled {
                           "Reflectance of the coat. schlick: approximation, eq. 1; dielectric: Fresnel's equations"});
   }
 
-  /// R_f(theta), eq. 1 or in full.
+  /// R_f(theta), by eq. 1 or the full Fresnel equations.
   T R_f(const T& cosTheta) const {
     if (fresnel == Dielectric) return FullCoat<T>(r0).R(cosTheta);
     return r0 + (T(1) - r0) * schlick_weight(cosTheta);
@@ -131,12 +134,12 @@ template <class T> struct Coupled {
     return select(above(wi, wo), rm * (k() * f(wi.z) * f(wo.z)), Rgb<T>(T(0)));
   }
 
-  /// The matte term's shape in wi, normalised; with the full equations nearly so.
+  /// The normalised matte term as a function of wi; approximate for the full Fresnel equations.
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     return select(above(wi, wo), T(21) / (T(20) * pi<T>()) * f(wi.z) * wi.z, T(0));
   }
 
-  /// cos theta' with eq. 6 = xi.
+  /// The cos theta' at which eq. 6 gives xi.
   static T invert_eq6(const T& xi) {
     const T t = named("t", cbrt(T(2) / T(7) * xi));
     const T rational = (((T(38295.9) * xi + T(13002.4)) * xi + T(154.4)) * xi + T(0.0114813)) /
@@ -162,13 +165,14 @@ template <class T> struct Coupled {
       const T shape = coat.That(c) / maximum(T(1.05) * coat.S() * f(c), tiny<T>());
       return sample_if(above(wi, wo), wi, rm * (coat.nu * coat.That(wo.z) * shape), pdf(wi, wo));
     }
-    // f cos / pdf = R_m (1 - R_f(theta_o)): the shape in wi cancels.
+    // f cos / pdf = R_m (1 - R_f(theta_o)): the dependence on wi cancels.
     return sample_if(above(wi, wo), wi, rm * ((T(1) - r0) * f(wo.z)), pdf(wi, wo));
   }
 
-  /// None with the full equations. With s = (1 - c)^5: (1 - s) c = 2 (1 - s/2) c - c. Burley's closure at roughness 0
-  /// gives the first term and a ramp, which may be negative, the second. The ramp is linear in c, hence exact. Its
-  /// magnitude sits in its colours, so that its weight adds nothing to what the passes take for albedo.
+  /// Not available with the full Fresnel equations. With s = (1 - c)^5: (1 - s) c = 2 (1 - s/2) c - c. The first term
+  /// is Burley's closure at roughness 0, the second a ramp, whose colours may be negative. The ramp is linear in c,
+  /// hence exact. Its magnitude is in its colours, so that its weight adds almost nothing to the albedo in the render
+  /// passes.
   std::optional<ClosureSum<T>> exact(const Vec3<T>& wo) const {
     if (fresnel == Dielectric) return std::nullopt;
     const Rgb<T> W = named("W", rm * (T(1.05) * (T(1) - r0) * f(wo.z)));
@@ -180,7 +184,8 @@ template <class T> struct Coupled {
     return ClosureSum<T>{burley, ramp, Closure<T>(ClosureKind::Reflection, mirror(wo))};
   }
 
-  /// The matte term is one function of wi times one of wo: a ramp through it. Its weight is the matte term's albedo.
+  /// The matte term is a product of a function of wi, which becomes a ramp, and a function of wo. The closure's weight
+  /// is the matte term's albedo.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const FullCoat<T> coat(r0);
     const bool full = fresnel == Dielectric;
@@ -193,7 +198,7 @@ template <class T> struct Coupled {
     return {ramp};
   }
 
-  /// Large enough that Cycles does not drop the closure (it does at 1e-5), small beside any albedo that matters.
+  /// Large enough that Cycles does not drop the closure (as it does at 1e-5), and small beside any relevant albedo.
   static constexpr double kRampWeight = 1e-3;
 };
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A polished metal: a mirror whose reflectance follows Fresnel's equations with a complex index n + i k.
+// Polished metal: a mirror whose reflectance is given by the Fresnel equations with a complex refractive index n + i k.
 //
 // P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
 // Graphics 1997, section 2: the average over both polarisations, with n and k at every wavelength.
-// Stable form: model/fresnel.h.
+// Numerically stable form: model/fresnel.h.
 //
-// Three channels stand for the spectrum: an index for each. model/optical.h finds those of a metal, or of measurements
-// of one's own, in the working space.
+// Three channels replace the spectrum, each with its own index. model/optical.h computes the channels' indices in the
+// working space from the spectral data of a metal or from a user's measurements.
 #include "model/fresnel.h"
 #include "model/sampling.h"
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A smooth boundary of two transparent media: ideal reflection and ideal refraction, shared out by Fresnel's equations.
+// A smooth boundary between two transparent media: ideal reflection and refraction, weighted by the Fresnel equations.
 //
 // P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
-// Graphics 1997, section 2. Stable form: model/fresnel.h. An index by channel: model/dispersion.h.
+// Graphics 1997, section 2. Numerically stable form: model/fresnel.h. A separate index for each channel:
+// model/dispersion.h.
 #include "model/dispersion.h"
 #include "model/sampling.h"
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Thick coloured glass: a smooth dielectric boundary around a medium that absorbs, exp(-a t) over a distance t.
+// Coloured glass: a smooth dielectric boundary around a medium that absorbs light, exp(-a t) over a distance t.
 //
 // P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
-// Graphics 1997, section 2. Stable form of the Fresnel equations: model/fresnel.h.
+// Graphics 1997, section 2. Numerically stable form of the Fresnel equations: model/fresnel.h.
 //
-// a is given as what is left of white light after one unit of length, attenuation = exp(-a / density).
+// a is specified by the colour of white light after one unit of length: attenuation = exp(-a / density).
 #include "model/dispersion.h"
 #include "model/sampling.h"
 
@@ -41,11 +41,11 @@ template <class T> struct Glass : DielectricBoundary<T> {
 
   Rgb<T> transmittance(const T& distance) const {
     const T d = named("depth", density * distance);
-    // 0 to the power of 0 is 1: what absorbs all absorbs nothing over no distance.
+    // 0 to the power of 0 is 1: even a medium that absorbs everything absorbs nothing over a distance of 0.
     const auto left = [&](const T& c) {
       return select(c > T(0), exp(d * log(maximum(c, tiny<T>()))), select(d > T(0), T(0), T(1)));
     };
-    // A recorded colour has no components; the largest of one that is black in two channels is the third.
+    // The components of a recorded colour can't be accessed. Here two channels are black, so the maximum is the third.
     const auto channel = [&](const Rgb<T>& one) { return left(max_component(attenuation * one)); };
     return {channel({T(1), T(0), T(0)}), channel({T(0), T(1), T(0)}), channel({T(0), T(0), T(1)})};
   }

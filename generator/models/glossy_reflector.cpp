@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Suffern's glossy reflector: rays about the mirror direction, each worth what a perfect mirror's is.
+// Suffern's glossy reflector: a blurred mirror that samples rays about the mirror direction, all with the same weight.
 //
-// K. Suffern: Ray Tracing from the Ground Up, 2007, chapter 25. Equations below are the book's.
-// Estimator eq. 25.7 over directions of density (e + 1) / (2 pi) cos^e alpha about r (eqs. 25.1, 25.8). What it
-// estimates is f cos theta_i = k_r c_r (e + 1) / (2 pi) cos^e alpha: the cosine of eq. 25.3 has gone, because
-// eq. 25.6 divides by it, so f is not reciprocal and grows without bound towards the horizon.
+// K. Suffern: Ray Tracing from the Ground Up, 2007, chapter 25. Equation numbers are those of the book.
+// The estimator eq. 25.7 averages over directions with the pdf (e + 1) / (2 pi) cos^e alpha about r (eqs. 25.1, 25.8).
+// It estimates the integral of f cos theta_i = k_r c_r (e + 1) / (2 pi) cos^e alpha. The cosine of eq. 25.3 is missing,
+// because eq. 25.6 divides by it. So f is not reciprocal and is unbounded towards the horizon.
 //
-// Rays below the surface: "lose" drops them (fig. 25.5, half as bright at the silhouette); "mirror" turns them about
-// r by half a circle, which puts them above it (figs. 25.6, 25.7). The density is then twice as large where the
-// partner, 2 (r.wi) r - wi, is below, and jumps there. Every ray counts, so the albedo is k_r c_r at every angle.
+// Rays below the surface: "lose" drops them (fig. 25.5: half as bright at the silhouette); "mirror" rotates them about
+// r by 180 degrees, which puts them above it (figs. 25.6, 25.7). The pdf is then twice as large where the rotated
+// direction, 2 (r.wi) r - wi, is below the surface, and is discontinuous there. No ray is lost, so the albedo is k_r
+// c_r at every angle.
 //
-// Stable forms: see power_lobe.h.
+// Numerical stability: see power_lobe.h.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -48,7 +49,7 @@ template <class T> struct GlossyReflector {
                         "dropped, as in the book's incorrect picture"});
   }
 
-  /// Scattered density without k_r c_r; also that of sample().
+  /// The pdf of sample(); it is also f cos theta_i divided by k_r c_r.
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const Vec3<T> r = reflect(wo);
     const T p = power_lobe_pdf(e, r, wi);

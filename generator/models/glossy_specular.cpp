@@ -3,11 +3,11 @@
 //
 // K. Suffern: Ray Tracing from the Ground Up, 2007, chapter 25. f = c k_s c_s cos^e alpha, eq. 25.2.
 //
-// The book leaves c open. "book" is 1, as in its listing, which at k_s = 1 gains energy below e = 4.28 and gives off
-// ever less as e grows. "estimator" is (e + 1) / (2 pi), the constant of the glossy reflector's density.
-// "conserving" is (e + 2) / (2 pi), which at normal incidence reflects k_s c_s and never more.
+// The book leaves c open. "book" is 1, as in its listing: with k_s = 1 it gains energy below e = 4.28, and reflects
+// less and less as e grows. "estimator" is (e + 1) / (2 pi), the normalisation of the glossy reflector's pdf.
+// "conserving" is (e + 2) / (2 pi): it reflects k_s c_s at normal incidence, and never more.
 //
-// Rays are drawn about r, eq. 25.8, and lost below the surface. Stable forms: see power_lobe.h.
+// Directions are sampled about r, eq. 25.8; those below the surface are lost. Numerical stability: see power_lobe.h.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -73,7 +73,7 @@ template <class T> struct GlossySpecular {
     return sample_if(above(wi, wo), wi, cs * (ks * share * wi.z), pdf(wi, wo));
   }
 
-  /// Cycles' ramp closure is this lobe times a ramp, here constant; see modified_phong.
+  /// Cycles' ramp closure is this lobe times a ramp, which is constant here; see modified_phong.cpp.
   ClosureSum<T> exact(const Vec3<T>&) const {
     return {power_closure(cs * (c() * ks * T(2) * pi<T>() / (e + T(2))), e)};
   }

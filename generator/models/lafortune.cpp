@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lafortune's generalised cosine lobe, isotropic: a Phong lobe about a direction that the mirrored viewer is scaled to.
+// Lafortune's generalised cosine lobe, isotropic: a Phong lobe about the mirrored view direction with scaled
+// components.
 //
 // E. Lafortune, S. Foo, K. Torrance, D. Greenberg: Non-Linear Approximation of Reflectance Functions, SIGGRAPH 1997.
-// f = k_s (e + 2) / (2 pi) [C_xy (i_x o_x + i_y o_y) + C_z i_z o_z]^e, 0 where the bracket is negative.
+// f = k_s (e + 2) / (2 pi) [C_xy (i_x o_x + i_y o_y) + C_z i_z o_z]^e; 0 where the bracket is negative.
 //
-// C_xy = -1, C_z = 1 is the modified Phong model; C_xy = 1 a retroreflector; |C_xy| > C_z off-specular; C_xy = 0 a lobe
-// about the normal. The paper lets the size of the C carry the scale of f; here it is k_s (e + 2) / (2 pi) and the C
-// are at most 1, so that no choice gains energy.
+// C_xy = -1, C_z = 1 is the modified Phong model; C_xy = 1 is retroreflective; |C_xy| > C_z is off-specular; C_xy = 0
+// is a lobe about the normal. In the paper the magnitude of the C also scales f. Here f is scaled by
+// k_s (e + 2) / (2 pi), and the C are at most 1, so that no parameters gain energy.
 //
-// Stable form. The bracket is |w| cos, w = (C_xy o_x, C_xy o_y, C_z o_z); |w|^e = exp(e log1p(|w|^2 - 1) / 2) with
-// 1 - |w|^2 = (1 - C_xy^2) sin^2 theta_o + (1 - C_z^2) cos^2 theta_o, a sum of positive terms.
+// Numerical stability. The bracket is |w| cos with w = (C_xy o_x, C_xy o_y, C_z o_z). |w|^e is computed as
+// exp(e log1p(|w|^2 - 1) / 2), where 1 - |w|^2 = (1 - C_xy^2) sin^2 theta_o + (1 - C_z^2) cos^2 theta_o is a sum of
+// positive terms.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -48,7 +50,7 @@ template <class T> struct Lafortune {
           .as(Optical::Reflectance));
   }
 
-  /// Axis of the lobe, and |w|^e.
+  /// The axis of the lobe, and |w|^e.
   struct Lobe {
     Vec3<T> axis;
     T scale;
@@ -56,7 +58,7 @@ template <class T> struct Lafortune {
   Lobe lobe(const Vec3<T>& wo) const {
     const T cos_o = maximum(wo.z, T(0));
     const Vec3<T> w = {cxy * wo.x, cxy * wo.y, cz * cos_o};
-    // Scaled by its largest component, so that no square underflows. Below 1e-30 w has no direction, and f is 0.
+    // Scaled by the largest component, so that no square underflows. Below 1e-30, w has no direction and f is 0.
     const T size = named("size", maximum(maximum(abs(w.x), abs(w.y)), w.z));
     const auto defined = size > tiny<T>();
     const Vec3<T> scaled = w / maximum(size, tiny<T>());
@@ -83,8 +85,8 @@ template <class T> struct Lafortune {
     return sample_if(above(wi, wo), wi, ks * ((e + T(2)) / (e + T(1)) * l.scale * wi.z), pdf(wi, wo));
   }
 
-  /// The lobe, mirrored about the middle between it and the viewer, times a cosine to there instead of that to the
-  /// normal.
+  /// The lobe as a Phong closure, whose normal is the half vector of the lobe's axis and the viewer. The closure's
+  /// cosine refers to that normal instead of the surface's.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const Lobe l = lobe(wo);
     const Vec3<T> n = normalize(wo + l.axis);

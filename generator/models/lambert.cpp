@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Lambert's diffuse reflector: f = rho / pi.
 //
-// J. H. Lambert: Photometria, 1760. Cycles' diffuse closure equals it.
+// J. H. Lambert: Photometria, 1760. Cycles' diffuse closure is this model.
 #include "model/sampling.h"
 
 namespace brdfc {

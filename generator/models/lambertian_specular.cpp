@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The traditional mixture of a matte and a mirror term with constant shares.
+// The traditional sum of a matte and a mirror term with constant weights.
 //
 // P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models, Pacific
-// Graphics 1997, section 5: f = R_d / pi + R_s delta. One of the three models that the coupled one is measured
-// against: the mirror grows no stronger towards grazing angles. R_s has no colour; R_d + R_s <= 1 is the user's affair.
+// Graphics 1997, section 5: f = R_d / pi + R_s delta. It is one of the three models with which the paper compares the
+// coupled model: its mirror does not become stronger towards grazing angles. R_s is grey. The user has to ensure
+// R_d + R_s <= 1.
 #include "model/sampling.h"
 
 namespace brdfc {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reflection without loss from a kernel: sech^2 (eq. 14), e^-u, or four heights of a drawn curve. The construction, its
-// equations and stable forms are in model/kernel_lobe.h.
+// Lossless reflection constructed from a kernel: sech^2 (eq. 14), e^-u, or a curve given by four heights. The
+// construction, its equations and its numerical stability are described in model/kernel_lobe.h.
 //
 // M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008, eqs. 9-16.
 #include "model/base_terms.h"
@@ -43,8 +43,9 @@ template <class T> struct Lossless : KernelLobe<T, EvenKnots<T, 4>> {
     v(this->tint, ColorSpec{"tint", "Tint", {1, 1, 1}, "Share of the light that is reflected"}.as(Optical::Tint));
   }
 
-  /// The light depends on its height alone, as that of a ramp does. The colours are those of sech^2, in closed form,
-  /// and add up to all of the light. From n = 5 on eight are too few: then drawn directions alone have less noise.
+  /// The reflected light depends on the height of wi alone, as that of a ramp closure does. The ramp's colours are
+  /// those of sech^2 in closed form, scaled so that no light is lost. From n = 5 on, eight colours are too few, and
+  /// sampled directions alone have less noise.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     if (this->kernel != Base::Sech2) return {};
     constexpr double kStep = 1. / (kRampSize - 1);

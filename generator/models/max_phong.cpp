@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Neumann's Phong lobe "pumped up" by the larger of both cosines, the start of Ashikhmin and Shirley's model.
+// Neumann's Phong lobe, "pumped up" by dividing by the larger of both cosines; the predecessor of Ashikhmin and
+// Shirley's model.
 //
 // L. Neumann, A. Neumann, L. Szirmay-Kalos: Compact Metallic Reflectance Models, Computer Graphics Forum 18(3), 1999;
-// quoted as eq. 2 by Ashikhmin and Shirley. f = k_s c cos^e alpha / max(cos theta_i, cos theta_o), alpha between the
-// light and the mirrored viewer.
+// quoted as eq. 2 by Ashikhmin and Shirley. f = k_s c cos^e alpha / max(cos theta_i, cos theta_o), where alpha is the
+// angle between the light and the mirrored view direction.
 //
-// c = (e + 1) / (2 pi): f cos theta_i is then at most a density over directions, so that the albedo stays below k_s and
-// reaches it for e -> infinity at every angle. The paper's Fresnel term is k_s here, constant.
+// c = (e + 1) / (2 pi): then f cos theta_i is at most a pdf, so that the albedo is below k_s and approaches it at every
+// angle for e -> infinity. The paper's Fresnel term is the constant k_s here.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -55,8 +56,9 @@ template <class T> struct MaxPhong {
     return sample_if(above(wi, wo), wi, ks * ratio, pdf(wi, wo));
   }
 
-  /// cos theta_i / max(cos theta_i, cos theta_o) as a constant and a share of cos theta_i / cos theta_o, by how much
-  /// the latter varies over the lobe: along the normal it is always the smaller one, near the horizon hardly ever.
+  /// Approximates cos theta_i / max(cos theta_i, cos theta_o) by a constant plus a multiple of cos theta_i / cos
+  /// theta_o. The coefficients depend on how much the cosine varies over the lobe: at normal incidence cos theta_i is
+  /// always the smaller one, near the horizon hardly ever.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T width = T(1) / sqrt(e + T(2)), z = maximum(wo.z, T(1e-3));
     const T slope = named("slope", sqrt(sin2_theta(wo)) / z * width), slope2 = slope * slope;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The reciprocal Phong lobe with the factor that keeps it from gaining energy.
+// The reciprocal Phong lobe, normalised so that it does not gain energy.
 //
 // E. Lafortune, Y. Willems: Using the Modified Phong Reflectance Model for Physically Based Rendering, Report CW 197,
-// K.U. Leuven, 1994. f = k_s (e + 2) / (2 pi) cos^e alpha, alpha between the light and the mirrored viewer.
+// K.U. Leuven, 1994. f = k_s (e + 2) / (2 pi) cos^e alpha, where alpha is the angle between the light and the mirrored
+// view direction.
 //
-// The albedo is k_s at normal incidence and falls towards grazing angles, for large e as cos theta_o.
+// The albedo is k_s at normal incidence and decreases towards grazing angles, as cos theta_o for large e.
+//
+// Numerical stability: see power_lobe.h.
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 
@@ -49,8 +52,9 @@ template <class T> struct ModifiedPhong {
     return sample_if(above(wi, wo), wi, ks * ((e + T(2)) / (e + T(1)) * wi.z), pdf(wi, wo));
   }
 
-  /// Cycles' ramp closure is this lobe times a ramp, here constant. It takes the power of a cosine rounded to float,
-  /// which under a lamp errs by about 1e-7 e relatively; what it samples does not.
+  /// Cycles' ramp closure is this lobe times a ramp, which is constant here. When Cycles evaluates it for a lamp, it
+  /// takes the power of a cosine rounded to float, with a relative error of about 1e-7 e; its sampling has no such
+  /// error.
   ClosureSum<T> exact(const Vec3<T>&) const {
     Closure<T> lobe(ClosureKind::PhongRamp, ks);
     for (Rgb<T>& colour : lobe.ramp) colour = Rgb<T>(T(1));

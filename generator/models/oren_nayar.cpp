@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Oren and Nayar's rough diffuse surface: Lambertian facets in V-shaped cavities.
+// Oren and Nayar's rough diffuse surface: Lambertian microfacets in V-shaped cavities.
 //
 // M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model, SIGGRAPH 1994. With alpha the larger and beta the
-// smaller of both polar angles, c the cosine of the difference of the azimuths, s = sigma^2:
+// smaller polar angle, c the cosine of the azimuth difference, and s = sigma^2:
 //   full:        f = rho / pi [C1 + c C2 tan beta + (1 - |c|) C3 tan((alpha + beta) / 2)]
 //                    + 0.17 rho^2 / pi s / (s + 0.13) [1 - c (2 beta / pi)^2],
 //                C1 = 1 - 0.5 s / (s + 0.33), C3 = 0.125 s / (s + 0.09) (4 alpha beta / pi^2)^2,
 //                C2 = 0.45 s / (s + 0.09) times sin alpha for c >= 0, sin alpha - (2 beta / pi)^3 below;
 //   qualitative: f = rho / pi [C1 + 0.45 s / (s + 0.09) max(c, 0) sin alpha tan beta].
 //
-// These are fits to an integral, with the fits' faults: the albedo with rho = 1 exceeds 1 at grazing angles (by up to
-// 1.5 % qualitative, 4.8 % full), f grows without limit where both directions graze, and beyond sigma = 0.664 (38
-// degrees) the full form is negative opposite to the light at grazing angles, so sigma ends before.
+// These formulas are fits to an integral, and have flaws: with rho = 1 the albedo exceeds 1 at grazing angles (by up to
+// 1.5 % qualitative, 4.8 % full); f is unbounded where both directions graze; and beyond sigma = 0.664 (38 degrees) the
+// full form is negative opposite to the light at grazing angles, so sigma is limited to less.
 //
-// Stable forms. sin alpha tan beta c = (the product of the horizontal parts) / max(cos); tan((alpha + beta) / 2) =
-// (sin alpha + sin beta) / (cos alpha + cos beta). Angles are 2 atan(sin / (1 + cos)), 1 - 2 beta / pi the same of the
-// complement. 1 - |c| is half the squared distance of the unit vectors at both azimuths (of one and the other's
-// opposite for c < 0). Opposite, sin alpha - (2 beta / pi)^3 is taken from 1 - 2 beta / pi and 1 - sin alpha.
+// Numerical stability. c sin alpha tan beta = (scalar product of the horizontal components) / max(cos);
+// tan((alpha + beta) / 2) = (sin alpha + sin beta) / (cos alpha + cos beta). Angles are 2 atan(sin / (1 + cos)), and
+// 1 - 2 beta / pi is computed likewise from the complementary angle. 1 - |c| is half the squared distance of the unit
+// vectors at the two azimuths (for c < 0 with one of them negated). On the side opposite to the light,
+// sin alpha - (2 beta / pi)^3 is computed from 1 - 2 beta / pi and 1 - sin alpha.
 #include "model/base_terms.h"
 #include "model/sampling.h"
 
@@ -71,13 +72,13 @@ template <class T> struct OrenNayar {
     const auto wi_lower = wi.z < wo.z;
     const T sin_a = named("sin_alpha", select(wi_lower, si, so)), sin_b = named("sin_beta", select(wi_lower, so, si));
     const T cos_a = minimum(wi.z, wo.z), cos_b = named("cos_beta", maximum(maximum(wi.z, wo.z), tiny<T>()));
-    // Angles over a right angle.
+    // Angles in units of a right angle.
     const auto over_right = [](const T& s, const T& c) { return T(4) / pi<T>() * atan(s / (T(1) + maximum(c, T(0)))); };
     const T alpha = named("alpha", over_right(sin_a, cos_a)), beta = named("beta", over_right(sin_b, cos_b));
     const T one_minus_beta = named("one_minus_beta", over_right(cos_b, sin_b));
     const T side = named("side", wi.x * wo.x + wi.y * wo.y);
     const T c = named("c", side / maximum(si * so, tiny<T>()));
-    // 1 - |c|, 1 at the normal where there is no azimuth.
+    // 1 - |c|; 1 at the normal, where the azimuth is undefined.
     const T ui = T(1) / maximum(si, tiny<T>()), uo = select(side < T(0), T(1), T(-1)) / maximum(so, tiny<T>());
     const T apart2 = sqr(wi.x * ui + wo.x * uo) + sqr(wi.y * ui + wo.y * uo);
     const T one_minus_c = named("one_minus_abs_c", select(si * so > T(0), minimum(apart2 / T(2), T(1)), T(1)));
@@ -101,8 +102,8 @@ template <class T> struct OrenNayar {
     return sample_if(above(wi, wo), wi, eval(wi, wo) * pi<T>(), cosine_pdf(wi));
   }
 
-  /// C1 and C2 are those of Cycles' rough facets, whose light towards the viewer has the same shape, and what facets
-  /// reflect again is nearly Lambert's.
+  /// Cycles' rough microfacets have the same C1 and C2, and the same shape towards the viewer. Interreflection is
+  /// nearly Lambertian.
   ClosureSum<T> base(const Vec3<T>&) const {
     const T ratio = T(0.45) * share(0.09) / C1();
     const Rgb<T> again = rho * rho * (form == Full ? T(0.17) * share(0.13) : T(0));

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Phong's highlight, as it was published: a formula of shading, here read as a BRDF.
+// Phong's highlight as it was published: a shading formula, interpreted as a BRDF.
 //
 // B. T. Phong: Illumination for Computer Generated Pictures, Communications of the ACM 18(6), 1975.
-// The reflected radiance is k_s cos^e alpha times the irradiance on a plane that faces the light, alpha being the angle
-// between the light and the mirrored viewer. The cosine that a BRDF is multiplied with is not in it, hence
+// The reflected radiance is k_s cos^e alpha times the irradiance on a plane that faces the light, where alpha is the
+// angle between the light and the mirrored view direction. The rendering equation's cosine is missing, so
 // f = k_s cos^e alpha / cos theta_i.
 //
-// So f is not reciprocal. Nothing ties k_s to e: at normal incidence the albedo is 2 pi k_s / (e + 1), a gain below
-// e = 5.28 and next to nothing for large e. What the horizon cuts off the lobe is lost.
+// Therefore f is not reciprocal. k_s is independent of e: at normal incidence the albedo is 2 pi k_s / (e + 1), which
+// is a gain below e = 5.28 and almost 0 for large e. The part of the lobe below the horizon is lost.
+//
+// Numerical stability: see power_lobe.h.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"

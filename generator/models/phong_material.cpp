@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Suffern's glossy-reflector material: the Phong material's diffuse term and highlight, and glossy reflection.
+// Suffern's glossy reflector material: the diffuse term and highlight of the Phong material, plus glossy reflection.
 //
 // K. Suffern: Ray Tracing from the Ground Up, 2007, chapters 15 and 25 (listing 25.4: Phong shading plus eq. 25.7).
-//   f = k_d c_d / pi + k_s c_s cos^es alpha + k_r c_r (e + 1) / (2 pi) cos^e alpha / cos theta_i,
-// the middle term as in the book's listing, with c = 1 (eq. 25.2), the last as in glossy_reflector.cpp, whose rays
-// below the surface are turned about r.
+//   f = k_d c_d / pi + k_s c_s cos^es alpha + k_r c_r (e + 1) / (2 pi) cos^e alpha / cos theta_i.
+// The highlight is as in the book's listing, with c = 1 (eq. 25.2). The last term is that of glossy_reflector.cpp,
+// whose rays below the surface are rotated about r.
 //
-// The book sends diffuse term and highlight to lights alone and the reflection to everything else. A scattering
-// function can't know what it meets: here all three reflect everything, so that a highlight is not seen twice only if
-// one of k_s and k_r is 0. The book's ambient term k_a c_d adds light that comes from nowhere. It is no scattering, and
-// left out: an emission shader beside this one is the same.
+// In the book the diffuse term and the highlight reflect only lamps, and the last term everything else. A BRDF can't
+// distinguish light sources: here all three terms reflect everything, so lamps have two highlights unless k_s or k_r is
+// 0. The book's ambient term k_a c_d is emission, not reflection, and is omitted; an emission shader added to this one
+// has the same effect.
 //
-// Stable forms: see power_lobe.h.
+// Numerical stability: see power_lobe.h.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
@@ -51,7 +51,7 @@ template <class T> struct PhongMaterial {
              .by_factors());
   }
 
-  /// (e + 1) / (2 pi) cos^e alpha, twice that where the partner about r is below the surface.
+  /// (e + 1) / (2 pi) cos^e alpha, doubled where the direction rotated about r is below the surface.
   T reflection_pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const Vec3<T> r = reflect(wo);
     const T partner_z = named("partner_z", T(2) * dot(r, wi) * r.z - wi.z);
@@ -64,7 +64,7 @@ template <class T> struct PhongMaterial {
     return select(above(wi, wo), f, Rgb<T>(T(0)));
   }
 
-  /// How often each lobe is drawn: by the light it reflects at most.
+  /// The probabilities of the lobes, in proportion to the largest albedo of each.
   struct Shares {
     T specular, reflection;
   };
@@ -94,7 +94,7 @@ template <class T> struct PhongMaterial {
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
   }
 
-  /// Two terms exactly, and the lobe of the last as in glossy_reflector.cpp.
+  /// The first two terms exactly, and the lobe of the third as in glossy_reflector.cpp.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     return {Closure<T>(ClosureKind::Diffuse, cd * kd), power_closure(cs * (ks * T(2) * pi<T>() / (es + T(2))), es),
             power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(0.25) / (e + T(2))))), e)};

@@ -1,24 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Radziszewski and Alda's energy-conserving glossy family: a latitudinal lobe in cos^2 theta times a longitudinal
-// lobe in azimuth, lossless and symmetric for every glossiness from matte (n = 0) to mirror (n -> infinity).
+// Radziszewski and Alda's energy-conserving family of glossy models: a latitudinal lobe in cos^2 theta times a
+// longitudinal lobe in azimuth. It is lossless and reciprocal for every glossiness from matte (n = 0) to mirror
+// (n -> infinity).
 //
-// M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008. Equations are the paper's.
-// x = cos^2 theta_i, y = cos^2 theta_r; f = f_theta(x, y) f_phi(phi_i - phi_r), eqs. 4, 17, 18, 19.
+// M. Radziszewski, W. Alda: Family of Energy Conserving Glossy Reflection Models, 2008. Equation numbers are the
+// paper's. x = cos^2 theta_i, y = cos^2 theta_r; f = f_theta(x, y) f_phi(phi_i - phi_r), eqs. 4, 17, 18, 19.
+// The lobe's centre omega_r is the direction of ideal reflection, of ideal refraction, or back to wo.
 //
 // Errata. Eqs. 17 and 19 integrate to 1/2, because eq. 8 has R_y = 0.5 integral f dx: f_theta needs a factor 2.
-// In eq. 19 P_5 must take nbar = n_phi sin theta_i sin theta_r, not n_phi.
+// In eq. 19 the argument of P_5 must be nbar = n_phi sin theta_i sin theta_r, not n_phi.
 //
-// Stable forms. f_theta: see latitudinal_lobe.h. f_phi: with k = 2 nbar + 1, q = 1/k, P_5(nbar) / k^5 = a^5 + 5 a^3 b^2
-// + (15/8) a b^4, a = (1+q)/2, b = (1-q)/2. omega_r: the direction of ideal reflection, of ideal refraction, or back to
-// wo. Refraction: simply evaluating the lobe around the refracted direction would lose nothing seen from one side, but
-// is neither reciprocal nor lossless from the other. Instead both directions are carried to the thin side (outside, for
-// the index is at least 1) by Snell's law and the lobe is evaluated there, times the squared index where the light is
-// on the dense side, whose solid angles are so much smaller. Beyond the critical angle nothing comes from outside:
-// there the reflection lobe, its heights stretched, x = cos^2 theta / X with X = 1 - 1/ior^2, shares the light among
-// these directions alone. So all is lossless seen from both sides, and reciprocal up to the squared index.
+// Numerical stability. f_theta: see latitudinal_lobe.h. f_phi: with k = 2 nbar + 1, q = 1/k, P_5(nbar) / k^5 =
+// a^5 + 5 a^3 b^2 + (15/8) a b^4, a = (1+q)/2, b = (1-q)/2.
 //
-// Sampling phi: tan psi = sqrt(k) tan(dphi/2) turns the density into (cos^2 psi + q sin^2 psi)^5 / (pi P_5/k^5),
-// bounded for every k; its CDF is a trigonometric polynomial, inverted by safeguarded Newton steps.
+// Refraction. Evaluating the lobe around the refracted direction would be lossless from one side, but neither
+// reciprocal nor lossless from the other. Instead, Snell's law maps both directions to the outside, which has the
+// smaller refractive index (the index is at least 1), and the lobe is evaluated there. If the light is inside, the
+// result is multiplied by the squared index, as solid angles inside are smaller by this factor. Beyond the critical
+// angle no light comes from outside. There the reflection lobe distributes the light among the directions beyond the
+// critical angle, with stretched heights x = cos^2 theta / X, X = 1 - 1/ior^2. So the model is lossless from both
+// sides, and reciprocal up to the squared index.
+//
+// Sampling phi: tan psi = sqrt(k) tan(dphi/2) transforms the pdf to (cos^2 psi + q sin^2 psi)^5 / (pi P_5/k^5), which
+// is bounded for every k. Its CDF is a trigonometric polynomial, which a safeguarded Newton method inverts.
 #include "model/latitudinal_lobe.h"
 
 namespace brdfc {
@@ -67,7 +71,7 @@ template <class T> struct RadziszewskiAlda {
 
   T latitudinal_n() const { return proportion == Custom ? n_theta : n; }
 
-  /// nbar = n_phi sin theta_i sin theta_r, sin sin the product of both sines.
+  /// nbar = n_phi sin theta_i sin theta_r; `sin_sin` is the product of the sines.
   T nbar(const T& sin_sin) const {
     switch (proportion) {
       case Paper:
@@ -96,7 +100,7 @@ template <class T> struct RadziszewskiAlda {
     const T si = sqrt(sin2_theta(wi)), sr = sqrt(sin2_theta(wr));
     const T sin_sin = named("sin_sin", si * sr);
     const T nb = named("nbar", nbar(sin_sin));
-    // 1 - cos(phi_i - phi_r) as half the squared distance of the unit vectors: no cancellation at the peak.
+    // 1 - cos(phi_i - phi_r) as half the squared distance of unit vectors, without cancellation at the peak.
     const T ix = wi.x / maximum(si, tiny<T>()), iy = wi.y / maximum(si, tiny<T>());
     const T rx = wr.x / maximum(sr, tiny<T>()), ry = wr.y / maximum(sr, tiny<T>());
     const T one_minus_cos = named("one_minus_cos", (sqr(ix - rx) + sqr(iy - ry)) / T(2));
@@ -106,10 +110,10 @@ template <class T> struct RadziszewskiAlda {
     return named("f_phi", sqrt(k) / (T(2) * pi<T>() * p5_over_k5(T(1) / k)) / base3 / base3);
   }
 
-  /// A direction of either side as the lobe of refraction takes it.
+  /// A direction on either side, mapped to the hemisphere in which the refraction lobe is evaluated.
   struct Carried {
-    Vec3<T> w;       ///< on the thin side, or stretched beyond the critical angle
-    Vec3<T> turned;  ///< the one whose sine counts for the azimuth: where it is stretched, the direction itself
+    Vec3<T> w;       ///< outside, or with stretched height beyond the critical angle
+    Vec3<T> turned;  ///< for the azimuthal lobe: the original one where the height is stretched
     T beyond;        ///< (ior sin)^2 - 1 inside, -1 outside: positive beyond the critical angle
   };
   Carried carry(const Vec3<T>& w) const {
@@ -118,10 +122,10 @@ template <class T> struct RadziszewskiAlda {
     const T x = scale * w.x, y = scale * w.y;
     const T sine = named("sin_thin", sqrt(x * x + y * y));
     const T cos2 = named("cos2_thin", (T(1) - sine) * (T(1) + sine));
-    // With equal indices no angle is critical, and rounding must not make one.
+    // With equal indices there is no critical angle, and rounding must not create one.
     const T beyond = named("beyond", select(inside && index > T(1), -cos2, T(-1)));
     const auto total = beyond > T(0);
-    // Stretched: sin^2 = ((ior sin)^2 - 1) / (ior^2 - 1), cos^2 = cos^2 ior^2 / (ior^2 - 1).
+    // Stretched: sin^2 = ((ior sin)^2 - 1) / (ior^2 - 1), and the squared cosine is cos^2 ior^2 / (ior^2 - 1).
     const T room = maximum((index - T(1)) * (index + T(1)), tiny<T>());
     const T stretch = sqrt(maximum(-cos2, T(0)) / room) / maximum(sine, tiny<T>());
     const T size = named("size", select(total, stretch, T(1)));
@@ -131,8 +135,8 @@ template <class T> struct RadziszewskiAlda {
             beyond};
   }
 
-  /// Is light carried between the two, through the surface or inside beyond the critical angle? Then the factor on the
-  /// lobe, else 0.
+  /// The factor of the lobe if light passes between the two directions, either through the surface or inside beyond the
+  /// critical angle; otherwise 0.
   T passage(const Vec3<T>& wi, const Carried& i, const Vec3<T>& wo, const Carried& o) const {
     const T through = select(wi.z < T(0), index * index, T(1));
     const T total = index * index / maximum((index - T(1)) * (index + T(1)), tiny<T>());
@@ -141,7 +145,8 @@ template <class T> struct RadziszewskiAlda {
     return named("passage", select(crosses, through, select(stays, total, T(0))));
   }
 
-  /// Eq. 19 around a direction on the upper side, without tint. The last two say what counts for the azimuth.
+  /// Eq. 19 around a direction on the upper side, without tint. `ti` and `tr` are the directions for the azimuthal
+  /// lobe.
   T product(const Vec3<T>& wi, const Vec3<T>& wr, const Vec3<T>& ti, const Vec3<T>& tr) const {
     switch (part) {
       case Latitudinal:
@@ -153,7 +158,7 @@ template <class T> struct RadziszewskiAlda {
     }
   }
 
-  /// Eq. 19 without tint; 0 where no light is carried.
+  /// Eq. 19 without tint; 0 where no light passes.
   T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
     if (around == Refraction) {
       const Carried i = carry(wi), o = carry(wo);
@@ -163,21 +168,22 @@ template <class T> struct RadziszewskiAlda {
     return select(above(wi, wo), product(wi, wr, wi, wr), T(0));
   }
 
-  /// Of the lobe, for reflection and back.
+  /// The centre of the lobe, for reflection and retroreflection.
   Vec3<T> centre(const Vec3<T>& wo) const { return around == Retro ? wo : reflect(wo); }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return tint * lobe(wi, wo); }
 
-  /// The cosine-weighted lobe is itself a density.
+  /// The cosine-weighted lobe is itself a pdf.
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return lobe(wi, wo) * abs(wi.z); }
 
-  /// cos^2 theta_i with density f_theta / 2 given y, for u in [0, 1).
+  /// Samples cos^2 theta_i with the pdf f_theta / 2, given y, for u in [0, 1).
   static T sample_cos2(const T& m, const T& y, const T& u) {
     const T v = named("one_minus_u", T(1) - u);
     // x = log1p(-u expm1(-m) / (v e^{-my} + u e^{-m})) / m.
     const T grow = -u * expm1(-m) / maximum(v * exp(-m * y) + u * exp(-m), tiny<T>());
     const T mild = named("mild", log1p(grow) / maximum(m, T(1e-6)));
-    // For large m the difference of ln(u + v e^{-my}) and ln(v e^{-my} + u e^{-m}), larger terms taken out.
+    // For large m: the difference of ln(u + v e^{-my}) and ln(v e^{-my} + u e^{-m}), each with its larger term factored
+    // out.
     const T lu = named("ln_u", log(maximum(u, tiny<T>())));
     const T lv = named("ln_v", log(maximum(v, tiny<T>())));
     const auto logaddexp = [](const T& p, const T& q) { return maximum(p, q) + log1p(exp(-abs(p - q))); };
@@ -185,8 +191,8 @@ template <class T> struct RadziszewskiAlda {
     return clamp01(select(m < T(1e-6), u, select(m < T(16), mild, steep)));
   }
 
-  /// (x, 1 - x) given (y, 1 - y). f_theta is unchanged when x and y become 1 - x and 1 - y, so that the smaller of
-  /// each pair is computed and keeps its digits, near the normal as at the horizon.
+  /// Samples (x, 1 - x) given (y, 1 - y). f_theta does not change if x and y are replaced by 1 - x and 1 - y. So the
+  /// smaller number of each pair is computed, which keeps it precise both near the normal and near the horizon.
   static std::array<T, 2> sample_x(const T& n, const T& y, const T& one_minus_y, const T& u) {
     const auto near_normal = y > T(0.5);
     const T m = log_cosh2(n);
@@ -194,7 +200,7 @@ template <class T> struct RadziszewskiAlda {
     return {select(near_normal, T(1) - x, x), select(near_normal, x, T(1) - x)};
   }
 
-  /// (cos dphi, sin dphi) with density f_phi for k = 2 nbar + 1.
+  /// Samples (cos dphi, sin dphi) with the pdf f_phi for k = 2 nbar + 1.
   static std::array<T, 2> sample_phi(const T& k, const T& u) {
     const T q = T(1) / k;
     const T a = named("a", (T(1) + q) / T(2)), b = named("b", (T(1) - q) / T(2));
@@ -206,7 +212,7 @@ template <class T> struct RadziszewskiAlda {
     const T c3 = named("c3", T(0.3125) * b * b2 * (T(8) * a2 + b2));
     const T c4 = named("c4", T(0.625) * a * b2 * b2);
     const T c5 = named("c5", T(0.0625) * b * b2 * b2);
-    // The lobe is even: solve for t in [0, pi] at the share 2 |u - 1/2|, then restore the sign.
+    // The lobe is even: solves for t in [0, pi] with the probability |2 u - 1|, then restores the sign.
     const T share = named("share", abs(T(2) * u - T(1)));
     const T target = named("target", share * c0 * pi<T>());
     const std::array<T, 3> state = settle(
@@ -242,9 +248,9 @@ template <class T> struct RadziszewskiAlda {
     std::array<T, 2> x = {T(1) - u.y, u.y};
     if (part != Longitudinal) x = sample_x(latitudinal_n(), wr.z * wr.z, sr2, u.y);
     T cosTheta = named("cosTheta_i", sqrt(x[0])), sinTheta = named("sinTheta_i", sqrt(x[1]));
-    T sr = sqrt(sr2), sine = sinTheta;  // what count for the azimuth
+    T sr = sqrt(sr2), sine = sinTheta;  // sines for the azimuthal lobe
     if (refracts) {
-      // Back from where the lobe was evaluated: see carry().
+      // Inverts the mapping of carry().
       const auto total = o.beyond > T(0);
       const T room = named("room", (index - T(1)) * (index + T(1)));
       const T beyond_sin = named("beyond_sin", sqrt(x[1] * room + T(1)) / index);
@@ -264,7 +270,7 @@ template <class T> struct RadziszewskiAlda {
     } else {
       dphi = sample_phi(named("k", T(2) * nbar(sine * sr) + T(1)), u.z);
     }
-    // Azimuth of the lobe's centre; any will do at normal incidence, where the lobe is round.
+    // The azimuth of the lobe's centre; arbitrary at normal incidence, where the lobe is isotropic.
     const T so = sqrt(sin2_theta(wo));
     const auto defined = so > T(1e-20);
     const T turn = around == Retro ? T(1) : T(-1);

@@ -1,23 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Schlick's rational model: from a Lambertian over a glossy to a mirror-like surface by one roughness.
+// Schlick's rational model, whose roughness goes from mirror over glossy to Lambertian.
 //
-// C. Schlick: An Inexpensive BRDF Model for Physically-based Rendering, Computer Graphics Forum 13(3), 1994 (a first
-// form in A Customizable Reflectance Model for Everyday Rendering, EG Workshop on Rendering 1993).
-// With t = n.h, u = o.h, v = n.o, v' = n.i, and w the cosine of the azimuth of h from the tangent,
+// C. Schlick: An Inexpensive BRDF Model for Physically-based Rendering, Computer Graphics Forum 13(3), 1994 (an earlier
+// version in A Customizable Reflectance Model for Everyday Rendering, EG Workshop on Rendering 1993).
+// With t = n.h, u = o.h, v = n.o, v' = n.i, and w the cosine of the angle between the tangent and the projection of h,
 //   f = S(u) (a / pi + b / (4 pi v v') G(v) G(v') Z(t) A(w)) + S(v) c delta,   S(u) = r + (1 - r) (1 - u)^5,
 //   Z(t) = s / (1 + s t^2 - t^2)^2,   A(w) = sqrt(p / (p^2 - p^2 w^2 + w^2)),   G(v) = v / (s - s v + v),
 //   b = 4 s (1 - s), the rest a for s >= 1/2, c for s < 1/2,   s the roughness, p the isotropy.
 //
-// The light that G blocks is lost here; the paper also offers to give it back as (1 - G G') / (4 pi v v'), whose albedo
-// grows without limit towards grazing angles. Z (n.h) A integrates to pi for p = 1 only: the mean of A over azimuths is
-// (2 / pi) sqrt(p) K(sqrt(1 - p^2)) (K: complete elliptic integral), so that anisotropy costs light. Beside a strong
-// mirror term it gains some at grazing angles: with r = 1, p = 1, s = 0.05 the albedo is 1.11 at v = 0.02.
+// The light that G blocks is lost here. The paper offers to add it as (1 - G G') / (4 pi v v'), but the albedo of that
+// term is unbounded towards grazing angles. Z (n.h) A integrates to pi for p = 1 only: the mean of A over azimuths is
+// (2 / pi) sqrt(p) K(sqrt(1 - p^2)) (K: complete elliptic integral), so that anisotropy loses light. With a strong
+// mirror term the model gains some light at grazing angles: with r = 1, p = 1, s = 0.05 the albedo is 1.11 at v = 0.02.
 //
-// There are no edges, but with p < 1 one point at h = n where f depends on the way that one comes from: so A is made.
+// f has no edges. But with p < 1 its limit at h = n depends on the azimuth of the approach, because of A.
 //
-// Stable forms. 1 + s t^2 - t^2 = sin^2 theta_h + s t^2; G(v) / v = 1 / (s (1 - v) + v). sqrt(p) A has no elementary
-// inverse of its integral; A / (2 pi) is the geometric mean of the uniform density and of
-// q = p / (2 pi (p^2 sin^2 + cos^2)), hence at most their arithmetic mean, which is sampled: weights stay below S.
+// Numerical stability: 1 + s t^2 - t^2 = sin^2 theta_h + s t^2; G(v) / v = 1 / (s (1 - v) + v).
+//
+// Sampling. The integral of sqrt(p) A has no elementary inverse. But A / (2 pi) is the geometric mean of the uniform
+// pdf and q = p / (2 pi (p^2 sin^2 + cos^2)), so it is at most their arithmetic mean. That mean is sampled, and weights
+// stay below S.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
 
@@ -62,8 +64,8 @@ template <class T> struct Schlick {
 
   Rgb<T> mirror(const Vec3<T>& wo) const { return S(clamp01(T(1) - wo.z)) * c(); }
 
-  /// Z(t) / pi. Below a roughness of 1e-16 the lobe stops growing, whose share b is then lost in the rounding of c:
-  /// divided by o.h at grazing angles it would overflow single precision.
+  /// Z(t) / pi. The lobe stops growing below a roughness of 1e-16, because the division by o.h at grazing angles would
+  /// overflow in single precision. At that roughness the lobe's share b is below the rounding error of c.
   T Z(const Vec3<T>& h, const T& sin2) const {
     const T d = maximum(sin2 + rough * (h.z * h.z), T(1e-16));
     return named("Z", rough / d / d / pi<T>());
@@ -84,7 +86,7 @@ template <class T> struct Schlick {
     return S(k.one_minus_oh) * select(above(wi, wo), a() / pi<T>() + glossy, T(0));
   }
 
-  /// Half vectors with density Z(t) t and, in azimuth, the mean of both densities.
+  /// The pdf of half vectors with density Z(t) t; in azimuth, the mean of both pdfs.
   T glossy_pdf(const HalfVector<T>& k) const {
     const T sin2 = named("sin2_h", sin2_theta(k.h));
     return Z(k.h, sin2) * k.h.z * (T(1) + p * A2(k.h, sin2)) / (T(8) * k.oh);
@@ -96,12 +98,12 @@ template <class T> struct Schlick {
   }
 
   Vec3<T> sample_glossy(const Vec3<T>& wo, const T& which, const T& u1, const T& u2) const {
-    // t^2 = u / (s (1 - u) + u), sin^2 = s (1 - u) / (s (1 - u) + u), with u1 for 1 - u.
+    // t^2 = u / (s (1 - u) + u), sin^2 = s (1 - u) / (s (1 - u) + u), where u1 replaces 1 - u.
     const T v = T(1) - u1;
     const T norm = maximum(rough * u1 + v, tiny<T>());
     const T sinTheta = named("sinTheta_h", sqrt(rough * u1 / norm)), cosTheta = named("cosTheta_h", sqrt(v / norm));
     const T phi = named("phi", T(2) * pi<T>() * u2);
-    // q: the azimuth of a circle's point after the circle has been squeezed across the tangent by p.
+    // q is the azimuth of a uniform point on a circle after scaling across the tangent by p.
     const T x = cos(phi) * select(which < T(0.5), p, T(1)), y = sin(phi);
     const T len = sqrt(x * x + y * y);
     const Vec3<T> h = {sinTheta * x / len, sinTheta * y / len, cosTheta};
@@ -118,12 +120,12 @@ template <class T> struct Schlick {
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
   }
 
-  /// Z is GGX's distribution with alpha^2 = s. A brightens azimuths and widens nothing, and takes light where it does
-  /// not: facets a little stretched, a little weaker.
+  /// Z is the GGX distribution with alpha^2 = s. A varies the brightness with the azimuth without widening the lobe,
+  /// and loses light: it is approximated by slightly anisotropic, slightly weaker microfacets.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T reach2 = named("reach2", rough * sin2_theta(wo));
     const Rgb<T> F = S(clamp01(T(1) - lobe_height(wo.z, reach2)));
-    // Both f cos at its peak: the closure's is Z / (4 z sqrt(1 + s tan^2)) by its own masking.
+    // Makes the peaks of f cos equal: the closure's is Z / (4 z sqrt(1 + s tan^2)), because of its own masking.
     const T z = lobe_height(wo.z, T(0.2) * reach2);
     const T peak = sqr(G(z)) * z * sqrt(z * z + reach2);
     const T wide = sqrt(rough), thin = named("thin", exp(T(0.18) * log(p)));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Schlick's "double" surface: a mirror by the Fresnel term over a matte base that fades with the half angle.
+// Schlick's "double" surface: a mirror with Schlick's Fresnel term over a matte base that darkens with the half angle.
 //
 // C. Schlick: A Customizable Reflectance Model for Everyday Rendering, Eurographics Workshop on Rendering 1993, as
 // printed in P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models,
-// Pacific Graphics 1997, section 5: f = R_f(theta) delta + R_d (1 - R_f(alpha)) / pi, alpha half the angle between the
-// directions. Reciprocal, but at grazing views the mirror takes all the light and the matte term still gives off most.
+// Pacific Graphics 1997, section 5: f = R_f(theta) delta + R_d (1 - R_f(alpha)) / pi, where alpha is half the angle
+// between the directions. It is reciprocal, but gains energy: at grazing views the mirror reflects all the light, and
+// the matte term still reflects most of it.
 //
-// Misprint: the fraction bar of the paper's equation divides the mirror term by pi, too.
+// Erratum: the fraction bar in the paper's equation divides the mirror term by pi as well.
 #include "model/base_terms.h"
 #include "model/sampling.h"
 
@@ -56,7 +57,7 @@ template <class T> struct SchlickDouble {
     return sample_if(above(wi, wo), wi, matte(wi, wo), cosine_pdf(wi));
   }
 
-  /// R_f(alpha) is R_0 but where both directions graze, apart.
+  /// R_f(alpha) is about R_0 except where both directions are at grazing angles and far apart.
   ClosureSum<T> base(const Vec3<T>&) const { return {Closure<T>(ClosureKind::Diffuse, rd * (T(1) - r0))}; }
 };
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shirley's matte term under a polish: what the mirror takes is taken from the matte term at the same angle.
+// Shirley's matte base under a polish: the matte term loses the light that the mirror reflects at the same angle.
 //
 // P. Shirley: Physically Based Lighting Calculations for Computer Graphics, thesis, University of Illinois, 1991, as
 // printed in P. Shirley, B. Smits, H. Hu, E. Lafortune: A Practitioners' Assessment of Light Reflection Models,
 // Pacific Graphics 1997, section 5: f = R_f(theta) delta + R_d (1 - R_f(theta)) / pi, here with Schlick's R_f.
 //
-// Only one of the two angles enters, so f is not reciprocal. Here theta is the viewer's: it is the direction that a
-// path tracer has in hand when it shares out the energy, and with R_d = 1 nothing is lost. With the light's angle a
-// grazing view would gain up to 20/21 (1 - R_0).
+// f depends on only one of the two angles, so it is not reciprocal. Here theta is the angle of the viewer, which a path
+// tracer knows when it distributes the energy; with R_d = 1 no light is lost. With the light's angle, grazing views
+// would gain up to 20/21 (1 - R_0).
 //
-// Misprint: the fraction bar of the paper's equation divides the mirror term by pi, too.
+// Erratum: the fraction bar in the paper's equation divides the mirror term by pi as well.
 #include "model/sampling.h"
 
 namespace brdfc {

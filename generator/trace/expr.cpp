@@ -69,7 +69,8 @@ int build(Op op, std::vector<int> args) {
       if (node(1).op == Op::Neg) return build(Op::Add, {args[0], node(1).args[0]});
       break;
     case Op::Mul:
-      // The factor is finite by construction, so a zero removes it: this is what prunes a lobe.
+      // Recording only produces finite factors, so a constant zero removes the product. This eliminates a lobe with
+      // weight 0.
       if (is_const(node(0), 0) || is_const(node(1), 0)) return constant(grey(0), type);
       if (is_const(node(0), 1) && node(1).type == type) return args[1];
       if (is_const(node(1), 1) && node(0).type == type) return args[0];
@@ -103,7 +104,7 @@ int build(Op op, std::vector<int> args) {
     default:
       break;
   }
-  // Equal operations share one node whichever way round they were written; the first way is the one printed.
+  // a + b and b + a share one node; the order that was recorded first is the one printed.
   if (op == Op::Add || op == Op::Mul) {
     const int swapped = r.find({op, type, {args[1], args[0]}, {}, "", 0, -1, ""});
     if (swapped >= 0) return swapped;
@@ -247,7 +248,7 @@ std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& ini
   std::vector<int> args;
   for (const Expr& e : init) args.push_back(e.id());
   for (const Expr& e : next) args.push_back(e.id());
-  // The serial rides in `value`, so that two loops with the same body stay apart in the table of nodes.
+  // The loop's serial is stored in `value`, so that two loops with equal bodies do not share a node.
   const int loop = r.add({Op::Loop, ExprType::Real, std::move(args), {double(serial), 0, 0}, "", count, -1, ""});
   std::vector<Expr> out;
   for (std::size_t i = 0; i < init.size(); ++i)
@@ -257,7 +258,7 @@ std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& ini
 
 }  // namespace trace
 
-// Of a template of core's.
+// Specialisation of a template in core.
 
 Rgb<Expr>::Rgb(const Expr& r, const Expr& g, const Expr& b) {
   if (r.is_literal() && g.is_literal() && b.is_literal())

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Expr: the scalar that records a formula.
+// Expr: the scalar type that records a formula.
 //
 // Operations fold constants in double precision, share equal subexpressions and drop neutral operations. Loops and
-// selections are nodes of their own. A comparison of Exprs is no bool, so a formula that branches on data does not
-// compile; what is met only while recording (a fold that is not finite, a nested loop, mixing recorders) throws
-// ExprError.
+// selections are nodes of their own. A comparison of Exprs does not convert to bool, so a formula that branches on data
+// does not compile. Errors that only recording can detect (constant folding with a result that is not finite, nested
+// loops, mixed recorders) throw ExprError.
 #pragma once
 
 #include <array>
@@ -27,16 +27,16 @@ class Expr {
  public:
   Expr() = default;
   Expr(double literal) : literal_(literal) {}  // NOLINT: formulas mix literals and scalars
-  /// What a program is given under this name.
+  /// The input with this name.
   static Expr input(const std::string& name);
   /// The value of a node of the current recorder.
   static Expr of_node(int id);
 
-  /// Is it a number, and not yet part of a recording?
+  /// True if it is a number that is not yet part of a recording.
   bool is_literal() const { return id_ < 0; }
   bool is_literal(double value) const { return id_ < 0 && literal_ == value; }
   double literal() const { return literal_; }
-  int id() const;  ///< of its node in the current recorder; a literal becomes one
+  int id() const;  ///< its node in the current recorder; adds a node for a literal
 
   friend Expr operator-(const Expr&);
   friend Expr operator+(const Expr&, const Expr&);
@@ -49,7 +49,7 @@ class Expr {
   double literal_ = 0;
 };
 
-/// A recorded comparison; converts to nothing, least of all to bool.
+/// A recorded comparison. It converts to nothing, in particular not to bool.
 class Condition {
  public:
   explicit Condition(bool literal) : literal_(literal) {}
@@ -86,7 +86,7 @@ Expr pow(const Expr& base, const Expr& exponent);
 Expr minimum(const Expr&, const Expr&);
 Expr maximum(const Expr&, const Expr&);
 Expr select(const Condition&, const Expr&, const Expr&);
-/// The same, under a name that a printed program declares a variable by.
+/// The same value, with a name for its variable in a printed program.
 Expr named(const char* name, const Expr&);
 
 }  // namespace trace
@@ -95,14 +95,14 @@ template <> inline int newton_steps<Expr>() {
   return Recorder::current().precision() == Precision::Single ? newton_steps<float>() : newton_steps<double>();
 }
 
-/// A recorded colour: one node, so that the printed text works on colours as the paper does.
+/// A recorded colour. It is a single node, so that the printed text computes with colours as the paper does.
 template <> struct Rgb<Expr> {
   Rgb() = default;
   Rgb(const Expr& r, const Expr& g, const Expr& b);
   explicit Rgb(const Expr& grey);
   static Rgb input(const std::string& name);
   static Rgb of_node(int id);
-  /// Is it known while recording? Then, unless null, `value` becomes it.
+  /// True if it is known while recording; then it is written to `value`, unless that is null.
   bool is_constant(std::array<double, 3>* value = nullptr) const;
   int id() const;
 
@@ -130,12 +130,12 @@ inline Vec3<Expr> input3(const std::string& name) {
   return {Expr::input(name + "_x"), Expr::input(name + "_y"), Expr::input(name + "_z")};
 }
 
-// What the templates below are made of; formulas call those.
+// Used by the templates below; formulas call those.
 Expr record_lookup(const std::shared_ptr<const Table>&, const std::vector<Expr>& coordinates);
 std::vector<Expr> loop_variables(int count, int serial);
 std::vector<Expr> close_loop(int count, int serial, const std::vector<Expr>& init, const std::vector<Expr>& next);
 
-/// The recorded look-up: an array and a call in OSL.
+/// Records a table look-up: an array and a function call in OSL.
 template <std::size_t D> Expr lookup(const std::shared_ptr<const Table>& table, const std::array<Expr, D>& x) {
   static_assert(D >= 1 && D <= 4);
   return record_lookup(table, {x.begin(), x.end()});
@@ -144,7 +144,7 @@ inline Expr lookup(const std::shared_ptr<const Table>& table, const std::vector<
   return record_lookup(table, x);
 }
 
-/// Records a loop that stays a loop. Loops do not nest.
+/// Records a loop, which is not unrolled. Loops can't be nested.
 template <std::size_t N, class Step>
 std::array<Expr, N> iterate(int count, const std::array<Expr, N>& state, Step step) {
   Recorder& recorder = Recorder::current();

@@ -13,7 +13,7 @@
 namespace brdfc::inline trace {
 namespace {
 
-/// To six digits, and no closer than 1e-9: what another library rounds otherwise is not seen.
+/// Rounded to six digits, and to multiples of 1e-9, so that different rounding in other libraries makes no difference.
 std::string digits_of(const Table& table) {
   std::string text = table.name;
   for (const TableAxis& a : table.axes) text += fmt::format(" {}", a.size());
@@ -47,7 +47,7 @@ std::string fingerprint(const Program& program) {
         text += " " + digits;
         break;
       }
-      case Op::Loop:  // how often; loops don't nest, so an index tells which variable of its loop is meant
+      case Op::Loop:  // the count; loops can't be nested, so an index identifies the variable of its loop
       case Op::LoopVar:
       case Op::LoopOut:
         text += fmt::format(" {}", n.index);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The graph that a formula becomes when it is recorded.
+// The graph in which a formula is recorded.
 #pragma once
 
 #include <array>
@@ -56,29 +56,30 @@ enum class Op : std::uint8_t {
   Lookup
 };
 
-/// As messages call it, and OSL those that it has.
+/// The name in messages, and in OSL for operations that exist there.
 const char* name_of(Op);
 
-/// Of a node's value: a number, three, or a truth value. A number among colours is grey.
+/// The type of a node's value: a number, three numbers, or a truth value. A number used as a colour is grey.
 enum class ExprType : std::uint8_t { Real, Color, Bool };
 
-/// A node of the graph. Its arguments are nodes with smaller numbers.
+/// A node of the graph. The numbers of its arguments are smaller than its own.
 struct ExprNode {
   Op op;
   ExprType type;
   std::vector<int> args;                 ///< numbers of nodes. Loop: N initial values, then N values of the next state
   std::array<double, 3> value{};         ///< Const; a Real uses element 0
   std::string name;                      ///< Input
-  int index = 0;                         ///< Loop: count. LoopVar, LoopOut: which state element
-  int scope = -1;                        ///< LoopVar: its loop's serial; else that of the loop it depends on, or -1
+  int index = 0;                         ///< Loop: count. LoopVar, LoopOut: index of the state element
+  int scope = -1;                        ///< LoopVar: its loop's serial; others: that of the loop they depend on, or -1
   std::string hint;                      ///< name given by named()
   std::shared_ptr<const Table> table{};  ///< Lookup
 };
 
-/// What a recording will be executed in.
+/// The precision in which a recording will be executed.
 enum class Precision : std::uint8_t { Single, Double };
 
-/// Owns the nodes of one recording, and shares equal ones; the innermost one alive on this thread is the current one.
+/// Owns the nodes of one recording; equal nodes are stored once. The innermost Recorder alive on this thread is
+/// current.
 class Recorder {
  public:
   explicit Recorder(Precision = Precision::Single);
@@ -86,20 +87,20 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Throws ExprError where there is none.
+  /// Throws ExprError if there is none.
   static Recorder& current();
   Precision precision() const { return precision_; }
-  /// The number of a node equal to this one, which is added if there is none. Throws ExprError if an argument is not of
-  /// this recorder.
+  /// The number of a node equal to this one; adds the node if there is none. Throws ExprError if an argument belongs to
+  /// another recorder.
   int add(ExprNode node);
   /// The node equal to this one, or -1.
   int find(const ExprNode& node) const;
-  /// The node of a number from 0 to size() - 1.
+  /// The node with a number from 0 to size() - 1.
   const ExprNode& node(int id) const { return nodes_[std::size_t(id)]; }
   int size() const { return int(nodes_.size()); }
-  /// The name that a printed program gives this node's value; the first one counts.
+  /// Sets the name of this node's value in a printed program; the first name stays.
   void hint(int id, const char* name);
-  /// The serial of a loop that begins, whose variables have it for a scope. Throws ExprError inside a loop.
+  /// Begins a loop and returns its serial, which is the scope of its variables. Throws ExprError inside a loop.
   int open_loop();
   void close_loop();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The meaning of an operation on numbers: for folding, in double, and for running a program.
+// Evaluates an operation on numbers: to fold constants, in double precision, and to run a program.
 #pragma once
 
 #include <cmath>

@@ -36,7 +36,7 @@ float apply_as_osl(Op op, const float* a) {
       return OIIO::fast_exp(a[0]);
     case Op::Log:
       return OIIO::fast_log(a[0]);
-    // As osl/brdfc.osl.in has them.
+    // As in osl/brdfc.osl.in.
     case Op::Log1p:
       return series_log1p(a[0], OIIO::fast_log(1 + a[0]));
     case Op::Expm1:

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The arithmetic that OSL uses in Blender, to tell what it costs from what a recording gets wrong.
+// The arithmetic of OSL in Blender. It separates OSL's rounding errors from errors of a recording.
 #pragma once
 
 #include "trace/graph.h"
 
 namespace brdfc::inline trace {
 
-/// While one is alive on this thread, Program::run<float> computes as OSL does.
+/// While an object of this class is alive on this thread, Program::run<float> computes as OSL does.
 class OslArithmetic {
  public:
   OslArithmetic();
@@ -16,8 +16,8 @@ class OslArithmetic {
   static bool active();
 };
 
-/// One operation, with the functions that OSL calls: OpenImageIO's fast ones, quotients and roots that are 0 where they
-/// are not defined, and the shaders' own expm1 and log1p.
+/// Evaluates one operation with the functions that OSL calls: OpenImageIO's fast versions, quotients and roots that are
+/// 0 where they are undefined, and the shaders' own expm1 and log1p.
 float apply_as_osl(Op, const float* arguments);
 
 }  // namespace brdfc::inline trace

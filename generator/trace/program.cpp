@@ -39,7 +39,7 @@ void Program::add(const std::string& name, int id) {
     nodes_[at] = r.node(int(at));
     stack.insert(stack.end(), nodes_[at].args.begin(), nodes_[at].args.end());
   }
-  // A formula may have named a node since.
+  // A formula may have named a node since it was copied.
   for (std::size_t i = 0; i < nodes_.size(); ++i)
     if (reachable_[i] && nodes_[i].hint.empty()) nodes_[i].hint = r.node(int(i)).hint;
 }
@@ -63,7 +63,7 @@ std::vector<std::string> Program::inputs() const {
 
 bool operator==(const Program& a, const Program& b) {
   if (a.outputs().size() != b.outputs().size()) return false;
-  // Nodes and loops of one by those of the other, and back.
+  // Maps nodes and loops of each program to those of the other.
   std::map<int, int> there, back, loop_there, loop_back;
   std::vector<std::pair<int, int>> unseen;
   const auto one_to_one = [](std::map<int, int>& to, std::map<int, int>& from, int x, int y) {
@@ -84,7 +84,7 @@ bool operator==(const Program& a, const Program& b) {
     if (m.op != n.op || m.type != n.type || m.name != n.name || m.index != n.index || m.hint != n.hint ||
         m.args.size() != n.args.size() || !pair_loops(m.scope, n.scope))
       return false;
-    // A loop has its serial there.
+    // The value of a Loop node is its serial.
     if (m.op == Op::Loop ? !pair_loops(int(m.value[0]), int(n.value[0])) : m.value != n.value) return false;
     if (m.op == Op::Lookup && m.table != n.table && !equal(*m.table, *n.table)) return false;
     for (std::size_t k = 0; k < m.args.size(); ++k)
@@ -123,13 +123,13 @@ template <class T> std::map<std::string, std::array<T, 3>> Program::run(const In
         break;
       }
       case Op::LoopVar:
-        break;  // set by the loop
+        break;  // set by its loop
       case Op::LoopOut:
         out = value[std::size_t(node(n.args[0]).args[std::size_t(n.index)])];
         break;
       default:
         for (std::size_t c = 0; c < 3; ++c) {
-          // A real is grey.
+          // A real used as a colour is grey.
           if (c > 0 && n.type != ExprType::Color) {
             out[c] = out[0];
             continue;

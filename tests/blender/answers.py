@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tool made, kept by what it was made of: tests ask the same, and so do runs in several
-versions of Blender.
+"""Caches results of the tool by their inputs: several tests, and runs in several versions of
+Blender, need the same ones.
 
-As a program it stands in for the tool: answers.py FOLDER PROGRAM ARGUMENT...
+As a program it can replace the tool: answers.py FOLDER PROGRAM ARGUMENT...
 """
 
 import contextlib
@@ -27,7 +27,7 @@ class Answers:
 
     @contextlib.contextmanager
     def of(self, *question):
-        """The path of the answer; while this is held nobody else makes it."""
+        """The path of an answer. While this is held, no other process computes it."""
         text = json.dumps([self.digest, *question])
         path = self.folder / hashlib.sha256(text.encode()).hexdigest()
         with path.with_suffix(".lock").open("w") as lock:
@@ -35,14 +35,14 @@ class Answers:
             yield path
 
     def run(self, arguments, stdin=""):
-        """What the tool prints; AssertionError with its words where it fails."""
+        """The tool's output. Raises AssertionError with its message if it fails."""
         command = [self.program, *arguments]
         done = subprocess.run(command, input=stdin, capture_output=True, text=True)
         assert done.returncode == 0, f"{arguments}: {done.stderr}"
         return done.stdout
 
     def ask(self, arguments, stdin=""):
-        """As run(), from what is kept where it can be."""
+        """The same as run(), from the cache if possible."""
         if arguments[0] == "build":
             kept = self.built(arguments)
             out = Path(arguments[arguments.index("--out") + 1])
@@ -59,7 +59,8 @@ class Answers:
             return path.read_text()
 
     def built(self, arguments):
-        """A folder, to be read only, with what `build` wrote in `out` and printed in `stdout`."""
+        """A folder, to be treated as read-only, with the output folder of `build` in `out` and its
+        output in `stdout`."""
 
         def names_file(i):
             return arguments[i - 1] in ("--scene", "--materials")

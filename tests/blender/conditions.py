@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the settings and scenes of users do to each form, measured against clean ones.
+"""Measures how settings and scenes of users affect each form, relative to clean ones.
 
-Grooves: each cell of a grid is a V of two quads, closed at its ends, so that light bounces inside
-it and none reaches other cells. One render shows every form in many cells: both walls of the form,
-or one of them white, so that caustics show. A condition is what it changes in that scene; its bias
-is what that does to the mean radiance of a form's cells.
+The scene consists of grooves: each cell of a grid is a V of two quads with closed ends, so that
+light bounces inside it but does not reach other cells. One render shows every form in many cells.
+In half of them both walls have the form's material, in the others one wall is white, to show
+caustics. A condition is a change to this scene; its bias is the resulting change in the mean
+radiance of a form's cells.
 """
 
 import dataclasses
@@ -25,17 +26,17 @@ from helpers import (
 from mathutils import Quaternion, Vector
 from worlds import gradient
 
-#: Cells of a form and of each kind.
+#: Number of cells for each form and kind.
 REPLICAS = 40
-#: Distance of cells, and so the size of a pixel; a groove is 1 wide and 1/2 deep.
+#: Distance between cells, and thereby the size of a pixel; a groove is 1 wide and 1/2 deep.
 PITCH = 2.0
-#: Towards the sun.
+#: Direction towards the sun.
 SUN = (0.3, -0.25, 0.9)
-#: A bias counts from this share on, and only beyond so many standard errors.
+#: A bias counts if it is at least this fraction and at least this many standard errors.
 BIASED, SIGNIFICANT = 0.02, 5.0
 
 
-#: What differs from the models' defaults: a coat that reflects enough for its mirror to matter.
+#: Values other than the models' defaults: a coat whose mirror reflects enough to matter.
 VALUES = {"coupled": {"r0": 0.5}}
 
 
@@ -58,7 +59,8 @@ NATIVE = DIFFUSE, GLOSSY = Form("Diffuse", "node"), Form("Glossy", "node")
 
 
 def representatives(extension, listed):
-    """Forms that stand for all, by what they are made of; `listed` is `brdfc list --json`."""
+    """Forms that represent all others, by what they consist of. `listed`: from `brdfc list
+    --json`."""
     models = {m["name"]: m for m in listed}
     forms = {}
 
@@ -86,7 +88,7 @@ def representatives(extension, listed):
     pick("drawn, anisotropic", "sampled", lambda m, e: not e["isotropic"])
     pick("fitted, with facets", "fitted", lambda m, e: of_facets(e))
     pick("fitted, of lobes", "fitted", lambda m, e: not of_facets(e))
-    # Facets below the drawn directions, none, a mirror beside them, ramps.
+    # Bases: microfacets below the sampled directions, none, with a mirror, ramps.
     for model in ("cook_torrance", "radziszewski_alda", "schlick_double", "phong_material"):
         pick(f"aimed, {model}", "aimed", lambda m, e, model=model: m["name"] == model)
     pick(
@@ -110,8 +112,8 @@ def _plain(grey):
 
 
 class Grooves:
-    """The scene. `copies`: materials of each form; `flip`: faces point away from the viewer;
-    `inset`: how far the walls are moved against their normals."""
+    """The scene. `copies`: number of materials for each form; `flip`: faces point away from the
+    viewer; `inset`: distance by which the walls are moved against their normals."""
 
     def __init__(
         self,
@@ -136,7 +138,7 @@ class Grooves:
         vertices, faces, slots = [], [], []
         white, black = len(flat), len(flat) + 1
         s = inset * math.sqrt(0.5)
-        # Walls whose normals look up and at each other; then the ends.
+        # Walls, whose normals point up and towards each other; then the ends.
         quads = [
             [(-0.5, -0.5, 0.5), (0, -0.5, 0), (0, 0.5, 0), (-0.5, 0.5, 0.5)],
             [(0, -0.5, 0), (0.5, -0.5, 0.5), (0.5, 0.5, 0.5), (0, 0.5, 0)],
@@ -187,7 +189,7 @@ class Grooves:
         tree, background = add_world(self.scene)
         gradient(tree, background)
         data = bpy.data.lights.new("Sun", "SUN")
-        # Bright enough for clamps to show.
+        # Bright enough for clamps to have an effect.
         data.energy, data.angle = 3.0, 0.3
         self.sun = bpy.data.objects.new("Sun", data)
         self.sun.rotation_mode = "QUATERNION"
@@ -195,7 +197,7 @@ class Grooves:
         self.scene.collection.objects.link(self.sun)
 
     def add_sun(self, towards, name="Other"):
-        """Another sun like the first one, which shines from `towards`."""
+        """Adds another sun like the first one, in the direction `towards`."""
         other = self.sun.copy()
         other.data, other.name = self.sun.data.copy(), name
         other.rotation_quaternion = Vector(towards).to_track_quat("Z", "Y")
@@ -204,7 +206,7 @@ class Grooves:
 
     def measure(self):
         """Radiance of each form's cells, (forms, 2, replicas)."""
-        # What aims at lamps is measured with lamps aimed at, or nothing of it would be.
+        # Forms that aim at lamps need the lamps in their slots.
         lamps = self.extension.api.see_lamps(self.scene)
         if any(f.form == "aimed" for f in self.forms):
             assert any(lamp.slot for lamp in lamps)
@@ -224,7 +226,7 @@ def _cycles(**settings):
     return change
 
 
-#: What Blender starts with, where a clean scene differs.
+#: Settings of a new file that differ from those of a clean scene.
 FACTORY = {
     "use_adaptive_sampling": True,
     "adaptive_threshold": 0.01,
@@ -237,7 +239,7 @@ FACTORY = {
 
 
 def _instance(grooves):
-    """The grooves are seen through an instance of a collection that lies elsewhere."""
+    """Shows the grooves through an instance of a collection that lies elsewhere."""
     collection = bpy.data.collections.new("source")
     collection.objects.link(grooves.object)
     grooves.scene.collection.objects.unlink(grooves.object)
@@ -266,7 +268,7 @@ def _deforming(grooves):
     for time, value in ((0, 0.0), (2, 1.0)):
         key.value = value
         key.keyframe_insert("value", frame=time)
-    # Its middle lies where the still one is.
+    # In the middle of the motion it is where the still one is.
     grooves.object.location.x -= 0.4
 
 
@@ -286,7 +288,7 @@ def _displaced(grooves):
             material.displacement_method = "DISPLACEMENT"
 
 
-#: Small, but met by what is drawn.
+#: Small, but large enough to be hit by random rays.
 SMALL_SUN = 0.02
 
 
@@ -299,7 +301,7 @@ def _no_size(grooves):
 
 
 def _overhead(grooves):
-    """A sun that no wall hides, and the ends of the grooves hardly."""
+    """A sun that no wall hides, and the ends of the grooves only slightly."""
     grooves.sun.rotation_quaternion = (1, 0, 0, 0)
     grooves.sun.data.angle = 0.05
 
@@ -310,7 +312,7 @@ def _shadowless(grooves):
 
 
 def _wide(grooves):
-    """A sun that directions of the material's own meet as often as light sampling does."""
+    """A sun that BSDF sampling hits as often as light sampling does."""
     grooves.sun.data.angle = 1.0
 
 
@@ -339,7 +341,7 @@ def _collection_of(item, name):
 
 
 def _linked_elsewhere(grooves):
-    """Another sun, which shines on something else alone."""
+    """Adds another sun that is linked to another object only (light linking)."""
     mesh = bpy.data.meshes.new("elsewhere")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     elsewhere = bpy.data.objects.new("elsewhere", mesh)
@@ -365,7 +367,7 @@ def _portal(grooves):
 
 
 def _nine_suns(grooves):
-    """As many that the list of lamps does not hold them, where one was: with its light."""
+    """Replaces the sun by nine, more than the list of lamps can hold, with the same total light."""
     grooves.sun.data.energy /= 9
     for i in range(8):
         grooves.add_sun(SUN, f"Sun{i}")
@@ -373,12 +375,12 @@ def _nine_suns(grooves):
 
 @dataclasses.dataclass(frozen=True)
 class Condition:
-    """`change` alters clean grooves, built with `build`; `clean`, if there is one, alters those
-    that it is compared with. `code`: how the panel's codes begin where a form suffers.
-    `light_from_a_point`: no mirror shows that lamp, the model's neither. What draws
-    its directions shows it as rare, bright dots, judged by the median cell, as a person would;
-    closures meet it, and are compared with what a very small lamp shows: a narrow highlight is
-    another one under a wide lamp."""
+    """`change` alters the clean grooves, which are built with `build`. `clean`, if given, alters
+    the grooves that these are compared with. `code`: prefix of the panel's codes where a form is
+    affected. `light_from_a_point`: the lamp has no size, so mirrors do not show it, in the model
+    neither. Forms that sample directions show it as rare bright dots, so they are judged by the
+    median cell, as a user would. Closures do show it, and are compared with a very small lamp
+    instead, because a narrow highlight looks different under a wide lamp."""
 
     name: str
     change: object = None
@@ -438,8 +440,8 @@ def panel_warns(extension, grooves):
 
 
 def measure(extension, forms, names, samples):
-    """Rows for the conditions of these names, None for all: condition, form, bias as a share of the
-    clean radiance, its standard error, what the panel says.
+    """Measures these conditions (None: all). Returns rows with the condition, the form, the bias
+    relative to the clean radiance, its standard error, and the panel's codes.
     """
     rows = []
     chosen = [c for c in CONDITIONS if names is None or c.name in names]
@@ -463,7 +465,7 @@ def measure(extension, forms, names, samples):
             if condition.light_from_a_point and form.form == "sampled":
                 bias, error = change_of_median(before[i], after[i])
             else:
-                # The same cells: where random numbers stay, so does the noise.
+                # The same cells are compared: with equal random numbers, the noise cancels.
                 clear = small[i] if condition.light_from_a_point else before[i]
                 mean = clear.mean()
                 off = after[i] - clear
@@ -485,9 +487,9 @@ def measure(extension, forms, names, samples):
 
 
 def change_of_median(before, after):
-    """Relative change of the kinds' median cells, and its standard error."""
+    """Relative change of the median cell for each kind, and its standard error."""
     middle = [np.median(x, 1).sum() for x in (before, after)]
-    # The median's error from the median deviation, as for a normal distribution.
+    # The standard error of the median, from the median deviation of a normal distribution.
     variances = [
         (1.2533 * 1.4826 * np.median(np.abs(x - np.median(x, 1)[:, None]), 1)) ** 2 / REPLICAS
         for x in (before, after)
@@ -499,8 +501,8 @@ def change_of_median(before, after):
 
 
 def passes(extension, tool, forms):
-    """What the passes that denoisers and compositors use say of each form, under a white sky and a
-    sun: differences from the model's albedo, the normal and the picture."""
+    """The render passes for denoisers and compositors, by form, under a white sky and a sun: their
+    differences from the model's albedo, the normal and the picture."""
     rows = []
     cosines = np.tile((0.2, 0.5, 0.8, 1.0), 64)
     normals = tilted(cosines, np.linspace(0, 6, len(cosines)))
@@ -528,7 +530,7 @@ def passes(extension, tool, forms):
         alpha = np.maximum(found["Combined"][at][:, 3:], 1e-6)
 
         def value(*names, found=found, at=at, alpha=alpha):
-            # 5.0 gave the passes other names.
+            # Passes were renamed in 5.0.
             name = next(n for n in names if n in found)
             return found[name][at][:, :3] / alpha
 
@@ -538,14 +540,14 @@ def passes(extension, tool, forms):
         else:
             first, mirrors = albedo_and_mirror(tool, form.model, form.values, wo[:4, 2])
             expected = np.tile(first, (64, 1))
-            # Denoisers look through mirrors: their weight is not in this pass.
+            # Denoisers see through mirrors, whose weight is not in this pass.
             scattered = np.tile(first - mirrors, (64, 1))
         colours = (
             value("DiffCol", "Diffuse Color")
             + value("GlossCol", "Glossy Color")
             + value("TransCol", "Transmission Color")
         )
-        # In the camera's frame, which looks along its z axis.
+        # In camera space; the camera looks along its z axis.
         normal = unit(value("Denoising Normal")) * (1, 1, -1)
         angle = np.degrees(np.arccos(np.clip((normal * meter.normals).sum(-1), -1, 1)))
         warned = {f.code for f in extension.api.warnings(material, scene)}
@@ -574,10 +576,11 @@ def passes(extension, tool, forms):
 # ---- tilted normals ---------------------------------------------------------------------------
 
 TILT = 0.3
-#: What Blender's nodes as material_of() has them reflect about a normal of their own, nearly: a
-#: Glossy node's facets lose little at this roughness.
+#: Approximate albedo of Blender's nodes, with the values in material_of(), about any normal: at
+#: this roughness the Glossy node loses little light.
 NATIVE_ALBEDO = {DIFFUSE: 0.8, GLOSSY: 0.8}
-#: Condition, how the normal is tilted, and whether Bump Map Correction is on.
+#: Name of the condition, whether the mesh's own normals are tilted, and whether Bump Map Correction
+#: is on.
 TILTED = (
     ("smooth normals", True, False),
     ("Normal input", False, False),
@@ -586,11 +589,13 @@ TILTED = (
 
 
 def normals(extension, tool, forms):
-    """A normal that differs from the surface's, the mesh's own or that of the Normal input, in a
-    white world; the worst of some views. Given is what is lost of all that the model reflects about
-    the normal as it is bent. Rays below the true surface are, as with Blender's own nodes. It is a
-    bias where more is lost, or less, than of the model's own samples in double precision, and where
-    the setting darkens matte closures, than of Blender's Diffuse node."""
+    """Tilts the shading normal, by the mesh or by the input Normal, in a white world.
+
+    Returns the fraction of the light that is lost, in the worst of some views, relative to the
+    light that the model reflects about the corrected normal. Rays below the true surface are lost,
+    as with Blender's own nodes. It is a bias if the loss differs from that of the model's samples
+    in double precision or, where the setting darkens diffuse closures, from that of Blender's
+    Diffuse node."""
     rows, softened, unsoftened = [], 0.0, 0.0
     cosines = np.array((0.4, 0.7, 0.95))
     replicas = 64
@@ -614,7 +619,7 @@ def normals(extension, tool, forms):
                 surfaces, seen = meter.normals[which], bent[which]
                 if form in NATIVE or extension.api.models()[form.model]["look"] != "matte":
                     seen = [corrected(n, s) for n, s in zip(seen, surfaces, strict=True)]
-                if form in NATIVE:  # each less than what it shows unbent
+                if form in NATIVE:  # relative to its untilted brightness
                     whole = np.full(len(cosines), NATIVE_ALBEDO[form])
                 else:
                     whole, lit = _lit_from_above(tool, form, surfaces, np.array(seen))
@@ -645,8 +650,8 @@ def normals(extension, tool, forms):
 
 
 def corrected(normal, surface, view=(0.0, 0.0, 1.0)):
-    """A shading normal turned towards the surface's until the mirror direction about it is above
-    that by as much as Cycles has it; found by halving."""
+    """A shading normal rotated towards the surface's until the mirror direction is above the
+    surface by the amount that Cycles requires; found by bisection."""
     least = min(0.9 * np.dot(surface, view), 0.01)
 
     def rises(n):
@@ -665,7 +670,7 @@ def corrected(normal, surface, view=(0.0, 0.0, 1.0)):
 
 
 def _bend(meter, material, bent, smooth):
-    """Gives each facet its normal of `bent`."""
+    """Gives each facet its normal in `bent`."""
     if smooth:
         mesh = meter.mesh
         mesh.polygons.foreach_set("use_smooth", np.ones(len(bent), bool))
@@ -682,8 +687,8 @@ def _bend(meter, material, bent, smooth):
 
 
 def _lit_from_above(tool, form, flat, bent):
-    """Share of a white world's light that a model reflects about normals `bent`, seen from above:
-    all, and without the rays that end below `flat`."""
+    """Fraction of a white world's light that a model reflects about the normals `bent`, seen from
+    above: in total, and without rays that end below `flat`."""
     whole, lit = [], []
     mirrors = np.zeros((len(bent), 3))
     if form.mirror:

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles makes of the closures that forms use or may come to use.
+"""Tests how Cycles evaluates and samples the closures that forms use or may use.
 
-Evaluation is measured under suns against our definition in double precision (`brdfc closure`).
-Sampling is measured against evaluation: The same squares shine once as meshes
-that only rays drawn from the closures find, once as lamps that only rays towards lights find, and
-both must give the same picture. Where they do not, the closure samples something else than it
-evaluates.
+Evaluation is measured under suns and compared with our definition in double precision (`brdfc
+closure`). Sampling is compared with evaluation: the same emissive squares are rendered once as
+meshes that only BSDF sampling finds, and once as lamps that only light sampling finds. Both must
+give the same picture; if they don't, the closure samples something other than it evaluates.
 """
 
 import dataclasses
@@ -18,8 +17,8 @@ from goniometer import Goniometer, frame, tilted, unit
 from helpers import node_material, pairs_csv, read_csv, script_material
 from worlds import gradient, spot, white
 
-#: Coloured. diffuse_ramp is drawn in proportion to the cosine, which it does not contain: where its
-#: first colour is not 0, its variance is infinite. A form must see to that, and this test does.
+#: With colours. diffuse_ramp is sampled with a cosine pdf, though it contains no cosine: if its
+#: first colour is not 0, its variance is infinite. Forms must avoid this, as does this test.
 RAMP = [
     (0.0, 0.0, 0.0),
     (0.7, 0.4, 0.1),
@@ -36,9 +35,9 @@ TILT = unit((0.3, -0.2, 0.93))
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A closure: its OSL text, in which n, t and m (a tilted normal) are vectors and `ramp` an
-    array of colours, and how our definition is asked for the same. `delta` maps wo to the one
-    direction in which it scatters, for closures that can't be evaluated."""
+    """A closure: its OSL text, in which n, t and m (a tilted normal) are vectors and `ramp` is an
+    array of colours; and the arguments for our definition. `delta`: for closures that can't be
+    evaluated, maps wo to the one direction into which they scatter."""
 
     name: str
     osl: str
@@ -85,7 +84,7 @@ def _microfacets():
                 (kind, "alpha_x=0.4", "alpha_y=0.4", TILTED),
             )
         )
-        # The tangent is not perpendicular to the tilted normal.
+        # This tangent is not perpendicular to the tilted normal.
         cases.append(
             Case(
                 f"{kind} 0.3 0.5 tilted",
@@ -147,7 +146,7 @@ CASES = [
     _rough_matte((0.8, 0.5, 0.2), 0.7),
     _rough_matte((1.0, 0.9, 0.1), 1.0),
     _rough_matte((0.8, 0.5, 0.2), 0.7, normal="m"),
-    # What oren_nayar's base is made of: facets of little albedo.
+    # The base of oren_nayar: rough facets with a low albedo.
     _rough_matte((0.01, 0.01, 0.01), 0.3),
     *(_velvet(sigma) for sigma in (0.2, 0.6, 1.0)),
     _velvet(0.6, normal="m"),
@@ -158,7 +157,7 @@ CASES = [
     *_microfacets(),
     *(_toon("diffuse_toon", *p) for p in ((0.5, 0.0), (0.3, 0.4), (0.9, 0.5))),
     *(_toon("glossy_toon", *p) for p in ((0.3, 0.0), (0.1, 0.3), (0.001, 0.05), (0.6, 0.4))),
-    # Nothing defines these yet: only their sampling is held against their evaluation.
+    # Without a definition of ours: only sampling and evaluation are compared.
     Case("oren_nayar 0.5", "oren_nayar(n, 0.5)"),
     Case("sheen 0.4", "sheen(n, 0.4)"),
     Case(
@@ -183,9 +182,8 @@ CASES = [
 _HALF = "half vectors that face away are mirrored after the ray was computed: wide lobes gain light"
 _TILT = "rays below the horizon of a tilted normal are kept, and evaluated as 0"
 _ROUGH = "light is evaluated in directions into which no facet refracts"
-#: What is known to be wrong, and the last version in which it was found: Cycles draws other
-#: directions than it evaluates, so a form must not use these. The other rows of these closures show
-#: nothing.
+#: Known faults, with the last version in which they were found: Cycles samples these closures
+#: differently than it evaluates them, so forms must not use them. Their other rows prove nothing.
 FAULTS = {
     "ashikhmin_shirley 0.4 0.4": (_HALF, (5, 2)),
     "ashikhmin_shirley 0.9 0.9": (_HALF, (5, 2)),
@@ -197,7 +195,7 @@ FAULTS = {
     "dielectric_bsdf 0.4": (_ROUGH, (5, 2)),
     "microfacet refraction 0.4": (_ROUGH, (5, 2)),
 }
-#: The last version in which they were looked for.
+#: The last version in which the faults were checked.
 LOOKED_AT = (5, 2)
 
 
@@ -224,7 +222,7 @@ def shader(case):
 
 
 def start(extension, cases, max_bounces):
-    """A clean scene and the materials of the cases."""
+    """A clean scene, and the materials of the cases."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=max_bounces)
@@ -234,7 +232,7 @@ def start(extension, cases, max_bounces):
 # ---- evaluation -------------------------------------------------------------------------------
 
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (0.8, 0.1, 0.6), (-0.5, 0.8, 0.3)]
-#: Facets a case and a sun.
+#: Number of facets for each case and sun.
 FACETS = 96
 
 
@@ -244,7 +242,8 @@ def defined(tool, case, wi, wo):
 
 
 def evaluation(extension, tool, cases=None):
-    """For each case with a definition: relative L1, and largest error over largest value."""
+    """For each case with a definition: the relative L1 error, and the largest error relative to the
+    largest value."""
     cases = [c for c in cases or CASES if c.definition]
     rng = np.random.default_rng(1)
     which = np.repeat(np.arange(len(cases)), FACETS)
@@ -256,7 +255,8 @@ def evaluation(extension, tool, cases=None):
         wi = meter.local(meter.add_sun(unit(towards)))
         wo, picture = meter.wo(), meter.measure()
         for i, case in enumerate(cases):
-            # A tilted normal has a terminator of its own, at which rounding decides as well.
+            # A tilted normal adds a terminator, where rounding decides between light and dark as
+            # well.
             lit = (which == i) & (wi[:, 2] > 1e-4) & (np.abs(wi @ TILT) > 1e-3)
             dark = (which == i) & (wi[:, 2] < -1e-4)
             expected = defined(tool, case, wi[lit], wo[lit]) * WEIGHT
@@ -272,12 +272,13 @@ def evaluation(extension, tool, cases=None):
 
 # ---- sampling ---------------------------------------------------------------------------------
 
-#: View cosines; grazing ones show what normal ones hide.
+#: View cosines; grazing views reveal errors that others hide.
 COSINES = (0.06, 0.15, 0.4, 0.8, 1.0)
-#: Half the side of a box of lamps around everything: directions to it hardly depend on the facet.
+#: Half the side of a box of lamps around everything: so large that all facets see them in the same
+#: directions.
 FAR = 2e4
-#: What shines with radiance 1, as (centre, half the size) in units of FAR: squares that face the
-#: origin. All six give a furnace.
+#: Squares of radiance 1 that face the origin, as (centre, half the side) in units of FAR. All six
+#: form a furnace.
 SIX = [(sign * axis, 1.0) for axis in np.eye(3) for sign in (1, -1)]
 SQUARES = {
     "white": SIX,
@@ -287,8 +288,8 @@ SQUARES = {
 
 
 def _square(meter, centre, half, sampled):
-    """A square that shines towards the origin. `sampled`: an area lamp, which only rays towards
-    lights find; else a mesh, which only rays drawn from the surface find."""
+    """A square that emits towards the origin. `sampled`: an area lamp, which only light sampling
+    finds; otherwise a mesh, which only BSDF sampling finds."""
     from mathutils import Vector
 
     if sampled:
@@ -306,7 +307,7 @@ def _square(meter, centre, half, sampled):
     lamp = bpy.data.objects.new("lamp", data)
     lamp.location = centre * FAR
     lamp.rotation_mode = "QUATERNION"
-    # Its -z axis looks at the origin.
+    # Its -z axis points to the origin.
     lamp.rotation_quaternion = Vector(centre).to_track_quat("Z", "Y")
     lamp.visible_camera = lamp.visible_shadow = False
     meter.scene.collection.objects.link(lamp)
@@ -322,7 +323,7 @@ def _emitter():
 
 
 def _hits(directions, world):
-    """Radiance in these directions from the origin, (n,); NaN beside an edge."""
+    """Radiance from these directions at the origin, (n,); NaN near an edge."""
     radiance = np.zeros(len(directions))
     for centre, half in SQUARES[world]:
         distance = np.linalg.norm(centre)
@@ -354,7 +355,7 @@ def _meter(extension, cases, replicas, samples):
 
 
 def _radiance(meter, cases, replicas):
-    """Of each case and kind of facet, (cases, kinds, 3), and its standard error."""
+    """Radiance for each case and kind of facet, (cases, kinds, 3), and its standard error."""
     found = meter.measure().reshape(len(cases), len(COSINES), replicas, 3)
     return found.mean(2), found.std(2, ddof=1) / math.sqrt(replicas)
 
@@ -367,20 +368,20 @@ def by_squares(extension, cases, world, sampled, replicas, samples):
 
 
 def by_world(extension, cases, world, replicas, samples):
-    """As above, lit by a smooth world that only rays drawn from the closures find; and the world's
-    radiance as a function."""
+    """The same, lit by a smooth world that only BSDF sampling finds; and the world's radiance as a
+    function."""
     meter = _meter(extension, cases, replicas, samples)
     radiance = world(*meter.add_world())
     return (*_radiance(meter, cases, replicas), radiance)
 
 
 def kind_axes():
-    """Frames of the kinds of facets, (kinds, 3, 3): rows t, b, n in world coordinates."""
+    """Frames of the kinds of facets, (kinds, 3, 3): rows t, b, n in world space."""
     return np.stack([*frame(kinds()), kinds()], 1)
 
 
 def _polar_grid(axis):
-    """Nodes and solid angles of a rule over the sphere, dense about an axis."""
+    """Nodes and solid angles of a quadrature rule over the sphere that is dense about an axis."""
     edges = (0, 0.05, 0.15, 0.4, 0.9, 1.8, math.pi)
     x, w = np.polynomial.legendre.leggauss(12)
     pairs = list(zip(edges[:-1], edges[1:], strict=True))
@@ -398,7 +399,7 @@ def _polar_grid(axis):
 
 
 def expected_in_worlds(tool, cases, radiances):
-    """By quadrature of our definitions: {world: (cases, kinds, 3)}."""
+    """Integrates our definitions by quadrature: {world: (cases, kinds, 3)}."""
     axes = kind_axes()
     wo = axes @ np.array([0.0, 0.0, 1.0])
     result = {name: np.zeros((len(cases), len(COSINES), 3)) for name in radiances}
@@ -423,11 +424,11 @@ def expected_in_worlds(tool, cases, radiances):
 
 
 def delta_radiance(case, world):
-    """Of a closure that scatters into one direction, (kinds, 3)."""
+    """Radiance of a closure that scatters into one direction, (kinds, 3)."""
     up = np.array([0.0, 0.0, 1.0])
     axes = kind_axes()
     wi = case.delta(axes @ up)
-    # A reflection below the surface is lost.
+    # Reflection below the surface is lost.
     kept = (wi[:, 2] > 0) | ("refraction" in case.name)
     towards = np.einsum("ki,kij->kj", wi, axes)
     return (_hits(towards, world) * kept)[:, None] * np.array(WEIGHT)
@@ -435,9 +436,9 @@ def delta_radiance(case, world):
 
 @dataclasses.dataclass(frozen=True)
 class Deviation:
-    """Largest difference between sampling and evaluation, as a share of the evaluation, and how
-    many standard errors it lies beyond what is tolerated. `resolution`: the share that would have
-    been found in half of the comparisons."""
+    """Largest difference between sampling and evaluation, relative to the evaluation, and by how
+    many standard errors it exceeds the tolerance. `resolution`: the difference that half of the
+    comparisons would have detected."""
 
     share: float
     z: float
@@ -448,22 +449,23 @@ class Deviation:
     resolution: float
 
 
-#: Below this share of the expected radiance a difference does not count.
+#: Smaller differences, relative to the expected radiance, do not count.
 TOLERANCE = 5e-3
-#: Differences must also stand out of the noise by so many standard errors: some 2,000 are looked
-#: at, and 16 replicas make Student's tails.
+#: Differences must also exceed the noise by this many standard errors: there are about 2,000
+#: comparisons, and with 16 replicas Student's t distribution has long tails.
 SIGNIFICANT = 8.0
-#: Share by which a closure's evaluation may differ from our definition (relative L1). Powers to
-#: large exponents cost most: Cycles computes them in single precision.
+#: Relative L1 difference allowed between a closure's evaluation and our definition. Powers with
+#: large exponents need most of it, as Cycles computes in single precision.
 EVALUATION = 1e-4
 
 
 def _worst(cases, world, drawn, noise, expected, drawn_rays, found):
-    """Keeps for each case the Deviation that stands out most."""
+    """Keeps the most significant Deviation of each case."""
     for i, case in enumerate(cases):
-        # Few replicas make a poor estimate of their own noise: a share of the radiance is a floor.
+        # A few replicas estimate their own noise poorly, so it is at least a fraction of the
+        # radiance.
         error = np.maximum(noise[i], 1e-3 * np.abs(expected[i]) + 1e-6)
-        # Where few rays meet light, replicas do not show the noise; one ray brings about 1.
+        # If few rays hit light, replicas underestimate the noise; a single ray contributes about 1.
         few = np.sqrt(np.abs(expected[i]) / drawn_rays) + 2 / drawn_rays
         error = np.where(np.abs(expected[i]) * drawn_rays < 100, np.maximum(error, few), error)
         beyond = np.maximum(np.abs(drawn[i] - expected[i]) - TOLERANCE * np.abs(expected[i]), 0)
@@ -489,8 +491,8 @@ def _worst(cases, world, drawn, noise, expected, drawn_rays, found):
 
 
 def sampling(extension, tool, cases=None, replicas=16, samples=512):
-    """For each case the Deviation that stands out most: of drawn rays against quadrature of our
-    definition, or, where we have none, against rays towards lamps."""
+    """For each case the most significant Deviation of BSDF sampling, compared with quadrature of
+    our definition or, if there is none, with light sampling."""
     cases = cases or CASES
     found = {}
     smooth = [c for c in cases if c.definition and "toon" not in c.name]
@@ -525,7 +527,7 @@ def _balanced(terms):
 
 
 def _chain(terms):
-    """As statements `BSDF += ...` add them: the first term is the deepest."""
+    """Nested as statements `BSDF += ...` nest them: the first term is the innermost."""
     text = terms[0]
     for term in terms[1:]:
         text = f"({text} + {term})"
@@ -541,8 +543,8 @@ def _equal(count, closure="diffuse(n)"):
 
 
 _GREY_RAMP = "diffuse_ramp(n, ones)"
-#: (name, OSL text, what a sun at the normal must show, in units of a white diffuse surface). That
-#: closures are lost is no wish of ours, but the generator relies on knowing where it begins.
+#: (name, OSL text, expected result of a sun at the normal, in units of a white diffuse surface).
+#: Lost closures are not desired, but the generator must know where the limit is.
 LIMITS = [
     ("a weight below 0 is 0", "diffuse(n) + color(-0.5) * diffuse(n)", 1.0),
     ("a tiny weight is kept", "2e-5 * diffuse(n)", 2e-5),
@@ -574,7 +576,7 @@ shader limit(output closure color BSDF = 0)
 
 
 def limits(extension):
-    """What each of LIMITS shows."""
+    """The results of LIMITS."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
@@ -592,7 +594,7 @@ def limits(extension):
 
 
 def table(evaluated, deviations):
-    """Rows for people and for the report: what was measured, and the verdict it leads to."""
+    """Rows for readers and for the report: the measurements, and the resulting verdict."""
     rows = []
     for case in (c for c in CASES if c.name in deviations):
         d = deviations[case.name]

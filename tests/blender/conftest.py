@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs in a Python that has the bpy module. BRDFC_EXTENSION_ZIP names the extension under test,
-BRDFC_TOOL the built brdfc. Blender's user folders are scratch, so nothing of the user's is touched.
+"""Fixtures for tests in a Python that has the bpy module.
 
-BRDFC_ANSWERS, if it is set, names a folder in which what the tool made is kept: runs in several
-versions of Blender ask it the same questions.
+BRDFC_EXTENSION_ZIP names the extension under test, BRDFC_TOOL the built brdfc. Blender's user
+folders are temporary, so nothing of the user's is touched. BRDFC_ANSWERS may name a folder in which
+results of the tool are cached, as runs in several versions of Blender need the same ones.
 """
 
 import json
@@ -55,7 +55,7 @@ def answers(program, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def tool(answers):
-    """Runs the generator's tool: tool("albedo", "lambert", stdin=...) returns stdout."""
+    """Runs the tool: tool("albedo", "lambert", stdin=...) returns stdout."""
 
     def run(*arguments, stdin=""):
         return answers.ask([str(a) for a in arguments], stdin)
@@ -65,7 +65,7 @@ def tool(answers):
 
 @pytest.fixture(scope="session")
 def kept_program(program, answers, tmp_path_factory):
-    """A program that answers as the tool, which runs once a question."""
+    """A program that answers like the tool, which computes each answer only once."""
     path = tmp_path_factory.mktemp("program") / "brdfc"
     command = [sys.executable, Path(__file__).with_name("answers.py"), answers.folder, program]
     path.write_text(f'#!/bin/sh\nexec {shlex.join(map(str, command))} "$@"\n')
@@ -75,8 +75,8 @@ def kept_program(program, answers, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def lean_pack(answers, tmp_path_factory):
-    """lean_pack(materials, *options): the folder of a pack of these alone, as `brdfc build
-    --materials` makes it. To be read only."""
+    """lean_pack(materials, *options): the folder of a pack for these materials alone, as `brdfc
+    build --materials` makes it; to be treated as read-only."""
 
     def make(materials, *options):
         folder = tmp_path_factory.mktemp("pack")
@@ -90,7 +90,7 @@ def lean_pack(answers, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def extension(extension_zip):
-    """The extension, installed from its zip as a person would; its modules as attributes."""
+    """The extension, installed from its zip as by a user; its modules are attributes."""
     import bpy
 
     bpy.ops.preferences.addon_enable(module="bl_pkg")
@@ -128,8 +128,8 @@ def batch():
 
 @pytest.fixture
 def empty(extension):
-    """An empty factory file with Cycles and, other than files that people begin with, with Open
-    Shading Language on. Preferences, and with them the extension, stay."""
+    """An empty factory file with Cycles and, unlike a new file of a user, with Open Shading
+    Language on. Preferences, including the extension, stay."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -143,8 +143,8 @@ def empty(extension):
 
 @pytest.fixture
 def use_pack(extension, lean_pack):
-    """use_pack(materials, *options): the extension takes a pack of these alone, until the test
-    ends. Returns the pack's folder."""
+    """use_pack(materials, *options): makes the extension use a pack for these materials alone,
+    until the test ends. Returns the pack's folder."""
 
     def use(materials, *options):
         folder = lean_pack(materials, *options)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures by EEVEE, in a process of its own: without a driver, such as Mesa's, Blender ends it.
+"""Renders with EEVEE, in a separate process: without a graphics driver, such as Mesa's, Blender
+exits.
 
-python eevee.py FILE.blend      renders it as it says, after `STARTED` is printed
+python eevee.py FILE.blend      prints `STARTED`, then renders as the file specifies
 """
 
 import subprocess
@@ -12,7 +13,7 @@ STARTED = "EEVEE runs"
 
 
 def picture_of(file, out):
-    """Renders a .blend file that writes the file `out`. Returns why EEVEE can't start."""
+    """Renders a .blend file that writes the file `out`. Returns the reason if EEVEE can't start."""
     command = [sys.executable, __file__, str(file)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     if STARTED not in done.stdout:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forms fitted to a model, in a white world."""
+"""Furnace test of forms fitted to a model."""
 
 import math
 
@@ -9,11 +9,11 @@ from helpers import arguments, read_csv
 
 
 def check(tool, scene, made, materials, cosines, *options, replicas, samples, slack):
-    """Each material reflects the albedo of its model, off by what `brdfc fit` states for that view
-    and by noise.
+    """Checks that each material reflects the albedo of its model, within the error that `brdfc fit`
+    states for that view and the noise.
 
-    `made`: in Blender, of `materials`, {model: parameters}. `options` are of `brdfc fit`; `slack`
-    is for what single precision and tables add.
+    `made`: objects in Blender for `materials`, {model: parameters}. `options` are passed to `brdfc
+    fit`; `slack` allows for single precision and tables.
     """
     seen = np.repeat(cosines, replicas)
     which = np.repeat(np.arange(len(materials)), len(seen))

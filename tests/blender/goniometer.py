@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A virtual gonioreflectometer in Cycles.
 
-A grid of small flat facets, one a pixel, each with its own normal, seen by one camera. Facets are
-visible to camera rays only, so that each meets the lights as if it were alone. Colour is divided by
-coverage. Two set-ups:
+One camera sees a grid of small flat facets, one per pixel, each with its own normal. Facets are
+visible to camera rays only, so they don't shade one another. Colours are divided by coverage. There
+are two set-ups:
 
-- for closures: orthographic camera and a pixel filter so narrow that each pixel has one view
-  direction; a sun gives f cos(theta_i), a white world the albedo;
-- for forms that draw their own random numbers from position and view: perspective camera and the
-  whole facet, because such a form needs positions that differ.
+- for closures: an orthographic camera and a pixel filter so narrow that all facets have the same
+  view direction; a sun gives f cos(theta_i), a white world the albedo;
+- for forms that derive random numbers from position and view: a perspective camera and the whole
+  facet, because such a form needs different positions.
 
-The frame of a facet is that of the shaders: t is the object's z axis (the world's, here) laid into
-the facet, x where they are parallel, and b = n x t.
+The frame of a facet is that of the shaders: t is the object's z axis (here the world's) projected
+onto the facet, or x where they are parallel, and b = n x t.
 """
 
 import bpy
 import numpy as np
 from helpers import add_camera, add_world, render
 
-#: Half the side of a facet, in units of the distance between pixels. Half its diagonal must stay
-#: below 1/2, or facets hide each other.
+#: Half the side of a facet, relative to the distance between pixels. Half its diagonal must stay
+#: below 1/2, or facets would hide each other.
 HALF = 0.35
-#: Distance of the perspective camera in units of the grid's width: view directions differ by less
-#: than 0.6 degrees, evenly about the middle one, and positions still have digits to spare.
+#: Distance of the perspective camera, relative to the grid's width: view directions differ by less
+#: than 0.6 degrees, symmetrically, and positions are still sufficiently precise.
 DISTANCE = 100.0
 
 
@@ -43,19 +43,19 @@ def frame(normal):
 
 
 def tilted(cosines, azimuths):
-    """Normals that the camera, looking down the z axis, sees at these cosines."""
+    """Normals that the camera, which looks down the z axis, sees at these cosines."""
     cosines = np.asarray(cosines, np.float64)
     sines = np.sqrt(1 - cosines**2)
     return np.stack([sines * np.cos(azimuths), sines * np.sin(azimuths), cosines], -1)
 
 
 class Goniometer:
-    """`normals` (n, 3): one facet each, as seen by a camera that looks along -z.
+    """`normals` (n, 3): of the facets, in the frame of a camera that looks along -z.
 
-    Facets are strewn over the pixels, so that what differs over the picture averages out over
-    facets of the same kind. `materials`: one, or several of which `which`, (n,), tells each
-    facet's, so that one render measures many. `attributes`: arrays (n,) or (n, 3) that shaders
-    can read.
+    Facets are distributed randomly over the pixels, so that variations over the picture average out
+    for facets of the same kind. `materials`: one, or several, of which `which`, (n,), selects one
+    for each facet, so that one render measures many. `attributes`: arrays (n,) or (n, 3) that
+    shaders can read.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Goniometer:
         ).astype(np.float64)
         height = DISTANCE * self.side
         eye = np.array([0.0, 0.0, height]) - positions
-        #: Towards the camera from the middle of each facet, in world coordinates.
+        #: Direction from the centre of each facet to the camera, in world space.
         self.views = unit(eye) if perspective else np.broadcast_to([0.0, 0.0, 1.0], eye.shape)
         self._build(materials, positions, normals, which)
         for name, values in (attributes or {}).items():
@@ -86,7 +86,7 @@ class Goniometer:
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         corners = [positions + HALF * (i * t + j * b) for i, j in signs]
         vertices = np.stack(corners, 1).astype(np.float32)
-        # The normals that Cycles sees are those of the rounded corners.
+        # Cycles computes normals from the rounded corners.
         exact = vertices.astype(np.float64)
         self.normals = unit(np.cross(exact[:, 2] - exact[:, 0], exact[:, 3] - exact[:, 1]))
         mesh = bpy.data.meshes.new("facets")
@@ -129,21 +129,21 @@ class Goniometer:
             cycles.filter_width = 0.01
 
     def own_wo(self):
-        """Each facet's own view direction in its frame, (n, 3)."""
+        """Each facet's exact view direction in its frame, (n, 3)."""
         return self.local(self.views)
 
     def local(self, directions):
-        """Directions (n, 3) or (3,) of the world in the frames of the facets, (n, 3)."""
+        """Transforms directions (n, 3) or (3,) from world space to the facets' frames, (n, 3)."""
         t, b = frame(self.normals)
         directions = np.broadcast_to(directions, self.normals.shape)
         return np.stack([(directions * a).sum(-1) for a in (t, b, self.normals)], -1)
 
     def wo(self):
-        """The middle view direction in the frames of the facets, (n, 3)."""
+        """The mean view direction in the facets' frames, (n, 3)."""
         return self.local(np.array([0.0, 0.0, 1.0]))
 
     def add_sun(self, towards):
-        """One sun of angle 0 and irradiance 1 in the direction `towards`."""
+        """Adds a sun of angle 0 and irradiance 1 in the direction `towards`."""
         from mathutils import Vector
 
         data = bpy.data.lights.new("Sun", "SUN")
@@ -153,17 +153,18 @@ class Goniometer:
         sun.rotation_quaternion = Vector(towards).to_track_quat("Z", "Y")
         self.scene.collection.objects.link(sun)
         bpy.context.view_layer.update()
-        # What the light really has: its matrix is in single precision.
+        # The actual direction of the light: its matrix is in single precision.
         return unit(np.array(sun.matrix_world.col[2][:3]))
 
     def add_world(self):
-        """A white world that is found by following the material's own rays; its tree and node."""
+        """Adds a white world that only BSDF sampling finds. Returns its tree and node."""
         tree, background = add_world(self.scene)
         self.scene.world.cycles.sampling_method = "NONE"
         return tree, background
 
     def measure(self):
-        """Radiance of each facet, (n, 3). `coverage`, (n,), becomes the share of rays that hit."""
+        """Radiance of each facet, (n, 3). Sets `coverage`, (n,), to the fraction of rays that hit
+        it."""
         picture = render(self.scene)[self.rows, self.columns]
         self.coverage = picture[:, 3]
         assert (self.coverage > 0).all(), "a facet was missed"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small scenes and pictures for the tests."""
+"""Small scenes and pictures for tests."""
 
 import csv
 import io
@@ -18,13 +18,13 @@ import numpy as np
 
 
 def with_every_model(form, *cases):
-    """Cases (model, values), and the default values of each model with the form that has no case.
+    """Cases (model, values), plus the default values of each model with the form that has no case.
 
-    So a new model is measured without a word in the tests. `form` None: any form.
+    So new models are measured without changing the tests. `form` None: any form.
     """
     path = os.environ.get("BRDFC_EXTENSION_ZIP", "")
     if not Path(path).is_file():
-        return list(cases)  # the fixtures say what is missing
+        return list(cases)  # the fixtures report what is missing
     with zipfile.ZipFile(path) as archive:
         models = json.loads(archive.read("manifest.json"))["models"]
     have_form = [m for m, e in models.items() if form is None or form in e["representations"]]
@@ -34,18 +34,18 @@ def with_every_model(form, *cases):
 
 
 class Batch:
-    """Measures all cases of a test in one render, when the first of them asks.
+    """Measures all cases of a test in one render, when the first of them asks for its result.
 
-    Only the cases that this run of pytest selected are measured. A case that raises while its
-    material is made fails alone.
+    Only cases that this run of pytest selected are measured. If making the material of a case
+    raises an exception, only that case fails.
     """
 
     def __init__(self):
         self.results = {}
 
     def result(self, request, measure):
-        """What `measure(cases)` returned for the case of the running test; its parameters other
-        than the case tell one batch from another."""
+        """The result of `measure(cases)` for the case of the running test. There is one batch for
+        each combination of the test's other parameters."""
 
         def key(item):
             others = {k: v for k, v in item.callspec.params.items() if k not in ("model", "values")}
@@ -67,18 +67,18 @@ class Batch:
 
 
 def materials_of(extension, form, cases):
-    """A material for each case, or the exception that making it raised."""
+    """A material for each case, or the exception that was raised when making it."""
     made = []
     for model, values in cases:
         try:
             made.append(extension.api.new_material(model, form, **values))
-        except Exception as error:  # it belongs to this case alone
+        except Exception as error:  # fails this case alone
             made.append(error)
     return made
 
 
 def render(scene):
-    """Renders the scene; (height, width, 4) float64, row 0 at the bottom."""
+    """Renders the scene; returns (height, width, 4) float64, row 0 at the bottom."""
     settings = scene.render.image_settings
     settings.file_format, settings.color_mode = "OPEN_EXR", "RGBA"
     settings.color_depth, settings.exr_codec = "32", "NONE"
@@ -90,7 +90,7 @@ def render(scene):
 
 
 def open_image_io():
-    """The module that Blender brings."""
+    """The OpenImageIO module in Blender."""
     import sys
 
     root = Path(bpy.utils.resource_path("LOCAL"))
@@ -100,8 +100,9 @@ def open_image_io():
     return OpenImageIO
 
 
-#: As `blender --background FILE --engine CYCLES --render-output PICTURE --render-frame FRAME` does,
-#: which a module has not, on a machine of a farm: Blender's factory settings.
+#: The equivalent, for Blender as a module, of `blender --background FILE --engine CYCLES
+#: --render-output PICTURE --render-frame FRAME` on a machine of a farm, with Blender's factory
+#: settings.
 FACTORY_RENDER = """
 import sys
 import bpy
@@ -120,7 +121,7 @@ bpy.ops.render.render(animation=True)
 
 
 def render_without_the_extension(blend, frame, folder):
-    """The picture of a saved file's frame by a Blender of its own that has nothing installed."""
+    """Renders a frame of a saved file in a separate Blender without the extension."""
     environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "nothing")}
     done = subprocess.run(
         [sys.executable, "-c", FACTORY_RENDER, blend, str(frame), folder],
@@ -133,13 +134,14 @@ def render_without_the_extension(blend, frame, folder):
 
 
 def render_passes(scene):
-    """Renders the scene; every pass by name, (height, width, channels), row 0 at the bottom.
+    """Renders the scene; returns every pass by name, (height, width, channels), row 0 at the
+    bottom.
 
-    Blender does not hand out the pixels of a multilayer file; the OpenImageIO that it brings does.
+    Blender does not expose the pixels of a multilayer file; the OpenImageIO in it does.
     """
     oiio = open_image_io()
     settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):  # from 5.0
+    if hasattr(settings, "media_type"):  # 5.0 on
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format = "OPEN_EXR_MULTILAYER"
     settings.color_depth, settings.exr_codec = "32", "NONE"
@@ -163,7 +165,7 @@ def render_passes(scene):
 
 
 def read_picture(path):
-    """Pixels of an EXR as they are in the file; (height, width, 4), row 0 at the bottom."""
+    """Pixels of an EXR, unconverted; (height, width, 4), row 0 at the bottom."""
     image = bpy.data.images.load(str(path))
     try:
         image.colorspace_settings.name = "Non-Color"
@@ -175,7 +177,7 @@ def read_picture(path):
 
 
 def empty_tree(owner):
-    """The node tree of a new material or world, without a node."""
+    """The node tree of a new material or world, emptied."""
     if owner.node_tree is None:
         owner.use_nodes = True  # deprecated in 5.0, where the tree exists from the start
     owner.node_tree.nodes.clear()
@@ -195,7 +197,7 @@ def node_material(kind, **inputs):
 
 
 def add_world(scene, strength=1.0):
-    """A white world; returns its node tree and the Background node."""
+    """Adds a white world; returns its node tree and the Background node."""
     world = bpy.data.worlds.new("World")
     scene.world = world
     tree = empty_tree(world)
@@ -218,7 +220,7 @@ def add_camera(scene, location=(0, -6, 0), rotation=(np.pi / 2, 0, 0), orthograp
 
 
 def add_lamp(scene, kind="POINT", name="Lamp", location=(0, 0, 4), turn=(0, 0, 0), **settings):
-    """A lamp with these values of its data; `turn` are its Euler angles."""
+    """Adds a lamp; `settings` are properties of its data, `turn` its Euler angles."""
     data = bpy.data.lights.new(name, kind)
     for key, value in settings.items():
         setattr(data, key, value)
@@ -245,7 +247,7 @@ def add_sphere(scene, material, segments=32):
 
 
 def bend(mesh, normals):
-    """Gives each face of the mesh the normal (x, y, z) that shaders see."""
+    """Sets the shading normal of each face of the mesh to (x, y, z)."""
     for polygon in mesh.polygons:
         polygon.use_smooth = True
     corners = [polygon.loop_total for polygon in mesh.polygons]
@@ -253,7 +255,7 @@ def bend(mesh, normals):
 
 
 def sphere_scene(scene, material, size=16, samples=16):
-    """A sphere in a white world that fills most of a small picture."""
+    """Adds a sphere in a white world that fills most of a small picture."""
     add_sphere(scene, material)
     add_camera(scene)
     add_world(scene)
@@ -262,7 +264,7 @@ def sphere_scene(scene, material, size=16, samples=16):
 
 
 def script_material(extension, name, source, surface="BSDF"):
-    """A material of an OSL source whose output `surface` is what is seen."""
+    """A material of an OSL source whose output `surface` is connected."""
     text = bpy.data.texts.new(f"{name}.osl")
     text.write(source)
     material = bpy.data.materials.new(name)
@@ -283,14 +285,14 @@ def read_csv(text):
 
 
 def to_csv(names, rows):
-    # Of whole rows and Python's own numbers: formatting takes longer than what the tool computes.
+    # Formats whole rows of Python numbers: formatting takes longer than the tool's computation.
     line = ",".join(["%.17g"] * len(names))
     lines = [line % tuple(row) for row in np.asarray(rows, np.float64).tolist()]
     return "\n".join([",".join(names), *lines]) + "\n"
 
 
 def arguments(values):
-    """Parameters as the tool takes them."""
+    """Parameters in the tool's notation."""
     return [
         f"{name}={','.join(map(str, v)) if isinstance(v, tuple | list) else v}"
         for name, v in values.items()
@@ -298,7 +300,7 @@ def arguments(values):
 
 
 def pairs_csv(wi, wo):
-    """Pairs of directions, each of shape (n, 3), as the tool reads them."""
+    """Pairs of directions, each of shape (n, 3), in the tool's format."""
     header = ("wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z")
     return to_csv(header, np.hstack([wi, wo]))
 
@@ -310,8 +312,8 @@ def evaluate(tool, model, values, wi, wo):
 
 
 def albedo_and_mirror(tool, model, values, cosines, phi=0.0):
-    """Directional albedo of the model by quadrature, and the weight of its mirror term, which is
-    part of it; (n, 3) each."""
+    """Directional albedo of the model by quadrature, and the weight of its mirror term, which the
+    albedo includes; (n, 3) each."""
     stdin = to_csv(("cos_theta_o",), np.reshape(cosines, (-1, 1)))
     text = tool("albedo", model, *arguments(values), "--phi", repr(float(phi)), stdin=stdin)
     rows = read_csv(text)[1]
@@ -324,8 +326,10 @@ def albedo(tool, model, values, cosines, phi=0.0):
 
 
 def draw(tool, model, values, wo, count):
-    """Directions drawn from the model in double precision, and each one's share of f cos dw."""
-    # Additive recurrence on the plastic number's relative: evenly spread in three dimensions.
+    """Directions sampled from the model in double precision, each with its contribution to the
+    integral of f cos."""
+    # Additive recurrence based on the plastic number's analogue in three dimensions: low
+    # discrepancy.
     root = 1.2207440846057596
     u = (0.5 + np.outer(np.arange(count), [1 / root, 1 / root**2, 1 / root**3])) % 1.0
     header = ("wo_x", "wo_y", "wo_z", "u1", "u2", "u3")
@@ -335,7 +339,7 @@ def draw(tool, model, values, wo, count):
 
 
 def counts():
-    """How many data-blocks of the kinds that this extension makes there are."""
+    """The number of data-blocks of each kind that the extension makes."""
     return {
         kind: len(getattr(bpy.data, kind))
         for kind in ("materials", "node_groups", "texts", "images")
@@ -343,14 +347,13 @@ def counts():
 
 
 def modules_of_operators(extension):
-    """The modules that define operators, a file a subject."""
+    """The modules that define operators, one file per subject."""
     prefix = f"{extension.operators.__name__}."
     return [module for name, module in sys.modules.items() if name.startswith(prefix)]
 
 
 class Layout:
-    """Stands in for a UILayout and keeps what is drawn, and the names of operators that are
-    greyed."""
+    """Replaces a UILayout; records what is drawn, and the names of disabled operators."""
 
     def __init__(self, log=None, greyed=None, enabled=True):
         self.log = log if log is not None else []

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What highlights must look like, by quadrature: f of the model, as the tool has it, times the
-cosine, over what a lamp sends. And a stage to hold pictures against it.
+"""Computes by quadrature how highlights must look: the model's f, from the tool, times the cosine
+and the lamp's radiance, integrated over the lamp. Also provides a stage whose pictures are compared
+with the result.
 
-A lamp is a function send(p, u) of points of the surface, (n, 1, 3), and numbers in [0, 1),
-(n, m, 2): m directions to it from each point, (n, m, 3), and radiance over their density, (n, m).
+A lamp is a function send(p, u) of surface points, (n, 1, 3), and numbers in [0, 1), (n, m, 2). It
+returns m directions from each point to the lamp, (n, m, 3), and the radiance divided by their pdf,
+(n, m).
 """
 
 import math
@@ -14,12 +16,12 @@ from goniometer import frame, unit
 from helpers import add_camera, add_sphere, evaluate
 from mathutils import Vector
 
-#: Side of a block, in pixels, and of an item's part of the picture.
+#: Side in pixels of a block, and of an item's part of the picture.
 BLOCK, SIDE = 8, 32
 
 
 def sequence(count, dimensions):
-    """Evenly spread points in [0, 1)^d (M. Roberts' additive recurrence)."""
+    """Evenly distributed points in [0, 1)^d (M. Roberts' additive recurrence)."""
     root = 2.0
     for _ in range(60):
         root = (1 + root) ** (1 / (dimensions + 1))
@@ -27,13 +29,13 @@ def sequence(count, dimensions):
 
 
 def disk(u):
-    """Points of the unit disk, each as likely as the others."""
+    """Uniformly distributed points of the unit disk."""
     radius, angle = np.sqrt(u[..., 0]), 2 * np.pi * u[..., 1]
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
 
 
 def across(axis):
-    """Two axes across directions, (..., 3) each."""
+    """Two axes perpendicular to directions, (..., 3) each."""
     a = unit(np.cross(np.where(np.abs(axis[..., 2:]) < 0.9, [0.0, 0, 1], [1.0, 0, 0]), axis))
     return a, np.cross(axis, a)
 
@@ -43,7 +45,7 @@ def everywhere(_wi):
 
 
 def facing_disk(place, radius, intensity, beam=everywhere):
-    """A point or a spot with Soft Falloff: a disk that faces the point."""
+    """A point or spot light with Soft Falloff: a disk that faces the shaded point."""
 
     def send(p, u):
         to = place - p
@@ -72,7 +74,7 @@ def sphere(place, radius, intensity, beam=everywhere):
 
 
 def cone_of(light, axis):
-    """How a spot that shines along an axis fades."""
+    """Falloff of a spot light that points along an axis."""
     edge = math.cos(light.spot_size / 2)
 
     def beam(wi):
@@ -97,7 +99,7 @@ def sun(towards, angle, irradiance):
 
 
 def patch(matrix, sizes, intensity, is_round=False, spread=np.pi):
-    """An area lamp, which shines along its own -z. `intensity`: straight ahead."""
+    """An area lamp, which emits along its own -z. `intensity`: straight ahead."""
     axes, place = np.array(matrix.to_3x3()), np.array(matrix.translation)
     x, y = (size / 2 * axes[:, i] for i, size in enumerate(sizes))
     ahead = -unit(axes[:, 2])
@@ -119,7 +121,7 @@ def patch(matrix, sizes, intensity, is_round=False, spread=np.pi):
 
 
 def of_light(item):
-    """What the object of a Blender light sends."""
+    """The send() function for the object of a Blender light."""
     light, matrix = item.data, item.matrix_world
     place, axis = np.array(matrix.translation), unit(np.array(matrix.col[2].to_3d()))
     energy, radius = light.energy, light.shadow_soft_size if light.type in {"POINT", "SPOT"} else 0
@@ -139,7 +141,8 @@ def of_light(item):
 
 
 def blocks(picture, mask):
-    """Means over the pixels of a mask by block, (..., rows, columns); and how many those are."""
+    """Means over a mask's pixels for each block, (..., rows, columns); and the number of these
+    pixels."""
     height, width = mask.shape
     shape = height // BLOCK, BLOCK, width // BLOCK, BLOCK
     counts = np.maximum(mask.reshape(shape).sum((1, 3)), 1)
@@ -148,8 +151,8 @@ def blocks(picture, mask):
 
 
 class Stage:
-    """Pieces of a floor, or balls, side by side in a picture: one that is white and matte, and one
-    of each model. `cases`: [(model, values)].
+    """Pieces of a floor, or balls, side by side in a picture: a white diffuse one, and one of each
+    model. `cases`: [(model, values)].
     """
 
     def __init__(self, scene, cases, ball=False):
@@ -180,7 +183,7 @@ class Stage:
             item = bpy.data.objects.new("Floor", mesh)
             scene.collection.objects.link(item)
         item.location = centre
-        if self.ball:  # none may shade another
+        if self.ball:  # so that none shades another
             for ray in ("diffuse", "glossy", "transmission", "shadow"):
                 setattr(item, f"visible_{ray}", False)
         return item
@@ -190,8 +193,8 @@ class Stage:
             item.data.materials[0] = material
 
     def hits(self, x, y):
-        """Where rays through this place of each pixel meet the items: points, normals, and of which
-        item; -1 where they miss."""
+        """Where rays through this position in each pixel hit the items: points, normals, and the
+        item's index; -1 where they miss."""
         height, width = self.size
         across, up = np.meshgrid(np.arange(width) + x, np.arange(height) + y)
         place = [(across / width - 0.5) * self.wide, (up - height / 2) / width * self.wide]
@@ -214,16 +217,18 @@ class Stage:
         return points, normals, which
 
     def whole(self):
-        """Which item a pixel of its part of the picture shows all over; -1: none."""
+        """The item that covers the whole of each pixel, in its part of the picture; -1 if there is
+        none."""
         corners = [self.hits(x, y)[2] for x in (0, 1) for y in (0, 1)]
         own = np.broadcast_to(np.arange(self.size[1]) // SIDE, self.size)
         return np.where(np.all([c == own for c in corners], 0), own, -1)
 
     def expected(self, tool, sends, least, most, seed):
-        """Radiance by block, (rows, columns), the models' green; NaN in blocks less bright than
-        `least` of an item's brightest, and in all but about its `most` brightest."""
+        """Radiance of the models' green channel by block, (rows, columns). NaN in blocks that are
+        below `least` times the item's brightest block, and in all but about the `most`
+        brightest."""
         whole, rng = self.whole(), np.random.default_rng(seed)
-        # One point a pixel, and one of the lamp, tell which blocks those are.
+        # A rough estimate, with one point per pixel and lamp, selects these blocks.
         rough = self._radiance(tool, sends, whole, 1, 1, np.random.default_rng(0))
         rough, _ = blocks(rough, whole >= 0)
         by_item = rough.reshape(-1, len(self.cases), SIDE // BLOCK)
@@ -237,7 +242,7 @@ class Stage:
     def _radiance(self, tool, sends, chosen, grid, points, rng):
         picture = np.zeros(self.size)
         places = [((i + 0.5) / grid, (j + 0.5) / grid) for i in range(grid) for j in range(grid)]
-        # One sequence of points of the lamp for all of a block.
+        # All points of a block share one sequence of lamp points.
         numbers = sequence(BLOCK**2 * len(places) * points, 2) + rng.uniform(size=2)
         rows, columns = np.indices(self.size) % BLOCK
         for i, case in enumerate(self.cases):

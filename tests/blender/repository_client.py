@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender of its own that takes the extension from a repository over HTTP; test_repository.py
+"""A separate Blender that installs the extension from a repository over HTTP; test_repository.py
 runs it.
 
     python repository_client.py RESOURCES ROOT STAGE...
 
-ROOT has a folder a stage, with index.json and zips. A local server shows the folder of one stage
-after the other; the client looks for updates and installs what it finds. A stage may end in
-":torn", where the server drops the connection halfway through a zip, or ":altered", where a byte of
-it is another one. Prints a JSON list with what is there after each stage.
+ROOT contains a folder for each stage, with index.json and zips. A local server serves these folders
+one after the other; the client looks for updates and installs what it finds. If a stage ends in
+":torn", the server drops the connection halfway through a zip; if it ends in ":altered", it changes
+a byte. Prints a JSON list with the state after each stage.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ PACKAGE_ID = "brdfc_shaders"
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
-    """Shows the files of `folder`, zips in the `manner` of the stage."""
+    """Serves the files of `folder`, and zips in the `manner` of the stage."""
 
     folder, manner = None, ""
 
@@ -50,7 +50,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
 
 def attempt(operator, **arguments):
-    """What an operator says against it; "" where it finishes."""
+    """The error message of an operator; "" if it finishes."""
     try:
         return "" if "FINISHED" in operator(**arguments) else "did not finish"
     except RuntimeError as error:
@@ -104,7 +104,7 @@ def main():
     )
     repositories = bpy.context.preferences.extensions.repos
     repository = repositories["Local"]
-    # Those that come with Blender are elsewhere.
+    # Excludes Blender's own repositories.
     for other in repositories:
         other.enabled = other == repository
 
@@ -126,7 +126,7 @@ def main():
 if __name__ == "__main__":
     with contextlib.redirect_stdout(sys.stderr):
         saved = os.dup(1)
-        os.dup2(2, 1)  # what Blender prints past Python
+        os.dup2(2, 1)  # output of Blender's native code
         answer = main()
     os.dup2(saved, 1)
     os.write(1, json.dumps(answer).encode())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Aimed forms under lamps: what they give there is the model; the slots are all they know of."""
+"""Aimed forms under lamps: they must match the model there, and know only the lamps in the
+slots."""
 
 import math
 
@@ -11,7 +12,7 @@ from goniometer import Goniometer, tilted, unit
 from helpers import add_camera, add_lamp, add_sphere, add_world, evaluate, render
 from mathutils import Vector
 
-#: Towards the sun; the camera is above.
+#: Directions towards the sun; the camera is above.
 SLOW = pytest.mark.slow
 SUNS = [
     (0.5, 0.2, 0.8),
@@ -19,7 +20,7 @@ SUNS = [
     pytest.param((0.0, 0.1, 1.0), marks=SLOW),
 ]
 FACETS = 150
-#: Defaults, and ends that are stiff.
+#: Default values, and extreme ones.
 CASES = {
     "ashikhmin_shirley": [{"nu": 100.0, "nv": 1e4, "rs": 0.9, "rd": 0.0}],
     "blinn": [{"e": 2000.0}],
@@ -34,7 +35,7 @@ CASES = {
 
 
 def random_values(schema, rng):
-    """Numbers and colours anywhere on their sliders, choices as they are by default."""
+    """Random values over the sliders of numbers and colours; choices keep their defaults."""
     values = {}
     for p in schema:
         low, high = p.get("soft_min", 0), p.get("soft_max", 1)
@@ -56,21 +57,23 @@ def cases_of(extension, rng, form="aimed"):
         if form not in model["representations"] or not model["scatter"]:
             continue
         drawn = {k: v for k, v in random_values(model["parameters"], rng).items()}
-        if name == "lossless":  # its heights are a kernel, of which not every one is admitted
+        if name == "lossless":  # not every combination of heights is valid
             drawn = {}
         found += [(name, values) for values in ({}, *CASES.get(name, []), drawn)]
     return found
 
 
 def off_under_a_sun(extension, scene, tool, form, towards, samples, pictures=1):
-    """[(model, values, relative L1, its noise, brightest f cos)]: a form under a sun without an
-    angle, against the formula; what the mean of several pictures is off by, and what their spread
-    explains of that, 0 for one picture. `scene` is as apply_clean_settings() leaves it."""
+    """Renders a form under a sun without an angle and compares it with the formula.
+
+    Returns [(model, values, relative L1, its noise, largest f cos)]: the error of the mean of
+    several pictures, and the error that their variance explains (0 for one picture). `scene` is in
+    the state of apply_clean_settings()."""
     rng = np.random.default_rng(17)
     cases = cases_of(extension, rng, form)
     which = np.repeat(np.arange(len(cases)), FACETS)
     normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
-    # Every other facet faces halfway between sun and camera, more or less: the highlight.
+    # On every other facet, the normal is near the half vector of sun and camera: the highlight.
     half = unit(unit(towards) + (0, 0, 1))
     near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
     normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
@@ -88,8 +91,8 @@ def off_under_a_sun(extension, scene, tool, form, towards, samples, pictures=1):
     for i, (name, values) in enumerate(cases):
         lit = (which == i) & (wi[:, 2] > 1e-3)
         expected = evaluate(tool, name, values, wi[lit], wo[lit]) * wi[lit, 2:]
-        # Light sampling may find the drawn direction's own lobe, once in 1e5 samples and as much
-        # brighter: such dots are noise. A facet in thirty may have one.
+        # About once in 1e5 samples, light sampling hits the sampled direction's own lobe, which is
+        # much brighter: such dots are noise. One facet in thirty may have one.
         error = np.abs(picture[lit] - expected).sum(1)
         kept = np.argsort(error)[: -(len(error) // 30)]
         off, noise = (x[kept].sum() / expected.sum() for x in (error, spread[lit].sum(1)))
@@ -102,14 +105,15 @@ def off_under_a_sun(extension, scene, tool, form, towards, samples, pictures=1):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
-    """No drawn direction meets it: what is seen is base and lobes, f cos to 1e-3 (relative L1)."""
+    """No random ray hits it, so the picture shows the base and the lamps' lobes: f cos to 1e-3
+    (relative L1)."""
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     extension.api.enable_osl(empty)
     for name, values, off, _, brightest in off_under_a_sun(
         extension, empty, tool, "aimed", towards, 16
     ):
         assert brightest > 1e-4, name
-        # A cosine in single precision and OSL's pow() err by some 5e-7 of the power times the
+        # A cosine in single precision and OSL's pow() have an error of about 5e-7 times the
         # exponent: 0.7 % at e = 12,000.
         exponent = max([0, *(v for k, v in values.items() if k in ("e", "es"))])
         assert off < max(1e-3, 8e-7 * exponent), f"{name} {values}: relative L1 {off:.3g}"
@@ -117,7 +121,7 @@ def test_a_sun_without_an_angle(extension, empty, tool, towards):
 
 @pytest.mark.slow
 def test_a_lamp_that_is_not_in_the_list(extension, empty, tool):
-    """Costs noise and no light: with and without slots the picture has the same mean."""
+    """It costs noise but no light: with and without slots, the picture has the same mean."""
     means = []
     for seen in (True, False):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -143,8 +147,8 @@ def test_a_lamp_that_is_not_in_the_list(extension, empty, tool):
     assert error < 0.01 * aimed
 
 
-#: Of these a ball sees more or less by place: an area lamp with a narrow spread, and a spot whose
-#: cone is hardly wider than it looks.
+#: Lamps whose visible part varies over a ball: an area lamp with a narrow spread, and a spot whose
+#: cone is hardly wider than its disk appears.
 CONES = {
     "spread": ("AREA", {"shape": "SQUARE", "size": 2.0, "spread": 0.7}),
     "spot": ("SPOT", {"shadow_soft_size": 0.8, "spot_size": 0.5, "spot_blend": 0.5}),
@@ -156,8 +160,8 @@ CONES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("lamp", CONES)
 def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
-    """f is averaged over what shines on the point, right to 2 %; over the whole lamp a ball would
-    be 5 % too dark."""
+    """f is averaged over the visible part of the lamp, to 2 %; averaged over the whole lamp, a ball
+    would be 5 % too dark."""
     kind, settings = CONES[lamp]
     towards = unit((0.5, -0.62, 0.6))
     turn = Vector(-towards).to_track_quat("-Z", "Y").to_euler()
@@ -188,9 +192,10 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
 @pytest.mark.long
 @pytest.mark.slow
 def test_a_small_lamp_before_a_large_one(extension, empty):
-    """The lobe of the large one gives light of the small one, which drawn directions hardly ever
-    meet to take it off again: so the small one comes later and is given less. Both at once show
-    what each shows alone; the other way round a ball is 62 % too bright."""
+    """The lobe of the large lamp includes the small one's direction. BSDF sampling would subtract
+    that light, but hardly ever hits the small lamp. So the small lamp has a later slot and its lobe
+    is reduced. The picture with both must be the sum of the pictures with each; in the opposite
+    order, a ball would be 62 % too bright."""
     towards = unit((0.5, -0.62, 0.6))
     turn = Vector(-towards).to_track_quat("-Z", "Y").to_euler()
     large = add_lamp(
@@ -227,8 +232,8 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["phong", "max_phong", "glossy_reflector"])
 def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
-    """Over an exponent from 1 to 600, from one side of a ball to the other, the base of cones comes
-    and goes: each quarter of it is as bright as by drawn directions."""
+    """The exponent varies from 1 to 600 over a ball, so the base of cones is present on a part of
+    it only. Each quarter must be as bright as with sampled directions."""
     worlds.gradient(*add_world(empty))
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     extension.api.enable_osl(empty)
@@ -254,19 +259,19 @@ def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
         pictures = []
         for seed in range(4):
             empty.cycles.seed = seed
-            # The ball takes the middle half.
+            # The ball covers the central half.
             pictures.append(render(empty)[:, 8:24, 1].reshape(32, 4, 4).mean((0, 2)))
         quarters[form] = np.mean(pictures, 0), np.std(pictures, 0, ddof=1) / 2
     (aimed, error), (drawn, other) = quarters["aimed"], quarters["sampled"]
     print(f"{model}: {aimed / drawn - 1} +- {np.hypot(error, other) / drawn}")
     assert (drawn > 1e-4).all() and (error < 0.05 * drawn).all()
-    # Spreads of four pictures: t of three degrees of freedom.
+    # The variance of four pictures: a t distribution with three degrees of freedom.
     assert (np.abs(aimed - drawn) < 9 * np.hypot(error, other)).all()
     whole, bound = aimed.sum() - drawn.sum(), 4.5 * math.hypot(*error, *other)
     assert abs(whole) < bound < 0.05 * drawn.sum()
 
 
-#: Number sockets whose models go astray outside their ranges, and a value beyond either end.
+#: Number sockets whose models break outside their ranges, and a value beyond either end.
 BEYOND = [
     ("cook_torrance", "m", -1.0),
     ("cook_torrance", "m", 50.0),
@@ -278,7 +283,7 @@ BEYOND = [
 
 @pytest.mark.parametrize(("model", "name", "value"), BEYOND)
 def test_a_link_beyond_the_range_is_its_end(extension, empty, model, name, value):
-    """Sliders stop at the ends of a parameter's range, links do not: a texture may be black."""
+    """Sliders stop at the ends of a parameter's range, but links do not: a texture may be black."""
     (schema,) = [p for p in extension.api.models()[model]["parameters"] if p["name"] == name]
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     extension.api.enable_osl(empty)
@@ -291,7 +296,7 @@ def test_a_link_beyond_the_range_is_its_end(extension, empty, model, name, value
     tree.links.new(number.outputs[0], extension.nodes.sockets(node)[name])
     pictures = []
     for material in made:
-        # About halfway between sun and camera.
+        # Around the half vector of sun and camera.
         towards = unit((0.3, 0.0, 0.9))
         slopes = 0.3 * np.random.default_rng(2).normal(size=(100, 3)) * (1, 1, 0)
         slopes[::2, 0] = 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the extension does where closures have little room: the slots that Cycles has, and the pool
-of limited size on OptiX, which is pretended. Sums are by hand, of what tests/pack/pack_test.cpp
-counts; 1016 bytes is what the pool holds."""
+"""What the extension does when there is little room for closures: the slots in Cycles, and the
+memory of limited size on OptiX, which is simulated. Expected numbers are computed by hand from
+those in tests/pack/pack_test.cpp; the memory has 1016 bytes."""
 
 from importlib import import_module
 
@@ -22,12 +22,12 @@ def optix(extension, empty, monkeypatch):
 
 
 def put(scene, material):
-    """A ball of a material."""
+    """A ball with a material."""
     return helpers.add_sphere(scene, material, segments=8)
 
 
 def add_lamps(scene, count):
-    """Lamps, the brightest first."""
+    """Adds lamps, brightest first."""
     for i in range(count):
         item = bpy.data.objects.new(f"Lamp{i}", bpy.data.lights.new(f"Lamp{i}", "POINT"))
         item.location, item.data.energy = (i, 0, 5), 100 / (i + 1)
@@ -35,7 +35,7 @@ def add_lamps(scene, count):
 
 
 def filled():
-    """How many slots hold a lamp after what Blender calls by itself."""
+    """The number of slots that hold a lamp after Blender's handlers have run."""
     for _ in range(2):
         bpy.context.view_layer.update()
     nodes = bpy.data.node_groups["brdfc Lamps"].nodes
@@ -89,13 +89,14 @@ def test_lamps_are_as_many_as_the_largest_material_has_room_for(extension, optix
     assert found[5].why == "fainter than the 5 that a material has room for"
     text = panel(extension, first.active_material, optix)
     assert "OptiX has memory for 5 lamps" in text and "Mix Shader" in text
-    # By themselves: another material, which needs more; its end; another device.
+    # Updates by handlers: another material, which needs more; its removal; another device.
     ward = put(optix, extension.api.new_material("ward"))  # (1016 - 232) / 160
     assert filled() == 4
     bpy.data.materials.remove(ward.active_material)
     put(optix, first.active_material)
     assert filled() == 5
-    # A script's change of a setting of Cycles tells nobody; the next change of anything does.
+    # Scripts can change Cycles' settings without an event; the next change of anything triggers
+    # one.
     for device, count in (("CPU", 7), ("GPU", 5)):
         optix.cycles.device = device
         first.location.x += 1
@@ -124,7 +125,7 @@ def test_models_that_are_mixed_share_the_pool(extension, optix):
     add_lamps(optix, 4)
     assert filled() == 1  # (1016 - 232 - 160 - 72) / (2 * 160)
     assert not {"closure_pool", "closure_pool_shared"} & codes(extension, material, optix).keys()
-    # What is not linked does not run; what Blender's own nodes take is not known.
+    # What is not linked does not run; the size of Blender's own nodes is unknown.
     tree = material.node_tree
     tree.links.remove(mix.inputs[2].links[0])
     assert filled() == 4  # (1016 - 232 - 72) / 160
@@ -140,7 +141,7 @@ def test_a_form_that_does_not_fit_is_refused(extension, optix):
     text = panel(extension, material, optix)
     assert "Fitted takes more memory than OptiX has: it is for the CPU" in text
     assert "operator brdfc.switch Fitted" not in text and "brdfc.switch Sampled" in text
-    # A material may have it already.
+    # A material may already have this form.
     api.switch_representation(material, "fitted")
     finding = codes(extension, material, optix)["closure_pool"]
     assert finding.severity == "ERROR" and "1256 bytes" in finding.message
@@ -153,7 +154,7 @@ def test_a_form_that_does_not_fit_is_refused(extension, optix):
 
 
 def mix_of(extension, scene, model, count, extra=()):
-    """A material of `count` nodes of a model and other shaders, by Mix Shader in equal parts."""
+    """A material of `count` nodes of a model and other shaders, in equal parts by Mix Shaders."""
     material = extension.api.new_material(model)
     tree = material.node_tree
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
@@ -178,7 +179,7 @@ def cpu(extension, empty):
 
 
 def test_several_models_in_one_material_aim_at_fewer_lamps(extension, cpu):
-    """By hand: phong has 8 slots beside its lamps, each of which takes 3."""
+    """By hand: phong takes 8 slots, and 3 more for each lamp."""
     put(cpu, extension.api.new_material("phong"))
     add_lamps(cpu, 8)
     assert filled() == 8
@@ -209,7 +210,7 @@ def test_blenders_own_shaders_in_a_material_count(extension, cpu):
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [4, 6])
 def test_a_mix_of_equal_nodes_is_as_bright_as_one(extension, cpu, count):
-    """Under eight point lamps six nodes of phong were 37.6 % too dark."""
+    """Under eight point lamps, six phong nodes used to be 37.6 % too dark."""
 
     def mean(material):
         ball = put(cpu, material)

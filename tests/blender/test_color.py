@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool's previews through Blender's OpenColorIO configuration, against what Blender saves;
-metals and glass of measured n and k in the working space of the file."""
+"""Compares the tool's previews through Blender's OpenColorIO configuration with pictures saved by
+Blender; and tests metals and glass with measured n and k in the working space of the file."""
 
 import importlib
 import json
@@ -18,7 +18,7 @@ from helpers import add_camera, add_world, open_image_io, render_passes
 CONFIG = Path(bpy.utils.resource_path("LOCAL")) / "datafiles" / "colormanagement" / "config.ocio"
 OBSERVER = Path(__file__).parents[2] / "data" / "color" / "observer.csv"
 ROOM = Path(__file__).parents[2] / "scenes" / "room-coupled.json"
-#: Where a file has no choice, Blender's own.
+#: Before 5.0 only Blender's own working space.
 SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
 SPACES = SPACES if hasattr(bpy.data, "colorspace") else SPACES[:1]
 VERSION = re.search(r"ocio_profile_version: ([\d.]+)", CONFIG.read_text())[1]
@@ -45,15 +45,15 @@ def eight_bits(path):
 
 @pytest.mark.parametrize("view", ["Standard", "Filmic", "AgX"])
 def test_view_is_blenders(empty, tmp_path, view):
-    """Equal to a step of 8 bits: Blender rounds and dithers in its own way."""
+    """Equal to one step of 8 bits: Blender rounds and dithers differently."""
     done = render(tmp_path, view)
-    if float(VERSION) > 2.1:  # than the tool's OpenColorIO reads
+    if float(VERSION) > 2.1:  # newer than the tool's OpenColorIO supports
         assert f"{CONFIG} is of version {VERSION}, later than" in done.stderr
         if view != "Standard":
             assert done.returncode == 2 and "expected one of Standard, Raw" in done.stderr
             return
     assert done.returncode == 0, done.stderr
-    # Without the layer of variances, with which Blender takes a file for several pictures.
+    # Without the variance layer, because of which Blender would read the file as multilayer.
     oiio = open_image_io()
     mean = oiio.ImageBufAlgo.channels(oiio.ImageBuf(str(tmp_path / "room.exr")), (0, 1, 2))
     assert mean.get_pixels().max() > 1
@@ -83,14 +83,14 @@ def color(extension):
 
 
 def of_index(values):
-    """What n and k by channel reflect from above."""
+    """Reflectance at normal incidence from n and k by channel."""
     n, k = (np.array([values[f"{q}_{c}"] for c in "rgb"]) for q in "nk")
     return ((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2)
 
 
 @pytest.mark.parametrize("space", SPACES)
 def test_a_metal_has_one_colour_in_every_working_space(extension, empty, color, space):
-    """1e-3 of the white; 4.5 writes the matrix of its interchange space with four digits."""
+    """To 1e-3 of white; 4.5 writes the matrix of its interchange space with four digits."""
     use_working_space(space)
     assert color.working_space() == space
     white = color.to_xyz([1, 1, 1])
@@ -109,7 +109,7 @@ def test_a_metal_has_one_colour_in_every_working_space(extension, empty, color, 
 
 @pytest.mark.parametrize("space", SPACES)
 def test_a_rendered_patch_has_one_colour(extension, empty, color, space):
-    """A mirror of copper under a white sky, seen from above; and the tool's figures for it."""
+    """A mirror of copper under a white sky, seen from above, compared with the tool's numbers."""
     use_working_space(space)
     material = extension.api.new_material("fresnel_conductor")
     extension.api.set_substance(material, "copper")
@@ -130,7 +130,7 @@ def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
     file.write_text("wl,n\n0.35,1.54\n0.9,1.51\n", encoding="utf-8")
     assert extension.api.set_substance(glass, str(file)) == {
         "ior": pytest.approx(1.527, abs=1e-3),
-        # 20 (n_F - n_C) / (n_d - 1) of a straight line.
+        # 20 (n_F - n_C) / (n_d - 1) for a straight line.
         "dispersion": pytest.approx(20 * 0.03 / 0.55 * (0.65627 - 0.48613) / 0.527, rel=1e-2),
     }
     before = extension.api.get_parameters(glass)
@@ -159,7 +159,8 @@ def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
 def test_a_substance_that_a_scenes_own_extension_lacks(
     extension, empty, use_pack, model, own, other, free
 ):
-    """It is refused where one of its numbers is a constant there, and nothing is set by half."""
+    """It is refused if one of its numbers is a different constant there, and nothing is half
+    set."""
     api = extension.api
     values = api.set_substance(api.new_material(model), own)
     varies = {"all": set(values), "one": set(list(values)[:1]), "none": set()}[free]
@@ -179,7 +180,7 @@ def test_a_substance_that_a_scenes_own_extension_lacks(
 
 
 def test_glass_absorbs_what_k_says(extension, empty, color, tmp_path):
-    """Beer's law at every wavelength, after the stated thickness; density is per Blender unit."""
+    """Beer's law at every wavelength, at the stated thickness; density is per Blender unit."""
     glass, file = extension.api.new_material("glass"), tmp_path / "own.csv"
     rows = [(0.38, 5e-6), (0.55, 4e-7), (0.7, 8e-6)]
     k = "".join(f"{um},{value}\n" for um, value in rows)
@@ -195,7 +196,7 @@ def test_glass_absorbs_what_k_says(extension, empty, color, tmp_path):
         assert values["density"] == pytest.approx(density)
         got = extension.api.get_parameters(glass)
         assert got["attenuation"] == pytest.approx(values["attenuation"], rel=1e-6)
-    # A unit of a millimetre.
+    # One unit is a millimetre.
     bpy.context.scene.unit_settings.scale_length = 0.001
     assert extension.api.set_substance(glass, str(file))["density"] == pytest.approx(0.1)
     before = extension.api.get_parameters(glass)
@@ -255,6 +256,6 @@ def test_the_screens_curve_is_srgb_and_luminance_is_that_of_the_space(extension,
         use_working_space(space)
         weights = color.luminance(np.eye(3))
         assert weights.sum() == pytest.approx(1, abs=1e-5) and weights[0] > 0.26
-        # A red of sRGB is one on the screen, whatever space it is kept in.
+        # A red in sRGB is the same on the screen, whatever the working space.
         red = mathutils.Color((0.5, 0, 0)).from_rec709_linear_to_scene_linear()
         np.testing.assert_allclose(color.to_screen(red), [0.73536, 0, 0], atol=1e-4)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The conditions that users live in: see conditions.py.
+"""Measures the conditions in conditions.py: settings and scenes as users have them.
 
-Where a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all every condition is
-measured, and the rows go to conditions/<version>.json beside the tool, of which script/conditions
-makes its table; else a few. BRDFC_CONDITIONS_FORM=aimed measures forms of that name alone.
+If a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all, every condition is
+measured, and the rows go to conditions/<version>.json beside the tool, from which script/conditions
+makes its table; otherwise only a few. BRDFC_CONDITIONS_FORM=aimed measures only that form.
 """
 
 import json
@@ -67,8 +67,8 @@ def test_the_panel_is_silent_under_clean_settings(extension, forms):
 
 @pytest.mark.evidence
 def test_conditions_can_tell(rows):
-    """A sun without size, which drawn rays never meet, must show as a bias of sampled forms: of
-    those whose noise elsewhere does not hide it, and in all as less light."""
+    """A sun without a size, which random rays never hit, must appear as a bias of sampled forms:
+    significantly for those with little noise elsewhere, and as a loss of light for all."""
     found = [r for r in rows if r["condition"] == "sun without size" and "sampled" in r["form"]]
     if ONLY not in (None, "sampled"):
         pytest.skip("it is of sampled forms, and others are asked for")

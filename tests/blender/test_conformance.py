@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the closures of this Blender do what the forms rely on; see conformance.py.
+"""Tests that the closures of this Blender behave as the forms require; see conformance.py.
 
-With BRDFC_EVIDENCE=all every closure is measured, and the table goes to conformance/<version>.json
-and .csv beside the tool, for the report; else a few closures are.
+With BRDFC_EVIDENCE=all, every closure is measured, and the table goes to conformance/<version>.json
+and .csv beside the tool, for the report; otherwise only a few closures are.
 """
 
 import csv
@@ -66,13 +66,13 @@ def test_closure_samples_what_it_evaluates_and_evaluates_what_we_define(rows, ca
 
 @pytest.mark.evidence
 def test_the_fault_of_ashikhmin_shirley_is_large(rows):
-    """The reason why no form uses the closure that would suit the model best."""
+    """The reason why no form uses the closure that would fit the model best."""
     assert rows["ashikhmin_shirley 0.4 0.4"]["sampling_share"] > 0.3
 
 
 def calls(source):
-    """What tells one closure from another in OSL: the function, its first argument if that is a
-    text, and whether microfacets refract."""
+    """What distinguishes closures in OSL: the function, its first argument if that is a string, and
+    whether microfacets refract."""
     found = re.findall(r"\b(\w+)\((?=(\"\w+\")?((?:[^()]|\([^()]*\))*))", source)
     return [
         (function, first, function == "microfacet" and rest.rstrip().endswith("1"))
@@ -82,7 +82,7 @@ def calls(source):
 
 @pytest.mark.evidence
 def test_forms_use_only_closures_that_conform(rows, extension):
-    """Every closure that the pack's shaders call has a row, and that row has no fault."""
+    """Every closure that the pack's shaders call has a row in the table without a fault."""
     sound = {}
     for case in conformance.CASES:
         key = calls(case.osl)[0]
@@ -96,7 +96,7 @@ def test_forms_use_only_closures_that_conform(rows, extension):
                 if key[0] in {f for f, *_ in sound} or key[0].endswith("_bsdf"):
                     called.add((model, form, key))
     assert called
-    # A portal only turns a ray, and transparency does not even that.
+    # A portal only redirects a ray, and transparency does not even that.
     called = {c for c in called if c[2][0] not in ("ray_portal_bsdf", "transparent")}
     bad = [c for c in called if not sound.get(c[2])]
     assert not bad, f"no sound row in the conformance table: {bad}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's own materials as the nearest model, and back."""
+"""Conversion of Blender's own materials to the nearest model, and back."""
 
 from importlib import import_module
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ KINDS = {
 
 
 def material_of(kind, distribution=None, **inputs):
-    """A material of one node; inputs by name, spaces as underscores."""
+    """A material of one node; inputs by name, with underscores for spaces."""
     material = bpy.data.materials.new(kind)
     tree = helpers.empty_tree(material)
     node = tree.nodes.new(KINDS[kind])
@@ -62,7 +62,7 @@ UNDER_A_SUN = [
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.5, "IOR": 1.6}),
     ("principled", "MULTI_GGX", {"Base_Color": GOLD, "Roughness": 0.6, "Metallic": 1.0}),
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.5, "Metallic": 0.5}),
-    # Above 1: the whole of some nodes, of others the base alone.
+    # Colours above 1: all of some nodes, only the base of others.
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.0}),
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.7}),
     ("glossy", "MULTI_GGX", {"Color": BRIGHT, "Roughness": 0.8}),
@@ -76,7 +76,7 @@ UNDER_A_SUN = [
 def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distribution, inputs):
     material, node = material_of(kind, distribution, **inputs)
     (native,) = convert.natives(node)
-    empty.cycles.shading_system = False  # as files are made
+    empty.cycles.shading_system = False  # as in new files
     rng = np.random.default_rng(3)
     cosines = rng.choice(nearest_model(convert).VIEWS, 200)
     empty.cycles.max_bounces = 0
@@ -89,7 +89,7 @@ def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distrib
     expected = nearest_model(convert).native_bsdf.f_cos(native, wi, wo, (each, which.ravel()))
     error = np.abs(measured[lit] - expected).sum() / expected.sum()
     print(f"{kind} {distribution} {inputs}: relative L1 {error:.2g}")
-    # Cycles takes albedos of facets from tables of its own, which are coarse.
+    # Cycles takes these albedos from its own tables, which are coarse.
     tabled = kind == "principled" or distribution == "MULTI_GGX"
     assert error < (0.03 if tabled else 2e-3)
 
@@ -115,7 +115,7 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
         ("principled", {"Roughness": 0.4}, {"ashikhmin_shirley"}, 0.15),
         ("principled", {"Roughness": 0.0}, {"coupled"}, 0.1),
         ("principled", {"Roughness": 0.4, "IOR": 1.0}, {"lambert"}, 1e-6),
-        # Mirrors that have a colour.
+        # Coloured mirrors.
         ("glossy", {"Roughness": 0.0, "Color": GOLD}, {"max_phong"}, 0.02),
         ("principled", {"Roughness": 0.0, "Metallic": 1.0, "Base_Color": GOLD}, {"schlick"}, 1e-6),
         (
@@ -139,7 +139,7 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
     assert plan.error < worst
     said = f"{100 * plan.error:.2g} % of the light in other" if plan.error > 1e-6 else "the same"
     assert said in plan.line()
-    # No other width would be nearer.
+    # Any other width must be worse.
     (native,) = convert.natives(plan.node)
     target = nearest_model(convert).Target(native)
     assert target.error(plan.model, plan.values) == pytest.approx(plan.error, rel=1e-9)
@@ -153,7 +153,8 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
 
 
 def test_the_error_is_that_of_the_bright_colour(convert):
-    """No model reflects more than there is: what is above 1 is lost, of what the node reflects."""
+    """No model reflects more than all light: the part of the colour above 1 is lost. The error is
+    relative to the light that the node reflects."""
     plan = only(convert.plan([material_of("diffuse", Color=(1.5, 1.0, 1.0), Roughness=0.0)[0]]))
     assert plan.model == "lambert" and plan.values["rho"] == (1.0, 1.0, 1.0)
     assert plan.error == pytest.approx(0.5 / 3.5, rel=1e-6)
@@ -172,10 +173,10 @@ def test_a_picture_of_a_bright_colour_is_off_as_is_said(extension, convert, empt
     helpers.sphere_scene(empty, material, samples=64)
     for shown in (material, copy):
         bpy.data.objects["Sphere"].data.materials[0] = shown
-        pictures.append(helpers.render(empty)[6:10, 6:10, :3])  # the ball alone
+        pictures.append(helpers.render(empty)[6:10, 6:10, :3])  # only the ball
     off = np.abs(pictures[0] - pictures[1]).sum() / pictures[0].sum()
     print(f"light of the ball that is another: {off:.3g}, said: {plan.error:.3g}")
-    assert off == pytest.approx(plan.error, rel=0.1)  # of other views
+    assert off == pytest.approx(plan.error, rel=0.1)  # whose views are different ones
 
 
 SEEN = [
@@ -191,7 +192,7 @@ SEEN = [
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("kind", "inputs"), SEEN)
 def test_a_picture_under_a_wide_lamp_is_off_as_is_said(extension, convert, empty, kind, inputs):
-    """Of a ball, with fewer grazing views than are taken for what is said."""
+    """For a ball, which has fewer grazing views than the stated error assumes."""
     material, _ = material_of(kind, "GGX", **inputs)
     plan = only(convert.plan([material]))
     copy = material.copy()
@@ -208,11 +209,11 @@ def test_a_picture_under_a_wide_lamp_is_off_as_is_said(extension, convert, empty
         pictures.append(helpers.render(empty)[..., :3])
     off = np.abs(pictures[0] - pictures[1]).sum() / pictures[0].sum()
     print(f"{kind} {inputs}: {plan.model}, seen {off:.3g}, said {plan.error:.3g}")
-    assert plan.error / 3 - 0.01 < off < 3 * plan.error + 0.02  # mirrors of a lamp are noisy
+    assert plan.error / 3 - 0.01 < off < 3 * plan.error + 0.02  # mirrored lamps are noisy
 
 
 def test_the_error_is_that_of_the_pictures(extension, convert, empty):
-    """Of the light of many suns on many facets, as far as one sun tells."""
+    """Compared with many suns on many facets, within the precision of each sun."""
     material, _ = material_of("principled", "GGX", Roughness=0.5)
     plan = only(convert.plan([material]))
     copy = material.copy()
@@ -284,7 +285,7 @@ def driven(socket):
 
 
 def played(socket):
-    """By a strip of the Nonlinear Animation."""
+    """By a strip in the Nonlinear Animation editor."""
     keyed(socket)
     data = socket.id_data.animation_data
     action, slot = data.action, data.action_slot
@@ -320,7 +321,7 @@ def test_an_animated_distribution_is_said(convert):
 
 def test_animation_that_shows_nothing_is_no_reason(convert):
     material, node = material_of("principled")
-    keyed(node.inputs["Coat Roughness"])  # of a coat of weight 0
+    keyed(node.inputs["Coat Roughness"])  # of a coat with weight 0
     keyed(node.inputs["Base Color"])
     linked(material, node, "Base Color")
     keyed(node.inputs["Roughness"])
@@ -332,7 +333,7 @@ def test_animation_that_shows_nothing_is_no_reason(convert):
 
 def test_a_strip_still_moves_a_parameter_in_another_form(extension, convert, empty):
     material = extension.api.new_material("phong_material", "sampled", kd=0.1)
-    helpers.add_sphere(empty, material)  # so that it is evaluated
+    helpers.add_sphere(empty, material)  # so that Blender evaluates it
     (group,) = extension.nodes.group_nodes(material)
     socket = extension.nodes.sockets(group)["kr"]
     for frame, value in ((1, 0.2), (10, 0.6)):
@@ -361,7 +362,7 @@ def test_a_limit_is_a_reason(extension, convert):
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
     with pytest.raises(ValueError, match="Expected a number, got 'much'"):
         extension.api.plan_conversion([material], limit="much")
-    # What no model reflects: a colour far above 1.
+    # A colour far above 1, which no model can reflect.
     (plan,) = extension.api.plan_conversion([material_of("diffuse", Color=(9.0, 0.0, 0.0))[0]])
     assert "sends 89 % of the light" in plan.refusal
 
@@ -369,7 +370,7 @@ def test_a_limit_is_a_reason(extension, convert):
 def test_a_linked_roughness_is_followed(extension, convert):
     material, node = material_of("glossy", "GGX", Color=GOLD)
     value = linked(material, node, "Roughness", "ShaderNodeValue")
-    value.outputs[0].default_value = 0.4  # of 0 a mirror comes, which has none
+    value.outputs[0].default_value = 0.4  # 0 would become a mirror, which has no roughness
     plan = only(convert.plan([material]))
     ((name, factor, power, low, high), *_) = plan.widths
     assert convert.apply([plan]) == 1
@@ -452,7 +453,7 @@ def test_a_shader_inside_a_group_stays_and_is_said(extension, convert):
         "Grouped, Lack außen: stays, its shader is inside this node group: ungroup it first"
     )
     assert convert.apply([plan]) == 0 and group.outputs[0].is_linked
-    # A model of this extension is a group as well, which holds nothing to convert.
+    # A model of this extension is a group as well, with nothing to convert inside.
     assert convert.plan([extension.api.new_material("lambert")]) == []
 
 
@@ -494,7 +495,7 @@ def mute_source(material, node, source):
 
 
 def dangle(material, node, source):
-    """A reroute that is given nothing; before 5.0 Cycles takes 0 for that."""
+    """A reroute without an input; before 5.0 Cycles uses 0 for it."""
     tree = material.node_tree
     tree.links.new(tree.nodes.new("NodeReroute").outputs[0], node.inputs["Base Color"])
     tree.nodes.remove(source)
@@ -512,7 +513,7 @@ IGNORED = [mute_link, mute_source, dangle, mute_behind_a_reroute]
 
 
 def look(scene, material):
-    """The colour of a ball of a material in a white world."""
+    """Colour of a ball with this material in a white world."""
     if "Sphere" not in bpy.data.objects:
         helpers.sphere_scene(scene, material, samples=64)
         scene.cycles.max_bounces = 1
@@ -576,7 +577,7 @@ def test_a_constant_behind_a_link_that_changes_is_stale(convert):
 
 
 def test_muted_links_stay_at_the_node_of_before(convert):
-    """Which shows nothing, as before."""
+    """The original node stays unconnected, as it was."""
     material, node = material_of("principled")
     tree = material.node_tree
     other = tree.nodes.new("ShaderNodeAddShader")
@@ -600,7 +601,7 @@ def test_nodes_that_are_not_used_are_not_converted(extension, convert):
 
 
 def picture_node(tree, *pixels, data=True):
-    """An Image Texture of a row of pixels, (r, g, b) or (r, g, b, a) each."""
+    """An Image Texture with one row of pixels, (r, g, b) or (r, g, b, a) each."""
     image = bpy.data.images.new("Image", len(pixels), 1, alpha=True, is_data=data)
     image.pixels.foreach_set(np.array([(*p, 1.0)[:4] for p in pixels], np.float32).ravel())
     image.pack()
@@ -610,13 +611,13 @@ def picture_node(tree, *pixels, data=True):
 
 
 def of_old_versions(material, node):
-    """What Blender makes of files of 2.91 to 3.6."""
+    """As Blender converts files of versions 2.91 to 3.6."""
     node.inputs["Emission Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     node.inputs["Emission Strength"].default_value = 1.0
 
 
 def of_fbx(material, node):
-    """And a colour by an image whose alpha is linked as well, and 1."""
+    """The same, with the colour from an image whose alpha, always 1, is linked as well."""
     of_old_versions(material, node)
     links = material.node_tree.links
     picture = picture_node(material.node_tree, (0.8, 0.2, 0.1), (0.4, 0.3, 0.1), data=False)
@@ -625,15 +626,15 @@ def of_fbx(material, node):
 
 
 def of_obj(material, node):
-    """Without a map of what emits."""
+    """Without an emission map."""
     of_old_versions(material, node)
     value = linked(material, node, "Metallic", "ShaderNodeValue")
     value.outputs[0].default_value = 0.0
 
 
 def of_gltf(material, node):
-    """Base colour, metal and roughness by the blue and the green of one image, a normal map, and an
-    alpha of 1."""
+    """Base colour; metallic and roughness from blue and green of one image; a normal map; and alpha
+    1."""
     tree, links = material.node_tree, material.node_tree.links
     of_old_versions(material, node)
     color = picture_node(tree, (0.8, 0.2, 0.1), (0.9, 0.8, 0.6), data=False)
@@ -653,7 +654,7 @@ def of_gltf(material, node):
 
 
 def without_metal(material, node):
-    """As of_gltf(), with a factor of 0 before its metal."""
+    """As of_gltf(), with the metallic channel multiplied by 0."""
     of_gltf(material, node)
     tree, socket = material.node_tree, node.inputs["Metallic"]
     factor = tree.nodes.new("ShaderNodeMath")
@@ -664,7 +665,7 @@ def without_metal(material, node):
 
 
 def of_a_library(material, node):
-    """A picture of metal that is black all over."""
+    """A metallic map that is black everywhere."""
     picture = picture_node(material.node_tree, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     material.node_tree.links.new(picture.outputs["Color"], node.inputs["Metallic"])
 
@@ -692,7 +693,7 @@ def test_what_importers_make_is_converted(extension, convert, imported, models):
 
 
 def flat(scene, material):
-    """Colours of a plane under a white world, from left to right of the image on it."""
+    """Colours of a plane in a white world, from left to right over the image on it."""
     if "Plane" not in bpy.data.objects:
         bpy.ops.mesh.primitive_plane_add(size=2, rotation=(np.pi / 2, 0, 0))
         helpers.add_camera(scene, orthographic=2)
@@ -735,7 +736,7 @@ def glows_behind_alpha(material, node):
 
 
 def has_a_colour_by_an_image(material, node):
-    """Beside a metal of a half, for which no model has one colour."""
+    """With a Metallic of a half, for which no model has a single colour."""
     node.inputs["Metallic"].default_value = 0.5
     tree = material.node_tree
     picture = picture_node(tree, (0.8, 0.1, 0.1), (0.1, 0.1, 0.8))
@@ -771,7 +772,7 @@ def test_a_picture_of_what_is_mixed_is_as_before(extension, convert, empty, chan
 
 
 def test_back_where_the_node_of_a_mix_is_gone_is_a_twin_of_each(extension, convert):
-    """Or nothing at all, where one of the models has no twin for its values."""
+    """Or nothing, if one of the models has no twin for its values."""
     material, node = material_of("principled", Roughness=0.5, Base_Color=GOLD)
     is_half_metal(material, node)
     assert convert.apply(convert.plan([material])) == 1
@@ -823,7 +824,7 @@ def test_the_error_of_an_image_is_that_of_its_mean(convert):
 
 @pytest.mark.parametrize("color", [0.0, 0.04, 0.5, 1.0])
 def test_a_picture_of_a_linked_colour_is_off_as_is_said(extension, convert, empty, color):
-    """Under a lamp as wide as windows, as what is said is of."""
+    """Under a lamp as wide as windows, for which the error is stated."""
     material, node = material_of("principled", "GGX", Roughness=0.5)
     noise = linked(material, node, "Base Color", "ShaderNodeTexNoise")
     noise.inputs["Scale"].default_value = 0.0
@@ -859,7 +860,7 @@ def test_a_picture_of_a_linked_colour_is_off_as_is_said(extension, convert, empt
 
 
 def test_a_socket_that_is_not_known_is_refused_by_name_when_it_is_set(convert, monkeypatch):
-    """As in a version of Blender that has one more."""
+    """As in a later version of Blender with an additional socket."""
     known = convert.KNOWN_SOCKETS["principled"] - {"Coat IOR"}
     monkeypatch.setitem(convert.KNOWN_SOCKETS, "principled", known)
     material, node = material_of("principled")
@@ -977,7 +978,7 @@ def test_the_button_has_a_limit(extension, item):
 
 
 def test_a_limit_that_is_changed_afterwards_plans_anew(extension, item):
-    """In the panel of the last operator, which undoes it first: nodes of before may be gone."""
+    """In the panel of the last operator, which first undoes it: original nodes may be gone."""
     operator = import_module(f"{extension.package}.operators.convert").BRDFC_OT_convert
     said = []
     last = SimpleNamespace(limit=35.0, _plans=None, report=lambda kind, text: said.append(text))

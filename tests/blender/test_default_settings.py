@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What people get who change no setting: Open Shading Language is off in a new file, and materials
-whose form was not asked for by name are right there; they follow when that changes."""
+"""What users get who change no settings: in a new file Open Shading Language is off, and materials
+of the form "auto" must be right nevertheless, and follow when the setting changes."""
 
 import math
 
@@ -17,14 +17,14 @@ from helpers import (
 )
 
 BLOCK = 8
-#: Pixels of a model in the picture of all, in each direction.
+#: Width and height in pixels of a model's part of the picture.
 PLACE = 32
 COLUMNS = 6
 
 
 @pytest.fixture
 def new_file(extension):
-    """A file as Blender begins with, and Cycles; the cube is gone."""
+    """A new file with Cycles, without the cube."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     scene = bpy.context.scene
@@ -45,7 +45,7 @@ def form_of(extension, material):
 
 
 def update(scene):
-    """What Blender does after a click, which a script's assignment leaves out."""
+    """The event after a user's click, which a script's assignment does not cause."""
     scene.update_tag()
     bpy.context.view_layer.update()
 
@@ -55,12 +55,12 @@ def native(extension, model):
 
 
 def gallery(scene, materials):
-    """A ball a material before the camera, in rows."""
+    """Balls, one for each material, in rows in front of the camera."""
     rows = math.ceil(len(materials) / COLUMNS)
     for index, material in enumerate(materials):
         ball = add_sphere(scene, material, segments=64)
         ball.location = (2.2 * (index % COLUMNS), 0, 2.2 * (index // COLUMNS))
-        # Filter Glossy makes another one of a closure in a mirror, of each kind in its own way.
+        # Filter Glossy would change closures seen in a mirror, differently for each kind.
         ball.visible_diffuse = ball.visible_glossy = False
     width, height = 2.2 * COLUMNS, 2.2 * rows
     where = (width / 2 - 1.1, -20, height / 2 - 1.1)
@@ -70,7 +70,7 @@ def gallery(scene, materials):
 
 
 def blocks(picture, index):
-    """Means of the blocks of pixels of a model's place."""
+    """Means of the blocks of pixels in a model's part of the picture."""
     row, column = divmod(index, COLUMNS)
     part = picture[row * PLACE : (row + 1) * PLACE, column * PLACE : (column + 1) * PLACE]
     side = PLACE // BLOCK
@@ -80,10 +80,11 @@ def blocks(picture, index):
 @pytest.mark.long
 @pytest.mark.slow
 def test_every_model_in_a_new_file(extension, new_file, few_of):
-    """What *Add > Shader > brdfc* gives has nothing to say, and is right: under a new file's lamp,
-    world and settings, with Open Shading Language off and on, where forms draw or aim and have been
-    held against the reference renderer. Means of balls, and blocks of pixels as far as noise
-    tells."""
+    """Materials of the menu *Add > Shader > brdfc* must be right and have no warnings.
+
+    In a new file, with its lamp, world and settings, the form without Open Shading Language is
+    compared with the one with it, which is known to match the reference renderer: means of balls,
+    and blocks of pixels within the noise."""
     models = few_of(extension.api.models(), 8)
     materials = [extension.api.new_material(model) for model in models]
     few_samples(new_file, 24)
@@ -107,13 +108,14 @@ def test_every_model_in_a_new_file(extension, new_file, few_of):
         errors = [x.mean(1).var(ddof=1) / count for x in (off, on)]
         relative = off.mean() / on.mean() - 1
         error = math.sqrt(sum(errors)) / on.mean()
-        # A standard error of four pictures may be half of what it should be.
+        # The standard error is estimated from four pictures, and may be half of the true one.
         assert abs(relative) < 6 * error + 5e-3, f"{model}: {relative:+.2%} \u00b1 {error:.2%}"
         noise = (off.var(0, ddof=1) + on.var(0, ddof=1)) / count
-        # Of the block in which a mirror shows the small lamp by chance four pictures say little.
+        # Excludes the noisiest block, where a mirror shows the small lamp by chance.
         lit = (on.mean(0) > 0.02 * on.mean(0).max()) & (noise < noise.max())
         apart = (off.mean(0) - on.mean(0))[lit] ** 2
-        # Beside noise half a percent of the ball's light a block: twins are 1 to 26 % off.
+        # Besides the noise, each block may differ by half a percent of the ball's light: twins
+        # differ by 1 to 26 %.
         allowed = noise[lit].sum() + lit.sum() * (5e-3 * on.mean()) ** 2
         assert apart.sum() / allowed < 3.5, f"{model}: blocks {apart.sum() / allowed:.2f}"
 
@@ -161,7 +163,7 @@ def moving_material(extension, model="lambertian_specular"):
 
 
 def test_a_material_follows_the_scene(extension, new_file):
-    """Whatever has it follow: its node stays, with values, links, animation and drivers."""
+    """Whatever causes the change: the node stays, with values, links, animation and drivers."""
     few_samples(new_file, 64)
     material = moving_material(extension)
     add_sphere(new_file, material)
@@ -179,11 +181,11 @@ def test_a_material_follows_the_scene(extension, new_file):
     new_file.frame_set(11)
     assert np.abs(render(new_file)[..., :3] - pictures[True]).max() > 0.01
     groups = [g.name for g in bpy.data.node_groups if extension.nodes.TAG in g]
-    assert len(groups) == 2  # its own, and the twin's
+    assert len(groups) == 2  # its own and the twin's
 
 
 def test_a_render_follows_what_a_script_has_changed(extension, new_file):
-    """Without a click nothing tells the extension before the picture."""
+    """Without a click, the extension is first notified by the render."""
     few_samples(new_file, 1, 8)
     add_camera(new_file)
     material = extension.api.new_material("lambert")
@@ -195,7 +197,7 @@ def test_a_render_follows_what_a_script_has_changed(extension, new_file):
 
 
 def test_baking_follows(extension, new_file):
-    """What is baked into an image is what a picture shows."""
+    """A baked image must show the same as a render."""
     few_samples(new_file, 4)
     material = extension.api.new_material("lambert", rho=(0.5, 0.4, 0.3))
     bpy.ops.mesh.primitive_plane_add()
@@ -225,7 +227,7 @@ def test_what_lacks_osl(extension, new_file, monkeypatch, change):
     elif change == "build":
         monkeypatch.setattr(extension.pack, "osl_available", lambda: False)
     elif change == "engine":
-        # Blender's own nodes stand in there, by the group's own choice.
+        # There Blender's own nodes stand in, selected inside the group.
         new_file.render.engine, wanted = "BLENDER_WORKBENCH", "exact"
     update(new_file)
     assert form_of(extension, material) == wanted
@@ -251,8 +253,8 @@ def test_what_was_asked_for_by_name_stays(extension, new_file):
 
 
 def test_a_choice_that_nodes_lack(extension, new_file):
-    """The twin is shown, with a sentence, as long as the choice is another, and the formulas again
-    when it is not, in the same group."""
+    """While the choice is one that the nodes lack, the twin is shown with a warning; otherwise the
+    formulas, in the same group."""
     few_samples(new_file, 64)
     material = extension.api.new_material("glossy_specular", normalisation="conserving")
     add_sphere(new_file, material)
@@ -275,8 +277,8 @@ def test_a_choice_that_nodes_lack(extension, new_file):
 
 
 def test_undo(extension, new_file):
-    """A step back takes the setting back and with it the form, whichever groups that needs; every
-    state is found again, and values that were changed between."""
+    """Undo restores the setting, and with it the form, whichever groups that requires. Every state
+    is restored, including values that were changed in between."""
     material = moving_material(extension)
     mesh = bpy.data.meshes.new("Mesh")
     mesh.materials.append(material)
@@ -299,7 +301,7 @@ def test_undo(extension, new_file):
 
     def push(message):
         bpy.ops.ed.undo_push(message=message)
-        update(bpy.context.scene)  # after the step, as in the interface
+        update(bpy.context.scene)  # after the step was recorded, as in the interface
         states.append(now())
 
     states = []
@@ -323,7 +325,7 @@ def test_undo(extension, new_file):
 
 
 def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_path):
-    """With the settings that it was saved with, and what stands in for scripts with others."""
+    """With the settings that it was saved with; and the stand-in for scripts with others."""
     few_samples(new_file, 16)
     new_file.cycles.seed = 3
     add_camera(new_file)
@@ -337,7 +339,7 @@ def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_pat
 
 
 def test_convert(extension, new_file):
-    """Nodes become models that follow the scene, with values that both forms have."""
+    """Nodes become models that follow the scene, with values that both forms support."""
     material = node_material("ShaderNodeBsdfDiffuse", Color=(0.5, 0.4, 0.3, 1), Roughness=0.6)
     (plan,) = extension.api.plan_conversion([material])
     assert extension.api.convert_materials([plan]) == 1

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forms that are made of a fit, of every model that has them, with its default parameters: under
+"""Tests forms that need a fit, of every model that has them, with its default parameters: under
 suns, in a white world and in worlds that vary with the direction.
 
-What is fitted, and a twin, must be the sum of closures that `brdfc fit` judges, an aimed form whose
-base is a fit the model. With BRDFC_EVERY_FIT=all every model is measured, as script/conditions
-does; else some, for their fits take minutes.
+A fitted form and a twin must equal the sum of closures that `brdfc fit` evaluates; an aimed form
+with a fit as its base must equal the model. With BRDFC_EVERY_FIT=all, every model is measured, as
+in script/conditions; otherwise only some, because their fits take minutes.
 """
 
 import json
@@ -24,32 +24,33 @@ from worlds import gradient, half, spot, white
 FULL = pytest.mark.full
 EVIDENCE = pytest.mark.evidence
 ALL = os.environ.get("BRDFC_EVERY_FIT") == "all"
-#: Facets that lean, a narrow lobe, a matte model, closures beside a mirror.
+#: Tilted microfacets, a narrow lobe, a diffuse model, closures with a mirror.
 SOME = {"ward", "glossy_reflector", "oren_nayar", "coupled"}
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
-#: Facets of a model under a sun.
+#: Number of facets for each model and sun.
 FACETS = 96
 WORLDS = (white, gradient, half, spot)
 REPLICAS = 48
-#: Samples a pixel: drawn directions, some of which weigh less than nothing, need more.
+#: Samples per pixel: sampled directions need more, because some have negative weights.
 SAMPLES = {"fitted": 256, "aimed": 1024, "twin": 256}
-#: What single precision and the steps of a twin's curves may add under a sun, as a share of the
-#: largest value; a narrow highlight moves with its roughness.
+#: Error allowed under a sun for single precision and for the steps of a twin's curves, relative to
+#: the largest value; a narrow highlight depends sensitively on its roughness.
 UNDER_A_SUN = {"fitted": 1e-3, "twin": 2e-3}
-#: Beyond noise, in a world, as a share of the largest value: what Cycles draws of Beckmann's facets
-#: (blinn, cook_torrance) is 0.3 % off from what it evaluates, in all versions, and where they lean
-#: to the sides (the twin of ashikhmin_shirley at a cosine of 0.1) 1.1 %.
+#: Error allowed in a world besides noise, relative to the largest value. In all versions, Cycles
+#: samples Beckmann microfacets (blinn, cook_torrance) differently than it evaluates them, by 0.3 %,
+#: and by 1.1 % if they are tilted sideways (the twin of ashikhmin_shirley at a cosine of 0.1).
 IN_A_WORLD = {"fitted": 4e-3, "aimed": 1e-3, "twin": 15e-3}
-#: Standard errors.
+#: In standard errors.
 SIGNIFICANT = 5.5
-#: Blender 4.5 keeps rays between the surface and the horizon of facets that lean, and twins' lean
-#: to all sides. 7 % of the light is measured, as the panel says; the rest is for noise.
+#: Blender 4.5 keeps rays between the surface and the horizon of tilted microfacets, which twins
+#: have in all directions. That is measured as 7 % of the light, as the panel warns; the rest is for
+#: noise.
 TOO_BRIGHT = 0.08
 
 
 @pytest.fixture(scope="module")
 def folder(lean_pack, tool):
-    """A pack with all that is made of a fit, as `script/forms` prints it."""
+    """A pack with every form that needs a fit, as in `script/forms`."""
     models = {m["name"]: m["representations"] for m in json.loads(tool("list", "--json"))}
     materials = {
         f"{name} {form}": {"model": name, "representation": form}
@@ -62,7 +63,7 @@ def folder(lean_pack, tool):
 
 @pytest.fixture
 def fits(extension, folder):
-    """fits(form): the models that have it, once with its default parameters."""
+    """fits(form): the models that have it with their default parameters."""
     extension.pack.use(folder)
 
     def having(form):
@@ -80,13 +81,15 @@ def start(extension, form, models):
     scene.cycles.shading_system = form != "twin"
     materials = [extension.api.new_material(model, form) for model in models]
     for material in materials:
-        # It bends the normals of closures that lean; the sums that are judged are those without.
+        # The correction would bend the normals of tilted closures; the expected sums are without
+        # it.
         material.cycles.use_bump_map_correction = False
     return scene, materials
 
 
 def under_suns(extension, form, models):
-    """By model: wi, wo and radiance of facets, (n, 3) each; half of them show the highlight."""
+    """By model: wi, wo and radiance of facets, (n, 3) each; half of the facets show the
+    highlight."""
     rng = np.random.default_rng(3)
     which = np.repeat(np.arange(len(models)), FACETS)
     found = [[] for _ in models]
@@ -98,8 +101,8 @@ def under_suns(extension, form, models):
         meter = Goniometer(scene, materials, normals, samples=4, which=which)
         wi, wo = meter.local(meter.add_sun(towards)), meter.wo()
         picture = meter.measure()
-        # Beside the terminator float rounding decides which side the sun is on, and a curve has
-        # its steps of a hundredth.
+        # Near the terminator, rounding to float decides on which side the sun is; and curves have
+        # steps of 0.01.
         lit = (wi[:, 2] > 1e-3) & (wo[:, 2] > 0.02)
         for i in range(len(models)):
             mine = (which == i) & lit
@@ -108,14 +111,14 @@ def under_suns(extension, form, models):
 
 
 def in_worlds(extension, form, models):
-    """By world: its radiance, and by model the mean radiance of the kinds of facets and its
+    """By world: its radiance, and for each model the mean radiance of the kinds of facets and its
     standard error, (kinds, 3) each."""
     result = []
     for world in WORLDS:
         scene, materials = start(extension, form, models)
         normals = np.tile(np.repeat(KINDS, REPLICAS, 0), (len(models), 1))
         which = np.repeat(np.arange(len(models)), len(KINDS) * REPLICAS)
-        # What draws its own directions does so by position.
+        # Forms that sample directions derive random numbers from positions.
         meter = Goniometer(scene, materials, normals, SAMPLES[form], form == "aimed", which)
         radiance = world(*meter.add_world())
         picture = meter.measure().reshape(len(models), len(KINDS), REPLICAS, 3)
@@ -125,14 +128,14 @@ def in_worlds(extension, form, models):
     return result
 
 
-#: Cosines and azimuths of the hemisphere's nodes. Facets that lean end at a horizon of their own,
-#: which takes more.
+#: Number of quadrature nodes in cosine and azimuth. Tilted microfacets end at their own horizon,
+#: which takes more nodes.
 NODES = ((96, 192), (200, 400))
 
 
 def closures(tool, form, model, sun):
-    """The sum of closures, by `brdfc fit`: for pairs under suns, (n, 3); and by view, nodes in the
-    local frame and f cos dw."""
+    """The sum of closures from `brdfc fit`: for the pairs under suns, (n, 3); and for each view,
+    quadrature nodes in the local frame and f cos dw there."""
     options = ["--twin"] if form == "twin" else []
     views = [local(normal, np.array([0.0, 0.0, 1.0])) for normal in KINDS]
     total = albedo(tool, model, {}, KINDS[:, 2]) - mirrors_of(tool, model)
@@ -146,7 +149,7 @@ def closures(tool, form, model, sun):
         wi, weights = hemisphere(*nodes)
         return wi, weights, [np.broadcast_to(views[k], wi.shape) for k in kinds]
 
-    # Two questions at most: a fit takes seconds.
+    # Asks at most twice: a fit takes seconds.
     wi, weights, wo = lobes(range(len(views)), NODES[0])
     under_sun, *values = ask([sun.wi, *[wi] * len(wo)], [sun.wo, *wo])
     found = [(wi, f * weights[:, None]) for f in values]
@@ -163,7 +166,7 @@ def mirrors_of(tool, model):
 
 
 def reflected(lobes, mirrors, radiance):
-    """Integrals over the hemisphere against a radiance, with the mirror; (kinds, 3)."""
+    """Integrals over the hemisphere against a radiance, including the mirror; (kinds, 3)."""
     result = []
     for normal, (wi, f), mirror in zip(KINDS, lobes, mirrors, strict=True):
         wo = local(normal, np.array([0.0, 0.0, 1.0]))
@@ -174,14 +177,14 @@ def reflected(lobes, mirrors, radiance):
 
 
 def compare(form, model, name, seen, truth):
-    """Mean radiance against what it should be, in standard errors."""
+    """Deviation of the mean radiance from the expected one, in standard errors."""
     mean, error = seen
-    # Where only a few samples meet light, replicas do not show the error: samples are about 1.
+    # If only a few samples hit light, replicas underestimate the error; samples are about 1.
     samples = SAMPLES[form] * REPLICAS
     rare = truth * samples < 400
     error = np.where(rare, np.maximum(error, np.sqrt(np.abs(truth) / samples) + 1 / samples), error)
     error = np.maximum(error, 1e-6)
-    # Beyond what may be off without noise.
+    # Only what exceeds the allowed error counts.
     off = mean - truth
     z = np.sign(off) * np.maximum(np.abs(off) - IN_A_WORLD[form] * truth.max(), 0) / error
     print(
@@ -194,13 +197,14 @@ def compare(form, model, name, seen, truth):
     assert np.abs(z).max() < SIGNIFICANT, f"{name}: z = {np.round(z, 1)}"
 
 
-# Versions differ in how facets that lean are sampled.
+# Versions differ in how they sample tilted microfacets.
 @pytest.mark.evidence
 @pytest.mark.parametrize("form", [pytest.param("fitted", marks=FULL), "twin"])
 def test_closures_of_every_model(extension, fits, tool, subtests, form):
-    """Cycles evaluates what the tool says under suns, and samples it: the mean in every world
-    within 5.5 standard errors, 60 comparisons a model, so one false alarm in some ten thousand
-    runs. The white world is the furnace: what is reflected is the model's albedo to 1 %."""
+    """Cycles must evaluate the tool's sum under suns, and sample it: in every world the mean is
+    within 5.5 standard errors. With 60 comparisons per model, that is one false alarm in about ten
+    thousand runs. The white world is a furnace test: the reflected light is the model's albedo to 1
+    %."""
     models = fits(form)
     assert len(models) >= 20 if ALL else set(models) == SOME
     suns = under_suns(extension, form, models)
@@ -226,8 +230,8 @@ def test_closures_of_every_model(extension, fits, tool, subtests, form):
 @FULL
 @EVIDENCE
 def test_aimed_forms_whose_base_is_a_fit(extension, fits, tool, subtests):
-    """They reflect what the model does: in every world within 5.5 standard errors, 60 comparisons a
-    model, so one false alarm in some ten thousand runs."""
+    """They must reflect the light that the model does: in every world within 5.5 standard errors.
+    With 60 comparisons per model, that is one false alarm in about ten thousand runs."""
     models = [m for m in fits("aimed") if m in fits("fitted")]
     assert len(models) >= 12 if ALL else set(models) == SOME
     worlds = in_worlds(extension, "aimed", models)
@@ -238,7 +242,8 @@ def test_aimed_forms_whose_base_is_a_fit(extension, fits, tool, subtests):
                 compare("aimed", model, world.__name__, seen[model], truth)
 
 
-#: Facets under a small lamp: two beside its highlight, as near as no mirror shows it, and others.
+#: Facets under a small lamp: two beside its highlight, close enough but without a mirror image, and
+#: others.
 LAMP, LAMP_ZENITH = 0.2, 0.56
 LIT = tilted(np.cos([LAMP_ZENITH / 2 + 0.08, LAMP_ZENITH / 2 - 0.15, 0.0, 1.0]), 0.0)
 
@@ -247,7 +252,7 @@ LIT = tilted(np.cos([LAMP_ZENITH / 2 + 0.08, LAMP_ZENITH / 2 - 0.15, 0.0, 1.0]),
 @EVIDENCE
 @pytest.mark.parametrize("settings", ["clean", "default"])
 def test_noise_of_aimed_forms_whose_base_is_a_fit(extension, fits, tool, subtests, settings):
-    """relMSE under a small lamp, at equal samples: a third of the sampled form's at most."""
+    """relMSE under a small lamp with equal samples: at most a third of the sampled form's."""
     models = [m for m in fits("aimed") if m in fits("fitted")]
     found = {}
     for form in ("sampled", "aimed"):
@@ -285,7 +290,7 @@ class Default(conditions.Form):
 @FULL
 @EVIDENCE
 def test_the_panel_warns_where_a_form_of_any_model_is_biased(extension, fits, tool):
-    """As test_conditions.py does for some forms of the extension."""
+    """The same as test_conditions.py does for some forms of the extension."""
     mirrors = {m["name"]: m["mirror"] for m in json.loads(tool("list", "--json"))}
     names = ["default settings", "clamp indirect 1", "caustics off", "sun without size"]
     silent = []

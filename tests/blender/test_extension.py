@@ -22,7 +22,7 @@ SCRIPTS = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
 
 
 def forms(extension):
-    """Those that are shaders; for Blender's own nodes there is test_twin.py."""
+    """Forms that are shaders; test_twin.py tests those of Blender's own nodes."""
     return [
         (model, representation)
         for model, entry in extension.api.models().items()
@@ -58,8 +58,9 @@ def test_zip_holds_no_binary(extension_zip):
 
 @pytest.fixture(scope="module")
 def every_form(extension, tmp_path_factory):
-    """One file for all, which also shows that groups live beside each other: a sphere of each form
-    in a row, pixels a sphere. What making a material raised stands in its place."""
+    """One file for all tests, which also shows that the groups coexist: a row of spheres, one for
+    each form, and the pixels of each. If making a material raised an exception, that takes its
+    place."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
@@ -68,7 +69,7 @@ def every_form(extension, tmp_path_factory):
     for x, (model, representation) in enumerate(pairs):
         try:
             material = extension.api.new_material(model, representation)
-        except Exception as error:  # it belongs to this form alone
+        except Exception as error:  # fails this form alone
             made[model, representation] = error
             continue
         made[model, representation] = material.name
@@ -86,7 +87,8 @@ def every_form(extension, tmp_path_factory):
 
 @pytest.fixture
 def made_forms(extension, every_form):
-    """(model, form, material) of all forms, of a file: to compile them anew takes seconds."""
+    """(model, form, material) of all forms, from one file: compiling them again would take
+    seconds."""
     bpy.ops.wm.open_mainfile(filepath=str(every_form.blend))
     names = {f: n for f, n in every_form.made.items() if isinstance(n, str)}
     assert names
@@ -117,12 +119,12 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
             assert np.isfinite(picture).all()
             centre = picture[6:10, 6:10, :3]
             assert centre.min() > 0.01
-            assert centre.max() < 1.5  # a white world can't be outshone, but for noise
+            assert centre.max() < 1.5  # only noise exceeds a white world
 
 
 def test_sliders_do_not_recompile(extension, every_form, monkeypatch, subtests):
-    """Every number and colour of every form is a socket: a change leaves text and bytecode alone,
-    and the compiler is not asked."""
+    """Every number and colour of every form is a socket: changing it leaves text and bytecode
+    alone, and does not call the compiler."""
     import cycles.osl
 
     compiled, compiler = [], cycles.osl.osl_compile
@@ -160,15 +162,15 @@ def test_sliders_do_not_recompile(extension, every_form, monkeypatch, subtests):
             assert node.node_tree == group and state(group) == before
             assert helpers.counts() == data
             assert not compiled
-    # Had one been compiled, it would have been seen.
+    # Shows that a compilation would have been noticed.
     script = state(group)[0]
     script.script = script.script
     assert compiled
 
 
 def statements(source):
-    """Most statements that one call of a shader executes, of alternatives the longest, a loop's
-    body once."""
+    """The largest number of statements that one call of a shader may execute: the longest of
+    alternatives, and loop bodies once."""
 
     def count(text):
         chains = re.finditer(r"#\d+#(?:\s*else[^#;]*#\d+#)*", text)
@@ -178,7 +180,7 @@ def statements(source):
     code = re.sub(r"//.*|\[\[.*?\]\]", "", source)
     body = code[re.search(r"^shader \w+\(", code, re.MULTILINE).start() :]
     body = body[body.index("\n{") :]
-    # Semicolons of loops and braces of tables.
+    # Removes the semicolons of loops and the braces of tables.
     body = re.sub(r"for \([^;]*;[^;]*;[^{\n]*\)|= \{[^{}]*\}", "", body)
     while "{" in body:
         body = re.sub(r"\{([^{}]*)\}", lambda block: f"#{count(block[1])}#", body)
@@ -187,9 +189,9 @@ def statements(source):
 
 def test_shaders_are_short(extension_zip, subtests):
     """Every shader of the extension has fewer than 600 statements, counted by the generator as
-    operations and here in its text. Aimed forms hold what is done with lamps beside a model's value
-    and its sampling, and a base: up to 1,400, which compile in some 0.4 s; `lossless`, whose value
-    is a long sum, 2,900."""
+    operations and here in its text. Aimed forms contain a base and the computations for lamps in
+    addition to a model's value and sampling: up to 1,400 statements, which compile in about 0.4 s;
+    `lossless`, whose value is a long sum, has 2,900."""
     import zipfile
 
     text = "shader x(float a = 0 [[ int b = 1; ]],\n    output color Albedo = 0)\n{\n"
@@ -201,7 +203,7 @@ def test_shaders_are_short(extension_zip, subtests):
         made = [f for m in manifest["models"].values() for f in m["representations"].values()]
         forms = [f for f in made if "shader" in f]
         shaders = {f["shader"]: f["operations"] for f in forms}
-        # A table's look-ups are no operations of the model.
+        # Table look-ups are not operations of the model.
         shaders |= {f["albedo_shader"]: 0 for f in forms if f["albedo_shader"]}
         assert set(shaders) == {name for name in archive.namelist() if name.endswith(".osl")}
         for name, operations in shaders.items():
@@ -216,8 +218,8 @@ def test_shaders_are_short(extension_zip, subtests):
 @pytest.mark.long
 @pytest.mark.slow
 def test_every_choice_reaches_the_shader(extension, empty, subtests):
-    """Each choice of a parameter gives a picture of its own, that of its index: the script node's
-    own input set by hand must render the same as the group's socket."""
+    """Each choice of a parameter gives a different picture, that of its index: setting the script
+    node's own input must render the same as setting the group's socket."""
     tested = 0
     for model, representation in forms(extension):
         sockets = extension.pack.socket_parameters(model, representation).values()
@@ -232,7 +234,7 @@ def test_every_choice_reaches_the_shader(extension, empty, subtests):
         helpers.sphere_scene(scene, material, size=16, samples=16)
         tree = extension.nodes.group_nodes(material)[0].node_tree
         script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
-        # Different ones, and broad lobes: else some choices make no difference.
+        # Different values and broad lobes: otherwise some choices would make no difference.
         for i, number in enumerate(p for p in sockets if p["kind"] == "number"):
             least = number["soft_min"]
             value = least + (number["default"] - least) * min(0.1 * (i + 1), 0.9)
@@ -397,7 +399,7 @@ BROKEN = {
 
 
 def spoil(extension, monkeypatch, source):
-    """Has the pack give this source of every shader."""
+    """Makes the pack return this source for every shader."""
     real = extension.pack.source
 
     def spoilt(model, form):
@@ -426,14 +428,14 @@ def test_broken_shader_under_another_engine(extension, empty, monkeypatch):
 
 
 def scripts_of(node):
-    """Of the model, not of what tells where shaders run."""
+    """The scripts of the model, without the one that tells where shaders run."""
     found = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript"]
     return [n for n in found if n.name != "Runs"]
 
 
 def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, made_forms, subtests):
-    """A file holds source and bytecode of each. Fits hold tables of their own; what two aimed forms
-    hold for each of their many choices is more than it should be."""
+    """A file contains source and bytecode of each shader. Fits contain their own tables; two aimed
+    forms still contain too much for each of their many choices."""
     longer = {("ashikhmin_shirley", "aimed"): 160_000, ("radziszewski_alda", "aimed"): 200_000}
     for model, form, material in made_forms:
         with subtests.test(model=model, form=form):
@@ -447,8 +449,8 @@ def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, made_f
 
 
 def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
-    """Where it takes a script of its own: with the node's values and links, once a form, and a
-    file does not keep what is not in use."""
+    """If it takes a script of its own: it gets the node's values and links, is made once per form,
+    and is not saved when unused."""
     api, nodes = extension.api, extension.nodes
     values = {"ax": 0.3, "ks": (0.1, 0.2, 0.3)}
     material, other, third = (api.new_material("ward", "sampled", **values) for _ in "123")
@@ -500,7 +502,7 @@ def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
 
 
 def test_albedo_output_goes_from_form_to_form(extension, empty):
-    """Also to a form whose one script has it, and back."""
+    """Including a form whose single script provides it, and back."""
     material = extension.api.new_material("coupled", "sampled")
     tree, node = material.node_tree, extension.nodes.group_nodes(material)[0]
     extension.api.add_albedo(material)
@@ -589,7 +591,7 @@ def test_group_of_another_version_is_offered_for_update(extension, empty, monkey
 
 
 def clean(extension, scene, model="lambert", form="exact"):
-    """A material with nothing to warn of."""
+    """A material without any warnings."""
     material = extension.api.new_material(model, form)
     extension.api.enable_osl(scene)
     scene.cycles.sample_clamp_indirect = scene.cycles.sample_clamp_direct = 0
@@ -613,7 +615,7 @@ def test_no_warnings_for_other_materials(extension, empty):
 
 
 def test_warning_engine_and_osl(extension, empty):
-    material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
+    material = clean(extension, empty, "glass")  # its stand-in has no warnings of its own
     empty.render.engine = "BLENDER_WORKBENCH"
     assert codes(extension, material, empty) == ["engine"]
     empty.render.engine = "CYCLES"
@@ -628,9 +630,9 @@ def test_warning_engine_and_osl(extension, empty):
     ("backend", "works"), [("CUDA", False), ("HIP", False), ("METAL", False), ("OPTIX", True)]
 )
 def test_warning_device(extension, empty, monkeypatch, backend, works):
-    # This machine may not have the device: only the preference is pretended.
+    # This machine may lack the device, so only the preference is simulated.
     monkeypatch.setattr(extension.device, "gpu_backend", lambda: backend)
-    material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
+    material = clean(extension, empty, "glass")  # its stand-in has no warnings of its own
     empty.cycles.device = "GPU"
     untested = ["optix_untested"] if backend == "OPTIX" else []
     assert codes(extension, material, empty) == (untested if works else ["device"])
@@ -640,7 +642,7 @@ def test_warning_device(extension, empty, monkeypatch, backend, works):
 
 
 def test_warning_device_of_another_computer(extension, empty, monkeypatch):
-    """Without a GPU in the preferences Cycles takes the CPU, and the file keeps GPU Compute."""
+    """Without a GPU in the preferences, Cycles uses the CPU, and the file keeps GPU Compute."""
     monkeypatch.setattr(extension.device, "gpu_backend", lambda: "NONE")
     material = clean(extension, empty, "glass")
     empty.cycles.device = "GPU"
@@ -702,7 +704,7 @@ def test_only_choices_leave_parameters_unread(extension):
 
 
 def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
-    material = clean(extension, empty, "glass")  # whose stand-in has no faults of its own
+    material = clean(extension, empty, "glass")  # its stand-in has no warnings of its own
     monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
     assert codes(extension, material, empty) == ["blender_version"]
     monkeypatch.undo()
@@ -713,7 +715,7 @@ def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
 
 
 def test_warning_bump_correction(extension, empty):
-    """Fitted forms alone need it off, and give it back; unless it was off before."""
+    """Only fitted forms need it off, and they restore it, unless it was off before."""
     api = extension.api
     material = clean(extension, empty, "phong", "fitted")
     assert material.cycles.use_bump_map_correction is False
@@ -747,7 +749,7 @@ def test_warning_path_guiding(extension, empty):
 
 
 def test_warning_clamp_direct(extension, empty):
-    """What only drawn directions show of a lamp is as bright as the lamp itself."""
+    """What only random rays show of a lamp is as bright as the lamp itself."""
     material = clean(extension, empty, *sampled_forms(extension)[0])
     empty.cycles.sample_clamp_direct = 10
     assert codes(extension, material, empty) == ["clamp_direct"]
@@ -757,7 +759,7 @@ def test_warning_clamp_direct(extension, empty):
 
 @pytest.mark.parametrize("reopened", [False, True])
 def test_what_a_material_is_made_of_goes_with_it(extension, empty, tmp_path, reopened):
-    """Blender gives every new text a fake user, and would keep each shader's for good."""
+    """Blender gives every new text a fake user, which would keep each shader's text for good."""
     before = helpers.counts()
     made = [("lambert", "auto"), ("glass", "auto"), ("phong", "aimed"), ("phong", "twin")]
     materials = [extension.api.new_material(model, form) for model, form in made]
@@ -790,7 +792,7 @@ def test_a_text_that_an_older_version_kept_goes_too(extension, empty):
 
 
 def test_warning_multiple_importance(extension, empty):
-    """Lamps that directions of a material's own do not meet."""
+    """Lamps that BSDF sampling does not hit."""
     made = {
         (model, form): clean(extension, empty, model, form)
         for model, form in (
@@ -867,7 +869,7 @@ def test_warnings_a_form_may_declare(extension, empty, monkeypatch, code, spoil)
 
 
 def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
-    """In a mirror at once, in a highlight if it is low."""
+    """In a mirror always; in a highlight if the clamp is low."""
     mirror = clean(extension, empty, "coupled", "exact")
     highlight = clean(extension, empty, "modified_phong", "exact")
     for clamp, in_mirror, in_highlight in (
@@ -881,7 +883,8 @@ def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
 
 
 def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
-    """The narrower it is the brighter, in a fit along its slider, in exact forms and aimed ones."""
+    """Narrower highlights are brighter: in a fit along its slider, in exact forms and in aimed
+    ones."""
     for model, form in (
         ("max_phong", "fitted"),
         ("modified_phong", "exact"),
@@ -898,7 +901,7 @@ def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
 
 
 def test_warning_normal_pass(extension, empty):
-    """A drawn lobe has a normal of its own, and the denoiser sees it."""
+    """A sampled lobe has its own normal, which the denoiser sees."""
     material = clean(extension, empty, *sampled_forms(extension)[0])
     passes = empty.view_layers[0].cycles
     passes.denoising_store_passes = True
@@ -910,7 +913,7 @@ def test_warning_normal_pass(extension, empty):
 
 
 def test_warning_albedo_passes(extension, empty):
-    """The signed sum of an exact form has closures that weigh more than it reflects."""
+    """An exact form with negative weights has closures whose weights exceed the reflected light."""
     form = extension.pack.representation("coupled", "exact")
     assert "albedo_passes" in form["warnings"]
     material = clean(extension, empty, "coupled", "exact")
@@ -927,8 +930,8 @@ def test_warning_albedo_passes(extension, empty):
 
 @pytest.mark.parametrize("model", ["coupled", "cook_torrance", "radziszewski_alda", "schlick"])
 def test_a_new_material_in_a_new_file_greets_without_warnings(extension, model):
-    """Where a clamp at 10, Filter Glossy at 1 and denoising change less than 1 % of the picture; a
-    sun brings the warnings of the first two back."""
+    """There a clamp at 10, Filter Glossy at 1 and denoising change less than 1 % of the picture. A
+    sun causes the warnings of the first two."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene = bpy.context.scene
     material = extension.api.new_material(model)
@@ -955,7 +958,7 @@ def test_a_new_material_in_a_new_file_greets_without_warnings(extension, model):
     ids=["dark", "bright", "animated", "met by chance", "not shown"],
 )
 def test_what_shines_brings_the_warning_of_a_mirror(extension, shines, change):
-    """Whatever shines beside the lamp of a new file, and not what no material shows."""
+    """Any emitter in addition to a new file's lamp causes it, but not an unused one."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene = bpy.context.scene
     material = extension.api.new_material("schlick")
@@ -984,8 +987,8 @@ def _sampled_by_chance(emission, material):
 
 
 def test_denoising_at_its_defaults_is_no_reason_to_warn(extension, empty):
-    """Measured: what Cycles' own denoiser makes of too bright an albedo differs by 0.1 % of the
-    light from what it makes of the picture alone."""
+    """Measured: with too bright an albedo, Cycles' own denoiser gives a result that differs by 0.1
+    % of the light from the one without albedo."""
     material = clean(extension, empty, "coupled", "exact")
     empty.cycles.use_denoising = True
     empty.cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
@@ -993,7 +996,8 @@ def test_denoising_at_its_defaults_is_no_reason_to_warn(extension, empty):
 
 
 def test_warnings_of_an_aimed_form_that_is_denoised(extension, empty):
-    """Base and rest are signed; normals are those of what is drawn where no base outweighs it."""
+    """Base and rest have weights of both signs; normals are those of the sampled lobe unless a base
+    outweighs it."""
     passes = empty.view_layers[0].cycles
     for model, expected in (
         ("cook_torrance", ["albedo_passes"]),
@@ -1020,7 +1024,7 @@ def test_warning_script_failed(extension, empty):
     assert "not compiled" in extension.api.warnings(material, empty)[0].message
     group.nodes.remove(script)
     assert "no script node" in extension.api.warnings(material, empty)[0].message
-    # A broken group is not used for the next material.
+    # A broken group is not reused for the next material.
     assert extension.nodes.group_nodes(extension.api.new_material("lambert"))[0].node_tree != group
 
 
@@ -1068,7 +1072,7 @@ LOOKS = ("Matte", "Glossy", "Metal", "Glass", "Special")
 
 @contextlib.contextmanager
 def shader_editor(material):
-    """An area of the window that shows the material's nodes is the context."""
+    """Makes an area of the window that shows the material's nodes the context."""
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
     area.type = "NODE_EDITOR"
@@ -1129,7 +1133,7 @@ def test_the_page_of_models_has_their_forms(extension):
     page = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*) \|$", page, re.M))
     for name, entry in extension.api.models().items():
-        # Of Blender's own nodes every model has some.
+        # Every model has some forms of Blender's own nodes.
         assert rows[name] == ", ".join(
             f for f, e in entry["representations"].items() if "nodes" not in e
         )
@@ -1149,7 +1153,8 @@ def test_the_readme_has_the_errors_that_panel_and_scripts_show(extension):
 
 
 def test_the_page_says_what_scripts_are_given(extension):
-    """Every attribute of what is returned, and keys that there are."""
+    """The page documents every attribute of the returned objects, and no key that does not
+    exist."""
     page = (Path(__file__).parents[2] / "docs" / "blender.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| (.*) \| (`.*) \|$", page.split("### What they return")[1], re.M))
     said = {of: re.findall(r"`(\w+)`", has) for of, has in rows.items()}
@@ -1174,7 +1179,7 @@ def test_search_finds_models_by_name_author_title_and_year(extension, empty):
     texts = {name: text.lower() for name, text, _ in items}
 
     def found(words):
-        """Blender's search lists what has all of the words."""
+        """Blender's search lists entries that contain all of the words."""
         return {n for n, text in texts.items() if all(w in text for w in words.lower().split())}
 
     assert found("ward") == found("measuring anisotropic 1992") == {"ward"}
@@ -1226,7 +1231,7 @@ def test_panel_shows_model_form_values_and_warnings(extension, made_forms, subte
 
 
 def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, made_forms, monkeypatch):
-    """Of each form: a panel is drawn at every movement of the mouse over it."""
+    """For each form: a panel is redrawn at every movement of the mouse over it."""
     made = [material for *_, material in made_forms]
     for material in made:
         extension.ui.draw_material(helpers.Layout(), material, bpy.context.scene)
@@ -1243,7 +1248,7 @@ def test_a_redraw_of_the_panel_reads_and_hashes_no_shader(extension, made_forms,
 
 
 def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
-    """By which groups of another version are told."""
+    """It identifies groups made by another version."""
     for model, form in forms(extension):
         with subtests.test(model=model, form=form):
             text = extension.pack.source(model, form)[1]
@@ -1253,7 +1258,7 @@ def test_the_manifest_has_the_hash_of_each_shader(extension, subtests):
 
 @pytest.mark.long
 def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, subtests):
-    """They are measured at the model's default parameters, which a pack cut to a scene lacks."""
+    """Costs are measured at the model's default parameters, which a pack cut to a scene lacks."""
     names = ("sampled", "fitted", "twin")
     listed = {
         name: {"model": "phong", "representation": name, "parameters": {"e": 40}} for name in names
@@ -1404,7 +1409,7 @@ def test_operator_switch(extension, empty):
 
 @pytest.fixture
 def drawn(extension, empty):
-    """A `lossless` node and a Float Curve beside it, in the active object's material."""
+    """A `lossless` node and a Float Curve node in the active object's material."""
     material = extension.api.new_material("lossless")
     mesh = bpy.data.meshes.new("Mesh")
     mesh.materials.append(material)
@@ -1417,7 +1422,7 @@ def drawn(extension, empty):
 
 
 def draw(curve, *heights):
-    """Straight lines between heights at x = 0, 1/3, 2/3, 1."""
+    """Sets a curve of straight lines with these heights at x = 0, 1/3, 2/3, 1."""
     points = curve.mapping.curves[0].points
     while len(points) < len(heights):
         points.new(0.5, 0.5)
@@ -1439,13 +1444,13 @@ def test_kernel_from_a_float_curve(extension, drawn):
     assert bpy.ops.brdfc.kernel() == {"FINISHED"}
     kernel, *heights = kernel_of(extension, node)
     assert kernel == "table"
-    # Blender evaluates curves through a table of 256 places, which rounds corners off.
+    # Blender evaluates curves through a table of 256 entries, which rounds corners off.
     assert heights == pytest.approx([1, 0.8, 0.6, 0.1], rel=1e-2)
-    # By a script, and where the largest is not the first.
+    # From a script, and where the first height is not the largest.
     draw(curve, 0.2, 0.4, 0.3, 0.1)
     extension.api.set_kernel(node, curve)
     assert kernel_of(extension, node)[1:] == pytest.approx([0.5, 1, 0.75, 0.25], rel=1e-2)
-    # Of several curves, the one that is selected.
+    # If there are several curves, the selected one is used.
     other = node.id_data.nodes.new("ShaderNodeFloatCurve")
     draw(other, 0.5, 0.4, 0.3, 0.05)
     curve.select, other.select = False, True

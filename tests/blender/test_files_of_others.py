@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles makes of images with values that are not finite or negative, as the tool assumes; and
-the scene loader under OpenColorIO configurations of studios."""
+"""Files from other sources: how Cycles treats non-finite and negative values in images, as the tool
+assumes; and the scene loader under OpenColorIO configurations of studios."""
 
 import json
 import os
@@ -25,8 +25,8 @@ def write(path, pixels):
 
 
 def test_what_is_not_finite_is_black_and_what_is_negative_stays(empty, tmp_path):
-    """From 5.2 on the whole pixel is black, which is what the tool makes of it; before, in some
-    places its other channels stay."""
+    """From 5.2 on the whole pixel is black, as in the tool; before, its other channels stay in some
+    cases."""
     pixels = np.full((4, 4, 3), 0.5)
     pixels[0, 1, 0], pixels[1, 2], pixels[2, 0, 1] = np.nan, np.inf, -np.inf
     pixels[3, 3], pixels[3, 0, 2] = -2, -6e-8
@@ -67,7 +67,8 @@ def test_what_is_not_finite_is_black_and_what_is_negative_stays(empty, tmp_path)
     ["cg-config-v1.0.0_aces-v1.3_ocio-v2.1", "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"],
 )
 def test_scenes_load_under_configurations_of_aces(extension_zip, tmp_path, config):
-    """Numbers of the working space pass as they are; a preview has the display's default view."""
+    """Numbers of the working space are passed on unchanged; a preview uses the display's default
+    view."""
     sky = np.full((4, 8, 3), [0.2, 0.6, 0.1])
     write(tmp_path / "sky.exr", sky)
     content = {
@@ -100,7 +101,7 @@ def test_scenes_load_under_configurations_of_aces(extension_zip, tmp_path, confi
         assert done.returncode == 0, done.stderr[-2000:]
     found = open_image_io().ImageBuf(str(tmp_path / "a.exr")).get_pixels()[..., :3]
     np.testing.assert_allclose(found, np.broadcast_to([0.2, 0.6, 0.1], found.shape), rtol=1e-4)
-    # Its working space by name, and another one, of which Blender has a choice from 5.0 on.
+    # The configuration's own working space, and another one, which Blender can select from 5.0 on.
     chooses = hasattr(bpy.data, "colorspace")
     for space, taken in (("ACEScg", True), ("Linear Rec.2020", chooses)):
         named = content | {"working_space": space, "environment": {"color": [0.2, 0.6, 0.1]}}

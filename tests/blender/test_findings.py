@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Findings about a scene's lamps, one of a kind; what scripts and consoles are told."""
+"""Findings about a scene's lamps, each code at most once; and messages to scripts and consoles."""
 
 import inspect
 import math
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def ring(scene, count, turn=0.0, **settings):
-    """Equal lamps at equal distances of the origin."""
+    """Adds equal lamps at equal distances from the origin."""
     turns = [turn + 2 * math.pi * i / count for i in range(count)]
     return [
         add_lamp(scene, name=f"Lamp{i}", location=(3 * math.cos(t), 3 * math.sin(t), 4), **settings)
@@ -37,9 +37,9 @@ def ball(extension, scene, model="ashikhmin_shirley", form="aimed", **values):
 
 
 def found(extension, material, scene):
-    """{code: message} of the findings, of which there is one of a kind."""
+    """{code: message} of the findings, each code at most once."""
     bpy.context.view_layer.update()
-    bpy.context.view_layer.update()  # what a handler changed
+    bpy.context.view_layer.update()  # runs Blender's handlers
     findings = extension.api.warnings(material, scene)
     assert len({f.code for f in findings}) == len(findings)
     return {f.code: f.message for f in findings}
@@ -144,7 +144,7 @@ def test_no_scene_node_or_plan_is_an_error_that_says_so(extension, empty, given)
 @pytest.mark.long
 @pytest.mark.slow
 def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(extension, empty):
-    material = ball(extension, empty, "radziszewski_alda")  # which has no base to show them
+    material = ball(extension, empty, "radziszewski_alda")  # it has no base that would show them
     first = ring(empty, 8, shadow_soft_size=0.0, energy=50)
     assert found(extension, material, empty) == {}
     alone = light_of(empty)
@@ -163,8 +163,7 @@ def test_lamps_without_a_size_beyond_the_slots_are_lost_until_they_have_one(exte
     assert bpy.ops.brdfc.enlarge_lamps() == {"FINISHED"}
     assert all(item.data.shadow_soft_size > 0 for item in (*first, *second))
     assert list(found(extension, material, empty)) == ["not_aimed"], "what is left is noise"
-    # What was lost comes as dots: that it comes is shown by lamps that are large enough for a small
-    # picture.
+    # The lost light returns as rare dots; larger lamps show it in a small picture.
     for item in (*first, *second):
         item.data.shadow_soft_size = 0.25
     assert light_of(empty, 2048) == pytest.approx(both, rel=0.05)
@@ -263,7 +262,8 @@ def test_a_world_that_can_not_be_followed(extension, empty):
 
 @pytest.mark.slow
 def test_lamps_that_take_light_are_aimed_at(extension, empty):
-    """No drawn direction meets one without a size: what it takes is what the closures say."""
+    """Lamps of negative power: random rays can't hit one without a size, so closures account for
+    all of it."""
     ball(extension, empty)
     lamp = add_lamp(empty, location=(1, -2, 4), energy=100, shadow_soft_size=0.0)
     bpy.context.view_layer.update()
@@ -336,7 +336,7 @@ def test_small_lamps_in_an_ideal_mirror(extension, empty):
     messages = found(extension, mirror, empty)
     assert list(messages) == ["small_in_mirror"] and "Lamp" in messages["small_in_mirror"]
     assert found(extension, matte, empty) == {}
-    for size in (0.0, 0.1, 0.5):  # a mirror shows no lamp without a size; 0.1 is a new lamp's
+    for size in (0.0, 0.1, 0.5):  # mirrors don't show lamps without a size; 0.1 is a new lamp
         lamp.data.shadow_soft_size = size
         assert found(extension, mirror, empty) == {}
 
@@ -364,7 +364,7 @@ def write_aov(tree, name):
 
 
 def test_aovs_are_black_under_osl(extension, empty):
-    """Of a material that has nothing of this extension, too."""
+    """This also affects materials that do not use this extension."""
     material = bpy.data.materials.new("diffuse")
     write_aov(helpers.empty_tree(material), "ID")
     empty.view_layers[0].aovs.add().name = "ID"
@@ -426,8 +426,8 @@ def test_turning_osl_on_says_that_aovs_will_be_black(extension, empty, capfd):
 
 
 def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch):
-    """By the name of the material, whose twin is 15 % off; of glass that is not known, and in lean
-    ones nothing stands in."""
+    """It names the material and its error: a twin with 15 %; glass, whose error is unknown; and
+    lean materials, which have no stand-in."""
     material = ball(extension, empty, "phong", "aimed")
     light_of(empty, 1)
     assert "brdfc: " not in capsys.readouterr().out

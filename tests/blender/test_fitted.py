@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fitted forms in Cycles are the sums of closures that `brdfc fit` judges, and return the model's
-light."""
+"""Tests that fitted forms in Cycles are the sums of closures that `brdfc fit` evaluates, and
+reflect the model's light."""
 
 import math
 
@@ -11,28 +11,29 @@ import pytest
 from goniometer import Goniometer, tilted, unit
 from helpers import arguments, bend, pairs_csv, read_csv
 
-#: A model for each family of closures, one of three channels, one of terms, one beside a mirror.
+#: One model for each family of closures, one with three channels, one with terms, one with a
+#: mirror.
 MATERIALS = {
     "phong": {"e": 40.0, "ks": (0.9, 0.6, 0.2)},
     "oren_nayar": {"sigma": 0.6, "rho": (0.9, 0.5, 0.1)},
     "cook_torrance": {"f0": (0.9, 0.5, 0.05)},
     "schlick_double": {"rd": (0.8, 0.4, 0.1), "r0": 0.1},
 }
-#: What a second material of the same model has other values of, so that it is a socket: a colour
-#: that multiplies all, a colour and a number that f is a polynomial of.
+#: Values of a second material of the same model, which make the parameter a socket: a colour that
+#: multiplies everything, and a colour and a number in which f is a polynomial.
 SOCKETS = {"phong": {"ks": 0.4}, "oren_nayar": {"rho": 0.4}, "schlick_double": {"r0": 0.02}}
 OPEN = {"oren_nayar": ("--any", "rho"), "schlick_double": ("--any", "r0")}
 SUNS = [(0, 0, 1), (0.3, -0.2, 0.9), (-0.5, 0.8, 0.3)]
 COSINES = (0.1, 0.4, 0.8, 1.0)
 FACETS = 96
-#: Pixels of a picture of linear colours, and the view at which sampling is tested with them.
+#: Pixels of a picture of linear colours, and the view cosine at which it tests sampling.
 TEXELS = np.array([(0.9, 0.5, 0.1), (0.05, 0.4, 0.8), (1, 1, 1), (0.3, 0.02, 0.6)])
 TEXTURED_COSINE = 0.7
 
 
 @pytest.fixture
 def lean(extension, use_pack):
-    """The extension with a pack of these materials alone."""
+    """The extension with a pack for these materials alone."""
     listed = {
         name: {"model": name, "parameters": values, "representation": "fitted"}
         for name, values in MATERIALS.items()
@@ -63,14 +64,14 @@ def fitted(tool, name, wi, wo):
 @pytest.mark.long
 @pytest.mark.slow
 def test_a_sun_on_a_fitted_form(lean, tool):
-    """Every pair is within 1e-3 of the largest value of what the tool says of the closures."""
+    """Every pair is within 1e-3 of the largest value of the tool's sum of closures."""
     rng = np.random.default_rng(3)
     which = np.repeat(np.arange(len(MATERIALS)), FACETS)
     lit_pairs = {name: [] for name in MATERIALS}
     for towards in SUNS:
         materials = start(lean)
         normals = tilted(rng.uniform(0.05, 1, len(which)), rng.uniform(0, 2 * math.pi, len(which)))
-        # Every other facet faces halfway between sun and camera, more or less: the highlight.
+        # On every other facet, the normal is near the half vector of sun and camera: the highlight.
         half = unit(unit(towards) + (0, 0, 1))
         near = unit(half + 0.1 * rng.normal(size=(len(which), 3)))
         normals = np.where((np.arange(len(which)) % 2 == 0)[:, None], near, normals)
@@ -94,8 +95,8 @@ def test_a_sun_on_a_fitted_form(lean, tool):
 @pytest.mark.evidence
 @pytest.mark.full
 def test_furnace_of_a_fitted_form(lean, tool):
-    """Sampling returns what evaluation says: the albedo of the model, off by what `brdfc fit`
-    states for that view and by noise."""
+    """Sampling agrees with evaluation: the reflected light is the albedo of the model, within the
+    error that `brdfc fit` states for that view and the noise."""
     made = start(lean)
     scene = bpy.context.scene
     furnace.check(tool, scene, made, MATERIALS, COSINES, replicas=60, samples=256, slack=1e-3)
@@ -104,9 +105,9 @@ def test_furnace_of_a_fitted_form(lean, tool):
 @pytest.mark.long
 @pytest.mark.slow
 def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
-    """They turn from the viewer at the rims of smooth meshes, where closures of opposite signs turn
-    black one before the other and left pixels of minus a half in a white world. The light is that
-    of the lowest view that fits have."""
+    """At the rims of smooth meshes, interpolated normals turn away from the viewer. There, closures
+    of opposite signs used to turn black at different angles, which caused pixels of -0.5 in a white
+    world. Now the light is that of the lowest view of the fit."""
     materials = {
         "phong": {"e": 20.0},
         "max_phong": {"e": 50.0},
@@ -139,14 +140,14 @@ def test_interpolated_normals_beyond_the_horizon(extension, use_pack):
         assert picture.min() > 0, name
 
 
-#: Where along the slider of its number, by factors, each fitted form of the extension is looked at,
-#: and its colours there.
+#: Positions along the (logarithmic) slider at which each fitted form of the extension is tested,
+#: and the colours used there.
 SHARES = {0.2: (1.0, 0.5, 0.1), 0.5: (0.3, 1.0, 0.7)}
 
 
 def along_sliders(extension):
-    """(model, number, values) of every fitted form that the extension comes with, twice: the number
-    and all that may vary beside it."""
+    """(model, number, values) of every fitted form of the extension, twice: the number and
+    everything else that may vary."""
     cases = []
     for model, entry in extension.api.models().items():
         if "fitted" not in entry["representations"]:
@@ -166,16 +167,16 @@ def along_sliders(extension):
 @pytest.mark.long
 @pytest.mark.slow
 def test_forms_of_the_extension_along_their_sliders(extension, tool):
-    """A shader serves all values of one number and of what f is a polynomial of: of two materials,
-    and from an attribute that varies over a third. Every pair is within 1e-3 of the largest value
-    of what the tool says."""
+    """One shader serves all values of its number and of the parameters in which f is a polynomial.
+    They are set by sockets in two materials, and by an attribute in a third. Every pair is within
+    1e-3 of the largest value of the tool's result."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
     cases = along_sliders(extension)
     made = [extension.api.new_material(m, "fitted", **values) for m, _, values in cases]
     of_blinn = [case for case in cases if case[0] == "blinn"]
-    of_blinn[1][2]["ks"] = of_blinn[0][2]["ks"]  # one material, whose number alone varies
+    of_blinn[1][2]["ks"] = of_blinn[0][2]["ks"]  # one material, in which only the number varies
     extension.api.set_parameters(made[cases.index(of_blinn[1])], ks=of_blinn[1][2]["ks"])
     varying = extension.api.new_material("blinn", "fitted", **of_blinn[0][2])
     attribute = varying.node_tree.nodes.new("ShaderNodeAttribute")
@@ -187,7 +188,7 @@ def test_forms_of_the_extension_along_their_sliders(extension, tool):
     what = [case for case in cases for _ in range(FACETS)] + of_blinn * (FACETS // 2)
     which = np.minimum(np.arange(len(what)) // FACETS, len(cases))
     towards = unit((0.3, -0.2, 0.9))
-    # Near and far from the highlight.
+    # Some near the highlight, some far from it.
     spread = np.where(np.arange(len(what)) % 2, 0.3, 0.03)[:, None]
     normals = unit(unit(towards + (0, 0, 1)) + spread * rng.normal(size=(len(what), 3)))
     values = np.array([given[name] for _, name, given in what])
@@ -240,7 +241,7 @@ def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
     api.switch_representation(material, "sampled")
     for name, value in api.get_parameters(material).items():
         assert value == pytest.approx(values[name], rel=1e-6)
-    api.switch_representation(material, "fitted")  # 0.8 is another number in a socket
+    api.switch_representation(material, "fitted")  # 0.8 is not exactly representable in a socket
     api.switch_representation(material, "sampled")
     api.set_parameters(material, cz=0.5)
     with pytest.raises(ValueError, match="only for cz=0.8, not for 0.5"):
@@ -256,8 +257,8 @@ def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
 
 @pytest.fixture
 def textured(extension, use_pack):
-    """A material whose colour is a picture's, in the fitted form of a pack that was made for it as
-    a person would; and one of the same model that is white."""
+    """A material with a texture as its colour, in the fitted form of a pack made for it as by a
+    user; and a white one of the same model."""
     api, nodes = extension.api, extension.nodes
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     extension.scene_loader.apply_clean_settings(bpy.context.scene, max_bounces=0)
@@ -280,7 +281,7 @@ def textured(extension, use_pack):
 
 
 def show(meter, texels):
-    """Every point of a facet shows one texel of the picture."""
+    """Makes every point of a facet show one texel of the picture."""
     u = np.repeat((texels + 0.5) / len(TEXELS), 4)
     uv = np.stack([u, np.full_like(u, 0.5)], -1).astype(np.float32)
     meter.mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv.ravel())
@@ -288,7 +289,7 @@ def show(meter, texels):
 
 @pytest.mark.long
 def test_a_textured_colour_under_a_sun(textured, tool):
-    """The sum that the tool says for a white one, times the texel, to 1e-3 of its largest value."""
+    """The tool's result for a white material, times the texel, to 1e-3 of its largest value."""
     rng = np.random.default_rng(6)
     count = len(TEXELS) * FACETS
     half = unit(unit(SUNS[1]) + (0, 0, 1))
@@ -305,14 +306,14 @@ def test_a_textured_colour_under_a_sun(textured, tool):
     print(f"off by {off:.2g} of {largest:.2g}")
     assert largest > 0.1
     assert off <= 1e-3 * largest
-    # One colour for all would be far from that.
+    # A single colour for all texels would differ much more.
     assert np.abs(white * TEXELS.mean(0) - expected).max() > 0.1 * largest
 
 
 def test_a_textured_colour_in_a_white_world(textured):
-    """What is sampled has the texel's colour: the mean of a white one's radiance times the texel
-    within 5 standard errors, 12 comparisons with a fixed seed, so one false alarm in some hundred
-    thousand seeds."""
+    """Sampled light has the texel's colour: the mean radiance of a white material times the texel,
+    within 5 standard errors. With 12 comparisons and a fixed seed, that is one false alarm in about
+    a hundred thousand seeds."""
     replicas = 144
     bpy.context.scene.cycles.seed = 5
     texels = np.tile(np.arange(len(TEXELS)), 2 * replicas)

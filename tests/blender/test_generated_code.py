@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles makes of the generated code, step by step from the model.
+"""Compares the generated code in Cycles with the model, step by step.
 
-`brdfc probe` prints a shader that shows f, pdf, and a sample's wi, weight and pdf for given wi, wo,
-u and parameters, which come from attributes: one render executes thousands of points. The tool
-executes the same points itself: the model in double and in float, the recording in float, and the
-recording with OSL's arithmetic. So each step has its own error:
+`brdfc probe` prints a shader that outputs f, pdf, and a sample's wi, weight and pdf for given wi,
+wo, u and parameters, which are read from attributes: one render executes thousands of points. The
+tool evaluates the same points in four ways: the model in double and in float precision, the
+recording in float, and the recording with OSL's arithmetic. So the error of each step is known:
 
-    double -> float      rounding, and how the formula passes it on
+    double -> float      rounding, and how the formula amplifies it
     float -> osl         OSL's fast functions
-    osl -> Cycles        what the printed text says other than the recording: an emission bug
+    osl -> Cycles        differences between the printed text and the recording: a bug in printing
 """
 
 import csv
@@ -23,9 +23,9 @@ from goniometer import Goniometer
 from helpers import arguments, read_csv, script_material, to_csv
 
 VERSION = ".".join(map(str, bpy.app.version[:2]))
-#: Points of a group: one parameter at one value, the others at their defaults.
+#: Number of points in a group: one parameter at one value, the others at their defaults.
 POINTS = 24
-#: Attribute `show` and the columns that it shows.
+#: Values of the attribute `show`, and the columns that it selects.
 SHOWN = {
     0.0: ("f_r", "f_g", "f_b"),
     1.0: ("wi_x", "wi_y", "wi_z"),
@@ -34,16 +34,17 @@ SHOWN = {
     3.0: ("pdf",) * 3,
 }
 NOT_FINITE = -31337.0
-#: Relative L1 that f, pdf and weight may be off in Cycles, by the largest parameter: single
-#: precision can't hold more where an exponent multiplies it.
+#: Relative L1 error allowed for f, pdf and weight in Cycles, by the largest parameter: an exponent
+#: amplifies the rounding of single precision.
 LIMITS = ((1e5, 1e-3), (1e6, 1e-2))
-#: What the last step may add: OSL's compiler may contract and reorder nothing, but shares constants
-#: that were rounded in other places.
+#: Error allowed for the last step: OSL's compiler does not contract or reorder, but merges
+#: constants that were rounded differently.
 EMISSION = 2e-5
 
 
 def groups(parameters):
-    """(name, value) for each decade of each wide number and a few values of each other one."""
+    """(name, value) for each decade of parameters with a wide range, and for a few values of the
+    others."""
     chosen = [("", None)]
     for p in parameters:
         if p["kind"] != "number":
@@ -59,14 +60,14 @@ def groups(parameters):
 
 
 def other_choices(parameters):
-    """Assignments of choices: each that is no default by itself."""
+    """Assignments of choices; each changes a single choice from its default."""
     choices = [p for p in parameters if p["kind"] == "choice"]
     return [{p["name"]: c} for p in choices for c in p["choices"] if c != p["default"]]
 
 
 def points_of(tool, model, choices, parameters, rng):
-    """Points of all groups as columns by name, and the group of each. Other choices than the
-    defaults are tried at the defaults of the numbers alone."""
+    """Points of all groups, as columns by name, and the group of each point. Choices other than the
+    defaults are tested only with default numbers."""
     numbers = [p for p in parameters if p["kind"] != "choice"]
     columns, group = {}, []
     for index, (name, value) in enumerate(groups(parameters)[: 1 if choices else None]):
@@ -93,7 +94,7 @@ def points_of(tool, model, choices, parameters, rng):
             columns.setdefault(key, []).append(column.astype(np.float64))
         group += [index] * count
     columns = {key: np.concatenate(parts) for key, parts in columns.items()}
-    # wi from the model, by other random numbers: nothing else meets a narrow lobe.
+    # wi is sampled from the model, with other random numbers: nothing else hits a narrow lobe.
     drawing = {f"u{i}": columns.pop(f"other_u{i}") for i in (1, 2, 3)}
     drawing |= {f"wi_{a}": columns[f"wo_{a}"] for a in "xyz"}
     drawn = run_probe(tool, model, choices, columns | drawing)
@@ -105,14 +106,14 @@ def points_of(tool, model, choices, parameters, rng):
 
 
 def run_probe(tool, model, choices, columns):
-    """What `brdfc probe --run` computes at points, as columns by name."""
+    """Results of `brdfc probe --run` at these points, as columns by name."""
     stdin = to_csv(list(columns), np.stack(list(columns.values()), -1))
     header, rows = read_csv(tool("probe", model, *arguments(choices), "--run", stdin=stdin))
     return {name: rows[:, i] for i, name in enumerate(header)}
 
 
 def probe_material(extension, name, source):
-    """Each input of the probe reads the attribute of its name."""
+    """A material in which each input of the probe reads the attribute of its name."""
     material = script_material(extension, name, source)
     tree = material.node_tree
     script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
@@ -129,13 +130,14 @@ PARTS = ["defaults", pytest.param("choices", marks=pytest.mark.slow)]
 
 @pytest.fixture(scope="module", params=PARTS)
 def chosen(request):
-    """Every model with its default choices, or with each other one."""
+    """Every model with its default choices, and with each other choice."""
     return request.param
 
 
 @pytest.fixture(scope="module")
 def measured(extension, tool, chosen):
-    """By (model, choices): groups, group of each point, runs by column, and Cycles' values."""
+    """By (model, choices): groups, group of each point, columns of the tool's runs, and Cycles'
+    values."""
     rng = np.random.default_rng(7)
     scattering = {m["name"] for m in json.loads(tool("list", "--json")) if m.get("scatter", True)}
     jobs = []
@@ -168,7 +170,8 @@ def measured(extension, tool, chosen):
                 at[part] = np.stack([columns[k] for k in keys], -1)
             for p in parameters:
                 name = f"p_{p['name']}"
-                # A name may be a number in one model and a colour in another: one attribute each.
+                # A name may be a number in one model and a colour in another: they get separate
+                # attributes.
                 if p["kind"] == "number":
                     at = attributes.setdefault(name, np.zeros(total))
                     if at.ndim == 2:
@@ -207,7 +210,7 @@ def _l1(a, b):
 
 @pytest.fixture(scope="module")
 def rows(measured, chosen):
-    """A row for each group and quantity: the error of each step."""
+    """A row for each group and quantity, with the error of each step."""
     found = []
     for (model, choices), (names, group, runs, cycles) in measured.items():
         for index, (name, value) in enumerate(names):
@@ -224,7 +227,7 @@ def rows(measured, chosen):
                     for run in ("double", "float", "recorded", "osl")
                 }
                 step["cycles"] = np.stack([cycles[c][mine] for c in columns])
-                # A lost sample has any direction.
+                # The direction of a lost sample is arbitrary.
                 if quantity == "wi":
                     alive = (runs["double_sample_pdf"][mine] > 0) & (cycles["sample_pdf"][mine] > 0)
                     step = {run: v[:, alive] for run, v in step.items()}
@@ -262,8 +265,9 @@ def _says(row):
 
 @pytest.mark.long
 def test_text_says_what_was_recorded(rows):
-    """Cycles against the recording with OSL's arithmetic. Where a formula amplifies rounding, the
-    last bit of a constant counts too: as much as it costs between float and double."""
+    """Compares Cycles with the recording in OSL's arithmetic. If a formula amplifies rounding, the
+    last bit of a constant matters as well: the allowed error is the one between float and
+    double."""
     bad = [r for r in rows if r["emission"] > EMISSION + r["rounding"] + r["osl_arithmetic"]]
     assert not bad, "\n".join(map(_says, bad))
 
@@ -274,8 +278,8 @@ def test_everything_is_finite(rows):
 
 
 def _sharpness(row):
-    """The Phong exponent that makes a lobe as narrow. Radziszewski and Alda's lobe is about 1/n
-    wide, so that rounded directions cost it what they cost an exponent of n^2."""
+    """The Phong exponent of an equally narrow lobe. Radziszewski and Alda's lobe has a width of
+    about 1/n, so rounded directions affect it as they affect an exponent of n^2."""
     value = row["value"] or 0
     squared = row["model"] == "radziszewski_alda" and (row["parameter"] or "").startswith("n")
     return value**2 if squared else value

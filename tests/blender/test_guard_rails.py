@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What keeps a person from a wrong picture: one line and one button for each thing that is wrong,
-and files that other versions of the extension made."""
+"""Protection against wrong pictures: one line and one button for each problem, and files that other
+versions of the extension made."""
 
 import contextlib
 from importlib import import_module
@@ -52,9 +52,9 @@ SPOILED = [
 
 
 def test_without_osl_models_are_blenders_own_nodes(extension, empty, monkeypatch):
-    """As in the packages of Debian: formulas, unless a form of scripts is asked for, which is
-    refused, and nothing is left of it."""
-    _cycles = import_module("_cycles")  # a part of bpy
+    """As in Debian's packages: materials use the formulas, and a form made of scripts is refused
+    without leaving anything behind."""
+    _cycles = import_module("_cycles")  # a module in bpy
     extension.scene_loader.apply_clean_settings(empty)
     named = extension.api.new_material("phong", "aimed")
     automatic = extension.api.new_material("phong", e=20.0)
@@ -123,7 +123,7 @@ def test_every_button_is_an_operator_with_these_settings(extension):
 
 
 def aged(extension, material, made_by="brdfc 0.0.1"):
-    """As a file of another version has it."""
+    """Makes the material look like one of another version."""
     (node,) = extension.nodes.group_nodes(material)
     tag = node.node_tree[extension.nodes.TAG]
     tag["digest"], tag["made_by"] = "of another version", made_by

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Highlights of aimed forms under lamps of every kind, block by block: the mean of a picture is
-right, too, where one half of a highlight is as much too bright as the other is too dark.
+"""Tests highlights of aimed forms under lamps of every kind, block by block: the mean of a picture
+can be right even if one half of a highlight is too bright and the other too dark.
 
-Floors, or balls, of three models and of Blender's own Diffuse node are held against quadrature of
-the models over the lamp (highlights.py), which knows nothing of closures or lists of lamps. The
-node shows that it knows the lamp.
+Floors, or balls, of three models and of Blender's own Diffuse node are compared with quadrature of
+the models over the lamp (highlights.py), which does not depend on closures or lists of lamps. The
+Diffuse node shows that the lamp itself is computed correctly.
 """
 
 import math
@@ -18,24 +18,25 @@ from goniometer import unit
 from helpers import add_lamp, add_sphere, add_world, node_material, render
 from mathutils import Matrix, Vector
 
-#: A wide base and next to no rest, a narrow lobe without a base, and cones.
+#: A wide base and almost no rest; a narrow lobe without a base; and cones.
 CASES = [("cook_torrance", {"m": 0.3}), ("radziszewski_alda", {"n": 12.0}), ("phong", {})]
-#: Blocks that have this share of the brightest one's light count as the highlight; so many at most.
+#: Blocks with at least this fraction of the brightest block's light count as the highlight, up to
+#: this number of blocks.
 LEAST, MOST = 0.2, 6
-#: What the form itself may be off by: f and the lamp are averaged apart.
+#: Error allowed for the form itself, which averages f and the lamp separately.
 OFF = 0.02
-#: A right picture fails one test in ten thousand. There are too few samples where most blocks may
-#: be off by more than this and the test would not tell.
+#: A correct picture fails one test in ten thousand. The number of samples is too small if most
+#: blocks could be wrong by more than POWER without failing.
 LEVEL, POWER = 1e-4, 0.25
 SAMPLES, SEEDS = 96, 2
-#: Blocks across an item's part of the picture.
+#: Number of blocks across an item's part of the picture.
 PART = highlights.SIDE // highlights.BLOCK
-#: From the floor towards a lamp.
+#: Direction from the floor to a lamp.
 TOWARDS = unit((0.1, 0.7, 0.6))
 
 
 def turned(towards):
-    """Euler angles of a lamp that shines from there."""
+    """Euler angles of a lamp that shines from this direction."""
     return Vector(-np.array(towards)).to_track_quat("-Z", "Y").to_euler()
 
 
@@ -50,7 +51,7 @@ def one(kind, **settings):
 
 
 def two(first, second):
-    """Lamps one before the other, from where the floor is."""
+    """Two lamps, one in front of the other as seen from the floor."""
 
     def add(scene):
         near = lit(scene, first[0], at=2.6 * TOWARDS + (0.1, 0, 0), **first[1])
@@ -60,7 +61,7 @@ def two(first, second):
 
 
 def scaled(kind, mirrored=False, **settings):
-    """A lamp under a parent that turns, scales and mirrors it."""
+    """A lamp under a parent that rotates, scales and mirrors it."""
 
     def add(scene):
         item = lit(scene, kind, **settings)
@@ -82,8 +83,8 @@ def scaled(kind, mirrored=False, **settings):
 
 
 def instance(scene):
-    """A lamp without a size in a collection that is shown by an object alone, which viewports do
-    not show."""
+    """A lamp without a size in a collection that only an instance shows, and that viewports
+    hide."""
     collection = bpy.data.collections.new("Lamps")
     item = lit(scene, "POINT", shadow_soft_size=0.0)
     bpy.context.view_layer.update()
@@ -100,19 +101,19 @@ def instance(scene):
 
 
 def hidden(scene):
-    """A lamp that viewports do not show, moved since they did."""
+    """A lamp hidden in viewports and moved after it was hidden."""
     item = lit(scene, "SPOT", at=(0, 0, 9), shadow_soft_size=0.0, spot_size=2.0)
     bpy.context.view_layer.update()
     item.hide_viewport = True
     bpy.context.view_layer.update()
     item.location = 3.0 * TOWARDS
-    # Which Blender does not work out of what is hidden.
+    # Blender does not update the matrix of hidden objects.
     item.matrix_world = Matrix.LocRotScale(item.location, item.rotation_euler, None)
     return [item]
 
 
 def settings_that_change_nothing(scene):
-    """And around the lamp a wider and brighter one that shines on something else."""
+    """Also adds a wider and brighter lamp around the first, linked to another object only."""
     item = lit(scene, "POINT", shadow_soft_size=0.4)
     item.data.cycles.max_bounces = 0
     item.data.cycles.is_caustics_light = True
@@ -121,7 +122,7 @@ def settings_that_change_nothing(scene):
     item.lightgroup = "Group"
     portal = lit(scene, "AREA", at=2.0 * TOWARDS, shape="SQUARE", size=2.0)
     portal.data.cycles.is_portal = True
-    add_world(scene, strength=0.0)  # without one Blender 5.2 crashes where there is a portal
+    add_world(scene, strength=0.0)  # without a world, Blender 5.2 crashes if there is a portal
     other = lit(scene, "POINT", at=3.3 * TOWARDS, energy=5000.0, shadow_soft_size=0.6)
     receivers = bpy.data.collections.new("Receivers")
     receivers.objects.link(bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing")))
@@ -130,7 +131,7 @@ def settings_that_change_nothing(scene):
 
 
 def sheet(scene):
-    """A flat mesh, behind which nothing is."""
+    """A flat mesh that lights nothing behind it."""
     mesh = bpy.data.meshes.new("Sheet")
     mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
     mesh.materials.append(node_material("ShaderNodeEmission", Strength=50.0))
@@ -147,7 +148,7 @@ def ball_of_light(scene):
 
 
 def bright_spot(scene):
-    """An environment image with a disk of light whose edge is soft."""
+    """An environment image with a soft-edged disk of light."""
     inner, outer, radiance, width = 0.16, 0.2, 30.0, 1024
 
     def shade(away):
@@ -180,14 +181,14 @@ def bright_spot(scene):
 
 
 def without_importance(scene):
-    """A wide lamp that no drawn direction meets."""
+    """A wide lamp that BSDF sampling does not hit."""
     item = lit(scene, "AREA", shape="SQUARE", size=1.5)
     item.data.cycles.use_multiple_importance_sampling = False
     return [item]
 
 
 def without_shadows(scene):
-    """A lamp that shines through what stands before it, as light sampling alone shows."""
+    """A lamp without shadows: only light sampling shows it behind objects."""
     (item,) = without_importance(scene)
     item.data.use_shadow = False
     mesh = bpy.data.meshes.new("Wall")
@@ -201,7 +202,7 @@ def without_shadows(scene):
 
 
 def copied_sheet(scene):
-    """A sheet that an object places a copy of."""
+    """A sheet that an object instances."""
     sends = sheet(scene)
     (item,) = (o for o in scene.collection.objects if o.name.startswith("Sheet"))
     collection = bpy.data.collections.new("Sheets")
@@ -213,16 +214,16 @@ def copied_sheet(scene):
     return sends
 
 
-#: Cosines of the vertical angles of an IES file, from straight down, to this power.
+#: Exponent of the cosine in the IES file; angles are measured from straight down.
 IES_POWER = 4
-#: From this version on Cycles goes round such a file.
+#: First version in which Cycles evaluates such a file at all azimuths.
 EVEN_IES = (5, 0, 0)
-#: W/sr of a lamp of 1 W for each candela of such a file; Cycles' own factor (its util/ies.cpp).
+#: W/sr of a lamp of 1 W for each candela in such a file; the factor is from Cycles' util/ies.cpp.
 PER_CANDELA = 0.0706650768394 / (4 * math.pi)
 
 
 def ies_text(candela):
-    """A file of photometric type C, round about its axis, of candela(angle in radians)."""
+    """A file of photometric type C, symmetric about its axis, with candela(angle in radians)."""
     angles = np.arange(0, 181, 2.5)
     values = [max(candela(math.radians(a)), 0.0) for a in angles]
     rows = [
@@ -238,7 +239,7 @@ def ies_text(candela):
 
 
 def photometric(candela, radius=0.0):
-    """A lamp that an IES file directs."""
+    """A lamp with an IES file."""
 
     def add(scene):
         item = lit(scene, "POINT", energy=50.0, shadow_soft_size=radius)
@@ -257,8 +258,8 @@ def photometric(candela, radius=0.0):
             seen = np.vectorize(candela)(np.arccos(np.clip(-z, -1, 1)))
             if bpy.app.version >= EVEN_IES:
                 return seen
-            # Of a file without an azimuth Cycles takes what lies before 0 and beyond 360 degrees
-            # for dark, and interpolates by cubics (docs/cycles.md).
+            # If a file has no azimuths, Cycles treats the range below 0 and above 360 degrees as
+            # dark, and interpolates with cubics (docs/cycles.md).
             turn = np.arctan2(x, y) / (2 * np.pi) + 0.5
             return seen * (1 + turn * (1 - turn) / 2)
 
@@ -315,23 +316,23 @@ EVIDENCE_KINDS = {
     "edge of a spot": one("SPOT", shadow_soft_size=0.3, spot_size=1.3, spot_blend=0.15),
     "half below the horizon": one("SUN", towards=(0.05, 1.0, 0.02), angle=0.4),
 }
-#: Of these, three models that are not noisy there.
+#: Three models with little noise under these lamps.
 WIDE_CASES = [("cook_torrance", {"m": 0.3}), ("radziszewski_alda", {"n": 1.0}), ("phong", {})]
-#: Of lamps without a size pictures have next to no noise.
+#: Lamps without a size, whose pictures have almost no noise.
 SHARP = {
     *("point without a size", "instance", "hidden"),
     *("IES file of one intensity", "IES file of cosines"),
 }
-#: Where light is bounded within the lamp.
+#: Allowed error where a boundary of the light crosses the lamp.
 BOUNDED = {"edge of a spot": 0.08, "half below the horizon": 0.04}
-#: Where a form has nothing to average.
+#: Allowed error where a form has nothing to average.
 BOUNDED |= {"IES file of one intensity": 0.005, "IES file of cosines": 0.005}
 FULL = pytest.mark.full
 WITH_MARKS = [
     *KINDS,
     *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW_KINDS),
     *(
-        # Versions differ in lamps below the horizon.
+        # Versions differ for lamps below the horizon.
         pytest.param(name, marks=[pytest.mark.evidence, *([] if "horizon" in name else [FULL])])
         for name in EVIDENCE_KINDS
     ),
@@ -345,7 +346,7 @@ def measured(scene, stage, samples):
     # The first sample of a pixel is the same in all pictures (docs/cycles.md).
     scene.cycles.use_sample_subset = True
     scene.cycles.sample_offset, scene.cycles.sample_subset_length = samples, samples
-    scene.render.use_persistent_data = True  # shaders are compiled once
+    scene.render.use_persistent_data = True  # compiles shaders once
     pictures = []
     for seed in range(SEEDS):
         scene.cycles.seed = seed
@@ -357,7 +358,7 @@ def measured(scene, stage, samples):
 
 
 def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, off=OFF):
-    """Each block of the highlight of each item has the light that it must have."""
+    """Checks that each block in each item's highlight has the expected light."""
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
     extension.api.enable_osl(scene)
     made = [extension.api.new_material(model, form, **values) for model, values in stage.cases[1:]]
@@ -369,7 +370,7 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
     wanted = np.mean(halves, 0)
     tests = np.isfinite(wanted).sum() + len(stage.cases)
     z = NormalDist().inv_cdf(1 - LEVEL / 2 / tests)
-    # Student's t of a block's pixels.
+    # Student's t for the pixels of a block.
     z += (z**3 + z) / (4 * highlights.BLOCK**2 * (SEEDS - 1))
     wrong = []
     for i, case in enumerate(stage.cases):
@@ -377,7 +378,7 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
         bright = np.isfinite(wanted[:, columns])
         want, got, spread = (a[:, columns][bright] for a in (wanted, found, variance))
         apart = np.subtract(*(half[:, columns][bright] for half in halves)) / 2
-        # As shares. Dots are rare: a block may have none, and then no spread.
+        # As fractions. Dots are rare: a block may have none, and then shows no variance.
         noise, rough = spread / want**2, (apart / want) ** 2
         noise, rough = (np.maximum(a, a.mean()) for a in (noise, rough))
         allowed = z * np.sqrt(noise + rough) + off
@@ -409,7 +410,7 @@ def test_highlights(extension, empty, tool, kind):
 @pytest.mark.evidence
 @pytest.mark.full
 def test_balls(extension, empty, tool):
-    """Every angle between the lamp and the surface, and the horizon."""
+    """All angles between lamp and surface, and the horizon."""
     stage = highlights.Stage(empty, CASES, ball=True)
     towards = unit((0.5, -0.62, 0.6))
     lamp = lit(empty, "AREA", at=6 * towards, towards=towards, shape="DISK", size=1.0)
@@ -419,7 +420,7 @@ def test_balls(extension, empty, tool):
 @pytest.mark.evidence
 @pytest.mark.full
 def test_drawn_directions_show_the_same(extension, empty, tool):
-    """Of a wide lamp, by a form that knows of none."""
+    """Under a wide lamp, with a form that does not know about lamps."""
     stage = highlights.Stage(empty, WIDE_CASES[:2])
     lamp = lit(empty, "AREA", shape="DISK", size=3.0)
     hold(extension, tool, empty, stage, [lamp], form="sampled", samples=192)

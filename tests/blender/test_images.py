@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole pictures against the reference renderer: every model in every form, by Welch's t-test.
+"""Compares whole pictures with the reference renderer, for every model in every form, by Welch's
+t-test.
 
-Each sphere of one scene has its own material; several renders that differ in their seed give the
-noise of every pixel. The pictures stay in the folder that pytest names where a test fails.
+In one scene, each sphere has its own material. Several renders with different seeds give the noise
+of every pixel. If a test fails, its pictures stay in pytest's temporary folder.
 """
 
 import json
@@ -18,12 +19,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 DRIVER, SCENES = ROOT / "script" / "render_scene.py", ROOT / "scenes"
-#: Pictures of a form; pixels along a sphere's diameter, roughly; spheres in a row.
+#: Number of pictures for each form; approximate diameter of a sphere in pixels; spheres per row.
 SEEDS, SIZE, COLUMNS = 8, 24, 8
 
 
 def write_sky(path, width=64):
-    """A smooth sky that differs in every direction and colour, without dark or bright spots."""
+    """A smooth sky in which direction and colour vary, without dark or bright spots."""
     phi, theta = np.meshgrid(
         2 * np.pi * (np.arange(width) + 0.5) / width,
         np.pi * (np.arange(width // 2) + 0.5) / width * 2,
@@ -38,7 +39,7 @@ def write_sky(path, width=64):
 
 
 def scene(materials, max_bounces, spp):
-    """Spheres side by side, seen from afar."""
+    """Spheres side by side, seen from far away."""
     rows = math.ceil(len(materials) / COLUMNS)
     columns = min(COLUMNS, len(materials))
     objects = [
@@ -79,7 +80,8 @@ def scene(materials, max_bounces, spp):
 
 
 def render_both(folder, extension_zip, tool, content, spp):
-    """Pictures of SEEDS seeds by Blender, and the reference; their paths, the reference last."""
+    """Renders pictures with SEEDS seeds in Blender, and the reference; returns their paths, the
+    reference last."""
     source = folder / "source.json"
     source.write_text(json.dumps(content))
     tool("scene", source, "--out", folder)
@@ -103,7 +105,8 @@ def render_both(folder, extension_zip, tool, content, spp):
 
 @pytest.fixture
 def judge(tmp_path):
-    """compare --test of pictures and reference: its JSON; further arguments as they are."""
+    """Runs compare --test on pictures and the reference; returns its JSON. Further arguments are
+    passed on."""
 
     def run(pictures, *arguments):
         command = [os.environ["BRDFC_TOOL"], "compare", *pictures, "--test", "--json"]
@@ -123,7 +126,7 @@ def judge(tmp_path):
     ["small-lamp", *(pytest.param(n, marks=pytest.mark.evidence) for n in ("ra-back", "lamps"))],
 )
 def test_small_lamps_against_the_reference(extension_zip, tool, tmp_path, judge, name):
-    """Scenes that drawn directions alone can't be told right in: nearly all they see is dots."""
+    """Scenes in which random rays alone prove nothing, because they show little but dots."""
     content = json.loads((SCENES / f"{name}.json").read_text())
     settings = content["settings"]
     settings |= {"width": 128, "height": round(128 * settings["height"] / settings["width"])}
@@ -136,15 +139,16 @@ def test_small_lamps_against_the_reference(extension_zip, tool, tmp_path, judge,
 @pytest.mark.evidence
 @pytest.mark.full
 def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_path, judge):
-    # Those that equal their model; what the others are off by test_fitted.py and test_twin.py tell.
+    # Forms that equal their model; the errors of the others are tested by test_fitted.py and
+    # test_twin.py.
     materials = {
         f"{model}_{form}": {"model": model, "representation": form}
         for model in extension.pack.model_names()
         for form in extension.pack.model(model)["representations"]
         if form not in ("fitted", "twin")
     }
-    # Smooth light alone: where a form meets a lamp once in a thousand samples, the spread of a few
-    # pictures does not show its noise, which the test takes from there.
+    # Only smooth light: if a form hits a lamp once in a thousand samples, the variance of a few
+    # pictures, on which the test relies, underestimates its noise.
     write_sky(tmp_path / "sky.exr")
     content = scene(materials, max_bounces=2, spp=1024) | {"environment": {"image": "sky.exr"}}
     pictures = render_both(tmp_path, extension_zip, tool, content, spp=64)
@@ -158,9 +162,10 @@ def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_pa
 def test_a_bias_of_one_percent_or_one_in_a_thousand_is_found(
     extension, extension_zip, tool, tmp_path, judge
 ):
-    """The power of the test: as rendered it accepts, brightened it rejects."""
+    """The power of the test: it accepts the pictures as rendered, and rejects brightened ones."""
     materials = {"lambert": {"model": "lambert", "representation": "exact"}}
-    # No bounce, so that a sky lost behind the lamp, which is a transparent bounce to Cycles, shows.
+    # With 0 bounces the test also detects a sky that is lost behind the lamp, which is a
+    # transparent bounce to Cycles.
     content = scene(materials, max_bounces=0, spp=8192)
     content["camera"]["height"] = 1.2  # nothing but the sphere
     content["environment"] = {"color": [0.5, 0.6, 0.7]}

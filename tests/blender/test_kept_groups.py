@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nodes of formulas that were made once are appended the next time, and are the same."""
+"""Tests that nodes of formulas are made once and appended the next time, and that both are the
+same."""
 
 from importlib import import_module
 
@@ -22,7 +23,7 @@ def value(socket):
 
 
 def described(tree, seen=None):
-    """All that makes a tree what it is, with the groups in it."""
+    """Everything that defines a tree, including the groups inside."""
     nodes = {node.name: i for i, node in enumerate(tree.nodes)}
     found = []
     for node in tree.nodes:
@@ -75,7 +76,7 @@ def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
         material = extension.api.new_material(model, "nodes")
         assert described(formulas(material, extension)) == made[model]
     assert len(bpy.data.libraries) == 0
-    # Parts that models share are in the file once.
+    # A file contains parts that models share only once.
     names = [group.name.split(".")[0] for group in bpy.data.node_groups]
     assert names.count("brdfc lamp seen") == 1
     assert not [g.name for g in bpy.data.node_groups if g.users == 0 or g.library]
@@ -114,7 +115,7 @@ def test_a_folder_that_can_not_be_made_matters_to_nobody(extension, kept, monkey
 
 
 def test_nothing_of_the_scene_is_kept(extension, kept):
-    """Lamps of the file that a group was made in are no part of it."""
+    """It does not contain the lamps of the file in which a group was made."""
     light = bpy.data.lights.new("Lamp", "POINT")
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("Lamp", light))
     extension.api.new_material("ward", "nodes")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How forms that aim at lamps learn of them: the shared node group and what keeps it current."""
+"""How forms that aim at lamps know about them: the shared node group and its updates."""
 
 import math
 import subprocess
@@ -35,7 +35,7 @@ def handlers(lamps):
 
 @pytest.fixture(scope="module")
 def aimed(extension):
-    """A model and a form of it that aims at lamps."""
+    """A model with a form that aims at lamps."""
     return next(
         (model, form)
         for model, entry in extension.api.models().items()
@@ -46,7 +46,7 @@ def aimed(extension):
 
 @pytest.fixture
 def ball(extension, empty, aimed):
-    """A ball at the origin of a material that aims at lamps, in the empty file."""
+    """A ball at the origin, with a material that aims at lamps, in the empty file."""
     return helpers.add_sphere(empty, extension.api.new_material(*aimed), segments=8)
 
 
@@ -59,7 +59,7 @@ def slots(scene, update=True):
     layer = scene.view_layers[0]
     if update:
         layer.update()
-        layer.update()  # what a handler changed
+        layer.update()  # after changes by handlers
     group = bpy.data.node_groups["brdfc Lamps"].evaluated_get(layer.depsgraph)
     assert group.is_evaluated
     numbers = []
@@ -74,14 +74,14 @@ def slots(scene, update=True):
 
 
 def axes(slot):
-    """Axes of the lamp as the shader makes them of its quaternion, as columns."""
+    """The lamp's axes, as columns, as the shader computes them from its quaternion."""
     quaternion = Quaternion((slot[8], *slot[3:6]))
     assert quaternion.magnitude == pytest.approx(1, abs=1e-5)
     return np.array(quaternion.to_matrix())
 
 
 def expected(item):
-    """(kind, a, b) of a lamp, its place, axes of unit length and scales."""
+    """(kind, a, b) of a lamp, its position, axes of unit length and scales."""
     light, matrix = item.data, np.array(item.matrix_world)
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     shape = {
@@ -104,7 +104,7 @@ def assert_lamp(slot, item):
     assert slot[6:8] == pytest.approx(scale[:2], rel=1e-4)
     found = axes(slot)
     assert found[:, 2] == pytest.approx(turn[:, 2], abs=1e-4), "it shines along -z"
-    # A rectangle turned round is the same one.
+    # A rectangle rotated by 180 degrees is the same.
     for axis in (0, 1):
         assert abs(found[:, axis] @ turn[:, axis]) == pytest.approx(1, abs=1e-4)
 
@@ -132,7 +132,7 @@ def test_model_groups_are_fed_by_the_one_group(extension, ball, aimed):
         assert link.from_node.node_tree == shared and link.from_socket.name == name
     assert not extension.nodes.script_problem(node.node_tree)
     assert slots(bpy.context.scene) == []
-    # It goes with the last that has it.
+    # The group is removed with its last user.
     for material in list(bpy.data.materials):
         bpy.data.materials.remove(material)
     extension.nodes.remove_unused_groups()
@@ -163,7 +163,7 @@ def test_every_type_of_lamp(ball, empty, subtests):
 
 
 def test_quaternions_are_of_one_sign(ball, empty):
-    """Blender works out the four numbers apart from each other."""
+    """Blender computes the four numbers separately."""
     random = np.random.default_rng(1)
     lamp = add_lamp(empty, "SUN")
     for _ in range(40):
@@ -181,7 +181,7 @@ def test_parents_and_constraints(ball, empty):
     tracked = add_lamp(empty, "SPOT", "Tracked", location=(-3, 1, 5))
     tracked.constraints.new("TRACK_TO").target = parent
     assert_lamps(slots(empty), [child, tracked])
-    # A parent that is stretched makes the child oblique; where it shines is kept.
+    # A stretched parent shears the child; the direction of its light is kept.
     parent.scale = (3, 1, 1)
     found = slots(empty)
     oblique = next(s for s in found if s[9] == 3)
@@ -265,7 +265,7 @@ def test_two_scenes(lamps, shared_group, ball, empty, extension):
     assert_lamps(slots(other), there)
     window.scene = empty
     assert_lamps(slots(empty), [here])
-    # A picture of a scene that no window shows has that scene's lamps.
+    # A picture of a scene that no window shows uses that scene's lamps.
     met = []
 
     def note(scene, *_):
@@ -294,7 +294,7 @@ def test_copies_of_the_group_give_way(extension, shared_group, ball, empty, aime
     bpy.context.view_layer.update()
     path = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    # Appended to a file that has a group of its own.
+    # Appended to a file that already has such a group.
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     own = extension.api.new_material(*aimed)
@@ -355,7 +355,7 @@ os._exit(0)
 
 
 def test_a_file_needs_no_extension(ball, empty, tmp_path):
-    """In a process of its own, with Blender's factory settings: scripts in files may not run."""
+    """In a separate process with Blender's factory settings, where scripts in files may not run."""
     animate(add_lamp(empty, "POINT", "Key"))
     add_lamp(empty, "SUN", "Sun", location=(1, 0, 7))
     add_lamp(empty, "AREA", "Area", location=(3, 3, 3), size=0.5)
@@ -391,14 +391,14 @@ def test_more_lamps_than_slots(extension, ball, empty):
     assert found[0].irradiance > found[7].irradiance > found[8].irradiance > 0
     assert "fainter" in found[8].why and not found[7].why
     assert_lamps(slots(empty), [bpy.data.objects[f"Lamp{i}"] for i in range(3, 11)])
-    # A lamp that becomes bright takes the slot of the faintest, and the others stay where they are.
+    # A lamp that becomes bright takes the slot of the faintest; the others keep theirs.
     before = slots(empty)
     bpy.data.objects["Lamp0"].data.energy = 1000
     after = slots(empty)
     kept = [np.array_equal(a, b) for a, b in zip(before, after, strict=True)]
     assert kept == [True] * 7 + [False]
     assert_lamp(after[7], bpy.data.objects["Lamp0"])
-    # What counts is the light where the camera looks.
+    # What counts is the irradiance where the camera looks.
     far = add_lamp(empty, "POINT", "Far", location=(0, 0, 500), energy=5000)
     assert all(not np.allclose(s[:3], far.location) for s in slots(empty))
     lines = helpers.Layout()
@@ -490,7 +490,7 @@ def environment(scene, pixels):
 
 
 def spotted(direction, half_angle, radiance, width=512):
-    """A dim picture with a bright disc in a direction, and the directions of its pixels."""
+    """A dim picture with a bright disk in a direction, and the directions of its pixels."""
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(width // 2) + 0.5) * 2 / width)
     phi, theta = (0.5 - u) * 2 * np.pi, (v - 0.5) * np.pi
     to = [np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)]
@@ -515,9 +515,9 @@ def test_bright_spots_are_found(lamps, subtests):
     window = spotted(np.array([1.0, 0, 0]), 0.2, 100.0)[..., 0]
     (spot,) = find(window)
     assert 0.38 <= spot[1] < 0.42
-    assert find(spotted(np.array([1.0, 0, 0]), 0.3, 100.0)[..., 0]) == []  # it is too wide
-    assert find(spotted(np.array([1.0, 0, 0]), 0.05, 3.0)[..., 0]) == []  # it gives too little
-    # The glow around a sun is none, a wall elsewhere that shines as much is one.
+    assert find(spotted(np.array([1.0, 0, 0]), 0.3, 100.0)[..., 0]) == []  # too wide
+    assert find(spotted(np.array([1.0, 0, 0]), 0.05, 3.0)[..., 0]) == []  # too little light
+    # The glow around a sun is not a spot; an equally bright wall elsewhere is one.
     glow = spotted(np.array([0.0, 1, 0]), 0.02, 5e4) + spotted(np.array([0.0, 1, 0]), 0.2, 60.0)
     spots = find((glow + spotted(np.array([1.0, 0, 0]), 0.2, 60.0))[..., 0])
     assert [spot[0] @ (0, 1, 0) > 0.99 for spot in spots] == [True, False]
@@ -533,7 +533,7 @@ def test_spot_of_an_environment_image(extension, ball, empty):
     (slot,) = slots(empty)
     assert slot[9] == 2 and 0.06 <= slot[10] < 0.09
     assert axes(slot)[:, 2] == pytest.approx(direction, abs=5e-3)
-    # What the ray's direction is turned by, the spot is turned back by.
+    # The spot is rotated by the inverse of the rotation that is applied to the ray's direction.
     coordinate = tree.nodes.new("ShaderNodeTexCoord")
     mapping = tree.nodes.new("ShaderNodeMapping")
     tree.links.new(coordinate.outputs["Generated"], mapping.inputs["Vector"])
@@ -584,7 +584,7 @@ def test_emissive_meshes(extension, ball, empty, kind):
     assert slots(empty) == []
     strength.default_value = 5
     assert len(slots(empty)) == 1
-    # A ball away from its object's origin can't be driven, but is followed.
+    # A ball that is not at its object's origin can't be driven, but handlers follow it.
     glow.data.transform(Matrix.Translation((1, 0, 0)))
     glow.data.update()
     glow.rotation_euler = (0, 0, math.pi / 2)
@@ -608,7 +608,8 @@ def emissive_plane(scene, material, points):
 
 
 def test_flat_meshes_are_area_lamps(extension, ball, empty):
-    """As rectangles and ellipses that shine towards the subject, however their points lie."""
+    """As rectangles and ellipses that emit towards the subject, whatever the order of their
+    points."""
     material, _ = emissive()
     panel = emissive_plane(empty, material, [(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)])
     for turn, points, stretch in ((0, 0, 3), (0.4, 0, 3), (0.4, 0.7, 1)):
@@ -652,7 +653,7 @@ def test_flat_meshes_are_area_lamps(extension, ball, empty):
 
 
 def test_lamps_whose_light_differs_over_them(extension, ball, empty):
-    """Half a softbox is dark: a lobe would show all of it half as bright."""
+    """If half of a softbox is dark, a lobe would show all of it half as bright."""
     item = add_lamp(empty, "AREA", "Softbox", shape="SQUARE", size=1.0)
     item.data.use_nodes = True
     tree = item.data.node_tree
@@ -665,7 +666,7 @@ def test_lamps_whose_light_differs_over_them(extension, ball, empty):
     )
     (lamp,) = extension.api.see_lamps(empty)
     assert lamp.slot is None and lamp.why == "its light is not the same all over it"
-    item.data.size = 0.1  # too small to tell
+    item.data.size = 0.1  # so small that it makes no difference
     assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
     item.data.type = "POINT"
     bpy.data.objects.remove(item)
@@ -679,7 +680,7 @@ def test_lamps_whose_light_differs_over_them(extension, ball, empty):
 
 
 def _mask(tree):
-    """1 on half of a mesh, 0 on the other."""
+    """1 on half of a mesh, 0 on the other half."""
     place = tree.nodes.new("ShaderNodeTexCoord")
     step = tree.nodes.new("ShaderNodeMath")
     step.operation = "GREATER_THAN"
@@ -696,7 +697,7 @@ def _mixed(tree, emission, factor):
 
 
 def _grouped(tree, emission, factor):
-    """The Emission in a group that takes its strength from outside."""
+    """The Emission node in a group whose strength is an input."""
     inner = bpy.data.node_groups.new("Glow", "ShaderNodeTree")
     inner.interface.new_socket("Strength", in_out="INPUT", socket_type="NodeSocketFloat")
     inner.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
@@ -745,7 +746,7 @@ def test_what_makes_light_differ(extension, ball, empty, shader, even):
 
 
 def test_parts_of_balls_and_of_planes(extension, ball, empty):
-    """Whose light is not that of the whole."""
+    """Their light differs from that of the whole ball or plane."""
     bright, dim = emissive()[0], emissive(5.0)[0]
     square = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     panel = emissive_plane(empty, bright, [*square[:2], (1, 0), *square[2:], (-1, 0)])
@@ -789,7 +790,7 @@ def test_soft_lamps_with_textures_and_scaled_spots(extension, ball, empty):
 
 
 def test_a_fine_grid_in_edit_mode(extension, ball, empty):
-    """Any number of faces make a plane, and one that is edited stays one."""
+    """A plane may have any number of faces, and stays a plane in Edit Mode."""
     n = 160
     mesh = bpy.data.meshes.new("Grid")
     points = [(x / n - 0.5, y / n - 0.5, 0) for y in range(n + 1) for x in range(n + 1)]
@@ -830,7 +831,7 @@ def test_materials_of_geometry_nodes(extension, ball, empty):
 
 
 def test_lamps_that_geometry_nodes_place(extension, ball, empty):
-    """Of a collection that is the modifier's input."""
+    """The lamps are in a collection that is an input of the modifier."""
     lamps = bpy.data.collections.new("Lamps")
     data = bpy.data.lights.new("Bulb", "POINT")
     data.shadow_soft_size = 0.1
@@ -868,7 +869,7 @@ def square(scene, material, side=0.5):
 
 
 def in_collection(scene, item):
-    """The item moved to a collection that no picture shows by itself."""
+    """Moves the item to a collection that is itself hidden."""
     collection = bpy.data.collections.new("Copied")
     scene.collection.objects.unlink(item)
     collection.objects.link(item)
@@ -876,8 +877,8 @@ def in_collection(scene, item):
 
 
 def placing(scene, *nodes):
-    """An object of geometry nodes: a point for each corner of a square of 2 m, and `nodes(tree,
-    points)` makes the output of them."""
+    """An object with geometry nodes: a point for each corner of a square of 2 m, and `nodes(tree,
+    points)`, which makes the output from them."""
     tree = bpy.data.node_groups.new("Place", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     end, grid = tree.nodes.new("NodeGroupOutput"), tree.nodes.new("GeometryNodeMeshGrid")
@@ -995,7 +996,7 @@ def test_copies_of_what_shines(extension, ball, empty, place):
 
 
 def bulb(scene, at=(0, 0, 0)):
-    """A lamp that no picture shows by itself."""
+    """A lamp that is itself hidden."""
     data = bpy.data.lights.new("Bulb", "POINT")
     data.shadow_soft_size = 0.1
     item = bpy.data.objects.new("Bulb", data)
@@ -1010,7 +1011,7 @@ def lamps_by(kind):
     def place(scene):
         parent = emissive_plane(scene, None, [(-1, -1), (1, -1), (1, 1), (-1, 1)])
         parent.location.z, parent.instance_type = 5, kind
-        parent.show_instancer_for_render = False  # half of each lamp is behind it
+        parent.show_instancer_for_render = False  # half of each lamp would be behind it
         bulb(scene).parent = parent
         return [(0, 0, 5)] if kind == "FACES" else [(x, y, 5) for x in (-1, 1) for y in (-1, 1)]
 
@@ -1054,7 +1055,8 @@ def lamps_by_nodes_of_a_collection(scene):
     ids=["vertices", "faces", "object", "collection"],
 )
 def test_copies_of_lamps(extension, ball, empty, place):
-    """As many as Cycles shows, and where: a floor looks the same under lamps that stand there."""
+    """Their number and positions are as in Cycles: a floor looks the same under real lamps in their
+    place."""
     places = place(empty)
     bpy.context.view_layer.update()
     extension.api.see_lamps(empty)
@@ -1071,7 +1073,7 @@ def test_copies_of_lamps(extension, ball, empty, place):
 
 
 def floor_picture(scene):
-    """Light by quarter of a matte floor of 4 m that lies below what shines, seen from above."""
+    """Light of each quarter of a diffuse floor of 4 m below the lamps, seen from above."""
     if "Floor" not in bpy.data.objects:
         floor = emissive_plane(scene, None, [(-2, -2), (2, -2), (2, 2), (-2, 2)])
         floor.name, floor.location.z = "Floor", -2
@@ -1086,7 +1088,7 @@ def floor_picture(scene):
 
 
 def test_many_copies_of_what_shines(extension, ball, empty):
-    """The nearest ones, and a line for all others."""
+    """The nearest ones, and one entry for all others."""
     item = square(empty, emissive()[0], 0.02)
     collection = in_collection(empty, item)
     for i in range(100):
@@ -1099,7 +1101,7 @@ def test_many_copies_of_what_shines(extension, ball, empty):
     assert [lamp.name for lamp in found[:8]] == [f"Copy0{i}/Panel" for i in range(8)]
     assert [lamp.slot for lamp in found[:9]] == [*range(1, 9), None]
     assert 9 < len(found) < 50 and any("and 67 more" in lamp.name for lamp in found)
-    # A copy that moves, and the one that all are copies of.
+    # An instance that moves, and the original of all.
     bpy.data.objects["Copy50"].location = (0, 0, 3)
     assert any(s[:3] == pytest.approx([0, 0, 3]) for s in slots(empty))
     item.data.transform(Matrix.Translation((0, 0, 0.5)))
@@ -1108,7 +1110,7 @@ def test_many_copies_of_what_shines(extension, ball, empty):
 
 
 def test_broken_and_empty_meshes(extension, ball, empty):
-    """Raise nothing and take no slot."""
+    """They raise no exception and take no slot."""
     material, _ = emissive()
     for points, faces in (
         ([], []),
@@ -1144,7 +1146,7 @@ def test_images_of_another_file_with_the_same_name(extension, ball, empty, tmp_p
 
 @pytest.mark.long
 def test_lamps_that_are_not_normalised(extension, ball, empty):
-    """Their energy is for a size of 1."""
+    """Their power refers to a size of 1."""
     helpers.add_camera(empty)
     empty.render.resolution_x = empty.render.resolution_y = 16
     empty.cycles.samples = 64
@@ -1203,7 +1205,7 @@ def test_scenes_within_the_picture(extension, ball, empty):
 
 
 def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, empty, monkeypatch):
-    """Whatever is written has shaders compiled anew."""
+    """Anything that is written recompiles shaders."""
     written = []
     write = shared_group.write
     monkeypatch.setattr(shared_group, "write", lambda s, v: (written.append(s), write(s, v)))
@@ -1217,7 +1219,7 @@ def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, e
     written.clear()
     lamp.location.x = 3
     lamp.data.energy = 3
-    lamp.data.shadow_soft_size = 0.3  # so much that it changes no order
+    lamp.data.shadow_soft_size = 0.3  # too little to change the order
     ball.location.z = 0.5
     glow.location.x = 5
     ball.active_material.diffuse_color = (0, 0, 0, 1)
@@ -1246,8 +1248,8 @@ def test_selecting_is_no_reason_to_look(scenes, ball, empty, monkeypatch):
 
 
 def test_a_sun_without_a_size_is_seen(extension, ball, empty):
-    """Drawn directions meet it by chance alone, aimed closures in every sample: and that from a
-    script that never updates anything."""
+    """Random rays never hit it, aimed closures do in every sample; this must also work in a script
+    that never updates anything."""
     extension.api.enable_osl(empty)
     add_lamp(empty, "SUN", turn=(0.9, 0, 0), angle=0.0)
     helpers.add_camera(empty)
@@ -1257,7 +1259,7 @@ def test_a_sun_without_a_size_is_seen(extension, ball, empty):
     for seed in (1, 2):
         empty.cycles.seed = seed
         pictures.append(helpers.render(empty)[5:11, 5:11, :3])
-    # What is left is the noise of edges of the coarse ball's faces, as Lambert's exact form has it.
+    # What remains is noise at the edges of the coarse ball's faces, as in Lambert's exact form.
     assert min(p.min() for p in pictures) > 0
     assert np.median(np.abs(pictures[0] / pictures[1] - 1)) < 0.05
 
@@ -1276,7 +1278,7 @@ def test_handlers_come_and_go(lamps, handlers, scenes, empty, monkeypatch):
     lamps.unregister()
     assert ours() == []
     lamps.register()
-    # In a file without such a group they don't look at anything.
+    # In a file without such a group, handlers don't examine anything.
     looked = []
     monkeypatch.setattr(scenes, "look", lambda *_: looked.append(1))
     add_lamp(empty, "POINT", "Key")
@@ -1294,7 +1296,8 @@ def test_lean_files_name_the_number_of_lamps(extension, ball, empty):
 
 
 def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
-    """The sign of their size tells shaders so; and the panel, where a closure misses them, too."""
+    """The sign of their size marks them for the shaders; and the panel warns if closures miss them,
+    too."""
     extension.scene_loader.apply_clean_settings(empty)
     extension.api.enable_osl(empty)
     material = ball.active_material
@@ -1323,7 +1326,7 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
     (found,) = extension.api.warnings(material, empty)
     assert (found.code, found.severity) == ("multiple_importance", "ERROR")
     assert "Near" in found.message and lamp.why in found.message
-    near.data.shadow_soft_size, near.data.energy = 0.1, 240.0  # the faintest, and no trifle
+    near.data.shadow_soft_size, near.data.energy = 0.1, 240.0  # the faintest, but not negligible
     for i in range(8):
         add_lamp(empty, "POINT", f"Lamp{i}", location=(0, i, 3), energy=5000.0)
     assert len(slots(empty)) == 8
@@ -1336,7 +1339,7 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
     [("aimed", "Multiple Importance, too"), ("sampled", "none of their light"), ("twin", "")],
 )
 def test_lamps_without_shadows_are_a_finding(extension, empty, form, expected):
-    """tests/blender/test_highlights.py has what is lost; Blender's own nodes lose it as well."""
+    """tests/blender/test_highlights.py shows what is lost; Blender's own nodes lose it as well."""
     extension.scene_loader.apply_clean_settings(empty)
     extension.api.enable_osl(empty)
     material = extension.api.new_material("ward", form)
@@ -1371,7 +1374,8 @@ TILT=INCLUDE
 
 
 def test_light_that_nodes_give(extension, ball, empty, tmp_path):
-    """How bright a lamp is counts by what is linked to its strength: by that it gets its slot."""
+    """A lamp's brightness, which decides about its slot, includes what is linked to its
+    strength."""
     item = add_lamp(empty, "POINT", energy=10.0)
     (plain,) = extension.api.see_lamps(empty)
     item.data.use_nodes = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lean materials: baked from inside Blender, with the program brdfc."""
+"""Lean materials, baked from inside Blender with the program brdfc."""
 
 import os
 import sysconfig
@@ -17,7 +17,7 @@ from helpers import Layout, counts
 
 @pytest.fixture
 def used(extension, empty, kept_program, monkeypatch):
-    """Materials of three models, one with a link; by model."""
+    """Materials of three models by name, one of them with a link."""
     monkeypatch.setenv("BRDFC_TOOL", str(kept_program))
     api = extension.api
     made = {
@@ -30,7 +30,7 @@ def used(extension, empty, kept_program, monkeypatch):
     value.outputs[0].default_value = 0.5
     made["ward"].node_tree.links.new(value.outputs[0], extension.nodes.sockets(node)["ay"])
     for material in made.values():
-        # What is not linked is left out anyhow.
+        # An output that is not linked would be left out anyway.
         extension.api.add_albedo(material)
         emission = material.node_tree.nodes.new("ShaderNodeEmission")
         albedo = the_node(extension, material).outputs["Albedo"]
@@ -44,7 +44,7 @@ def the_node(extension, material):
 
 
 def source(extension, material):
-    """Of all scripts that a material has."""
+    """The text of all scripts in a material."""
     scripts = the_node(extension, material).node_tree.nodes
     return "".join(n.script.as_string() for n in scripts if n.bl_idname == "ShaderNodeScript")
 
@@ -73,8 +73,8 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
         assert words in lines
     assert counts() == before, "a plan changes nothing"
     assert api.bake(plan) == 3
-    # The file has no lamp, so no lean shader has a slot: the group that lamps are read from goes.
-    # And so do three twins, one with an image, and the text that tells where shaders run.
+    # The file has no lamp, so no lean shader has a slot, and the group of lamps is removed. So are
+    # three twins, one with an image, and the text that tells where shaders run.
     less = {"node_groups": 4, "texts": 1, "images": 1}
     lean = before | {kind: before[kind] - count for kind, count in less.items()}
     assert counts() == lean, "groups and texts that nothing uses are left"
@@ -85,7 +85,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
         node = the_node(extension, material)
         assert nodes.is_baked(node)
         assert set(nodes.sockets(node)) == free[model] | {"Normal", "Tangent"}
-        # In coupled's short text a table of three colours takes the place of a colour.
+        # In coupled's short text, a table of three colours replaces a colour.
         part = 1.1 if model == "coupled" else 0.5
         assert len(source(extension, material)) < part * sizes[model]
         assert nodes.uses_albedo(node)
@@ -94,7 +94,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
         for name, value in found.items():
             same = value if isinstance(value, str) else pytest.approx(value, rel=1e-6)
             assert values[model][name] == same
-        # What is left out is what no ray meets; the noise is another one.
+        # Only closures that no ray hits are left out; the noise differs.
         after = picture(extension, material)
         centre = (slice(8, 16), slice(8, 16))
         assert after[centre].mean() == pytest.approx(pictures[model][centre].mean(), rel=0.05)
@@ -103,7 +103,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     for name, entry in api.used_materials().items():
         assert entry["parameters"] == listed[name]["parameters"]
 
-    # The file keeps them where the pack is gone.
+    # The file keeps them when the pack is gone.
     path = tmp_path / "lean.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -234,8 +234,8 @@ def refused_and_unchanged(extension, material, match):
 
 
 def test_the_program_of_an_environment_is_found(extension, tmp_path, monkeypatch):
-    """As pip puts it there: on the PATH where the environment is activated, and else beside the
-    Python that runs."""
+    """Where pip puts it: on the PATH if the environment is activated, otherwise beside the running
+    Python."""
     for folder in ("path", "scripts"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "brdfc").symlink_to(os.environ["BRDFC_TOOL"])
@@ -316,7 +316,7 @@ class Stand:
 
 @pytest.fixture
 def manager():
-    """What operators ask of Blender's windows while they are modal, and what they told them."""
+    """Replaces what modal operators use of Blender's windows, and records what they report."""
     told = []
     window_manager = SimpleNamespace(
         event_timer_add=lambda step, window: told.append("timer") or "timer",
@@ -335,9 +335,9 @@ def manager():
 
 
 def run_through(stand, context, job, event="TIMER"):
-    """How a modal operator ends."""
+    """Runs a modal operator; returns its final result."""
     assert stand.begin(context, job) == {"RUNNING_MODAL"}
-    # By time and not by events: the program takes as long as what else the machine does lets it.
+    # Limited by time and not by events: how long the program takes depends on the machine's load.
     end = time.monotonic() + 300
     while time.monotonic() < end:
         result = stand.modal(context, SimpleNamespace(type=event))
@@ -377,7 +377,7 @@ def test_esc_while_planning_ends_the_program_and_leaves_no_file(
     while 25.0 not in manager.told and time.monotonic() < end:
         assert stand.modal(manager.context, SimpleNamespace(type="TIMER")) == {"RUNNING_MODAL"}
     assert 25.0 in manager.told, "the share is what the program says"
-    # Other events wait: what the user would change meanwhile is not in the plan.
+    # Other events are blocked: what the user changed meanwhile would not be in the plan.
     assert stand.modal(manager.context, SimpleNamespace(type="A")) == {"RUNNING_MODAL"}
     assert stand.modal(manager.context, SimpleNamespace(type="ESC")) == {"CANCELLED"}
     assert "nothing is changed" in stand.reports[0]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The library of ready-made materials: what it lists, how it comes into the Asset Browser, and what
-dragging from there does. Blender's drag appends, as wm.append does with these options."""
+"""The library of ready-made materials: its contents, its registration in the Asset Browser, and
+dragging from there. Blender's drag appends, as wm.append does with these options."""
 
 import importlib
 import json
@@ -38,7 +38,7 @@ def made(library):
 
 
 def drag(made, name):
-    """What dropping a material of the Asset Browser does; returns it."""
+    """Does what dropping a material of the Asset Browser does; returns the material."""
     before = set(bpy.data.materials)
     bpy.ops.wm.append(
         directory=f"{made.blend / 'Material'}/",
@@ -164,8 +164,8 @@ def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty
 @pytest.mark.long
 @pytest.mark.full
 def test_the_program_is_started_as_blender_expects_it(library, monkeypatch, tmp_path):
-    """As a module Blender has no program: this one takes its options as the manual says, and runs
-    the script."""
+    """Blender as a module has no program: this one parses its options as documented, and runs the
+    script."""
     program = tmp_path / "blender"
     program.write_text(
         f"#!{sys.executable}\n"
@@ -212,13 +212,13 @@ def test_making_it_may_be_given_up(library, made):
 
 # Dragged
 
-#: Groups of what is dragged, with Open Shading Language and without: what suits itself to the
-#: scene, what that is made of there, and what stands in for it.
+#: Forms in the groups of a dragged material, with Open Shading Language and without: the group that
+#: adapts to the scene, the form inside, and the stand-in.
 FORMS = {True: ("auto", "twin"), False: ("auto", "nodes", "twin")}
 
 
 def assert_aims_at(extension, material, lamp):
-    """That the group of lamps in the material's model has the lamp's place."""
+    """Checks that the lamp group in the material's model contains the lamp's position."""
     bpy.context.view_layer.update()
     (node,) = extension.nodes.group_nodes(material)
     content = extension.nodes.made_of(node.node_tree)
@@ -278,7 +278,7 @@ def test_a_group_that_differs_does_not_give_way(extension, made, empty):
 
 
 def test_what_is_asked_for_by_name_stays(extension, made, empty):
-    """Who appends a group itself holds on to it; as who loads it from a script does."""
+    """The user, or a script, may be using a group that was appended by name."""
     extension.api.new_material("ward")
     with bpy.data.libraries.load(str(made.blend)) as (there, here):
         here.node_groups = [name for name in there.node_groups if name == "Ward (auto)"]
@@ -328,8 +328,8 @@ def test_every_material_is_as_the_same_one_made_by_hand(extension, library, made
 @pytest.mark.evidence
 @pytest.mark.full
 def test_dragged_materials_render_as_those_made_by_hand(extension, library, made, empty, subtests):
-    """Of each catalogue one, on balls in a row under a lamp and a white sky. Both pictures have the
-    same noise. (Of all there is a picture, made by the same functions.)"""
+    """One of each catalogue, on balls in a row under a lamp and a white sky. Both pictures have the
+    same noise. (script/assets renders all, with the same functions.)"""
     entries, pixels = list({e.catalog: e for e in library.entries()}.values()), 16
     balls = [helpers.add_sphere(empty, drag(made, e.name), segments=24) for e in entries]
     for x, ball in enumerate(balls):

@@ -16,7 +16,7 @@ MODELS = ("phong", "lossless", "fresnel_conductor")
 
 @pytest.fixture
 def library(extension, empty, tmp_path):
-    """A file with a material of each of the models, named as they are, Phong's on a ball."""
+    """A file with a material for each of the models, named after it; that of Phong is on a ball."""
     for model in MODELS:
         material = extension.api.new_material(model)
         material.name, material.use_fake_user = model, True
@@ -48,7 +48,7 @@ def overridden(path, kind, name):
 
 
 def put_on_a_ball(material):
-    """It is the active one then."""
+    """It then is the active material."""
     item = helpers.add_sphere(bpy.context.scene, material)
     bpy.context.view_layer.objects.active = item
 
@@ -61,7 +61,7 @@ def make_active(item):
 
 @pytest.fixture(params=[linked, overridden])
 def foreign(library, request):
-    """foreign(name): a material of that file in a new one, the active one."""
+    """foreign(name): a material of that file in a new one, as the active material."""
 
     def get(name):
         material = request.param(library, "materials", name)
@@ -174,7 +174,7 @@ def test_all_materials_are_all_that_can_be_changed(extension, foreign):
 
 
 def test_a_linked_group_in_the_files_own_material(extension, library):
-    """What holds the model's node is of another file, the material is not."""
+    """The node that contains the model belongs to another file, the material does not."""
     material = bpy.data.materials.new("own")
     tree = helpers.empty_tree(material)
     inner = bpy.data.node_groups.new("inner", "ShaderNodeTree")
@@ -199,7 +199,7 @@ def test_a_linked_group_in_the_files_own_material(extension, library):
 
 
 def changed_and_kept(extension, tmp_path):
-    """Whether the active material takes changes after Make Local, which its file keeps."""
+    """Whether the active material, after Make Local, accepts changes that its file keeps."""
     assert bpy.ops.brdfc.make_local() == {"FINISHED"}
     material = bpy.context.object.active_material
     extension.api.set_parameters(material, e=30.0)
@@ -237,7 +237,7 @@ def test_new_materials_are_for_what_keeps_them(extension, library, tmp_path):
 
 
 def test_overrides_keep_no_values(library, tmp_path):
-    """Why they are refused."""
+    """The reason why they are refused."""
     material = overridden(library, "materials", "phong")
     material.use_fake_user = True
     sockets = material.node_tree.nodes["Group"].inputs

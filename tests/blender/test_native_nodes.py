@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What script/native_nodes.py takes Blender's own nodes for is what Cycles computes: only then does
-a fit to a model mean anything."""
+"""Tests that Cycles computes what script/native_nodes.py assumes of Blender's own nodes: the fits
+rely on that."""
 
 import sys
 from pathlib import Path
@@ -33,7 +33,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def tool(program, tool):
-    """Whose answers are kept."""
+    """The tool, with cached answers."""
     made = native_nodes.Tool(program)
     made.ask = tool
     return made
@@ -45,7 +45,7 @@ def fresnel(tool):
 
 
 def turned(directions, angle):
-    """In a frame that is turned about the normal."""
+    """Directions in a frame rotated about the normal."""
     x, y, z = np.asarray(directions).T
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * x + s * y, c * y - s * x, z], -1)
@@ -65,7 +65,7 @@ def test_node_under_a_sun(extension, tool, fresnel, case):
     kind, p = CASES[case]
     p = {"rotation": 0.0} | p
     rng = np.random.default_rng(2)
-    # Views that a fit looks at: few, since the node's albedo is measured for each.
+    # Views of the fits: only a few, because the node's albedo is measured for each.
     cosines = rng.choice(native_nodes.VIEWS, 200)
     normals = tilted(cosines, rng.uniform(0, 6.28, 200))
     meter = start(extension, kind, p, normals, 4, 0)
@@ -77,7 +77,7 @@ def test_node_under_a_sun(extension, tool, fresnel, case):
     expected = native_nodes.f_cos(fresnel, kind, p, lobe)
     error = np.abs(measured[lit] - expected).sum() / expected.sum()
     print(f"{case}: relative L1 {error:.2g}")
-    # Principled's base takes the share that the lobe leaves from Cycles' own tables.
+    # Principled takes the fraction of light left to its base from Cycles' own tables.
     assert error < (0.03 if kind == "principled" else 1e-3)
 
 

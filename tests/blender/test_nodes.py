@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Models as trees of Blender's own nodes, without Open Shading Language: right under lamps, in
-worlds, with links and without the extension."""
+"""Models as trees of Blender's own nodes, without Open Shading Language: under lamps, in worlds,
+with links and without the extension."""
 
 import math
 
@@ -11,7 +11,7 @@ from helpers import add_camera, add_lamp, add_sphere, add_world, albedo, render,
 from test_aimed import SUNS, off_under_a_sun
 
 SLOW = pytest.mark.slow
-#: Of what takes long script/test runs one version, and script/evidence all.
+#: For slow tests: script/test runs them in one version, script/evidence in all.
 IN_ONE_VERSION = SLOW if bpy.app.version < (5, 0, 0) else pytest.mark.evidence
 BLOCK = 8
 
@@ -26,7 +26,7 @@ def settings(extension, scene, samples, osl, size=64):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
-    """Every model with defaults, stiff ends and random values: f cos to 1e-3 (relative L1)."""
+    """Every model with default, extreme and random values: f cos to 1e-3 (relative L1)."""
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     empty.cycles.shading_system = False
     found = off_under_a_sun(extension, empty, tool, "nodes", towards, 32, pictures=4)
@@ -34,10 +34,11 @@ def test_a_sun_without_an_angle(extension, empty, tool, towards):
         name for name, model in extension.api.models().items() if model["scatter"]
     }
     for name, values, off, noise, _ in found:
-        # A cosine in single precision to a power, as in test_aimed.py.
+        # A power of a cosine in single precision, as in test_aimed.py.
         exponent = max([0, *(v for k, v in values.items() if k in ("e", "es"))])
-        # Closures of small weight are kept by chance, which is noise where a lobe has faded; of
-        # some hundred facets with spreads of four pictures it is known to a tenth.
+        # Closures with small weights are kept at random, which causes noise in the tails of a lobe.
+        # From about a hundred facets and the variance of four pictures, this noise is known to a
+        # tenth.
         limit = max(1e-3, 8e-7 * exponent) + 1.3 * noise
         assert off < limit, f"{name} {values}: relative L1 {off:.3g}, noise {noise:.3g}"
         assert noise < 0.1
@@ -73,7 +74,7 @@ def lamps(scene):
 
 
 def flat_lamps(scene):
-    """A strip and an ellipse, seen from the side, which their cones fill to a small part."""
+    """A strip and an ellipse, seen from the side, which fill only a small part of their cones."""
     add_world(scene, 0.3)
     add_lamp(
         scene, "AREA", "Strip", (2.5, -3, 1), (math.pi / 2, 0, 0.3), energy=200, shape="RECTANGLE",
@@ -86,14 +87,14 @@ def flat_lamps(scene):
 
 
 def one_before_the_other(scene):
-    """Cones of lamps that overlap, as seen from the ball."""
+    """Lamps whose cones overlap as seen from the ball."""
     add_lamp(scene, "POINT", "Near", (-2, -4, 3), energy=300, shadow_soft_size=0.6)
     add_lamp(scene, "POINT", "Far", (-4.2, -8, 6), energy=1000, shadow_soft_size=0.3)
     add_lamp(scene, "POINT", "Beside", (-2.5, -4.2, 2.8), energy=300, shadow_soft_size=0.0)
 
 
 def blocks_of(extension, model, values, form, light, samples, pictures=6):
-    """Means of blocks of pixels, a picture a row: (pictures, blocks)."""
+    """Means of blocks of pixels, one picture per row: (pictures, blocks)."""
     found = []
     for seed in range(pictures):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -112,8 +113,8 @@ def blocks_of(extension, model, values, form, light, samples, pictures=6):
 
 
 def difference(a, b):
-    """Relative difference of means with its standard error, and the mean square difference of
-    blocks over what their noise explains."""
+    """Relative difference of the means with its standard error; and the mean squared difference of
+    blocks divided by the expectation from their noise."""
 
     def of(x):
         return x.mean(0), x.var(0, ddof=1) / len(x), x.mean(1).var(ddof=1) / len(x)
@@ -132,12 +133,12 @@ def difference(a, b):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_a_white_world(extension, model, values):
-    """Blocks of a ball are those of directions drawn in Open Shading Language."""
+    """Blocks of a ball equal those of directions sampled in Open Shading Language."""
     a, b = (blocks_of(extension, model, values, f, white_world, 64) for f in ("nodes", "sampled"))
     off, error, noise = difference(a, b)
     print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
     assert abs(off) < 4.5 * error + 1e-3
-    assert noise < 1.7  # of some 50 blocks with variances of ten pictures
+    assert noise < 1.7  # of about 50 blocks, with variances from ten pictures
 
 
 @pytest.mark.full
@@ -147,8 +148,8 @@ def test_a_white_world(extension, model, values):
 )
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_lamps(extension, model, values, light):
-    """Blocks of a ball are those of the form that aims at lamps, which has been held against the
-    reference renderer: no lamp counts twice, and none is lost."""
+    """Blocks of a ball equal those of the aimed form, which was compared with the reference
+    renderer: no lamp counts twice, and none is lost."""
     forms = {"nodes": 128, "aimed": 128}
     a, b = (blocks_of(extension, model, values, f, light, n) for f, n in forms.items())
     off, error, noise = difference(a, b)
@@ -159,7 +160,8 @@ def test_lamps(extension, model, values, light):
 
 @pytest.mark.long
 def test_noise_under_a_rectangle(extension):
-    """What its cone does not cover is not left to random rays, of which few meet it."""
+    """The part of the lamp outside its cone is not left to random rays, few of which would hit
+    it."""
 
     def rectangle(scene):
         add_lamp(
@@ -169,9 +171,9 @@ def test_noise_under_a_rectangle(extension):
 
     found = blocks_of(extension, "cook_torrance", {}, "nodes", rectangle, 16)
     noise = found.var(0, ddof=1).sum() / (found.mean(0) ** 2).sum()
-    # Half of the samples of the lamp are in the cone: 0.23 of the square of a pixel's light each.
-    # Blender 4.5 has 1.0 times that, 5.0 2.1 times; a cone that carries its own light alone has 24
-    # times that in 4.5.
+    # Half of the lamp's samples are in the cone, which gives a variance of 0.23 times the square of
+    # a pixel's light for each. Blender 4.5 has 1.0 times that, 5.0 2.1 times. If the cone carried
+    # only the light inside it, it would be 24 times that in 4.5.
     assert noise < 4 * 0.23 / (16 * BLOCK**2), noise
 
 
@@ -180,7 +182,7 @@ def test_noise_under_a_rectangle(extension):
     [("lambertian_specular", {}), ("shirley_1991", {}), ("fresnel_conductor", {}), ("glass", {})],
 )
 def test_closures_of_blenders_own(extension, empty, tool, model, values):
-    """Where diffuse, mirror and refraction nodes are all of a model: a ball in a white world."""
+    """Models that consist of diffuse, mirror and refraction nodes only: a ball in a white world."""
     pictures = {}
     for form in ("nodes", "exact"):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -194,8 +196,8 @@ def test_closures_of_blenders_own(extension, empty, tool, model, values):
 
 
 def test_links_and_ranges(extension, empty, tool):
-    """A parameter that a node controls, and one that a link brings out of its range, which counts
-    as the end of that."""
+    """A parameter controlled by a node, and one that a link takes outside its range, where it is
+    clamped."""
     settings(extension, empty, 256, osl=False, size=16)
     material = extension.api.new_material("ward", "nodes", ks=0.6, ax=0.5, ay=0.3)
     add_sphere(empty, material)
@@ -218,7 +220,7 @@ def test_links_and_ranges(extension, empty, tool):
 
 
 def test_a_choice_without_nodes_is_a_sentence(extension, empty):
-    """Trees are made for the default choices."""
+    """Trees exist for the default choices only."""
     with pytest.raises(ValueError, match="Formula Nodes is only for Normalisation = Bounded"):
         extension.api.new_material("ward", "nodes", normalisation="duer")
     material = extension.api.new_material("ward", "aimed", normalisation="duer")
@@ -233,7 +235,7 @@ def test_auto_takes_other_forms(extension, empty):
 
 
 def test_a_group_a_model_and_none_that_is_left(extension, empty):
-    """Materials of a model share its groups, which go with the last one."""
+    """Materials of a model share its groups, which are removed with the last one."""
     first = extension.api.new_material("phong", "nodes")
     before = len(bpy.data.node_groups)
     second = extension.api.new_material("phong", "nodes", e=50.0)
@@ -265,7 +267,7 @@ def test_a_saved_file_renders_without_the_extension(extension, empty, tmp_path):
 
 
 def test_albedo_in_a_white_world(extension, empty, tool):
-    """Facing the viewer a surface reflects its albedo."""
+    """A surface that faces the viewer reflects its albedo."""
     settings(extension, empty, 4096, osl=False, size=4)
     values = {"m": 0.4}
     material = extension.api.new_material("cook_torrance", "nodes", **values)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles computes against what the models say, by the virtual gonioreflectometer."""
+"""Compares what Cycles computes with the models, by the virtual gonioreflectometer."""
 
 import functools
 import math
@@ -23,7 +23,7 @@ EXACT = with_every_model(
 
 
 def start(extension, model, form, values, max_bounces):
-    """A clean scene and a material in it."""
+    """A clean scene, and a material in it."""
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=max_bounces)
     return scene, extension.api.new_material(model, form, **values)
@@ -32,8 +32,8 @@ def start(extension, model, form, values, max_bounces):
 def measure_each(
     extension, form, cases, normals, samples, max_bounces, light=None, **meter_options
 ):
-    """One render of the normals for each case: by case an exception, or radiance (n, 3), coverage
-    and first facet; and the goniometer. `light(meter)` adds what shines."""
+    """Renders the normals for each case at once. Returns by case an exception, or radiance (n, 3),
+    coverage and first facet; and the goniometer. `light(meter)` adds the lights."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=max_bounces)
@@ -58,13 +58,14 @@ def measure_each(
 
 
 def random_normals(rng, count):
-    """Facets seen at cosines from 0.02 to 1, evenly in solid angle."""
+    """Facets seen at cosines from 0.02 to 1, uniform in solid angle."""
     return tilted(rng.uniform(0.02, 1, count), rng.uniform(0, 2 * math.pi, count))
 
 
 @pytest.mark.parametrize(("model", "values"), EXACT)
 def test_exact_form_under_a_sun(extension, empty, tool, batch, request, model, values):
-    """Closures are evaluated, not sampled, under a lamp without size: no noise, float accuracy."""
+    """Under a lamp without a size, closures are evaluated and not sampled: no noise, float
+    accuracy."""
 
     def measure(cases):
         rng = np.random.default_rng(1)
@@ -93,7 +94,7 @@ def test_exact_form_under_a_sun(extension, empty, tool, batch, request, model, v
 
     found = batch.result(request, measure)
     measured, wi, wo = (np.concatenate(part) for part in found)
-    # Beside the terminator alone float rounding decides which side the sun is on.
+    # Near the terminator, rounding to float decides on which side the sun is.
     clear = np.abs(wi[:, 2]) > 1e-4
     lit = clear & (wi[:, 2] > 0)
     expected = np.zeros_like(wi)
@@ -111,7 +112,8 @@ def test_exact_form_under_a_sun(extension, empty, tool, batch, request, model, v
 @pytest.mark.parametrize(("model", "values"), EXACT)
 def test_furnace_of_exact_form(extension, empty, tool, batch, request, model, values):
     cosines = np.linspace(0.01, 1, 64)
-    # At grazing views Cycles rarely picks the closure that carries the rest: more pixels there.
+    # At grazing views, Cycles rarely selects the closure with the remaining light: more pixels
+    # there.
     replicas = np.where(cosines < 0.02, 128, np.where(cosines < 0.06, 16, 2))
     normals = tilted(np.repeat(cosines, replicas), 0.3)
 
@@ -131,8 +133,9 @@ def test_furnace_of_exact_form(extension, empty, tool, batch, request, model, va
     assert error <= 1e-3
 
 
-# Sampled forms. A furnace can't verify one: its weights are f cos / pdf, and any wrong distribution
-# whose weights fit passes. So each also sees worlds that vary with direction.
+# Sampled forms. A furnace test can't verify one: its weights are f cos / pdf, and any wrong
+# distribution with consistent weights passes. So each form is also tested in worlds that vary with
+# direction.
 
 SAMPLED = with_every_model(
     "sampled",
@@ -153,7 +156,7 @@ SAMPLED = with_every_model(
     ("schlick", {}),
     ("schlick", {"rough": 0.7, "p": 0.4, "r": (0.9, 0.5, 0.1)}),
 )
-#: Facets: view cosines times azimuths, each seen by so many pixels that its noise can be measured.
+#: Facets: view cosines and azimuths, each seen by enough pixels to measure its noise.
 COSINES = (1.0, 0.8, 0.5, 0.25, 0.1)
 KINDS = tilted(COSINES, 0.4 + 2.1 * np.arange(len(COSINES)))
 REPLICAS = 48
@@ -180,16 +183,16 @@ def hemisphere(cosines=96, azimuths=192):
 
 @functools.cache
 def kernel(tool, model, values):
-    """Directions and f cos dw of the model in the frames of the kinds of facets, a pair for each
+    """Directions and f cos dw of the model in the frames of the kinds of facets, one pair for each
     kind, and its mirror weight, (kinds, 3).
 
-    Fixed nodes where they resolve the lobe, as the albedo tells; else the model's own samples in
-    double precision, whose density the unit tests prove.
+    Uses fixed nodes if they resolve the lobe, as its albedo shows; otherwise the model's own
+    samples in double precision, whose pdf the unit tests verify.
     """
     values = dict(values)
     wi, weights = hemisphere()
     views = [local(normal, np.array([0.0, 0.0, 1.0])) for normal in KINDS]
-    # One question: the tool takes longer to start than to answer.
+    # Asks once: the tool takes longer to start than to answer.
     everywhere = np.tile(wi, (len(views), 1)), np.repeat(views, len(wi), 0)
     values_of_f = evaluate(tool, model, values, *everywhere).reshape(len(views), len(wi), 3)
     lobes, mirrors = [], []
@@ -207,7 +210,7 @@ def kernel(tool, model, values):
 
 
 def axes(normal):
-    """Rows: the frame of a facet, in world coordinates."""
+    """The frame of a facet as rows, in world space."""
     return np.stack([*frame(normal), normal])
 
 
@@ -216,7 +219,8 @@ def local(normal, direction):
 
 
 def expected_radiance(tool, model, values, radiance):
-    """Integral of f cos L over the hemisphere of each kind of facet, with mirror; (kinds, 3)."""
+    """Integral of f cos L over the hemisphere of each kind of facet, including the mirror; (kinds,
+    3)."""
     lobes, mirrors = kernel(tool, model, tuple(values.items()))
     result = []
     for normal, (wi, f), weight in zip(KINDS, lobes, mirrors, strict=True):
@@ -228,8 +232,8 @@ def expected_radiance(tool, model, values, radiance):
 
 
 def light_of_lamp(tool, model, values, normals, wo, towards, angle):
-    """Radiance under a sun of irradiance 1 that is `angle` wide, of facets with these normals seen
-    from `wo`, (n, 3) in their frames; (n, 3)."""
+    """Radiance of facets with these normals, seen from `wo`, (n, 3) in their frames, under a sun of
+    irradiance 1 and the full angle `angle`; (n, 3)."""
     i = np.arange(64) + 0.5
     radius, turn = math.tan(angle / 2) * np.sqrt(i / 64), i * math.pi * (3 - math.sqrt(5))
     t, b = frame(towards[None])
@@ -244,7 +248,7 @@ def light_of_lamp(tool, model, values, normals, wo, towards, angle):
     return np.array(result)
 
 
-# The gradient alone would find most errors; it is the one of the developer's loop.
+# The gradient alone finds most errors; quick runs use only that.
 WORLDS = [
     pytest.param(white, marks=pytest.mark.full),
     gradient,
@@ -262,7 +266,8 @@ def test_sampled_form_in_a_world(extension, empty, tool, batch, request, model, 
 
 
 def check_in_a_world(extension, form, tool, batch, request, model, values, world):
-    """Per kind of facet a z-test: the mean over replicas against quadrature, in standard errors."""
+    """A z-test for each kind of facet: the mean over replicas against quadrature, in standard
+    errors."""
 
     def measure(cases):
         lights = []
@@ -283,19 +288,19 @@ def check_in_a_world(extension, form, tool, batch, request, model, values, world
     expected = expected_radiance(tool, model, values, radiance)
     mean = measured.mean(1)
     error = measured.std(1, ddof=1) / math.sqrt(REPLICAS)
-    # Where only a few samples meet light, replicas do not show the error; samples are at most 1.
+    # If only a few samples hit light, replicas underestimate the error; samples are at most 1.
     total = SAMPLES * coverage.reshape(len(KINDS), REPLICAS).sum(1)[:, None]
     rare = expected * total < 100
     error = np.where(rare, np.sqrt(expected / total) + 1 / total, error)
-    # What the quadrature, the spread of view directions and single precision may add.
+    # Allows for the quadrature, the spread of view directions and single precision.
     error = np.hypot(error, 1e-4)
     z = (mean - expected) / error
     print(f"{model} {world.__name__}: {np.round(mean[:, 0], 4)} {np.round(expected[:, 0], 4)}")
-    # Some thousands of comparisons, and each model that is added draws all anew.
+    # Thousands of comparisons, with new random numbers whenever a model is added.
     assert np.abs(z).max() < 5.5, f"z = {np.round(z, 1)}"
 
 
-# Aimed forms: base and rest in worlds without a lamp; test_aimed.py has those with lamps.
+# Aimed forms: base and rest in worlds without a lamp; test_aimed.py tests them with lamps.
 
 AIMED = with_every_model(
     "aimed",
@@ -320,7 +325,7 @@ def test_aimed_form_in_a_world(extension, empty, tool, batch, request, model, va
 @pytest.mark.full
 @pytest.mark.parametrize(("model", "values"), SAMPLED)
 def test_furnace_of_sampled_form_by_angle(extension, empty, tool, batch, request, model, values):
-    """The albedo at 64 view angles, each by itself: no average hides an angle that is off."""
+    """The albedo at 64 view angles, each tested separately: no average hides a wrong angle."""
     cosines = np.linspace(0.01, 1, 64)
     # A facet seen at a grazing angle covers little of its pixel.
     replicas = np.where(cosines < 0.1, 48, 12)
@@ -338,11 +343,11 @@ def test_furnace_of_sampled_form_by_angle(extension, empty, tool, batch, request
         ]
 
     radiance, coverage, own = batch.result(request, measure)
-    # Views differ by half a degree, which counts near the horizon: each facet has its own truth,
-    # interpolated between angles that lie close there.
+    # Views vary by half a degree, which matters near the horizon: the expected albedo of each facet
+    # is interpolated between angles that are dense there.
     knots = np.unique(np.concatenate([cosines, np.linspace(0.003, 0.1, 24)]))
-    # The view lies along the default tangent: an azimuth of 0 but for the perspective, which shows
-    # near the normal alone, where the azimuth does not matter.
+    # Views lie along the default tangent: the azimuth is 0 except for the perspective, which
+    # matters only near the normal, where the azimuth does not.
     azimuth = np.median(np.arctan2(own[:, 1], own[:, 0]))
     table = albedo(tool, model, values, knots, azimuth)
     truth = np.stack([np.interp(own[:, 2], knots, channel) for channel in table.T], -1)
@@ -353,14 +358,15 @@ def test_furnace_of_sampled_form_by_angle(extension, empty, tool, batch, request
     expected, measured = mean(truth), mean(radiance)
     error = np.sqrt(mean((radiance - truth - mean(radiance - truth).repeat(replicas, 0)) ** 2))
     error /= np.sqrt(replicas - 1)[:, None]
-    # Neighbouring angles share their noise: the median of five steadies what few replicas say. And
-    # where only some hundred rays meet the facets, all of them together do not show it.
+    # Neighbouring angles have similar noise: the median of five is more stable than a few replicas.
+    # If only about a hundred rays hit the facets, even that underestimates it.
     padded = np.pad(error, ((2, 2), (0, 0)), mode="edge")
     steady = np.median([padded[i : i + len(cosines)] for i in range(5)], 0)
     rays = 256 * np.add.reduceat(coverage, first)[:, None]
     error = np.maximum(error, steady)
     error = np.maximum(error, np.where(rays < 1000, 0.5 / np.sqrt(rays), 2e-4))
-    # Rays that are lost now and then: where less than a hundred are, replicas do not show it.
+    # Rays that are lost occasionally: if fewer than a hundred are, replicas underestimate the
+    # noise.
     full = table.max(0)
     lost = np.maximum(1 - expected / np.maximum(full, 1e-9), 0)
     error = np.maximum(error, np.where(lost * rays < 100, full * np.sqrt(lost / rays), 0))
@@ -368,12 +374,12 @@ def test_furnace_of_sampled_form_by_angle(extension, empty, tool, batch, request
     worst = np.unravel_index(np.abs(z).argmax(), z.shape)
     print(f"{model}: mean error {(measured - expected).mean():.2e}, worst z {z[worst]:.1f}")
     assert np.abs(z).max() < 6, f"at cos {cosines[worst[0]]:.3f}: z = {z[worst]:.1f}"
-    # All angles together: a small bias that is the same everywhere.
+    # All angles together: detects a small bias common to all.
     mean_z = (measured - expected).mean(0) / (np.sqrt((error**2).sum(0)) / len(cosines))
     assert np.abs(mean_z).max() < 5, f"mean z = {mean_z}"
 
 
-# As fig. 2 of Ashikhmin and Shirley: a mirror-like sphere, n_u = n_v = 10, in a white room.
+# As in fig. 2 of Ashikhmin and Shirley: a mirror-like sphere, n_u = n_v = 10, in a white room.
 
 RIM = 0.09
 
@@ -400,7 +406,7 @@ def test_as_fig2_centre_and_rim(extension, empty, tool):
     assert centre == pytest.approx(0.6957, abs=1e-3)
     assert rim == pytest.approx(quadrature[1], abs=max(4 * rim_error, 2e-3))
 
-    # Blender's own node with that distribution gives back energy that is lost.
+    # Blender's own node with that distribution adds the lost energy back.
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=1)
@@ -428,7 +434,7 @@ def test_ashikhmin_shirley_loses_nothing_by_eq_12(extension, empty):
         reflected[diffuse] = facets.mean(1)
         noise[diffuse] = facets.std(1, ddof=1) / math.sqrt(replicas)
     print(reflected, noise)
-    # What the model declares for its tables, and three standard errors.
+    # The error that the model declares for its tables, plus three standard errors.
     assert noise["tabulated"].max() < 0.015
     assert (np.abs(reflected["tabulated"] - 1) < 0.02 + 3 * noise["tabulated"]).all()
     # Eq. 14 loses more than half.
@@ -436,7 +442,7 @@ def test_ashikhmin_shirley_loses_nothing_by_eq_12(extension, empty):
 
 
 def test_lobes_that_are_not_drawn_cost_no_path(extension, empty):
-    """A lossless model in a white world is white whatever is drawn: at one sample, too."""
+    """A lossless model in a white world is white whatever is sampled, even with a single sample."""
     values = {"n": 4.0, "tint": 1.0}
     scene, material = start(extension, "radziszewski_alda", "sampled", values, max_bounces=1)
     normals = tilted(np.full(64, 0.6), np.linspace(0, 6, 64))
@@ -467,18 +473,19 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
     if entry.get("albedo"):
         expected = np.array([extension.api.albedo(model, c, **values) for c in cosines])
         complete = {p["name"]: p["default"] for p in entry["parameters"]} | values
-        # The table holds the mean over azimuth: quadrature at one is that only without stretch.
+        # The table contains the mean over azimuths, which quadrature at one azimuth equals only for
+        # isotropic lobes.
         if entry["isotropic"] or ("nu" in complete and complete["nu"] == complete["nv"]):
             error = entry["albedo"]["error"]
             off = (np.abs(expected - quadrature) / np.maximum(quadrature, 1)).max()
             print(f"{model}: {off:.3g}, table says {error:.3g}")
-            # The table's error is the largest at random points of its own: no strict bound.
+            # The stated error is the largest at random points, and not a strict bound.
             assert off <= 2 * error + 1e-6
     else:
-        expected = quadrature  # delta terms alone, with more parameters than a table has axes
+        expected = quadrature  # only delta terms, with more parameters than a table has axes
 
     for form in extension.pack.model(model)["representations"]:
-        # A twin's albedo is its own, which test_every_fit.py measures.
+        # A twin has its own albedo, which test_every_fit.py measures.
         if extension.pack.is_native(model, form) or extension.pack.refusal(model, form, values):
             continue
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An extension cut to a scene renders the same picture, holds less, and says what it lacks."""
+"""An extension cut to a scene renders the same picture, contains less, and reports what it
+lacks."""
 
 import json
 import os
@@ -15,7 +16,7 @@ from helpers import read_picture
 ROOT = Path(__file__).parents[2]
 DRIVER = ROOT / "script" / "render_scene.py"
 SEEDS = 4
-#: Scenes with isotropic material of one model, and with four models.
+#: Scenes with an isotropic material of one model, and with four models.
 SCENES = [
     pytest.param("room-radziszewski_alda", marks=pytest.mark.evidence),
     pytest.param("small-lamp", marks=[pytest.mark.full, pytest.mark.evidence]),
@@ -23,14 +24,14 @@ SCENES = [
 
 
 def small(name):
-    """That scene as a small picture of few samples."""
+    """The scene as a small picture with few samples."""
     content = json.loads((ROOT / "scenes" / f"{name}.json").read_text())
     content["settings"] |= {"width": 48, "height": 48, "spp": 16}
     return content
 
 
 def shaders_and_tables(extension_zip):
-    """Bytes, uncompressed; the manifest holds the tables that the panel reads."""
+    """Uncompressed bytes; the manifest contains the tables that the panel reads."""
     with zipfile.ZipFile(extension_zip) as archive:
         return sum(
             i.file_size
@@ -75,7 +76,7 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
             for seed in range(SEEDS)
         ]
         if pack == extension_zip:
-            # The whole extension takes a pack for one picture, without being installed anew.
+            # The whole extension uses the pack for one picture, without being reinstalled.
             folder = tmp_path / "cut" / "brdfc_shaders"
             jobs.append({"out": str(tmp_path / "used.exr"), "seed": 0, "pack": str(folder)})
         done = render(pack, scene, *jobs)
@@ -83,14 +84,14 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
         pictures.append([read_picture(Path(job["out"]))[..., :3].mean(-1) for job in jobs])
     used_pack = pictures[0].pop()
     assert np.array_equal(used_pack, pictures[1][0])
-    # Closures that are left out are no longer drawn from, so that the noise is another one: the
-    # means of tiles agree within it, by a t-test with the spread of both.
+    # Omitted closures are no longer sampled, so the noise differs: a t-test compares the means of
+    # tiles, with the variance of both.
     tiles = np.array(pictures).reshape(2, SEEDS, 6, 8, 6, 8).mean((3, 5)).reshape(2, SEEDS, -1)
     assert tiles.mean() > 0.01
     whole, lean = tiles.mean(1)
     spread = tiles.var(1, ddof=1).sum(0) / SEEDS
-    # A tile in which few paths meet something bright shows less than its noise: no tile has less
-    # than a tenth of the mean.
+    # A tile in which few paths hit something bright underestimates its noise: no tile's variance is
+    # less than a tenth of the mean.
     z = (lean - whole) / np.sqrt(np.maximum(spread, spread.mean() / 10))
     assert np.abs(z).max() < 7, z
     total = tiles.mean(2)
@@ -106,7 +107,8 @@ def test_a_pack_cut_to_a_scene_renders_the_same(empty, extension_zip, tool, tmp_
 def test_tables_of_the_views_that_occur_show_the_same(
     extension, empty, extension_zip, tool, tmp_path, form
 ):
-    """A tilted disk: with camera rays alone the pack has a part of the tables over the view."""
+    """A tilted disk: with camera rays alone, the pack contains only a part of the tables over the
+    view."""
     content = {
         "name": "disk",
         "settings": {"width": 32, "height": 32, "spp": 8, "max_bounces": 0},
@@ -161,7 +163,7 @@ def test_tables_of_the_views_that_occur_show_the_same(
     assert done.returncode == 0, done.stderr
     cut, whole = (read_picture(Path(job["out"]))[..., :3] for job in jobs)
     assert whole.mean() > 0.05 and whole.std() > 0.05
-    # What is drawn may fall on the other side of an edge in a few pixels.
+    # In a few pixels, a sample may fall on the other side of an edge.
     off = np.abs(cut - whole).max(-1) / (1e-3 + whole.max(-1))
     assert np.quantile(off, 0.98) < 1e-4, np.quantile(off, [0.5, 0.9, 0.98, 1])
     assert cut.mean() == pytest.approx(whole.mean(), rel=1e-3)

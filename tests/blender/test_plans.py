@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What plans are made of: what animates a parameter stays, and a file that has changed since, or a
-budget that is none, is an error that changes nothing."""
+"""Plans: animated parameters stay inputs; and a file that has changed since, or an invalid budget,
+is an error that changes nothing."""
 
 import math
 from types import SimpleNamespace
@@ -72,7 +72,7 @@ def seen_at(extension, material, name="r0"):
 @pytest.mark.parametrize("animate", [key, by_driver, by_strip, by_name, by_the_material])
 def test_what_is_animated_stays_an_input_and_moves(extension, empty, api, animate):
     material = api.new_material("cook_torrance", "sampled", m=0.05)
-    add_sphere(empty, material)  # or nothing evaluates it
+    add_sphere(empty, material)  # Blender evaluates only what is used
     before = socket(extension, material, "m").path_from_id("default_value")
     animate(socket(extension, material, "m"))
     assert seen_at(extension, material, "m") == pytest.approx([0.05, 0.6], abs=1e-3)
@@ -89,7 +89,8 @@ def test_what_is_animated_stays_an_input_and_moves(extension, empty, api, animat
 
 
 def test_a_farm_renders_what_is_animated(extension, empty, api, tmp_path):
-    """Frame 10 as before, by the same shader with fewer inputs, and without the extension."""
+    """Frame 10 looks as before, with the same shader but fewer inputs, and without the
+    extension."""
     api.enable_osl(empty)
     material = api.new_material("coupled", r0=0.05)
     key(socket(extension, material))
@@ -145,7 +146,7 @@ def test_materials_that_share_an_action_keep_their_own_paths(extension, empty, a
     assert api.bake(api.plan()) == 2
     for material in (first, second):
         assert seen_at(extension, material, "m") == pytest.approx([0.05, 0.6])
-    api.switch_representation(first, "sampled")  # whose socket has another number again
+    api.switch_representation(first, "sampled")  # its sockets have other indices again
     for material in (first, second):
         assert seen_at(extension, material, "m") == pytest.approx([0.05, 0.6])
 
@@ -254,7 +255,7 @@ def test_an_albedo_output_does_not_age_a_plan(used):
 
 
 def test_models_of_one_name_in_two_groups_are_two(extension, api):
-    """Of which each keeps its value."""
+    """Each keeps its value."""
     material = bpy.data.materials.new("Groups")
     tree, inner = empty_tree(material), []
     for r0 in (0.1, 0.3):

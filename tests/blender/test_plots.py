@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plots in the panel: their pixels are what the model says, and they cost little."""
+"""Plots in the panel: their pixels show the model's values, and drawing them is fast."""
 
 import functools
 import json
@@ -31,7 +31,7 @@ def plots(extension):
 
 
 def pixels_of(preview):
-    """(rows from below, columns, RGB) from 0 to 1, as Blender has them."""
+    """(rows from below, columns, RGB) from 0 to 1, as Blender stores them."""
     width, height = preview.image_size
     flat = np.empty(width * height, np.int32)
     preview.image_pixels.foreach_get(flat)
@@ -46,12 +46,13 @@ def shown(panel, extension, model, **values):
 
 
 def above(picture):
-    """The half circle: rows from below."""
+    """The half circle; rows from below."""
     return picture[-(picture.shape[1] // 2) :]
 
 
 def peak_angle(picture):
-    """Where the lobe above reaches furthest, in degrees from the normal, and how far."""
+    """The angle from the normal, in degrees, at which the lobe in the half circle is longest, and
+    its length."""
     size = picture.shape[1]
     upper = above(picture).min(axis=-1)
     rows, columns = np.nonzero(upper > 0.9)
@@ -68,7 +69,7 @@ def loaded(package):
 def test_formulas_are_not_loaded_before_a_plot_is_drawn(
     extension, panel, empty, extension_zip, tmp_path
 ):
-    """Blender starts faster for it."""
+    """This makes Blender start faster."""
     script = f"""
 import sys
 sys.path.insert(0, {str(SCRIPTS)!r})
@@ -88,7 +89,7 @@ print("loaded:", [m for m in sys.modules if ".brdfc.models" in m or m.endswith("
 
 @pytest.mark.parametrize(("form", "balls"), [("exact", 2), ("twin", 3)])
 def test_balls_of_a_matte_surface_are_lamberts_cosine(extension, panel, plots, empty, form, balls):
-    """That of the model, of a twin, and of the Principled node without a boundary."""
+    """For the model, for a twin, and for a Principled node without a specular interface."""
     rho = np.array([0.8, 0.4, 0.1])
     material = extension.api.new_material("lambert", form, rho=tuple(rho))
     (node,) = extension.nodes.group_nodes(material)
@@ -116,7 +117,8 @@ def test_balls_of_a_matte_surface_are_lamberts_cosine(extension, panel, plots, e
     ],
 )
 def test_the_albedo_curve_is_that_of_the_table(extension, panel, plots, empty, model, values):
-    """Of the extension's table, which the C++ quadrature made. A pixel is 1.3 % of the light."""
+    """Compared with the extension's table, which C++ quadrature made. A pixel is 1.3 % of the
+    light."""
     picture = shown(panel, extension, model, **values)[0][plots.CURVES]
     height, width, _ = picture.shape
     margin, top = 8, 1.15
@@ -131,8 +133,7 @@ def test_the_albedo_curve_is_that_of_the_table(extension, panel, plots, empty, m
 
 
 def over_the_hemisphere(wo, count=120):
-    """Directions and what solid angle each stands for: rings about the mirror direction, closer to
-    one another the nearer they are to it."""
+    """Directions and their solid angles: rings about the mirror direction, denser towards it."""
     x, part = np.polynomial.legendre.leggauss(count)
     first, whole = 1e-3, math.log(math.pi / 1e-3 + 1)
     grown = np.exp((x + 1) / 2 * whole)
@@ -168,8 +169,8 @@ def light_of(extension, plots, form_light, material):
 def test_the_albedo_of_a_form_is_that_of_the_tools_closures(
     extension, plots, form_light, tool, empty, model, form, values, over
 ):
-    """Added up over the hemisphere. The curve is within half a percent of the light, and at 73
-    degrees within 1.5."""
+    """Compared with the sum over the hemisphere. The curve is within half a percent of the light,
+    and at 73 degrees within 1.5."""
     material = extension.api.new_material(model, form, **values)
     values = {name: extension.api.get_parameters(material)[name] for name in values}
     albedo = light_of(extension, plots, form_light, material).albedos[1]
@@ -188,7 +189,7 @@ def test_albedos_of_what_equals_the_model_are_its_own(extension, plots, form_lig
     lambert = extension.api.new_material("lambert", "twin", rho=rho)
     for albedo in light_of(extension, plots, form_light, lambert).albedos:
         np.testing.assert_allclose(albedo, np.tile(rho, (13, 1)), atol=2e-5)
-    # A mirror counts as well: each share is what its slider says.
+    # The mirror is included: each term reflects the fraction that its slider says.
     twin = extension.api.new_material("lambertian_specular", "twin", rd=rho, rs=0.15)
     albedo = light_of(extension, plots, form_light, twin).albedos[1]
     np.testing.assert_allclose(albedo, np.tile(np.array(rho) + 0.15, (13, 1)), atol=2e-3)
@@ -206,7 +207,7 @@ def test_albedos_of_what_equals_the_model_are_its_own(extension, plots, form_lig
 def test_the_albedo_of_the_principled_node_adds_its_light_up(
     extension, plots, form_light, empty, model, values
 ):
-    """test_convert.py holds what is added up to what Cycles renders."""
+    """test_convert.py compares the added terms with Cycles' renders."""
     found = light_of(extension, plots, form_light, extension.api.new_material(model, **values))
     native = found.near.native
     for view in (0, 4, 8, 10):
@@ -233,7 +234,7 @@ def test_the_ball_of_a_form_is_lit_as_each_of_its_pixels(
 
 
 def test_curves_are_lines_dots_and_dashes(extension, panel, plots, empty):
-    """Of the albedo, where they lie apart; and below each ball its own stroke."""
+    """For the albedo, where the curves differ; and below each ball the line style of its curve."""
     material = extension.api.new_material("lossless", "twin")
     picture = legend_of(panel, extension, material)[2]
     (node,) = extension.nodes.group_nodes(material)
@@ -242,7 +243,7 @@ def test_curves_are_lines_dots_and_dashes(extension, panel, plots, empty):
     lit = [keys[i * third : (i + 1) * third].max(axis=-1) > 0.5 for i in range(3)]
     runs = [int(np.count_nonzero(np.diff(x.astype(int)) == 1)) for x in lit]
     assert runs[0] == 1 and runs[1] > runs[2] > 3
-    # All is reflected by the model, 69 % by the node.
+    # The model reflects everything, the node 69 %.
     curves, height = picture[plots.CURVES], 104 - 16
     dashes = curves[round(8 + 0.69 / 1.15 * height) + np.arange(-2, 3)].max(axis=0)[8:250, 0]
     assert 0.4 < (dashes > 0.7).mean() < 0.8
@@ -255,13 +256,14 @@ def test_a_lobe_points_where_the_light_goes_and_a_matte_one_up(extension, panel,
     assert angle == pytest.approx(45, abs=1.5) and length == pytest.approx(0.95, abs=0.03)
     angle, _ = peak_angle(shown(panel, extension, "lambert", rho=1.0)[0])
     assert angle == pytest.approx(0, abs=10)
-    # Ideal reflection: an arrow that is bright as far as its share.
+    # Ideal reflection is an arrow, whose brightness is its fraction of the light.
     angle, length = peak_angle(shown(panel, extension, "lambertian_specular", rs=0.7, rd=0.0)[0])
     assert angle == pytest.approx(45, abs=1.5) and length == pytest.approx(0.7, abs=0.03)
 
 
 def test_the_nearest_glossy_node_is_as_rough_as_its_own_lobe(plots, extension, panel, empty):
-    """Cook and Torrance's facets are Beckmann's, nearly GGX's: m is about the roughness squared."""
+    """Cook and Torrance's microfacets are Beckmann's, similar to GGX: m is about the roughness
+    squared."""
     theta = plots._angles()
     for roughness in (0.1, 0.35, 0.8):
         found, curve = plots.nearest_glossy(3 * plots.glossy_slice(roughness**2, theta))
@@ -280,8 +282,8 @@ def principled(extension):
 
 @pytest.fixture(scope="module")
 def node_curve(principled, plots):
-    """f cos of a Principled node over the angles of a plot: test_convert.py holds that formula to
-    what Cycles renders."""
+    """f cos of a Principled node over the angles of a plot; test_convert.py compares that formula
+    with Cycles' renders."""
 
     def curve(color, roughness, metallic, ior):
         f0 = ((ior - 1) / (ior + 1)) ** 2
@@ -293,7 +295,7 @@ def node_curve(principled, plots):
 
 
 def misplaced(plots, curve, expected):
-    """Part of the area of a curve, by the trapezoid rule."""
+    """The fraction of a curve's area that is misplaced, by the trapezoid rule."""
     area = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
     off = area(np.abs(curve - expected), plots._angles(), axis=0).sum()
     return off / area(expected, plots._angles(), axis=0).sum()
@@ -338,8 +340,8 @@ def test_a_matte_surface_is_a_principled_node(extension, panel, plots, empty):
     ],
 )
 def test_no_principled_node_beside_it_is_nearer(plots, principled, node_curve, model, values):
-    """And its error is what it says: by the squares of what is off, each angle for what it stands
-    for. A node beside it may be nearer by as much as the search is coarse."""
+    """And its error is as stated, by the squared errors weighted by the angles. A neighbouring node
+    may be better within the resolution of the search."""
     curve = plots.slice_of(plots.brdfc.model(model), values, plots._angles())
     near = principled.nearest_principled(curve, plots._angles(), plots.INCIDENCE)
     assert near.error == pytest.approx(misplaced(plots, near.curve, curve), rel=0.01)
@@ -361,7 +363,7 @@ def test_no_principled_node_beside_it_is_nearer(plots, principled, node_curve, m
 
 
 def test_the_curve_of_the_principled_node_is_dashed(extension, panel, plots, empty):
-    """Where it is beyond the model's own it is ink on paper, with gaps."""
+    """Where it exceeds the model's, it is dark on paper, with gaps."""
     picture, near = shown(panel, extension, "cook_torrance", m=0.3)
     red = above(picture)[..., 0]
     model = plots.brdfc.model("cook_torrance")
@@ -385,7 +387,8 @@ def form_light(extension):
 
 
 def of_form(form_light, plots, extension, material, wi, wo):
-    """f cos of a material's form at its own values, for several views wo and lights wi of each."""
+    """f cos of a material's form at its values, for several views wo and light directions wi of
+    each."""
     (node,) = extension.nodes.group_nodes(material)
     model = plots.brdfc.model(extension.nodes.identity(node)[0])
     values = plots.values_in_range(model, extension.api.get_parameters(material))
@@ -394,18 +397,18 @@ def of_form(form_light, plots, extension, material, wi, wo):
 
 
 def of_tool(tool, form, model, values, over, wi, wo):
-    """What the tool says of that: the closures of its own fit."""
+    """The tool's result for that: the closures of its own fit."""
     options = [*(["--twin"] if form == "twin" else []), *over, "--pairs"]
     text = tool("fit", model, *arguments(values), *options, stdin=pairs_csv(wi, wo))
     return read_csv(text)[1]
 
 
-#: Views of forms: steep and flat, in the plane of the plots and aside.
+#: Views of forms: steep and grazing, in the plane of the plots and outside it.
 VIEWS = [unit(v) for v in ((-1, 0, 1), (0.1, 0.2, 1), (0.5, -0.8, 0.6), (-0.3, 0.9, 0.1))]
 
 
 def lights(wo):
-    """Directions all over the hemisphere, down to its rim, and near the mirror direction."""
+    """Directions over the whole hemisphere, including its rim, and near the mirror direction."""
     rng = np.random.default_rng(1)
     z, phi = rng.uniform(0.02, 1, 60), rng.uniform(0, 2 * np.pi, 60)
     around = np.stack([np.cos(phi), np.sin(phi), np.zeros(60)], axis=-1)
@@ -417,8 +420,8 @@ def lights(wo):
 
 @pytest.fixture
 def off_the_tool(form_light, plots, extension, tool):
-    """off_the_tool(form, model, values, *options): how far a form's curve is from what the tool
-    says, as a share of the largest value, at worst over VIEWS."""
+    """off_the_tool(form, model, values, *options): the largest difference over VIEWS between a
+    form's curve and the tool's result, relative to the largest value."""
 
     def measured(form, model, values, *options):
         material = extension.api.new_material(model, form, **values)
@@ -435,13 +438,13 @@ def off_the_tool(form_light, plots, extension, tool):
 
 
 def test_the_curve_of_a_fitted_form_is_that_of_the_tool(off_the_tool, extension, empty):
-    """Its closures in double precision, from tables and numbers of six digits: of every fitted form
-    of the extension at two values of all that is a socket."""
+    """Its closures in double precision, from tables and numbers with six digits: for every fitted
+    form of the extension, at two values of all that is a socket."""
     for model, name, values in along_sliders(extension):
         assert off_the_tool("fitted", model, values, "--over", name) < 2e-6, (model, values)
 
 
-#: Values of numbers and colours of a twin: one of each way to be a socket, and a mirror's.
+#: Values of numbers and colours of a twin: one for each kind of socket, and one with a mirror.
 TWINS = {
     "phong": {"e": 73.0, "ks": (0.9, 0.6, 0.2)},
     "cook_torrance": {"m": 0.37, "f0": (0.9, 0.3, 0.05)},
@@ -500,8 +503,8 @@ def inked(picture):
 def test_a_form_made_for_other_values_has_its_own_curve(
     panel, plots, extension, tool, use_pack, empty
 ):
-    """From the shader that the file holds, of a pack that is no longer there; the error of its
-    curve is what tool and model say."""
+    """It is drawn from the shader in the file, made by a pack that no longer exists; the stated
+    error of its curve is that of the tool relative to the model."""
     values = {"ks": (0.9, 0.7, 0.3), "ax": 0.25, "ay": 0.25}
     use_pack({"ward": {"model": "ward", "parameters": values, "representation": "fitted"}})
     material = extension.api.new_material("ward", "fitted", **values)
@@ -520,7 +523,7 @@ def test_a_form_made_for_other_values_has_its_own_curve(
 
 
 def test_the_curve_of_a_form_is_dotted(panel, plots, form_light, extension, empty):
-    """A twin without the round flanks that this kernel has: dots with gaps, there and nowhere
+    """A twin lacks the round flanks of this kernel, so it has dots with gaps there, and nowhere
     else."""
     material = extension.api.new_material("lossless", "twin")
     on = inked(legend_of(panel, extension, material)[2])
@@ -537,7 +540,7 @@ def test_the_curve_of_a_form_is_dotted(panel, plots, form_light, extension, empt
     near = np.abs(radius - over_peak(curve)) * unit < 1
     assert (near & away).sum() > 50 and 0.2 < on[near & away].mean() < 0.8
     assert not (on & away & (np.abs(radius - over_peak(own)) < 0.02)).any()
-    # Where it is steep, a line of two pixels covers more of a radius.
+    # Where the curve is steep, a line of two pixels covers more of a radius.
     steep = np.interp(angle, plots._angles(), np.abs(np.gradient(curve, plots._angles())))
     tilt = np.hypot(1, 0.95 / own.max() * steep / np.maximum(radius, 0.02))
     assert (np.abs(radius - over_peak(curve)) * unit / tilt)[on].max() < 3
@@ -554,14 +557,14 @@ def test_forms_that_equal_the_model_have_no_curve(panel, extension, empty):
 
 
 def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
-    """A file may hold anything."""
+    """A file may contain anything."""
     material = extension.api.new_material("phong", "fitted")
     (node,) = extension.nodes.group_nodes(material)
     script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
     said = "Render method Fitted: what it reflects can't be plotted"
     good = script.script.as_string()
     for text in ("", "shader x(\n)\n{\n  BSDF = diffuse(N);\n}\n", good.replace("exp(", "eval(")):
-        extension.api.set_parameters(material, e=10.0 + len(text) % 97)  # drawn anew
+        extension.api.set_parameters(material, e=10.0 + len(text) % 97)  # drawn again
         script.script.from_string(text)
         log, legend, _ = legend_of(panel, extension, material)
         assert said in " ".join(log) and legend.form is None and legend.principled is not None
@@ -613,7 +616,7 @@ def test_what_is_no_fitted_shader_is_unreadable(extension, text):
 def test_arrows_are_as_bright_as_the_tools_mirror(
     panel, plots, extension, tool, empty, model, values
 ):
-    """And what is let through is the rest of the albedo, for what scatters none."""
+    """And the transmitted light is the rest of the albedo, for models that scatter nothing."""
     material = extension.api.new_material(model, **values)
     log, legend, picture = legend_of(panel, extension, material)
     values = {k: extension.api.get_parameters(material)[k] for k in values}
@@ -650,7 +653,7 @@ def test_all_is_reflected_beyond_the_critical_angle(panel, extension, empty):
 
 @pytest.mark.parametrize("ior", [1.3, 1.8, 2.4])
 def test_the_principled_node_of_a_dielectric_is_it(extension, panel, tool, empty, ior):
-    """With Transmission, at the same index: Fresnel's shares, without an error."""
+    """With Transmission and the same IOR: Fresnel reflection and refraction, without an error."""
     material = extension.api.new_material("fresnel_dielectric", ior=ior)
     log, legend, _ = legend_of(panel, extension, material)
     near = legend.principled
@@ -676,7 +679,7 @@ def test_the_principled_node_of_a_dielectric_is_it(extension, panel, tool, empty
 def test_no_smooth_node_beside_it_is_nearer(
     extension, plots, form_light, panel, empty, model, values, most
 ):
-    """By the squares of what is off in either share of the light, over the hemisphere."""
+    """By the squared errors of both fractions of the light, over the hemisphere."""
     material = extension.api.new_material(model, **values)
     found = light_of(extension, plots, form_light, material)
     near, native = found.near, plots.native_bsdf
@@ -706,7 +709,7 @@ def test_no_smooth_node_beside_it_is_nearer(
     beside += [(color, metallic, ior + d) for d in (-0.3, -0.03, 0.03, 0.3) if ior + d >= 1]
     for node in beside:
         assert least <= 1.001 * squares(*node) + 1e-12, node
-    # What is off at 45 degrees, in parts of the light.
+    # The error at 45 degrees, as a fraction of the light.
     light = plots._slice(np.radians(-plots.INCIDENCE))
     node = near.native
     shares = native.mirror(node, light[None])[0], own.mirror(light, **values)
@@ -719,7 +722,7 @@ def test_no_smooth_node_beside_it_is_nearer(
 
 
 def test_the_arrow_of_the_principled_node_is_dashed(extension, panel, plots, empty):
-    """Beside the model's own, bright as far as its share."""
+    """Beside the model's own arrow; its brightness is its fraction of the light."""
     material = extension.api.new_material("lambertian_specular", rs=0.7, rd=0.0)
     log, legend, picture = legend_of(panel, extension, material)
     share = legend.principled.mirror[0]
@@ -735,7 +738,7 @@ def test_the_arrow_of_the_principled_node_is_dashed(extension, panel, plots, emp
 
 
 def test_a_lobe_that_outweighs_its_mirror_has_a_rough_node(extension, panel, empty):
-    """And the panel says that it lacks the mirror."""
+    """And the panel says that the node lacks the mirror."""
     material = extension.api.new_material("schlick", rough=0.45, r=0.8)
     log, legend, _ = legend_of(panel, extension, material)
     near = legend.principled
@@ -745,8 +748,8 @@ def test_a_lobe_that_outweighs_its_mirror_has_a_rough_node(extension, panel, emp
 
 
 def test_glossy_is_ggx_with_the_light_that_facets_reflect(plots):
-    """From above facets of GGX lose nothing where they are narrow: the slice, turned about the
-    normal, adds up to 1."""
+    """At normal incidence, narrow GGX lobes lose nothing: the slice, rotated about the normal,
+    integrates to 1."""
     light = plots.INCIDENCE
     try:
         plots.INCIDENCE = 0.0
@@ -788,7 +791,7 @@ def test_a_moved_slider_draws_anew_and_nothing_else_does(
     assert (
         np.array_equal(pictures[0], pictures[2]) and np.abs(pictures[2] - pictures[3]).max() > 0.1
     )
-    for i in range(40):  # more than are kept
+    for i in range(40):  # more than are cached
         extension.api.set_parameters(material, ax=0.1 + i / 100)
         last = pixels_of(panel.picture(node)[0])
     fresh, _ = draw("ward", {**extension.api.get_parameters(material)})
@@ -814,7 +817,7 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
     panel.draw_plots(layout, material)
     label = extension.pack.parameters("cook_torrance")["m"]["label"]
     assert f"At the default of {label}" in layout.log
-    # A model that a pack cut to a scene lacks: said, not raised.
+    # A model that a pack cut to a scene lacks causes a message, and no exception.
     monkeypatch.setattr(plots.brdfc, "NAMES", ())
     monkeypatch.setattr(panel, "_places", {})
     layout = helpers.Layout()
@@ -823,14 +826,14 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
 
 
 def test_a_value_at_the_edge_of_its_range_is_drawn(extension, panel, empty):
-    """Sockets are floats: 1e-4 as one lies below the 1e-4 that is accepted."""
+    """Sockets are floats: 1e-4 in single precision is below the accepted 1e-4."""
     for ax in (1e-4, 1.0):
         picture, _ = shown(panel, extension, "ward", ax=ax, ay=ax)
         assert picture.max() > 0.5
 
 
 def test_every_model_is_drawn(extension, plots, empty):
-    """How long that takes script/plots.py tells."""
+    """script/plots.py measures how long that takes."""
     for model in extension.pack.model_names():
         picture, _ = plots.draw(model, {})
         assert picture.shape == (plots.ABOVE.stop, plots.SIZE, 4), model

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension from a static repository, as script/release makes it: installed over HTTP, brought
-up to date, and never half there."""
+"""The extension from a static repository, as made by script/release: installation over HTTP,
+updates, and no incomplete installations."""
 
 import hashlib
 import json
@@ -17,7 +17,7 @@ import bpy
 import pytest
 
 CLI = Path(bpy.utils.resource_path("LOCAL")) / "scripts/addons_core/bl_pkg/cli/blender_ext.py"
-#: What the older version has that the newer one has not.
+#: What distinguishes the older version from the newer one.
 OLDER, MARK, LEFT_BEHIND = "0.0.1", "\nMARK = 'older'\n", "lamps/left_behind.py"
 
 
@@ -33,8 +33,8 @@ def version_of(path):
 
 
 def make_older(source, target):
-    """The extension as an earlier version of it might have been: Python, files and one shader are
-    others."""
+    """Makes a plausible earlier version of the extension: with other Python code, files and one
+    other shader."""
     with zipfile.ZipFile(source) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     toml = members["blender_manifest.toml"].decode()
@@ -59,7 +59,7 @@ def make_older(source, target):
 
 @pytest.fixture(scope="module")
 def repositories(extension_zip, tmp_path_factory):
-    """Folders `older` and `newer`, each a repository of one version."""
+    """Folders `older` and `newer`, each a repository with one version."""
     root = tmp_path_factory.mktemp("repositories")
     newer, older = root / "newer" / extension_zip.name, root / "older" / "older.zip"
     for path in (newer, older):
@@ -75,7 +75,7 @@ def repositories(extension_zip, tmp_path_factory):
 
 @pytest.fixture
 def visit(repositories, tmp_path):
-    """visit(STAGE...): what repository_client.py finds after each."""
+    """visit(STAGE...): the results of repository_client.py after each stage."""
 
     def run(*stages):
         client = Path(__file__).with_name("repository_client.py")
@@ -114,7 +114,7 @@ def test_it_installs_and_comes_up_to_date(visit, repositories):
     is_whole(first, repositories.older, "older")
     assert "outdated" not in first["codes"]
     is_whole(second, repositories.newer)
-    # A material of before keeps its own shader, and is known for it.
+    # An existing material keeps its shader, and is recognized as outdated.
     assert "outdated" in second["codes"]
 
 
@@ -130,5 +130,5 @@ def test_a_download_that_fails_leaves_the_version_before(visit, repositories):
 def test_a_first_download_that_fails_leaves_nothing(visit, repositories):
     torn, whole = visit("newer:torn", "newer")
     assert (torn["enabled"], torn["files"], torn["beside"]) == (False, {}, [])
-    # There is nothing to bring up to date then.
+    # Then there is nothing to update.
     assert (whole["enabled"], whole["files"]) == (False, {})

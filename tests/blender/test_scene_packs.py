@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every scene of the repository from an extension of its own, which holds what that scene needs and
-nothing else; and every model with all, some and no parameters that such an extension folds."""
+"""Renders every scene of the repository with an extension cut to it, which contains only what that
+scene needs; and tests every model with all, some and none of its parameters made constant by such
+an extension."""
 
 import json
 import re
@@ -15,9 +16,9 @@ from helpers import render
 from scene_loader import SceneLoader
 
 SCENES = Path(__file__).parents[2] / "scenes"
-#: Those whose materials have what differs: mirrors, glass, metal, textures, all models at once.
+#: Scenes that cover all kinds of materials: mirrors, glass, metal, textures, all models at once.
 QUICK = {"dispersion", "gl-fig11", "sh-fresnel", "sh-glass"}
-#: The head picture, and meshes.
+#: The picture of the README, and meshes.
 SLOWER = {"as-fig8", "small-lamp"}
 REPOSITORY = "user_default"
 
@@ -52,7 +53,7 @@ def installed(extension, path):
 
 @pytest.mark.parametrize("name", scenes())
 def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool, tmp_path, name):
-    """As the driver does: installed, loaded and rendered, with every material of the scene."""
+    """As the driver does: installs, loads and renders, with every material of the scene."""
     content = json.loads((SCENES / f"{name}.json").read_text(encoding="utf-8"))
     content["settings"] |= {"width": 16, "height": 16, "spp": 2}
     source = tmp_path / f"{name}.json"
@@ -72,8 +73,8 @@ def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool,
 def test_a_scene_renders_from_its_own_extension_without_osl(
     extension, empty, answers, tool, tmp_path
 ):
-    """Forms that its materials leave open are Blender's own nodes then, which the extension has
-    unless it was asked for without; the picture is the same within noise."""
+    """Materials without a fixed form then use Blender's own nodes, which the extension contains
+    unless it was built without; the picture is the same within the noise."""
     content = json.loads((SCENES / "as-fig7.json").read_text(encoding="utf-8"))
     content["settings"] |= {"width": 32, "height": 32, "spp": 64}
     source = tmp_path / "open.json"
@@ -106,15 +107,15 @@ def test_a_scene_renders_from_its_own_extension_without_osl(
     assert np.abs(pictures["both", False].mean() / with_osl.mean() - 1) < 0.01
 
 
-#: How much of a model an extension folds. With all of it constant most twins are searched for anew,
-#: which takes seconds each: these stand for them.
+#: How many of a model's parameters are constant. With all of them constant, most twins must be
+#: fitted again, which takes seconds each: QUICK_TWINS represent them.
 FOLDED = ("all", "some", "none")
 QUICK_TWINS = {"coupled", "lambert", "lambertian_specular"}
 
 
 def values_of(entry):
-    """Values other than the defaults, where no twin has to be searched for that: colours, and the
-    numbers of models without one."""
+    """Values other than the defaults, if they don't require fitting a twin: colours, and numbers of
+    models without a twin."""
     values = {}
     for parameter in entry["parameters"]:
         value = parameter["default"]
@@ -128,8 +129,8 @@ def values_of(entry):
 
 
 def has_twin(name, entry, folded, varies):
-    """Whether the materials of a model leave it a twin that is found quickly: what that has one
-    value of is the same in all of them."""
+    """Whether a model has a twin that needs no fit with these materials: its fixed parameters must
+    have the same values in all of them."""
     if folded == "all":
         return name in QUICK_TWINS
     forms = entry["representations"].values()
@@ -140,9 +141,9 @@ def has_twin(name, entry, folded, varies):
 
 
 def materials_of(models, folded):
-    """A material of each form of each model but those that have to be fitted first, as a file of
-    `build --materials` has it. Of some parameters, colours and the number that a twin is kept over
-    vary, or the first one."""
+    """A material for each form of each model, except forms that would have to be fitted first, as
+    in a file for `build --materials`. Of some parameters, either colours and the number of the
+    stored twin vary, or the first one does."""
     made = {}
     for name, entry in models.items():
         values = values_of(entry)
@@ -163,7 +164,7 @@ def materials_of(models, folded):
 
 
 def stands_in(node):
-    """What a group's node of Blender's own takes where no shader runs, by socket; linked: None."""
+    """Values of a group's stand-in node by socket; None if linked."""
     found = {}
     for inner in node.node_tree.nodes:
         if inner.bl_idname in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfMetallic"):
@@ -212,7 +213,7 @@ def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pa
 
 
 def check_stand_in(socket, found, fixed):
-    """Folded parameters are constants of the node, the others are linked."""
+    """Checks that fixed parameters are constants of the node, and the others linked."""
     names = {"IOR": ["ior"], "Extinction": ["k_r", "k_g", "k_b"]}
     if isinstance(found, list):
         names["IOR"] = ["n_r", "n_g", "n_b"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The loader of resolved scenes and the headless driver."""
+"""The loader of resolved scenes, and the renderer script."""
 
 import json
 import math
@@ -37,7 +37,7 @@ def sphere(segments=64, rings=32):
     )
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     vertices = points.reshape(-1, 3).astype(np.float32)
-    # At the poles one triangle of each pair has no area.
+    # At the poles, one triangle of each pair has no area.
     corners = vertices[triangles]
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -47,7 +47,7 @@ def sphere(segments=64, rings=32):
 
 @pytest.fixture
 def scene_file(tmp_path):
-    """Writes a resolved scene; returns its path. Keywords replace parts of a lit white floor."""
+    """Writes a resolved scene and returns its path. Keywords replace parts of a lit white floor."""
     vertices, triangles, uvs = quad(20)
     np.save(tmp_path / "floor_v.npy", vertices)
     np.save(tmp_path / "floor_t.npy", triangles)
@@ -105,7 +105,7 @@ def ball(**more):
     return {"name": "ball", "shape": shape, "material": "white"} | more
 
 
-# Radiance of a Lambert floor of reflectance 1/2 straight under each lamp, from the conventions.
+# Radiance of a Lambertian floor with reflectance 1/2 straight below each lamp, by the conventions.
 POWER, HEIGHT = 100.0, 5.0
 LAMPS = {
     "point": (
@@ -174,7 +174,7 @@ def test_lamp_colour_and_camera_visibility(extension, empty, scene_file):
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
 @pytest.mark.parametrize(("width", "height"), [(64, 32), (32, 64)])
 def test_camera_frames_the_same_height(extension, empty, scene_file, kind, width, height):
-    """A square of side 2 seen from 5 away fills half the picture's height."""
+    """A square of side 2 at a distance of 5 fills half the picture's height."""
     vertices, triangles, _ = quad(2)
     path = scene_file()
     np.save(path.parent / "floor_v.npy", vertices)
@@ -246,7 +246,7 @@ def test_equal_shapes_of_one_material_share_a_mesh(extension, empty, scene_file)
     meshes = [scene.objects[f"ball{index}"].data for index in range(4)]
     assert meshes[0] == meshes[1] and meshes[2] == meshes[3] and meshes[0] != meshes[2]
     assert [m.materials[0].name for m in meshes] == ["white", "white", "black", "black"]
-    # A copy has the normals of the first.
+    # The copy has the normals of the first.
     normals = np.empty((2, 3 * len(meshes[0].loops)), np.float32)
     for mesh, into in zip(meshes[::2], normals, strict=True):
         mesh.corner_normals.foreach_get("vector", into)
@@ -274,7 +274,7 @@ def test_camera_only_objects_do_not_meet_other_rays(extension, empty, scene_file
 
 
 def write_exr(path, pixels):
-    """Float EXR from (height, width, 3), row 0 at the bottom."""
+    """Writes a float EXR from (height, width, 3), row 0 at the bottom."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new("new", width, height, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
@@ -365,8 +365,8 @@ def test_representation_can_be_overridden(extension, empty, scene_file):
 
 
 def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch):
-    """A pack of one model, as of an own one, loads a scene with a floor: Blender's Diffuse node is
-    Lambert's model."""
+    """A pack of one model, such as a user's own, can load a scene with a floor: Blender's Diffuse
+    node equals Lambert's model."""
     sun = [{"type": "sun", "direction": [0.3, 0, -1], "irradiance": math.pi}]
     materials = {"white": {"model": "lambert", "parameters": {"rho": [0.2, 0.5, 0.8]}}}
     path = scene_file(lights=sun, materials=materials)
@@ -389,7 +389,7 @@ def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch
 
 
 def test_glossy_comparison_has_the_same_axes(extension, empty, scene_file):
-    """The stretched highlight of Blender's node lies where the model's does."""
+    """The anisotropic highlight of Blender's node has the same orientation as the model's."""
     values = {"nu": 20.0, "nv": 2000.0, "rs": 1.0, "part": "specular"}
     camera = {"type": "perspective", "position": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1]}
     path = scene_file(
@@ -517,8 +517,9 @@ def test_driver_renders_and_reports(extension, extension_zip, empty, scene_file,
 
 @pytest.mark.slow
 def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_path):
-    """Of a pixel's first sample, which goes through its centre, a drawn form would make the same in
-    both: a correlation of 0.84. Two pictures of one sphere have 0.03 to 0.12 in common."""
+    """The first sample goes through the pixel's centre; with it, a form that samples directions
+    would use the same ones in both pictures: a correlation of 0.84. Without it, two pictures of a
+    sphere have 0.03 to 0.12."""
     content = json.loads((SCENES / "room-coupled.json").read_text())
     content["settings"] |= {"width": 64, "height": 64, "spp": 1}
     source = tmp_path / "s.json"
@@ -539,8 +540,8 @@ def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_p
 
 @pytest.mark.slow
 def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, tool, tmp_path):
-    """Gold, which Rec.709 does not hold, and a texture, as the reference has them; then a scene
-    that names no space, in the one that Blender starts with."""
+    """Gold, which is outside Rec.709, and a texture look as in the reference; then a scene that
+    names no space is in the space that Blender starts with."""
     write_exr(tmp_path / "green.exr", np.broadcast_to([0.18, 0.4, 0.05], (2, 2, 3)))
     texture = {"texture": {"image": "green.exr", "colorspace": "Linear Rec.709"}}
     content = {
@@ -592,7 +593,7 @@ def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, to
     for blender, reference in pixels:
         np.testing.assert_allclose(blender, reference, rtol=2e-3)
     np.testing.assert_array_equal(pixels[3][0], pixels[0][0])
-    # What the file says and what the scene said are the same, or compare would convert.
+    # The space in the files equals the scene's; otherwise compare would convert.
     off = [json.loads(tool("compare", *pair, "--json"))["bias"] for pair in pairs]
     assert np.abs(off).max() < 1e-3
     assert all(np.abs(pixels[i][0] - pixels[0][0]).max() > 0.02 for i in (1, 2))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of few faces that are shaded smooth: their normals lean so far from the surface's own that
-mirror directions about them lie below it."""
+"""Meshes with few faces and smooth shading: their normals differ so much from the surface's that
+mirror directions about them lie below the surface."""
 
 import bpy
 import helpers
@@ -10,7 +10,7 @@ from mathutils import Vector
 
 SIZE, BLOCK = 64, 8
 EYE = Vector((4.2, -3.6, 2.9))
-#: Blender's default meshes, and one of few faces.
+#: Blender's default meshes, and one with few faces.
 SHAPES = {
     "cube": lambda: bpy.ops.mesh.primitive_cube_add(size=2),
     "cylinder": lambda: bpy.ops.mesh.primitive_cylinder_add(radius=1, depth=2),
@@ -19,8 +19,8 @@ SHAPES = {
 
 
 def picture(extension, shape, make, samples=16, correction=None, lamp=False):
-    """Radiance of a smooth object in a white world, and where it is; (SIZE, SIZE) each. `make`
-    makes its material; `correction`: Bump Map Correction, or None: as made."""
+    """Radiance of a smooth object in a white world, and a mask of the object; (SIZE, SIZE) each.
+    `make` makes its material; `correction`: Bump Map Correction, or None to leave it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, samples=samples, max_bounces=1)
@@ -45,12 +45,12 @@ def picture(extension, shape, make, samples=16, correction=None, lamp=False):
 
 
 def dark(found, seen):
-    """Share of an object's pixels below half of its median."""
+    """Fraction of an object's pixels below half of its median."""
     return (found[seen] < np.median(found[seen]) / 2).mean()
 
 
 def by_block(found, seen):
-    """Means over squares of BLOCK x BLOCK pixels that are largely of the object."""
+    """Means over squares of BLOCK x BLOCK pixels that mostly belong to the object."""
     shape = (SIZE // BLOCK, BLOCK, SIZE // BLOCK, BLOCK)
     count = seen.reshape(shape).sum((1, 3))
     total = np.where(seen, found, 0).reshape(shape).sum((1, 3))
@@ -69,7 +69,7 @@ def mirror():
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_converted_mirror_is_as_it_was_and_so_are_its_settings(extension, shape):
-    """A third of a cube's pixels were black, also after going back."""
+    """A third of a cube's pixels used to be black, even after converting back."""
     api = extension.api
 
     def converted(as_earlier_versions=False):
@@ -103,7 +103,8 @@ def test_back_restores_a_setting_that_was_off(extension, empty):
     assert material.cycles.use_bump_map_correction is False
 
 
-#: Those that are about as bright at any view: how dark as of a Glossy node.
+#: Forms that are about equally bright from all views, so that they can be compared with a Glossy
+#: node.
 EVEN = [
     ("schlick", "aimed"),
     ("schlick", "sampled"),
@@ -115,13 +116,13 @@ EVEN = [
     ("radziszewski_alda", "aimed"),
     ("ashikhmin_shirley", "aimed"),
 ]
-#: Those that are darker by nature where they are seen from the side.
+#: Forms that are darker when seen from the side by nature.
 OTHERS = [("phong", "aimed"), ("phong", "fitted"), ("phong", "twin"), ("modified_phong", "exact")]
 
 
 @pytest.fixture(scope="module")
 def darkness_of_glossy(extension):
-    """Of a Glossy node part of a wide lobe is lost below the surface, too."""
+    """A Glossy node, too, loses a part of a wide lobe below the surface."""
     return dark(*picture(extension, "cylinder", native("ShaderNodeBsdfAnisotropic", Roughness=0.3)))
 
 
@@ -131,7 +132,8 @@ def darkness_of_glossy(extension):
 def test_no_part_of_a_smooth_cylinder_is_dark(
     extension, darkness_of_glossy, model, form, correction
 ):
-    """At the setting of Bump Map Correction that a form has, and at any but for those that lean."""
+    """With the setting of Bump Map Correction that a form sets; and with any, except for tilted
+    closures."""
     if correction is False and form == "twin" or correction is True and form == "fitted":
         pytest.skip("of which the panel warns, or nobody sets")
     material = lambda: extension.api.new_material(model, form)  # noqa: E731
@@ -145,7 +147,7 @@ def test_no_part_of_a_smooth_cylinder_is_dark(
 @pytest.mark.full
 @pytest.mark.parametrize("model", ["cook_torrance", "ashikhmin_shirley"])
 def test_aimed_forms_are_as_drawn_directions_alone(extension, model):
-    """Block by block under a lamp and a sky, whatever the setting; not so on a cube: see
+    """Block by block under a lamp and a sky, with either setting; on a cube this does not hold, see
     docs/limits.md."""
 
     def blocks(form, samples, correction):
@@ -160,8 +162,8 @@ def test_aimed_forms_are_as_drawn_directions_alone(extension, model):
 
 @pytest.mark.full
 def test_a_cube_under_a_lamp_is_lit_as_by_blenders_diffuse_node(extension):
-    """Block by block, also where the lamp is partly below a face and drawn directions alone are up
-    to 44 % darker. Of roughness 0 the model is Lambert's."""
+    """Block by block, also where the lamp is partly below a face, where sampled directions alone
+    are up to 44 % darker. With roughness 0 the model is Lambert's."""
 
     def model(form):
         return lambda: extension.api.new_material("oren_nayar", form, rho=0.8, sigma=0.0)

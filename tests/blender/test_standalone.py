@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `brdfc build --osl` writes: shaders in Blender's own Script node, without the extension, and
-headers of formulas, which OSL's own compiler, as Blender has it, takes.
+"""The output of `brdfc build --osl`: shaders for Blender's Script node, without the extension, and
+headers with formulas, compiled by the OSL compiler in Blender.
 
-The renders show what they give: albedos in a white world, and f, pdf and samples at given
-directions, against the tool's own.
+Renders show albedos in a white world, and f, pdf and samples at given directions, which are
+compared with the tool's.
 """
 
 import json
@@ -22,9 +22,9 @@ from helpers import albedo_and_mirror, empty_tree, pairs_csv, read_csv, to_csv
 COSINES = (1.0, 0.7, 0.3)
 REPLICAS, SAMPLES = 512, 48
 POINTS = 24
-#: What is shown: 0 f, 1 pdf, 2 a sample's wi, 3 its weight, 4 its pdf, 5 mirror, 6 transmit.
+#: Values to show: 0 f, 1 pdf, 2 a sample's wi, 3 its weight, 4 its pdf, 5 mirror, 6 transmit.
 SHOWN = range(7)
-#: Relative L1 that single precision and OSL's fast functions may take at default parameters.
+#: Relative L1 error allowed for single precision and OSL's fast functions at default parameters.
 CLOSE = 1e-3
 
 
@@ -43,7 +43,7 @@ def models(tool):
 
 @pytest.fixture(scope="module")
 def scene():
-    """Settings by hand: nothing here asks the extension for anything."""
+    """Settings made directly: these tests must not use the extension."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -52,14 +52,14 @@ def scene():
     cycles.max_bounces = 4
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = 0
     cycles.use_denoising = cycles.use_adaptive_sampling = False
-    # Cycles asks the module oslquery for a script's sockets, which the wheel has elsewhere.
+    # Cycles imports oslquery to find a script's sockets; in the wheel it is elsewhere.
     root = Path(bpy.utils.resource_path("LOCAL"))
     sys.path += [str(p) for p in root.glob("python/lib/python3.*/site-packages")]
     return scene
 
 
 def script_of_file(path):
-    """A material with a Script node of a file; and the node."""
+    """A material with a Script node for a file; and the node."""
     import cycles.osl
 
     material = bpy.data.materials.new(path.stem)
@@ -112,13 +112,14 @@ def test_shaders_reflect_the_albedo_of_their_models(folder, models, few_of, scen
     which = np.repeat(np.arange(len(made)), len(seen))
     turns = np.random.default_rng(5).uniform(0, 2 * np.pi, len(which))
     normals = tilted(np.tile(seen, len(made)), turns)
-    # Forms that draw take their random numbers from places and views, which have to differ.
+    # Forms that sample directions derive random numbers from positions and views, which must
+    # differ.
     meter = Goniometer(scene, made, normals, SAMPLES, perspective=True, which=which)
     meter.add_world()
     picture = meter.measure().reshape(len(made), len(COSINES), REPLICAS, 3)
     cosines = meter.own_wo()[:, 2].reshape(len(made), len(COSINES), REPLICAS)
     for i, (model, info) in enumerate(models.items()):
-        # Facets are turned at random.
+        # Facets are rotated at random.
         isotropic = info["properties"]["isotropic"]
         around = [0.0] if isotropic else np.arange(8) * np.pi / 16
         means = cosines[i].mean(1)
@@ -150,7 +151,7 @@ def has(header, model, function):
 
 
 def shader_around(folder, model, parameters):
-    """A shader that shows what the header's functions give."""
+    """A shader that outputs the results of the header's functions."""
     header = (folder / "include" / f"brdfc_{model}.h").read_text()
     lines = []
     if has(header, model, "eval"):
@@ -199,7 +200,7 @@ def sampled(tool, model, wo, numbers):
 
 
 def expected(tool, model, info, wi, wo, numbers):
-    """(shown, n, 3); what the model has not is 0."""
+    """Expected values, (shown, n, 3); 0 for functions that the model lacks."""
     out = np.zeros((len(SHOWN), len(wi), 3))
     if info.get("scatter", True):
         rows = read_csv(tool("eval", model, stdin=pairs_csv(wi, wo)))[1]
@@ -225,7 +226,7 @@ def test_headers_give_what_the_models_do(folder, models, few_of, scene, tool, su
         wi = np.zeros_like(wo)
         wi[:, 2] = 1
         if info.get("scatter", True):
-            # From the model itself: nothing else meets a narrow lobe.
+            # Sampled from the model: nothing else hits a narrow lobe.
             drawn = sampled(tool, model, wo, rng.random((POINTS, 3)))
             wi = np.where(drawn[:, 6:] > 0, drawn[:, :3], wi)
             wi = wi.astype(np.float32).astype(np.float64)
@@ -259,7 +260,7 @@ def test_headers_give_what_the_models_do(folder, models, few_of, scene, tool, su
         for show in SHOWN:
             with subtests.test(model=model, show=show):
                 found, truth = picture[i, show], truths[i][show]
-                if show == 2:  # where a direction was drawn
+                if show == 2:  # if a direction was sampled
                     kept = truths[i][4][:, 0] > 0
                     found, truth = found[kept], truth[kept]
                 scale = np.abs(truth).sum()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Windows and macOS do otherwise, simulated: paths, encodings, files that are in use, names of
-programs, file systems that tell no case. docs/limits.md says what this can't show."""
+"""Differences of Windows and macOS, simulated: paths, encodings, files in use, program names,
+case-insensitive file systems. docs/limits.md says what this can't show."""
 
 import ast
 import errno
@@ -20,11 +20,11 @@ import bpy
 import pytest
 
 SOURCES = sorted((Path(__file__).resolve().parents[2] / "blender_addon").rglob("*.py"))
-#: Calls that read or write text, and the place of the mode among their arguments.
+#: Calls that read or write text, and the position of the mode among their arguments.
 TEXT = {"open": 1, "read_text": None, "write_text": None, "fdopen": 1, "NamedTemporaryFile": 0}
-#: Device names that Windows takes no file for, whatever its extension.
+#: Device names, which Windows allows for no file, whatever its extension.
 RESERVED = {"con", "prn", "aux", "nul"} | {f"{d}{i}" for d in ("com", "lpt") for i in range(10)}
-#: Of the 260 characters that Windows has for a path by default, some belong to the user's profile.
+#: Of the 260 characters that Windows allows for a path by default, the user's profile takes some.
 LONGEST = 200
 
 
@@ -39,7 +39,7 @@ def calls(tree):
 
 
 def without_encoding(tree):
-    """Lines where text is read or written in whatever encoding the system has."""
+    """Lines where text is read or written in the system's default encoding."""
     found = []
     for call, name in calls(tree):
         if name not in TEXT:
@@ -56,8 +56,8 @@ def without_encoding(tree):
 
 
 def joined_with_slashes(tree):
-    """Lines where a path is put together with the separator of one system. Names of data-blocks
-    and of node groups are no paths."""
+    """Lines where a path is composed with the separator of one system. Names of data-blocks and of
+    node groups are not paths."""
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
@@ -175,7 +175,7 @@ def lean(extension, monkeypatch):
 
 @pytest.fixture
 def windows(monkeypatch):
-    """What shutil.which() asks of the system, as on Windows."""
+    """Simulates what shutil.which() sees on Windows."""
     monkeypatch.setattr(shutil, "sys", SimpleNamespace(platform="win32"))
     monkeypatch.setattr(
         shutil,
@@ -298,8 +298,8 @@ print("RESULT", json.dumps({
 def test_a_profile_with_spaces_and_letters_of_other_scripts_and_read_only(
     extension_zip, program, tmp_path
 ):
-    """A Blender of its own, whose Python warns of text in the system's encoding. After the
-    installation the profile can't be written."""
+    """In a separate Blender, whose Python warns of text in the system's encoding. After
+    installation the profile is read-only."""
     profile = tmp_path / "Jörg Müller" / "Профиль 日本 X"
     out, temporary = tmp_path / "Ausgäbe Ordner", tmp_path / "Témp Files"
     for folder in (profile, out, temporary):
@@ -344,6 +344,6 @@ def test_a_profile_with_spaces_and_letters_of_other_scripts_and_read_only(
     ],
 )
 def test_what_is_written_first_lies_beside_the_file(extension, path):
-    """On the same drive, as a file takes the place of another one at once nowhere else."""
+    """On the same drive, because replacing a file is atomic only there."""
     beside = extension.api._beside(path)
     assert beside.parent == path.parent and beside.name.startswith(".materials.json.")

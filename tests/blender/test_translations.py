@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension in other languages. The bpy module is built without translations, its
-bpy.app.build_options.international is False: what Blender would look up is read from the classes
-that are registered, and what the extension looks up itself comes from the catalogues instead."""
+"""The extension in other languages. The bpy module is built without translations
+(bpy.app.build_options.international is False). So texts that Blender would look up are read from
+the registered classes, and texts that the extension looks up are taken from the catalogues."""
 
 import copy
 import inspect
@@ -21,7 +21,7 @@ def i18n(extension):
 
 @pytest.fixture
 def speak(i18n, monkeypatch):
-    """speak(locale): what Blender's look-up would answer in that language."""
+    """speak(locale): simulates Blender's look-up in that language."""
 
     def use(locale):
         known = i18n.catalogues()[locale]
@@ -132,7 +132,7 @@ def test_sentences_within_sentences(i18n, speak):
 
 
 def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
-    """Scripts have all in one text, people a sentence and a button."""
+    """Scripts get one text with everything, users a sentence and a button."""
     group = extension.nodes.group_nodes(phong)[0].node_tree
     script = next(n for n in group.nodes if n.bl_idname == "ShaderNodeScript")
     group.nodes.remove(script)
@@ -144,7 +144,7 @@ def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
     assert "operator brdfc.more " in layout.log
     assert "script node" not in "\n".join(layout.log)
     assert bpy.ops.brdfc.more(text="behind") == {"FINISHED"}
-    # What the sentence asks for mends it.
+    # The suggested action fixes it.
     node = extension.nodes.group_nodes(phong)[0]
     assert bpy.ops.brdfc.switch(node=node.name, representation="fitted") == {"FINISHED"}
     assert "script_failed" not in {f.code for f in extension.api.warnings(phong, empty)}
@@ -160,6 +160,6 @@ def test_lines_fit_the_panel(extension, i18n, locale):
         lines = labels.lines_of(text, labels.room())
         assert "".join("".join(lines).split()) == "".join(text.split())
         for line in lines:
-            # What can't be broken may stick out.
+            # A word that can't be broken may exceed the width.
             assert labels.width(line) <= labels.room() or " " not in line, line
             assert not line.startswith(tuple(labels._CLOSING)), line

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that goes through: glass against closed forms, sampled refraction against the model."""
+"""Transmission: glass compared with closed forms, sampled refraction compared with the model."""
 
 import math
 
@@ -15,7 +15,8 @@ def test_dielectric_sphere_is_invisible_in_a_furnace(extension, empty):
     material = extension.api.new_material("fresnel_dielectric", ior=1.5)
     sphere_scene(scene, material, size=12, samples=128)
     pixels = render(scene)[..., :3]
-    # What 64 bounces leave inside by total reflection at facets is all that may be missing.
+    # Only light that 64 bounces leave inside, by total internal reflection at faces, may be
+    # missing.
     print(f"furnace of a glass sphere: {pixels.min():.4f} to {pixels.max():.4f}")
     assert pixels.mean() == pytest.approx(1, abs=1e-3)
     assert pixels.max() < 1 + 1e-4
@@ -23,7 +24,7 @@ def test_dielectric_sphere_is_invisible_in_a_furnace(extension, empty):
 
 @pytest.mark.parametrize("thickness", [0.5, 2.0])
 def test_slab_absorbs_along_the_way(extension, empty, thickness):
-    """A slab seen squarely: all orders of inner reflection add up to a closed form."""
+    """A slab at normal incidence: the sum over all orders of inner reflection has a closed form."""
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, samples=2048, max_bounces=32)
     attenuation, density, ior = (0.2, 0.5, 0.9), 0.7, 1.5
@@ -57,7 +58,7 @@ VIEWS = [(1, 0.9), (1, 0.25), (-1, 0.9), (-1, 0.4)]  # side and cosine; the last
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("n", "ior"), [(0.0, 1.5), (20.0, 1.3)])
 def test_sampled_refraction_in_a_world(extension, empty, tool, n, ior):
-    """A quad seen from both sides in a world whose colour tells the direction."""
+    """A quad seen from both sides in a world whose colour encodes the direction."""
     values = {"n": n, "around": "refraction", "ior": ior}
     for side, cosine in VIEWS:
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -81,7 +82,7 @@ def test_sampled_refraction_in_a_world(extension, empty, tool, n, ior):
         scene.world.cycles.sampling_method = "NONE"
         scene.render.resolution_x = scene.render.resolution_y = 16
         measured = render(scene)[..., :3].reshape(-1, 3)
-        # x is the object's x axis laid into the quad: the world's.
+        # x is the object's x axis projected onto the quad: the world's.
         wo = (0.0, -math.sin(angle), math.cos(angle))
         text = tool(
             "sample", "radziszewski_alda", *arguments(values), "--count", "100000",
@@ -90,7 +91,7 @@ def test_sampled_refraction_in_a_world(extension, empty, tool, n, ior):
         rows = read_csv(text)[1]
         light = (0.5 + 0.5 * rows[:, :3]) * rows[:, 3:6]
         expected, spread = light.mean(0), light.std(0)
-        # Of the picture as its pixels show it: samples inside of one pixel are not independent.
+        # The error from whole pixels: samples inside a pixel are not independent.
         own = measured.std(0, ddof=1) / math.sqrt(len(measured))
         error = np.hypot(spread / math.sqrt(len(rows)), own) + 2e-4
         z = (measured.mean(0) - expected) / error

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What reaches a socket, by pictures: an emitting surface shows the colour that the extension says
-reaches it, and none where it says that nothing is shown."""
+"""Compares shader_trees with pictures: an emissive surface must show the colour that the extension
+says reaches it, and nothing if the extension says so."""
 
 from importlib import import_module
 
@@ -12,7 +12,7 @@ import pytest
 OWN = (0.1, 0.2, 0.3)
 GREEN = (0.0, 1.0, 0.0)
 OF_GROUP = (0.9, 0.8, 0.7)
-#: From 5.0 muted and dangling nodes leave a socket its own value; before, it was 0.
+#: From 5.0 on, a socket behind muted or unconnected nodes has its own value; before, it had 0.
 SINCE_5 = bpy.app.version >= (5, 0, 0)
 
 
@@ -30,7 +30,7 @@ def rgb(tree, color=GREEN):
 
 
 class Bench:
-    """A surface of an Emission node whose colour is OWN, and the socket of that colour."""
+    """A surface with an Emission node whose colour is OWN, and the socket of that colour."""
 
     def __init__(self, tree):
         self.tree = tree
@@ -49,7 +49,7 @@ class Bench:
         return self.link(rgb(self.tree), socket)
 
     def group(self, fill):
-        """A group of one colour in and out, whose node has OF_GROUP for it."""
+        """A group with a colour input and output, whose node has OF_GROUP for the input."""
         group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
         for name, direction in (("In", "INPUT"), ("Out", "OUTPUT")):
             group.interface.new_socket(name, in_out=direction, socket_type="NodeSocketColor")
@@ -292,7 +292,7 @@ def muted_start_of_a_group(bench):
 
 @case
 def socket_that_is_gone(bench):
-    """Of a node that is set to another type of data."""
+    """A socket of a node that was set to another data type."""
     mix = new(bench.tree, "Mix")
     mix.data_type = "RGBA"
     bench.tree.links.new(next(s for s in mix.outputs if s.enabled), bench.socket)
@@ -316,7 +316,7 @@ def values(extension):
 
 @pytest.fixture
 def shown(empty):
-    """A plane that fills the picture of a pixel, and its material's tree."""
+    """A plane that fills the picture of one pixel, and its material's tree."""
     mesh = bpy.data.meshes.new("Plane")
     mesh.from_pydata([(-9, 0, -9), (9, 0, -9), (9, 0, 9), (-9, 0, 9)], [], [(0, 1, 2, 3)])
     empty.collection.objects.link(bpy.data.objects.new("Plane", mesh))
@@ -334,7 +334,7 @@ def test_what_reaches_a_socket_is_what_cycles_shows(empty, shown, trees, values,
     bench = Bench(shown.node_tree)
     CASES[name](bench)
     bpy.context.view_layer.update()
-    # Those behind a mix that is muted have another colour.
+    # Nodes behind a muted mix have another colour.
     found = [s for s in trees.shown(shown) if s.node.bl_idname == "ShaderNodeEmission"]
     said = values.constant(found[0].node.inputs["Color"], found[0].within) if found else (0, 0, 0)
     seen = helpers.render(empty)[1, 1, :3]
@@ -421,7 +421,7 @@ def test_what_differs_is_no_constant(shown, values):
     checker(bench, product)
     bench.feed(product)
     assert values.constant(bench.socket) is None
-    product.inputs[1].default_value = 0.0  # as importers have a factor of 0 before a texture
+    product.inputs[1].default_value = 0.0  # importers multiply textures by such a factor
     assert values.constant(bench.socket) == (0, 0, 0)
 
 
@@ -475,7 +475,7 @@ def test_an_image_of_two_has_a_mean(shown, values):
 
 
 def test_a_muted_link_leaves_a_parameter_its_value(extension, empty):
-    """To scripts, the list of models that are used, and a lean shader."""
+    """To scripts, the list of used models, and a lean shader."""
     material = extension.api.new_material("coupled", r0=0.3)
     (node,) = extension.nodes.group_nodes(material)
     socket = extension.nodes.sockets(node)["r0"]
@@ -514,7 +514,7 @@ def test_nodes_that_are_not_used_are_said(extension, empty):
 
 @pytest.fixture
 def glowing(empty):
-    """A light whose nodes emit by a link of 5, and the link."""
+    """A light whose nodes emit by a linked strength of 5, and the link."""
     item = helpers.add_lamp(empty, energy=10.0)
     tree = helpers.empty_tree(item.data)
     item.data.use_nodes = True

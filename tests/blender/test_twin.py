@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Twins without Open Shading Language: Blender's own nodes make of the curves what the tool judges,
-and stand where the shader does."""
+"""Twins without Open Shading Language: Blender's own nodes must reproduce what the tool evaluates,
+and replace the shader."""
 
 import math
 
@@ -20,7 +20,7 @@ from helpers import (
     render,
 )
 
-#: One colour for all closures, and three channels beside a mirror.
+#: One with a single colour for all closures, and one with three channels and a mirror.
 MATERIALS = {
     "phong": {"e": 40.0, "ks": (0.9, 0.6, 0.2)},
     "schlick_double": {"rd": (0.8, 0.4, 0.1)},
@@ -31,9 +31,9 @@ FACETS = 96
 
 @pytest.fixture
 def lean(extension, use_pack):
-    """The extension with a pack of these materials alone."""
+    """The extension with a pack for these materials alone."""
     listed = {name: {"model": name, "parameters": values} for name, values in MATERIALS.items()}
-    # A second one, so that the first one's colour is a socket.
+    # A second material, which makes the first one's colour a socket.
     listed["grey"] = {"model": "phong", "parameters": MATERIALS["phong"] | {"ks": 0.4}}
     use_pack(listed, "--twin")
     return extension
@@ -48,7 +48,7 @@ def start(lean):
 
 
 def facets(rng, count, towards):
-    """Normals of so many facets under a sun: every second one is near where its highlight is."""
+    """Normals of facets under a sun; every second one is near the highlight."""
     normals = tilted(rng.uniform(0.05, 1, count), rng.uniform(0, 2 * math.pi, count))
     half = unit(unit(towards) + (0, 0, 1))
     near = unit(half + 0.1 * rng.normal(size=(count, 3)))
@@ -58,7 +58,7 @@ def facets(rng, count, towards):
 @pytest.mark.evidence
 @pytest.mark.full
 def test_a_sun_on_a_twin(lean, tool):
-    """Every pair is within 1e-3 of the largest value of what the tool says of the nodes."""
+    """Every pair is within 1e-3 of the largest value that the tool states for the nodes."""
     rng = np.random.default_rng(3)
     which = np.repeat(np.arange(len(MATERIALS)), FACETS)
     found = {name: [] for name in MATERIALS}
@@ -82,7 +82,7 @@ def test_a_sun_on_a_twin(lean, tool):
         assert off <= 1e-3 * largest, name
 
 
-#: By model values away from the defaults, and a form.
+#: By model: a form, and values other than the defaults.
 STAND_INS = {
     "phong": ("aimed", {"e": 300.0, "ks": (0.9, 0.6, 0.2)}),
     "cook_torrance": ("sampled", {"f0": (0.1, 0.2, 0.3), "m": 0.5}),
@@ -117,7 +117,7 @@ def balls(extension):
 
 
 def test_a_twin_stands_in_where_shaders_do_not_run(extension, balls):
-    """Pixel for pixel, to rounding: with OSL it is the shader alone, without it the twin."""
+    """Pixel by pixel, up to rounding: with OSL the shader alone, without it the twin."""
     api, nodes = extension.api, extension.nodes
     made = [api.new_material(m, form) for m, (form, _) in STAND_INS.items()]
     for material, (_, values) in zip(made, STAND_INS.values(), strict=True):
@@ -194,8 +194,8 @@ def test_linked_materials_become_the_files_own_with_their_twins(extension, empty
 
 def test_what_is_said_is_of_the_twin_where_that_stands_in(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
-    empty.cycles.use_guiding = True  # of which only the shader is warned
-    empty.cycles.caustics_reflective = False  # and the twin of this
+    empty.cycles.use_guiding = True  # the warning is for the shader only
+    empty.cycles.caustics_reflective = False  # and this one for the twin
     material = extension.api.new_material("phong", "aimed")
     before = {f.code for f in extension.api.warnings(material, empty)}
     assert "path_guiding" in before and "caustics" not in before
@@ -206,9 +206,9 @@ def test_what_is_said_is_of_the_twin_where_that_stands_in(extension, empty):
 
 
 def test_animation_stays_with_its_socket_when_the_form_changes(extension, empty):
-    """The twin of lafortune has fewer sockets, so that they have other numbers."""
+    """The twin of lafortune has fewer sockets, so they have other indices."""
     material = extension.api.new_material("lafortune")
-    add_sphere(empty, material)  # or nothing evaluates it
+    add_sphere(empty, material)  # Blender evaluates only what is used
     (node,) = extension.nodes.group_nodes(material)
     sockets = extension.nodes.sockets
     for frame, value in ((1, 10.0), (11, 60.0)):
@@ -241,8 +241,8 @@ def test_a_twin_goes_with_its_shader(extension, empty):
 
 @pytest.mark.full
 def test_a_twin_in_eevee(extension, use_pack, tmp_path):
-    """Two balls in the sun look as Cycles shows the same nodes: as bright, to 5 %, and their
-    highlights where those are. EEVEE's lobes are its own, so pixels differ by more."""
+    """Two balls in the sun must look like the same nodes in Cycles: equally bright, to 5 %, with
+    highlights in the same places. EEVEE's lobes differ, so single pixels differ more."""
     from mathutils import Vector
 
     balls = {"phong": {"e": 20.0, "ks": (0.9, 0.6, 0.2)}, "oren_nayar": {"sigma": 0.5}}
@@ -305,8 +305,8 @@ def test_all_models_that_scatter_have_a_twin_and_none_takes_it_unasked(extension
 
 
 def test_every_model_renders_without_osl(extension):
-    """A row of balls, pixels a ball: none is black or has a value that is no number. Glass and
-    ideal mirrors are Blender's own."""
+    """A row of balls, and their pixels: none is black or has a non-finite value. Glass and ideal
+    mirrors are Blender's own nodes."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene, pixels = bpy.context.scene, 12
     extension.scene_loader.apply_clean_settings(scene, max_bounces=4)
@@ -343,8 +343,8 @@ def test_how_far_off_a_twin_is_is_said_where_that_is_known(extension, empty):
         extension.api.new_material("ward", "twin", ax=0.0625, ay=0.3)
 
 
-#: By model a value of the number that its twin runs over, away from the middle between two rows of
-#: its tables, and what it mixes. Of two colours, none, and a mirror's.
+#: By model: a value of the number that its twin's tables run over, between two rows but not in the
+#: middle, and the other parameters. Models with two colours, with none, and with a mirror.
 SLIDERS = {
     "phong": {"e": 73.0, "ks": (0.9, 0.6, 0.2)},
     "cook_torrance": {"m": 0.37, "f0": (0.9, 0.3, 0.05)},
@@ -355,7 +355,7 @@ SLIDERS = {
 
 @pytest.mark.full
 def test_tables_over_a_slider_are_what_the_tool_judges(extension, tool, empty):
-    """Nodes with values in their sockets, half of all highlights, as test_a_sun_on_a_twin."""
+    """Nodes with socket values, half of the facets in the highlight, as in test_a_sun_on_a_twin."""
     rng = np.random.default_rng(5)
     count = 64
     which = np.repeat(np.arange(len(SLIDERS)), count)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every operator that changes the file is one step of undo, and that step takes all of it back."""
+"""Every operator that changes the file is a single undo step, which restores everything."""
 
 import json
 
 import bpy
 import pytest
 
-#: What changes no data of the file: no undo.
+#: Operators that change no data of the file need no undo.
 CHANGE_NOTHING = {
     "brdfc.write_materials",
     "brdfc.details",
@@ -20,7 +20,7 @@ CHANGE_NOTHING = {
 @pytest.fixture
 def start(extension, empty):
     """start(model, **parameters): an object with that material, at the beginning of the undo
-    history. Data-blocks are other objects after a step back: ask for them anew."""
+    history. After undo, data-blocks are new objects and must be looked up again."""
 
     def make(model="ward", **parameters):
         extension.scene_loader.apply_clean_settings(empty)
@@ -57,7 +57,7 @@ def tree_state(tree):
 
 
 def state():
-    """What of the file the extension's operators may change, as text."""
+    """Everything in the file that the extension's operators may change, as text."""
     scene = bpy.context.scene
     found = {
         "render": [
@@ -85,7 +85,7 @@ def node_name(extension):
 def is_one_step(run):
     before = state()
     assert run() == {"FINISHED"}
-    # Called from a script, an operator leaves its step to who calls.
+    # When called from a script, an operator leaves the undo step to the caller.
     bpy.ops.ed.undo_push(message="Operator")
     after = state()
     assert after != before, "it changes something"
@@ -167,7 +167,7 @@ def test_update(extension, start):
 
 
 def test_find_lamps(extension, start):
-    """The list of lamps is kept by itself, too: here only that a step back is a step back."""
+    """The list of lamps is also updated automatically: this only tests that undo works."""
     start("ward")
     assert bpy.ops.brdfc.find_lamps() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="Lamps")

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise of drawn forms, as Blender renders them, against that of the models' own samplers.
+"""Compares the noise of forms that sample directions, as rendered by Blender, with that of the
+models' own samplers.
 
-In a furnace a drawn direction is worth its weight f cos / pdf, and a mirror beside it its own: the
-mean of the channels is their sum whichever of the two Cycles follows. So over pixels of one sample
-it has the variance of the sampler's weights. Tests of means miss a form that wastes samples.
+In a furnace, a sampled direction contributes its weight f cos / pdf, and a mirror its own: the mean
+of the channels is their sum, whichever of the two Cycles follows. So the variance over pixels with
+one sample is that of the sampler's weights. Tests of means would not detect a form that wastes
+samples.
 """
 
 import math
@@ -27,29 +29,30 @@ CASES = with_every_model(
     ("ward", {}),
     ("ward", {"ax": 0.3, "ay": 0.6, "normalisation": "duer"}),
 )
-#: Seen at these cosines, by so many pixels each.
+#: View cosines, and the number of pixels for each.
 COSINES = (0.9, 0.5, 0.2)
 AZIMUTH = 0.4
 PIXELS = 4096
-#: Samples of the model's own sampler.
+#: Number of samples from the model's own sampler.
 DRAWN = 40000
-#: A right form fails one run of all tests in a thousand, were its weights' fourth moments known.
+#: A correct form fails one run of all tests in a thousand, if the fourth moments of the weights are
+#: known.
 Z = NormalDist().inv_cdf(1 - 1e-3 / (2 * len(COSINES) * max(len(CASES), 1)))
-#: What single precision may add, as a share.
+#: Error allowed for single precision, as a fraction.
 SHARE = 0.02
-#: A drawn direction is carried by a lobe 1.4e-3 rad wide: its weight scatters by this part of the
-#: mean, and what of it sinks below the horizon is lost.
+#: A sampled direction is carried by a lobe 1.4e-3 rad wide: its weight varies by this fraction of
+#: the mean, and the part of it below the horizon is lost.
 OF_LOBE, LOW = 0.01, 3e-3
 
 
 def measured(extension, materials):
-    """Mean of the channels in a furnace, one sample a pixel, (materials, cosines, pixels); and the
-    views in the frames of the facets."""
+    """Mean of the channels in a furnace with one sample per pixel, (materials, cosines, pixels);
+    and the views in the facets' frames."""
     scene = bpy.context.scene
     extension.scene_loader.apply_clean_settings(scene, max_bounces=1)
     kinds = tilted(COSINES, AZIMUTH * np.ones(len(COSINES)))
     shape = len(materials), len(COSINES), PIXELS
-    # One view direction each: random numbers differ by the facets' positions.
+    # One view direction for each cosine: random numbers differ by the facets' positions.
     meter = Goniometer(
         scene,
         materials,
@@ -63,8 +66,8 @@ def measured(extension, materials):
 
 
 def disagreement(pixels, drawn):
-    """How the variances of pixels and of the sampler's weights differ beyond chance; "" if they do
-    not. Twice as much would be told, or the test fails."""
+    """How the variances of pixels and of the sampler's weights differ significantly; "" if they do
+    not. Fails as well if a factor of two would not be detected."""
     weights, heights = drawn
     expected, found = weights.var(ddof=1), pixels.var(ddof=1)
     fourth = ((weights - weights.mean()) ** 4).mean()
@@ -80,12 +83,12 @@ def disagreement(pixels, drawn):
 
 
 def draw(tool, model, values, wo):
-    """Means of the channels of weights that the model's sampler draws, and the heights of where
-    they go."""
+    """Means of the channels of weights from the model's sampler, and the heights of the sampled
+    directions."""
     unit = wo / np.linalg.norm(wo)
     options = ("--count", DRAWN, "--seed", 1, "--wo", ",".join(map(repr, unit.tolist())))
     rows = read_csv(tool("sample", model, *arguments(values), *options))[1]
-    # A direction that does not exist is low by chance alone.
+    # The height of an invalid direction is meaningless.
     return rows[:, 3:6].mean(1), np.where(rows[:, 6] > 0, rows[:, 2], 1)
 
 
@@ -110,7 +113,7 @@ def test_drawn_form_is_as_noisy_as_its_sampler(
 
 
 def test_a_form_of_the_same_mean_that_wastes_samples_is_found(extension, empty, tool):
-    """Seven of eight drawn directions weigh nothing, the others eight times as much."""
+    """Seven of eight sampled directions have weight 0, the others eight times the weight."""
     model = "ward"
     source = extension.pack.source(model, "sampled")[1]
     weight = "BSDF = weight *"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Worlds whose radiance depends on the direction, as nodes and as functions.
 
-Each builds its nodes and returns its radiance by direction, (n, 3) to (n,) or (n, 3).
+Each function builds the nodes and returns the radiance by direction, (n, 3) to (n,) or (n, 3).
 """
 
 import numpy as np
@@ -51,7 +51,7 @@ def _along(tree, background, axis, shape):
 
 
 def half(tree, background):
-    """Half white, half black, the edge 10 degrees wide."""
+    """Half white, half black, with an edge 10 degrees wide."""
     axis = unit((0.6, 0.3, 0.2))
 
     def shape(dot):
@@ -72,7 +72,7 @@ def half(tree, background):
 
 
 def coloured(tree, background):
-    """Each channel a gradient along an axis of its own."""
+    """Each channel is a gradient along its own axis."""
     direction = tree.nodes.new("ShaderNodeTexCoord")
     scaled = tree.nodes.new("ShaderNodeVectorMath")
     scaled.operation = "MULTIPLY_ADD"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The checks against models that are wrong on purpose.
+// Runs the checks on models with deliberate errors.
 #include "check/check.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@
 namespace brdfc::check {
 
 // Not in the anonymous namespace: the model adapter has members of this type.
-/// Black, and without a direction to draw.
+/// Black, and unable to sample a direction.
 template <class T> struct Lost {
   static ModelInfo info() {
     return {.name = "lost", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
@@ -28,7 +28,7 @@ template <class T> struct Lost {
   Sample<T> sample(const Vec3<T>&, const Vec3<T>&) const { return {{T(0), T(0), T(1)}, Rgb<T>(T(0)), T(0)}; }
 };
 
-/// Leaves a member out of its parameters.
+/// Omits a member from its parameters.
 template <class T> struct Forgetful : Lost<T> {
   Rgb<T> rho;
   T k;
@@ -46,7 +46,7 @@ using namespace faulty;
 
 using testing::HasSubstr;
 
-/// Of the checks that apply.
+/// The results of the checks that apply.
 template <Defect D> std::map<std::string, bool> outcome() {
   const detail::ModelOf<Faulty<D>::template Type> model;
   std::map<std::string, bool> passed;
@@ -63,7 +63,7 @@ Row row_of(const Model& model, const std::string& check) {
 TEST(Checks, PassARightModel) {
   for (const auto& [check, passed] : outcome<kNone>()) EXPECT_TRUE(passed) << check;
 }
-/// Its lobe is chosen by the half vector that is drawn, and light goes through.
+/// Its lobe is chosen depending on the sampled half vector, and it transmits light.
 TEST(Checks, PassARoughDielectric) {
   const detail::ModelOf<testing_models::RoughDielectric> model;
   for (const Row& r : check_model(model, {.effort = 0.2}))
@@ -86,7 +86,7 @@ TEST(Checks, SeeAPdfThatIsNotTheSamplers) {
   EXPECT_TRUE(r.at("pdf integral"));
 }
 TEST(Checks, SeeASamplerThatLeavesTwoPercentOut) {
-  // All its weights are the reflectance, so that no furnace can tell.
+  // All its weights equal the reflectance, so a furnace test can't detect the error.
   const auto r = outcome<kSampler>();
   EXPECT_FALSE(r.at("chi-square"));
   EXPECT_TRUE(r.at("sampled albedo"));
@@ -110,7 +110,7 @@ TEST(Checks, NameWhatIsNotZeroBelowTheSurface) {
   const Row f = row_of(detail::ModelOf<Faulty<kBelow>::Type>(), "horizon");
   EXPECT_EQ(f.result, Result::Failed);
   EXPECT_THAT(f.where, testing::AllOf(HasSubstr("faulty rho="), HasSubstr(" f(wi=("), HasSubstr("wo=(")));
-  // Of a view from below.
+  // For a view from below.
   const Row pdf = row_of(detail::ModelOf<Faulty<kPdfBelow>::Type>(), "horizon");
   EXPECT_EQ(pdf.result, Result::Failed);
   EXPECT_THAT(pdf.where, HasSubstr("pdf(wi=("));
@@ -179,7 +179,7 @@ TEST(Checks, AreTheSameNumberForEveryModelAndHaveALimit) {
   EXPECT_EQ(numbers.size(), 1u);
 }
 
-/// A property may be declared absent, and what every model must keep may not.
+/// A property may be declared absent, but not one that every model must have.
 TEST(Checks, SayWhatToDeclareIfAFailureIsMeant) {
   const detail::ModelOf<Faulty<kModest>::Type> modest;
   const detail::ModelOf<Faulty<kShadow>::Type> shadow;
@@ -217,9 +217,9 @@ TEST(Checks, NameModelParametersDirectionsAndValueOfABadOne) {
     EXPECT_THAT(text, HasSubstr("= -0.00"));
     EXPECT_THAT(text, HasSubstr("expected finite and >= 0"));
   }
-  // Only at some parameters, which the table has to come across.
+  // Occurs only for some parameters, which the tabulation has to find.
   EXPECT_THAT(message([&] { measure::tabulate_albedo(nan); }), HasSubstr("nan"));
-  // One bad value fails the checks that meet it, and no other.
+  // One bad value fails the checks that encounter it, and no others.
   for (const char* check : {"values", "conserving"}) EXPECT_EQ(row_of(negative, check).result, Result::Failed) << check;
   EXPECT_EQ(row_of(negative, "sample weight").result, Result::Passed);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Random parameters and directions for every model, shrunk to the simplest that fails: reciprocity, positive values,
-// energy, rotation. RC_PARAMS="seed=... max_success=..." chooses others.
+// Properties of every model for random parameters and directions, shrunk to the simplest failing case: reciprocity,
+// non-negative values, energy conservation, rotation. RC_PARAMS="seed=... max_success=..." selects other cases.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
@@ -15,12 +15,12 @@
 namespace brdfc::check {
 namespace {
 
-// The same in every run, unless somebody asks for something else; read when the first property is checked.
+// The same cases in every run, unless the user sets others; read when the first property is checked.
 const int kSeeded = ::setenv("RC_PARAMS", "seed=1 max_success=150", 0);
 
 constexpr int kSteps = 1 << 16;
 
-/// Parameters within the sliders' ranges; shrinks to their lower ends, the first choice and black.
+/// Parameters within the sliders' ranges; shrinks to the lower ends, the first choice and black.
 ParamValues any_parameters(const ModelInfo& info) {
   ParamValues values;
   for (const ParamInfo& p : info.params) {
@@ -37,7 +37,7 @@ ParamValues any_parameters(const ModelInfo& info) {
   return values;
 }
 
-/// Above the surface; shrinks to the normal.
+/// A direction above the surface; shrinks to the normal.
 Vec3<double> any_direction() {
   const double slope = *rc::gen::inRange(0, kSteps) / double(kSteps);
   return direction(1 - slope, 2 * kPi * *rc::gen::inRange(0, kSteps) / kSteps);
@@ -100,7 +100,8 @@ INSTANTIATE_TEST_SUITE_P(Models, Property, testing::ValuesIn(model_names()),
                          [](const testing::TestParamInfo<std::string>& info) { return info.param; });
 
 TEST(PropertyChecks, FindAFailureAndShrinkIt) {
-  // Lambert's reflector is brighter than 0.1 / pi in red from a certain reflectance on: the simplest one is just there.
+  // From a certain reflectance on, Lambert's reflector is brighter than 0.1 / pi in red: the simplest case is that
+  // value.
   const Model& lambert = find_model("lambert");
   double simplest = 1;
   testing::internal::CaptureStderr();

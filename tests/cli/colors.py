@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours as OpenColorIO converts them, without loss."""
+"""Colour conversion by OpenColorIO, in floating point."""
 
 import numpy as np
 import PyOpenColorIO as ocio
@@ -7,7 +7,7 @@ from support import CONFIG
 
 
 def converted(colors, first, second, config=CONFIG):
-    """Colours (..., 3) of the first space of a configuration, as the second one has them."""
+    """Converts colours (..., 3) from the first space of a configuration to the second."""
     pixels = np.array(colors, np.float32, order="C")
     cpu = ocio.Config.CreateFromFile(str(config)).getProcessor(first, second)
     lossless = ocio.OptimizationFlags.OPTIMIZATION_LOSSLESS

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mesh files as other programs write them, for tests of what reads them."""
+"""Mesh files as written by other programs, for tests of the readers."""
 
 import base64
 import json
@@ -37,14 +37,14 @@ def sphere(radius, segments, rings):
 
 
 def obj(vertices, faces):
-    """As scanners write it: positions alone."""
+    """As scanners write it: only positions."""
     lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices]
     lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
     return "\n".join(lines) + "\n"
 
 
 def ply(vertices, faces, order="<", extra=True):
-    """Binary, with properties that only other programs know: colour, quality, flags."""
+    """Binary, with properties of other programs: colour, quality, flags."""
     name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
     head = f"ply\nformat {name} 1.0\ncomment VCGLIB generated\nelement vertex {len(vertices)}\n"
     head += "property float x\nproperty float y\nproperty float z\n"
@@ -71,7 +71,7 @@ def ply(vertices, faces, order="<", extra=True):
 
 
 def stl(vertices, triangles, normal=(0, 0, 0), head=b"solid exported by a CAD program"):
-    """Binary, with the normals 0 0 0 of many CAD programs."""
+    """Binary, with the normals 0 0 0 that many CAD programs write."""
     data = head.ljust(80, b" ") + struct.pack("<I", len(triangles))
     for triangle in triangles:
         corners = np.asarray(vertices)[list(triangle)].ravel()
@@ -89,7 +89,7 @@ def stl_text(vertices, triangles, normal="0 0 0"):
 
 
 class Gltf:
-    """A file of one buffer that grows."""
+    """A file with one buffer, to which data is appended."""
 
     FLOAT, UINT, USHORT, UBYTE, SHORT = 5126, 5125, 5123, 5121, 5122
     TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2", 5121: "<u1", 5122: "<i2"}
@@ -123,7 +123,7 @@ class Gltf:
         return len(self.json["nodes"]) - 1
 
     def text(self, uri=None):
-        """.gltf: the buffer within, or in a file beside."""
+        """.gltf: with the buffer embedded, or in a separate file."""
         uri = uri or "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
         self.json["buffers"] = [{"uri": uri, "byteLength": len(self.bytes)}]
         return json.dumps(self.json)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are damaged, huge or hostile, and disks that take nothing: one line says why, exit
-status 2, and nothing half-written stays. What the readers do with arbitrary bytes is
-fuzzed by script/fuzz.
+"""Damaged, huge or hostile files, and disks that can't be written: one line gives the reason, the
+exit status is 2, and no incomplete file is left. script/fuzz tests the readers with arbitrary
+bytes.
 """
 
 import json
@@ -14,9 +14,9 @@ import time
 import pytest
 from support import TOOL, scene
 
-#: Seconds of processor time within which the tool has refused or is taken to look for ever, and is
-#: stopped by the system. Not of the clock: that of a busy machine says nothing of the tool. A
-#: refusal takes a fraction of one.
+#: Seconds of CPU time after which the system stops the tool, as it must then be in an endless loop;
+#: a refusal takes a fraction of a second. CPU time, because wall time depends on the machine's
+#: load.
 ENDLESS = 20
 
 
@@ -24,7 +24,8 @@ def run(*arguments, file_limit=None, **options):
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (ENDLESS, ENDLESS))
         if file_limit is not None:
-            # Writing beyond the limit fails with an error, as on a full disk, instead of a signal.
+            # Writing beyond the limit then fails with an error, as on a full disk, instead of a
+            # signal.
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_limit, file_limit))
 
@@ -79,7 +80,7 @@ def test_a_scene_that_is_no_scene(text, word, tmp_path):
 
 
 def test_names_reach_no_path(tmp_path):
-    """Names of a scene are text, whatever they look like."""
+    """Names in a scene are only text, even if they look like paths."""
     name = '../../e"vil\n$(touch x)'
     content = scene(name=name, materials={name: {"model": "lambert"}})
     content["objects"][0] |= {"name": name, "material": name}
@@ -96,7 +97,7 @@ def test_names_reach_no_path(tmp_path):
 
 
 def exr_header(width, height):
-    """A header without pixels: scan lines, three channels of 32 bits, no compression."""
+    """A header without pixels: scan lines, three 32-bit channels, no compression."""
 
     def attribute(name, kind, data):
         return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(data)) + data
@@ -142,14 +143,14 @@ def test_a_header_that_promises_too_much(picture, width, height, tmp_path):
 
 
 def test_an_attribute_that_promises_too_much(picture, tmp_path):
-    """OpenEXR would reserve 2 GiB for it."""
+    """OpenEXR would allocate 2 GiB for it."""
     bad = tmp_path / "bad.exr"
     bad.write_bytes(picture.read_bytes().replace(b"chlist\0", b"chlist\0" + b"\xff\xff\xff\x7f"))
     refused(run("compare", bad, picture), "bad.exr", "header")
 
 
 def test_a_damaged_picture_of_bytes(tmp_path):
-    """The library for PNG would say it on two lines, one of them its own."""
+    """The PNG library would report it in two lines, one of them its own."""
     bad = tmp_path / "bad.png"
     bad.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
     refused(run("compare", bad, bad), "bad.png: damaged PNG file: its header can't be read")
@@ -197,14 +198,14 @@ end_header
         ("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", False),
         ("other.blend", "BLENDER", False),
         ("binary.ply", "\x00\x01\x02", False),
-        # The importer would look for the end of these for ever.
+        # The importer would search for the end of these forever.
         ("list.ply", PLY.replace("list uchar int vertex_indices", "list 0"), False),
         ("many.ply", PLY.replace("vertex 3", "vertex 2000000000"), False),
         ("faceless.ply", PLY.replace("0 1 0\n", "0 1 0*"), False),
         ("good.ply", PLY, True),
-        # No area: nothing to see, and nothing to divide by.
+        # No area: nothing to see, and a division by zero to avoid.
         ("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\nv 0 1 0\nf 1 2 4\n", True),
-        # Three faces on one edge, and one turned over.
+        # Three faces at one edge, one of them flipped.
         (
             "fan.obj",
             "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 0 0\nf 1 2 3\nf 1 2 4\nf 2 1 5\n",
@@ -235,7 +236,7 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def pack(tmp_path_factory):
-    """A folder with a pack in it, and what the pack consists of."""
+    """A folder with a pack in it, and the pack's contents."""
     folder = tmp_path_factory.mktemp("pack")
     done = run("build", "--model", "lambert", "--out", folder)
     assert done.returncode == 0, done.stderr
@@ -264,7 +265,7 @@ def test_a_killed_build_leaves_the_old_pack(pack):
         assert kept == before
     done = run("build", "--model", "lambert", "--out", folder)
     assert done.returncode == 0, done.stderr
-    # Equal bytes, and what the killed builds left is gone.
+    # The bytes are equal, and what the killed builds left behind is gone.
     assert contents(folder) == before
     assert not list(folder.glob(".brdfc-build-*"))
 
@@ -306,7 +307,7 @@ def test_a_scene_that_is_no_file(path, tmp_path):
 
 
 def test_a_pack_is_not_built_over_what_is_not_one(tmp_path):
-    """Said before the plan, which may take minutes."""
+    """Reported before planning, which may take minutes."""
     mine = tmp_path / "brdfc_shaders" / "mine.txt"
     mine.parent.mkdir()
     mine.write_text("mine")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool's commands on models: list, eval, sample, albedo, kernel, check, stability.
+"""The tool's commands for models: list, eval, sample, albedo, kernel, check, stability.
 
-Their output, exit status and messages.
+Tests their output, exit status and messages.
 
-The tool is the program in the environment variable BRDFC_TOOL, build/brdfc if that is not set.
+The environment variable BRDFC_TOOL names the tool; the default is build/brdfc.
 """
 
 import csv
@@ -35,7 +35,8 @@ def rows(result):
 
 
 def refused(result, *words, status=2):
-    """One line on stderr with every word, nothing like a table on stdout, the exit status."""
+    """Expects one line on stderr that contains every word, no table on stdout, and the exit
+    status."""
     assert result.returncode == status, (result.returncode, result.stderr)
     assert len(result.stderr.strip().splitlines()) == 1, result.stderr
     assert result.stderr.startswith("brdfc: ")
@@ -134,7 +135,7 @@ def test_closure_is_f_cos_with_its_weight():
     text = f"{EVAL_HEADER}\n0.6,0,0.8,0,0,1\n"
     (row,) = rows(run("closure", "diffuse", "weight=1,0.5,0.25", stdin=text))
     assert row["f_cos_g"] == pytest.approx(0.4 / math.pi, rel=1e-15)
-    # Ashikhmin and Shirley's lobe with n = 0: (n + 1) / (8 pi) over (h.k) max(cos).
+    # Ashikhmin and Shirley's lobe with n = 0: (n + 1) / (8 pi) divided by (h.k) max(cos).
     (row,) = rows(run("closure", "ashikhmin_shirley", "alpha_x=1", "alpha_y=1", stdin=text))
     assert row["f_cos_r"] == pytest.approx(0.8 / (8 * math.pi * math.sqrt(0.9)), rel=1e-14)
 
@@ -219,7 +220,7 @@ def help_of(command):
 
 
 def numbers_of(command):
-    """{option: INTEGER or NUMBER, and how many where it takes several}, of the command's help."""
+    """{option: INTEGER or NUMBER, and how many if it takes several}, from the command's help."""
     found = re.findall(
         r"^  (?:-\w,)?(--[\w-]+) ((?:INTEGER|NUMBER)\S*(?: x \d+)?)", help_of(command), re.M
     )
@@ -227,7 +228,7 @@ def numbers_of(command):
 
 
 def test_every_option_that_is_a_number_is_checked_as_one():
-    """By app/numbers.h: types of CLI11's own take NaN for a number within any range."""
+    """By app/numbers.h: CLI11's own types accept NaN as a number in any range."""
     for command in commands():
         assert not re.findall(r"^  --.*\b(?:FLOAT|INT|UINT|DOUBLE)\b.*$", help_of(command), re.M), (
             command
@@ -262,7 +263,7 @@ def test_a_number_that_is_none_is_named(command):
         wrong = wrong[index % 3 :: 3]
         for value in wrong:
             done = run(command, f"{option}={','.join([value] * many)}")
-            if value == "":  # CLI11 says that itself
+            if value == "":  # CLI11 reports that itself
                 assert done.returncode == 2 and option in done.stderr, (command, option)
                 continue
             refused(done, f"{option}: expected ", f"got '{value}'")
@@ -303,8 +304,8 @@ def test_sample_is_reproducible_and_its_seed_matters():
 
 
 def test_sample_takes_a_pattern():
-    """Regular points are the middles of cells, whatever the seed; random ones are as without a
-    pattern; jittered ones are spread over lambert's heights."""
+    """Regular points are the centres of cells, whatever the seed; random ones equal those without a
+    pattern; jittered ones are stratified in the heights of lambert's samples."""
     args = ["sample", "lambert", "--count", "16", "--wo", "0,0.6,0.8"]
     cells = [((i + 0.5) / 4, (j + 0.5) / 4) for i in range(4) for j in range(4)]
     text = "\n".join([SAMPLE_HEADER, *(f"0,0.6,0.8,0.5,{x},{y}" for x, y in cells)])
@@ -314,7 +315,7 @@ def test_sample_takes_a_pattern():
     assert run(*args, "--pattern", "random").stdout == run(*args).stdout
     one, other = (rows(run(*args, "--pattern", "jittered", "--seed", s)) for s in ("1", "2"))
     assert one != other
-    # One in each cell, of which there are four of each height.
+    # One in each cell; there are four cells for each height.
     for found in (one, other):
         assert sorted(int(4 * r["wi_z"] ** 2) for r in found) == sorted([0, 1, 2, 3] * 4)
 
@@ -384,7 +385,7 @@ def drawn(path, points):
 
 
 def kernel(*args):
-    """The parameters as other commands take them, and the three errors stated."""
+    """The parameters in the notation of other commands, and the three stated errors."""
     result = run("kernel", *args)
     assert result.returncode == 0, result.stderr
     errors = [
@@ -404,7 +405,7 @@ def test_kernel_of_four_heights_comes_back(tmp_path):
 def test_kernel_of_sech2_differs_from_it_by_the_stated_error(tmp_path):
     places = [5 * i / 49 for i in range(50)]
     file = drawn(tmp_path / "k.csv", [(u, 1 / math.cosh(u) ** 2) for u in places])
-    parameters, (_, l1, l1_view) = kernel(file)  # n = 4, the model's default
+    parameters, (_, l1, l1_view) = kernel(file)  # n = 4 is the model's default
     steps, views, lines = 1000, 8, []
     for view in range(views):
         y = (view + 0.5) / views
@@ -475,7 +476,7 @@ def test_check_json():
 
 
 def test_check_says_what_it_skips_and_why():
-    # A mirror has no lobe to judge, and what is not judged has not passed.
+    # A mirror has no lobe to check, and a check that was skipped has not passed.
     quick = ("check", "fresnel_dielectric", "--effort", "0.1")
     table = {row["check"]: row for row in json.loads(run(*quick, "--json").stdout)}
     row = table["chi-square"]
@@ -632,7 +633,7 @@ def test_a_scene_of_camera_rays_alone_has_tables_of_the_views_that_occur(tmp_pat
         materials={"m": {"model": "phong", "parameters": {"e": 20}, "representation": "fitted"}},
         objects=[{"name": "floor", "shape": {"type": "quad", "size": [2, 2]}, "material": "m"}],
     )
-    # What one quad scatters meets nothing; a second one is met by it.
+    # Light scattered by a single quad hits nothing; a second quad is hit by it.
     (floor,) = content["objects"]
     below = floor | {"name": "below", "transform": {"translate": [0, 0, -1]}}
     file = tmp_path / "s.json"
@@ -661,8 +662,7 @@ def test_a_scene_of_camera_rays_alone_has_tables_of_the_views_that_occur(tmp_pat
 
 @pytest.fixture
 def phong(tmp_path):
-    """build(*options): the extension of one material of `phong`, whose forms have costs of their
-    own here."""
+    """build(*options): the extension for a `phong` material, whose forms have made-up costs."""
     addon = tmp_path / "addon"
     shutil.copytree(ROOT / "blender_addon", addon)
     rows = ("phong,aimed,1.1", "phong,sampled,1.2", "phong,fitted,0.9", "phong,twin,0.7")
@@ -744,7 +744,8 @@ def test_what_renders_without_osl_is_beside_the_form(phong):
 
 
 def test_lamps_of_a_blend(phong):
-    """Which have no size is said of the form that is taken; how many there are, is had in slots."""
+    """Lamps without a size are reported with the chosen form; the number of lamps determines the
+    slots."""
     content = json.loads(phong.file.read_text())
     lamps = {"sizeless_lamps": ["Sun.001"], "lamps": 2}
     phong.file.write_text(json.dumps(content | lamps))

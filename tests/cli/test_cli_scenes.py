@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built tool's help, and what it says of scenes, files and wrong use.
+"""The tool's help, and its messages about scenes, files and wrong usage.
 
-test_cli.py has list, eval, sample, albedo and check.
+test_cli.py tests list, eval, sample, albedo and check.
 """
 
 import csv
@@ -150,7 +150,7 @@ def test_a_resolved_scene_is_the_same_bytes_again(tmp_path):
     file.write_text(json.dumps(scene(environment={"procedural": "sky"})), encoding="utf-8")
     out = [tmp_path / "one", tmp_path / "two"]
     for folder in out:
-        time.sleep(1.1)  # time stamps, if there were any, have a resolution of a second
+        time.sleep(1.1)  # the resolution of time stamps, if the files had any, is a second
         assert brdfc("scene", file, "--out", folder).returncode == 0
     names = sorted(p.name for p in out[0].iterdir())
     assert "scene.json" in names and any(n.endswith(".exr") for n in names)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images and OpenColorIO configurations as other programs make them: values that are not finite or
-negative, primaries that a file states, studios' names of colour spaces."""
+"""Images and OpenColorIO configurations from other programs: non-finite and negative values,
+primaries stated in files, and other names of colour spaces."""
 
 import json
 import os
@@ -20,7 +20,7 @@ AP1 = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
 AP0 = (0.7347, 0.2653, 0, 1, 0.0001, -0.077, 0.32168, 0.33767)
 P3 = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.3290)
 XYZ = (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)
-#: A green that every space holds, and white.
+#: A green inside all working spaces, and white.
 COLORS = np.array([[[0.18, 0.4, 0.15], [1, 1, 1]]], np.float32)
 
 
@@ -45,7 +45,8 @@ def resolve(folder, config=None, **changes):
 
 
 def as_sky(folder, name, config=None, space=None, **keys):
-    """The pixels that both renderers get of an image as the environment, and what was said."""
+    """The pixels that both renderers get for an image as the environment, and the tool's
+    messages."""
     more = {"working_space": space} if space else {}
     done = resolve(folder, config, environment={"image": name, **keys}, **more)
     assert done.returncode == 0, done.stderr
@@ -62,7 +63,7 @@ def refused(done, *words):
 
 
 def test_what_is_not_finite_is_black_and_what_is_negative_stays(tmp_path):
-    """As in Cycles: tests/blender/test_images.py looks."""
+    """The same as Cycles does: see tests/blender/test_files_of_others.py."""
     sky = np.full((4, 8, 3), 0.5)
     sky[1, 2, 0], sky[1, 3], sky[2, 5, 1] = np.nan, np.inf, -np.inf
     sky[3, 0, 2], sky[3, 1] = -6e-8, -2
@@ -75,7 +76,7 @@ def test_what_is_not_finite_is_black_and_what_is_negative_stays(tmp_path):
         "4 values are negative, the first at (0, 3), the least -2; they take light away, as in "
         "Cycles",
     ]
-    # A sky of little but negative light still has a mean that both ways of sampling agree on.
+    # A sky with mostly negative light still has a mean, on which both sampling techniques agree.
     path = tmp_path / "s.json"
     means = []
     for strategy in ("mis", "brdf"):
@@ -117,7 +118,7 @@ def test_primaries_that_a_file_states_are_honoured(tmp_path, primaries, name, sp
     else:
         np.testing.assert_allclose(pixels[0, 1], 1, atol=1e-4)
         assert np.abs(pixels[0, 0] - COLORS[0, 0]).max() > 0.005
-    # What the scene says comes first.
+    # The scene's statement takes precedence.
     stored, _ = as_sky(tmp_path, "a.exr", space=space, colorspace="linear")
     np.testing.assert_array_equal(stored, colors)
 
@@ -131,7 +132,7 @@ def test_color_interop_ids_are_honoured(tmp_path):
         ("lin_ciexyzd65_scene", "Linear CIE-XYZ D65"),
     ):
         colors = converted(COLORS, REC709, name)
-        # It says more than the chromaticities.
+        # It takes precedence over the chromaticities.
         write(tmp_path / "a.exr", colors, colorInteropID=id, chromaticities=P3)
         np.testing.assert_allclose(as_sky(tmp_path, "a.exr")[0], COLORS, atol=3e-4)
     write(tmp_path / "a.exr", COLORS, colorInteropID="data")
@@ -177,7 +178,7 @@ def test_an_environment_has_a_colorspace(tmp_path):
 
 
 def png(width, height):
-    """A picture without its end."""
+    """An image without its end."""
 
     def chunk(name, data):
         return (
@@ -219,7 +220,7 @@ def written(folder, name):
 
 @pytest.mark.parametrize("name", [n for n in BUILT_IN if n.endswith("ocio-v2.1")])
 def test_configurations_of_aces(tmp_path, name):
-    """sRGB, the linear spaces and the default view, by the names that these have for them."""
+    """The configurations' own names for sRGB, the linear spaces and the default view are found."""
     config = written(tmp_path, name)
     write(tmp_path / "a.png", COLORS, oiio.UINT8)
     stored = np.round(COLORS * 255) / 255
@@ -235,7 +236,7 @@ def test_configurations_of_aces(tmp_path, name):
         np.testing.assert_allclose(
             found, converted(stored, "sRGB - Texture", of_file, config), atol=1e-5
         )
-    # Pictures that say their space are converted, and shown through the display's own view.
+    # Images that state their space are converted, and shown with the display's default view.
     write(tmp_path / "b.exr", converted(COLORS, REC709, "ACES2065-1"), chromaticities=AP0)
     found = as_sky(tmp_path, "b.exr", config)[0]
     np.testing.assert_allclose(found, converted(COLORS, REC709, ACESCG), atol=5e-4)
@@ -260,7 +261,8 @@ def test_a_configuration_without_the_names_of_srgb_has_its_curve(tmp_path):
 
 
 def test_configurations_that_are_too_new_are_said(tmp_path):
-    """Debian 12's OpenColorIO is 2.1: ours is taken instead. A later one reads them."""
+    """With Debian 12's OpenColorIO 2.1, brdfc's own configuration is used instead; a later version
+    reads them."""
     write(tmp_path / "a.png", COLORS, oiio.UINT8)
     resolve(tmp_path, environment={"image": "a.png"})
     for config, words in (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The installed tool, moved elsewhere, finds its data beside itself, and says what it misses."""
+"""The installed tool, moved elsewhere, finds its data beside itself and reports what is missing."""
 
 import hashlib
 import os
@@ -26,7 +26,7 @@ def run(program, *arguments, **environment):
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """The folder of an installation that was moved after it was made."""
+    """The folder of an installation that was moved afterwards."""
     folder = tmp_path_factory.mktemp("install")
     command = ["cmake", "--install", Path(TOOL).parent, "--prefix", folder / "first"]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -36,14 +36,14 @@ def installed(tmp_path_factory):
 
 @pytest.fixture
 def own(installed, tmp_path):
-    """A copy of the data, to be damaged."""
+    """A copy of the data that tests may damage."""
     return Path(shutil.copytree(installed / "share" / "brdfc", tmp_path / "data"))
 
 
 def test_it_takes_its_data_from_beside_itself(installed):
     done = run(installed / "bin" / "brdfc", "where")
     assert (done.returncode, done.stdout.strip()) == (0, str(installed / "share" / "brdfc"))
-    # Through a link in a folder of programs, too.
+    # Also through a symbolic link in another folder.
     link = installed.parent / "brdfc"
     link.symlink_to(installed / "bin" / "brdfc")
     assert run(link, "where").stdout == done.stdout
@@ -54,7 +54,7 @@ def test_it_lists_and_builds_what_the_built_one_does(installed, tmp_path):
     assert "lambert" in run(program, "list").stdout
     hashes = set()
     for tool, out in ((program, tmp_path / "installed"), (TOOL, tmp_path / "built")):
-        # Coupled has a stored albedo that takes long to make.
+        # Coupled has a stored albedo that takes long to compute.
         done = run(tool, "build", "--model", "lambert", "--model", "coupled", "--out", out)
         assert done.returncode == 0, done.stderr
         assert "no stored" not in done.stderr
@@ -87,7 +87,7 @@ def test_a_table_that_is_not_stored_is_made_and_said(installed, own, tmp_path):
 
 
 def test_what_was_made_once_is_kept_in_the_users_cache(installed, own, tmp_path):
-    """As for a model of one's own, of which no data are stored."""
+    """As for a user's own model, for which no data is stored."""
     (table,) = (own / "data" / "albedos").glob("lambert_*.exr")
     table.unlink()
     program, cache, hashes = installed / "bin" / "brdfc", tmp_path / "cache", set()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Suffern's turned rays on docs/gallery/landmarks.md: against quadrature, and what turning does."""
+"""Suffern's turned rays on docs/gallery/landmarks.md: compared with quadrature, and the effect of
+turning."""
 
 import landmarks
 import numpy as np
@@ -11,15 +12,16 @@ PAGE = (ROOT / "docs" / "gallery" / "landmarks.md").read_text(encoding="utf-8")
 
 
 def quadrature(degrees, e):
-    """Share of cos^e about r below the surface: of the circle at an angle alpha from r that part is
-    there whose cosine of the azimuth is below -cot(alpha) cot(theta)."""
+    """Fraction of cos^e about r that is below the surface. On the circle at an angle alpha from r,
+    the points below are those whose cosine of the azimuth is below -cot(alpha) cot(theta)."""
     theta = mp.radians(degrees)
 
     def density(alpha):
         part = mp.acos(min(mp.cot(alpha) * mp.cot(theta), mp.one)) / mp.pi
         return (e + 1) * mp.cos(alpha) ** e * mp.sin(alpha) * part
 
-    # From where the circle first dips below, in steps for the narrow peak of a sharp lobe.
+    # From where the circle first reaches below, in steps that resolve the narrow peak of a sharp
+    # lobe.
     start = mp.pi / 2 - theta
     width = 1 / mp.sqrt(e)
     steps = [start + k * width for k in (0, 1, 2, 4, 8) if start + k * width < mp.pi / 2]
@@ -34,13 +36,13 @@ def test_quadrature_is_the_closed_form_where_there_is_one():
 
 @pytest.mark.parametrize(("degrees", "e"), [(45, 10), (80, 1), (85, 100), (89, 1000)])
 def test_shares_below_the_surface_are_those_of_quadrature(degrees, e):
-    """65536 points of Hammersley err by less than 0.0003."""
+    """65536 Hammersley points have an error of less than 0.0003."""
     found = landmarks.share_below(TOOL, degrees, e)
     assert found == pytest.approx(quadrature(degrees, e), abs=3e-4)
 
 
 def test_the_page_has_the_shares_of_quadrature():
-    """To the digit that it prints, and a unit of it."""
+    """To the last printed digit, plus or minus one."""
     for e in landmarks.EXPONENTS:
         (row,) = (line for line in PAGE.splitlines() if line.startswith(f"| {e} |") and "%" in line)
         printed = [float(cell.split()[0]) for cell in row.split("|")[2:-1]]

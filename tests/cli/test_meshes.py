@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes as other programs write them: every triangle of the file is there, and what is left out or
-assumed is said in a line."""
+"""Meshes as written by other programs: every triangle of the file is read, and each omission or
+assumption is reported in a line."""
 
 import json
 
@@ -10,13 +10,13 @@ from mesh_files import Gltf, obj, ply, sphere, stl, stl_text
 from support import run, scene
 
 MILLIMETRE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]) / 1000
-#: 5 cm of radius: areas about 1e-7 square metres.
+#: A radius of 5 cm: areas of about 1e-7 square metres.
 BALL, TRIANGLES = sphere(0.05, 60, 30)
 QUAD = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
 
 
 def read(folder, name, content, material=None, **shape):
-    """The arrays of a mesh file as the tool hands them to Blender, and what it said."""
+    """The arrays of a mesh file as the tool passes them to Blender, and its messages."""
     if content is not None:
         if isinstance(content, str):
             content = content.encode()
@@ -62,7 +62,7 @@ BALLS = {
 
 @pytest.mark.parametrize("name", BALLS)
 def test_small_triangles_stay(name, tmp_path):
-    """Areas under 1e-6 are those of scans in metres."""
+    """Areas below 1e-6 are common in scans measured in metres."""
     mesh, said = read(tmp_path, name, BALLS[name])
     assert said == [f"{len(TRIANGLES)} triangles"] and len(mesh["triangles"]) == len(TRIANGLES)
     size = np.linalg.norm(flat(mesh), axis=1)
@@ -70,7 +70,7 @@ def test_small_triangles_stay(name, tmp_path):
     if name.endswith(".stl"):
         assert "normals" not in mesh
     else:
-        # Averaged by angle, they point from the centre.
+        # Normals averaged by angle point away from the centre.
         outwards = mesh["vertices"] / np.linalg.norm(mesh["vertices"], axis=1)[:, None]
         assert len(mesh["vertices"]) == len(BALL)
         assert (mesh["normals"] * outwards).sum(1).min() > 0.9998
@@ -85,7 +85,7 @@ def test_a_quad_of_a_millimetre_is_two_triangles(name, tmp_path):
 
 
 def test_a_polygon_that_is_not_convex_keeps_its_outline(tmp_path):
-    """An L of six corners, turned and tilted; its area is that of its triangles."""
+    """An L with six corners, rotated and tilted; its area is that of its triangles."""
     corners = np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], float)
     for start in range(6):
         turned = np.roll(corners, start, axis=0)
@@ -193,7 +193,7 @@ def test_a_texture_without_uvs_is_said(tmp_path):
     mesh, said = read(tmp_path, "none.obj", obj(QUAD, [range(4)]), material=TEXTURED)
     assert said[0] == "2 triangles" and "uvs" not in mesh
     assert "objects[0]: the mesh has no UVs" in said[1] and '"m"' in said[1]
-    assert read(tmp_path, "none.obj", None)[1] == ["2 triangles"]  # no texture, nothing to say
+    assert read(tmp_path, "none.obj", None)[1] == ["2 triangles"]  # no texture, no message
 
 
 def test_materials_of_a_file_are_said_and_can_be_chosen(tmp_path):
@@ -246,8 +246,8 @@ def test_ply_of_strips_and_of_uvs_by_corner(tmp_path):
 
 
 def furniture():
-    """Two primitives and points in a mesh that stands twice, the second time mirrored, with
-    children, quantised positions and normals of an uneven scale."""
+    """Two primitives and points in a mesh with two instances, the second one mirrored, with
+    children, quantised positions, and normals under non-uniform scaling."""
     g = Gltf()
     slope = QUAD @ np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1)]) + np.outer(QUAD[:, 0], (0, 0, 1))
     index = g.accessor([0, 1, 2, 0, 2, 3], g.UBYTE)
@@ -280,12 +280,12 @@ def test_gltf(name, tmp_path):
     assert said[0] == "8 triangles; left out: 2 sets of points" and len(mesh["triangles"]) == 8
     assert said[1].startswith("4 triangles without UVs") and "2 materials in the file" in said[2]
     corners = mesh["vertices"][mesh["triangles"]]
-    # y up becomes z up: the quad in the plane z = 0 of the file stands upright, its front to -y.
+    # y up becomes z up: the quad in the plane z = 0 of the file is upright, and faces -y.
     np.testing.assert_allclose(corners[2].min(0), [0, 0, 0], atol=1e-6)
     np.testing.assert_allclose(flat(mesh)[2], [0, -1, 0], atol=1e-6)
-    # The second stands 20 to the side: moved by 10, scaled by 2 along y, turned by 90 degrees.
+    # The second one is 20 to the side: moved by 10, scaled by 2 along y, rotated by 90 degrees.
     np.testing.assert_allclose(corners[6:].reshape(-1, 3).min(0), [-22, 0, -1], atol=1e-5)
-    # Normals of the file are those of its faces, mirrored or not; v counts from below.
+    # The file's normals are those of its faces, mirrored or not; v is counted from below.
     normals, facets = mesh["normals"][mesh["triangles"][:, 0]], flat(mesh)
     np.testing.assert_allclose(normals, facets / np.linalg.norm(facets, axis=1)[:, None], atol=1e-6)
     np.testing.assert_allclose(mesh["uvs"][mesh["triangles"][0]], [(0, 1), (1, 1), (1, 0)])

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Metals and glass of measured n and k: the tool, the Python package and an independent source say
-the same, in every working space; what is wrong in a file is said by both alike."""
+"""Metals and glass with measured n and k: the tool, the Python package and an independent source
+agree in every working space; and both report errors in files with the same words."""
 
 import importlib
 import json
@@ -13,8 +13,9 @@ import PyOpenColorIO as ocio
 import pytest
 from support import CONFIG, ROOT, SPACES, TOOL, run, scene
 
-#: X, Y, Z of the normal reflectance under D65 for the observer of 1931, over those of a perfect
-#: reflector, by colour-science 0.4.7 of the same tables: from 360 to 830 nm, every 1 nm.
+#: X, Y, Z of the normal reflectance under D65 for the 1931 observer, relative to a perfect
+#: reflector, computed by colour-science 0.4.7 from the same tables: from 360 to 830 nm in steps of
+#: 1 nm.
 COLOUR_SCIENCE = {
     "aluminium": (0.9134, 0.9145, 0.9214),
     "copper": (0.7377, 0.6811, 0.5406),
@@ -29,7 +30,7 @@ COLOUR_SCIENCE = {
 
 @pytest.fixture(scope="module")
 def optics(tmp_path_factory):
-    """The module of what `brdfc python` writes, and of no earlier one."""
+    """The module written by this `brdfc python`, and not an earlier one."""
     out = tmp_path_factory.mktemp("python")
     done = subprocess.run([TOOL, "python", "--out", out], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -45,7 +46,7 @@ def optics(tmp_path_factory):
 
 
 def config_in(folder, space):
-    """Ours with another working space."""
+    """Our configuration with another working space."""
     path = folder / f"{space.split()[-1]}.ocio"
     text = CONFIG.read_text(encoding="utf-8")
     path.write_text(text.replace("scene_linear: Linear Rec.709", f"scene_linear: {space}"))
@@ -78,7 +79,7 @@ def test_colours_are_those_of_an_independent_source():
 
 @pytest.mark.parametrize("space", SPACES)
 def test_a_substance_has_one_colour_in_every_working_space(tmp_path, optics, space):
-    """Also as n and k by channel, but for gold's red in Rec.709, which does not hold it."""
+    """Also as n and k by channel, except gold's red in Rec.709, which is outside that space."""
     config = config_in(tmp_path, space)
     white = converted(config, space, XYZ, [1, 1, 1])
     for s in optical(config=config):
@@ -114,7 +115,8 @@ def test_the_package_and_the_tool_say_the_same(tmp_path, optics, space):
 
 
 def test_a_file_is_a_conductor_or_a_dielectric(tmp_path):
-    """As refractiveindex.info exports them, with the line ends of Windows, and in one block."""
+    """In the export format of refractiveindex.info, with Windows line ends, and in a single
+    block."""
     file = tmp_path / "own.csv"
     rows = [(0.35, 0.2, 3.0), (0.5, 0.4, 3.5), (0.8, 0.3, 4.0)]
     n, k = ("".join(f"{r[0]},{r[i]}\r\n" for r in rows) for i in (1, 2))
@@ -131,20 +133,20 @@ def test_a_file_is_a_conductor_or_a_dielectric(tmp_path):
 
 
 def spectrum(rows):
-    """Over the observer's wavelengths in nm: linear in between, constant beyond the ends."""
+    """At the observer's wavelengths in nm: interpolated linearly, and constant beyond the ends."""
     um, values = zip(*rows, strict=True)
     return lambda nm: np.interp(nm, 1000 * np.array(um), values)
 
 
 def seen(config, space, of_nm):
-    """A spectrum's colour, by a sum over the CIE's tables that is this test's own."""
+    """A spectrum's colour, by the test's own summation over the CIE's tables."""
     table = np.genfromtxt(ROOT / "data/color/observer.csv", delimiter=",", names=True)
     weights = np.stack([table[c] * table["d65"] for c in "xyz"], -1)
     xyz = of_nm(table["nm"]) @ weights / weights.sum(0)
     return converted(config, XYZ, space, xyz * converted(config, space, XYZ, [1, 1, 1]))
 
 
-#: k of a made-up green glass, over micrometres.
+#: k of a fictitious green glass, by micrometres.
 GREEN = ((0.38, 6e-6), (0.45, 3e-6), (0.52, 4e-7), (0.56, 5e-7), (0.62, 3e-6), (0.7, 8e-6))
 
 
@@ -168,7 +170,7 @@ def test_absorption_is_beers_law_over_the_spectrum(tmp_path, optics, space, metr
     told = optical(file, "--thickness", metres, config=config)["absorption"]
     np.testing.assert_allclose(told["transmittance"], exact(metres), atol=1e-5)
     assert told["thickness"] == metres and 0.05 < told["xyz"][1] < 0.99
-    # A power of it is exact there alone.
+    # A power of it is exact at that distance only.
     stated = np.clip(exact(metres), 1e-4, 1)
     for row in told["power_law"]:
         power = stated ** (row["distance"] / metres)
@@ -182,7 +184,7 @@ def test_absorption_is_beers_law_over_the_spectrum(tmp_path, optics, space, metr
 
 
 def test_what_has_k_absorbs(tmp_path, optics):
-    """Water, as G. M. Hale and M. R. Querry measured it: 0.0448 per metre at 550 nm."""
+    """Water, as measured by G. M. Hale and M. R. Querry: 0.0448 per metre at 550 nm."""
     found = {s["name"]: s for s in optical()}
     for name, s in found.items():
         package = optics.substance(name)
@@ -195,7 +197,7 @@ def test_what_has_k_absorbs(tmp_path, optics):
     assert -np.log(at_550) == pytest.approx(0.0448, abs=1e-4)
     red, green, blue = optical("water", "--thickness", 1)["absorption"]["transmittance"]
     assert 0.7 < red < 0.76 and 0.95 < green < blue < 0.98
-    # k of 0 is none.
+    # A k of 0 does not absorb.
     file = tmp_path / "clear.csv"
     file.write_text("wl,n,k\n0.3,1.5,0\n0.8,1.5,0\n", encoding="utf-8")
     assert optical(file)["absorption"] is None and not optics.read(file).absorbs
@@ -220,7 +222,7 @@ def test_a_scene_states_the_thickness(tmp_path):
         told = optical(tmp_path / "green.csv", "--thickness", metres)["absorption"]
         assert got["density"] == pytest.approx(1 / metres)
         assert got["attenuation"] == pytest.approx(np.clip(told["transmittance"], 1e-4, 1))
-    # A surface alone has nothing inside.
+    # A surface without an inside does not absorb.
     assert "attenuation" not in resolved(model="fresnel_dielectric", optical="green.csv")
     assert set(resolved(model="glass", optical="silica")) == {"ior", "dispersion"}
     for material, expected in (
@@ -239,7 +241,7 @@ def test_a_scene_states_the_thickness(tmp_path):
 
 
 def test_a_slab_of_the_stated_thickness_has_the_exact_colour(tmp_path):
-    """Seen straight through by the reference renderer; its surfaces reflect R, to and fro."""
+    """Seen straight through by the reference renderer; its surfaces reflect R repeatedly."""
     green_glass(tmp_path, n=(1.5, 1.5))
     content = scene(
         camera={
@@ -261,14 +263,14 @@ def test_a_slab_of_the_stated_thickness_has_the_exact_colour(tmp_path):
     pixels = oiio.ImageBuf(str(tmp_path / "s.exr")).get_pixels(oiio.FLOAT)[..., :3]
     found = optical(tmp_path / "green.csv")
     left = np.array(found["absorption"]["transmittance"])
-    # Through, and what the near side and the far one send back, of a white world.
+    # The transmitted light, plus reflections from the near and the far side, in a white world.
     reflected = ((found["n_d"] - 1) / (found["n_d"] + 1)) ** 2
     inside = (1 - reflected) ** 2 / (1 - (reflected * left) ** 2)
     expected = inside * left + reflected + inside * reflected * left**2
     np.testing.assert_allclose(pixels.mean((0, 1)), expected, atol=3e-3)
 
 
-#: A file, and what others have that is to be read like it, with what is said of it.
+#: A file, and variants that must be read in the same way, with the resulting message.
 GOOD = "wl,n,k\n0.38,1.54,0.001\n0.6,1.5,0.0005\n1.2,1.4,0.002\n"
 ODD = {
     GOOD.replace("0.38", "0.42"): ("n from 0.42 to 1.2 µm: taken for constant", "k from 0.42"),
@@ -290,7 +292,8 @@ ODD = {
 
 @pytest.mark.parametrize("text", ODD, ids=range(len(ODD)))
 def test_what_files_of_others_have_is_assumed_and_said(tmp_path, optics, text):
-    """The visible is what it is without the oddity; the tool and the package say the same."""
+    """Visible wavelengths are not affected by the variation; the tool and the package report the
+    same."""
     file = tmp_path / "odd.csv"
     file.write_text(GOOD, encoding="utf-8")
     plain = optical(file)
@@ -308,7 +311,7 @@ def test_what_files_of_others_have_is_assumed_and_said(tmp_path, optics, text):
     assert (told["absorption"] is not None) is read.absorbs is ("wl,k" not in text)
 
 
-#: What is wrong, and what is said, the file's name left out.
+#: Errors, and the messages without the file's name.
 BAD = {
     "": ": expected a line wl,n and rows below it, found no n",
     "wl,k\n0.3,1\n0.8,1\n": ": expected a line wl,n and rows below it, found no n",
@@ -372,7 +375,7 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     of_channels = [found["a"]["parameters"][f"{q}_{c}"] for q in "nk" for c in "rgb"]
     assert of_channels == pytest.approx([*gold["n"], *gold["k"]])
     assert found["b"]["parameters"] == {"ior": 1.5, "dispersion": 0, "density": 0}
-    # 20 over Abbe's number.
+    # 20 divided by the Abbe number.
     assert resolved(b={"model": "fresnel_dielectric", "optical": "sf11"}).returncode == 0
     found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]
     flint = optical("sf11")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension reads its own pack, or refuses it in words, whatever is in the file."""
+"""The extension reads its own pack, or refuses it with a message, whatever the file contains."""
 
 import importlib
 import random
@@ -71,5 +71,5 @@ def test_damaged_manifests(read, manifest):
             read(bytes(data))
         except read.refusal:
             refused += 1
-    # Some bytes are inside of words that people read.
+    # Some damaged bytes are in display texts, which can't be checked.
     assert refused > 200

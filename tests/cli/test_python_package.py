@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package of `brdfc python`: its formulas against the tool's, its errors and page.
+"""The package of `brdfc python`: its formulas compared with the tool's, its errors, and its page.
 
-The tool evaluates the C++ in double precision: of each model `brdfc eval` and `brdfc sample` one
-set of parameters, `brdfc probe` all others in one run. Values agree to 1e-12 of themselves, for
-every model, at defaults, at random parameters and at the stiff ones of tests/models/cases.csv. A
-sample's density is given 1e-11: the narrowest lobes, of exponents of 1e8, multiply by 1e4 what
-their own direction is rounded by. NumPy's exp, sin and log differ from the C library's by a unit in
-the last place.
+The tool evaluates the C++ in double precision: one set of parameters of each model by `brdfc eval`
+and `brdfc sample`, all others in one run of `brdfc probe`. Values agree to a relative 1e-12 for
+every model, at default, random and extreme parameters (tests/models/cases.csv). The pdf of a sample
+agrees to 1e-11: the narrowest lobes, with exponents of 1e8, amplify the rounding of their own
+direction by 1e4. NumPy's exp, sin and log differ from the C library's in the last place.
 """
 
 import csv
@@ -32,7 +31,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """What `brdfc python` writes."""
+    """The output of `brdfc python`."""
     out = tmp_path_factory.mktemp("python")
     done = subprocess.run([TOOL, "python", "--out", out], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -49,7 +48,7 @@ def brdfc(folder):
 
 
 def tool(command, model, values, rows, header):
-    """What the tool says, a row for each."""
+    """The tool's results, one row for each."""
     words = [
         f"{k}={v if isinstance(v, str) else ','.join(repr(float(c)) for c in np.atleast_1d(v))}"
         for k, v in values.items()
@@ -63,7 +62,7 @@ def tool(command, model, values, rows, header):
 
 
 def values_of(model, text):
-    """A case of cases.csv: "n=3 tint=0.9:0.5:0.1"."""
+    """The parameters of a case in cases.csv: "n=3 tint=0.9:0.5:0.1"."""
     values = {}
     for name, value in (assignment.split("=") for assignment in text.split()):
         is_word = type(model.parameters[name]).__name__ == "Choice"
@@ -96,11 +95,11 @@ def unit(v):
 
 
 def pairs(random, count):
-    """Directions anywhere, below the surface too; light near the mirror direction and near the
-    viewer, closer and closer; the normal; grazing."""
+    """Directions anywhere, including below the surface; light directions at decreasing distances
+    from the mirror direction and from the view direction; the normal; grazing directions."""
     wi, wo = unit(random.normal(size=(2, count, 3)))
     lights, views = [wi], [wo]
-    above = wo * [1, 1, np.nan] + 0  # filled below
+    above = wo * [1, 1, np.nan] + 0  # z is set in the next line
     above[:, 2] = np.abs(wo[:, 2])
     for spread in (0.3, 0.03, 1e-3, 1e-4):
         for around in (above * [-1, -1, 1], above):
@@ -112,7 +111,7 @@ def pairs(random, count):
 
 
 def off(got, expected):
-    """The largest difference in units of the expected value; where that is 0 both must be."""
+    """The largest difference relative to the expected value; if that is 0, both must be."""
     same = got == expected
     return np.max(
         np.where(same, 0, np.abs(got - expected) / np.where(expected == 0, 1e-300, expected))
@@ -120,9 +119,9 @@ def off(got, expected):
 
 
 def in_double(model, points):
-    """What the tool says of points (values, wi, wo, u), for each an array by row: f, density, and
-    the sample's direction, weight and density. One run of it a combination of choices, for what
-    takes time is its start."""
+    """The tool's results at points (values, wi, wo, u), an array for each by row: f, pdf, and the
+    sample's direction, weight and pdf. Runs the tool once for each combination of choices, as
+    starting it takes most of the time."""
     p = model.parameters
     is_choice = {name: type(p[name]).__name__ == "Choice" for name in p}
     by_choices = {}
@@ -140,7 +139,7 @@ def in_double(model, points):
         blocks = []
         for i in which:
             values, wi, wo, u = points[i]
-            # probe takes directions as they are.
+            # probe does not normalize directions.
             vectors = [model._directions("wi", wi), model._directions("wo", wo), u]
             for name in p:
                 if is_choice[name]:
@@ -178,7 +177,7 @@ def test_values_are_those_of_the_formulas_in_cpp(brdfc, name):
     scatters = next(iter(model.formulas.values())).eval is not None
     if scatters:
         all_expected += in_double(model, points[1:])
-    else:  # ideal reflection alone
+    else:  # only ideal reflection
         assert not all_expected[0].any()
         all_expected += [np.zeros((len(wi), 4)) for _, wi, _, _ in points[1:]]
     some = 0
@@ -219,7 +218,8 @@ def test_samples_are_those_of_the_formulas_in_cpp(brdfc, name):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_albedo_is_that_of_the_tools_quadrature(brdfc, name):
-    """Of 4096 samples, as docs/python.md says; the mirror's share, no integral, to 1e-12."""
+    """By 4096 samples, as docs/python.md states; the mirror's fraction, which is not an integral,
+    to 1e-12."""
     model, random = brdfc.model(name), np.random.default_rng(7)
     cosines = np.array([0.2, 0.7, 1])
     for values in ({}, random_values(model, random)):
@@ -244,7 +244,7 @@ def test_arrays_broadcast_and_blocks_are_joined(brdfc):
     assert grid.shape == (4, 5, 3)
     np.testing.assert_array_equal(grid[2, 3], model.eval(wi[2], wo[3], ax=ax[3]))
     assert model.eval(np.zeros((0, 3)), wo[0]).shape == (0, 3)
-    # Textures of an albedo: one more axis inside.
+    # A texture of albedos adds an inner axis.
     many = model.albedo([0.5, 0.9], ks=ks[:2], ax=ax[:2])
     for i, cosine in enumerate((0.5, 0.9)):
         np.testing.assert_allclose(many[i], model.albedo(cosine, ks=ks[i], ax=ax[i]), rtol=1e-13)
@@ -389,7 +389,7 @@ def test_the_plots_of_the_page(folder, tmp_path):
 
 
 def test_what_papers_say_as_curves(brdfc):
-    """The figures of docs/gallery/landmarks.md."""
+    """The numbers of docs/gallery/landmarks.md."""
     lobe = brdfc.model("radziszewski_alda")
     for n in (4, 100):
         assert landmarks.anisotropy(lobe, 0, n=n) == pytest.approx(1, abs=0.03)
@@ -409,7 +409,7 @@ def test_what_papers_say_as_curves(brdfc):
 
 @pytest.mark.parametrize("name", ["schlick", "fresnel_conductor"])
 def test_a_model_is_drawn(brdfc, tmp_path, name):
-    """The gallery's drawings: of lobes and a mirror, and of a mirror alone."""
+    """The gallery's drawings: lobes with a mirror, and a mirror alone."""
     listed = json.loads(subprocess.run([TOOL, "list", "--json"], capture_output=True).stdout)
     model = next(m for m in listed if m["name"] == name)
     gallery_models.draw(model, brdfc.model(name), tmp_path)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report's page as a browser shows it: nothing runs out of the window, the filter hides what it
-should, pointing at a picture shows the reference in its place."""
+"""The report's page in a browser: nothing exceeds the window, the filter hides the right rows, and
+hovering over a picture shows the reference in its place."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from support import TOOL, scene
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 WIDTH = 1280
-#: What the page says of itself once it is laid out, as text at its end.
+#: Appends the page's state after layout to it, as text.
 PROBE = """<script>
 const select = document.getElementById("model");
 const shown = () => [...document.querySelectorAll("section[data-models]")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wheels that script/release gives away: what is in them, and both in a new environment."""
+"""The wheels of script/release: their contents, and both of them in a new environment."""
 
 import importlib.metadata
 import json
@@ -28,7 +28,7 @@ def succeeded(command, **options):
 
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
-    """Both, by name."""
+    """Both wheels, by name."""
     out = tmp_path_factory.mktemp("wheels")
     succeeded([ROOT / "script" / "release", "--wheels", out])
     return {path.name.split("-")[0]: path for path in out.iterdir()}
@@ -36,8 +36,8 @@ def wheels(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def environment(wheels, tmp_path_factory):
-    """A new one, in which `pip install brdfc[tool]` found these wheels and no network. Of what is
-    installed here it has NumPy alone."""
+    """A new environment in which `pip install brdfc[tool]` found these wheels without a network. Of
+    the packages installed here, it has only NumPy."""
     folder = tmp_path_factory.mktemp("environment")
     succeeded([sys.executable, "-m", "venv", "--without-pip", folder / "venv"])
     numpy = folder / "numpy"
@@ -54,7 +54,7 @@ def environment(wheels, tmp_path_factory):
 
 
 def run(environment, *arguments, **options):
-    """As in an environment that was activated, and of which nothing else is known."""
+    """Runs a program as in an activated environment without other settings."""
     path = f"{environment / 'bin'}:/usr/bin:/bin"
     return subprocess.run(
         [shutil.which(arguments[0], path=path), *arguments[1:]],
@@ -94,7 +94,7 @@ def test_that_of_the_tool_is_what_is_built_and_its_data(wheels):
 
 @pytest.mark.slow
 def test_the_package_works_in_a_new_environment(environment):
-    """No model is loaded before it is asked for."""
+    """No model is loaded before it is used."""
     code = (
         "import sys, brdfc\n"
         "loaded = [m for m in sys.modules if m.startswith('brdfc.models.')]\n"
@@ -108,8 +108,8 @@ def test_the_package_works_in_a_new_environment(environment):
 
 @pytest.mark.slow
 def test_the_tool_works_in_a_new_environment(environment, tmp_path):
-    """With its own data. It stands where the extension looks: on the PATH, and where pip puts
-    programs for the Python that runs."""
+    """With its own data. It is where the extension looks: on the PATH, and where pip installs
+    programs for the running Python."""
     assert shutil.which("brdfc", path=environment / "bin")
     scripts = "import sysconfig; print(sysconfig.get_path('scripts'))"
     assert run(environment, "python", "-c", scripts).stdout.strip() == str(environment / "bin")
@@ -127,7 +127,7 @@ def test_the_tool_works_in_a_new_environment(environment, tmp_path):
 
 @pytest.mark.slow
 def test_what_is_missing_is_said(environment, tmp_path, monkeypatch):
-    """Libraries that are not there, by their names; a loader that isn't."""
+    """Reports missing libraries by name; likewise a missing loader."""
     (tool,) = environment.glob("lib/python3*/site-packages/brdfc_tool")
     copy = shutil.copytree(tool, tmp_path / "brdfc_tool")
     program = copy / "tree" / "bin" / "brdfc"
@@ -143,7 +143,7 @@ def test_what_is_missing_is_said(environment, tmp_path, monkeypatch):
     wrong = said(lambda b: b.replace(b"libembree3.so.3\0", b"libembree3.so.9\0"))
     assert wrong.startswith("brdfc: shared libraries are missing: libembree3.so.9; on Debian 12: ")
     assert wrong.endswith(f"install {' '.join(sorted(set(brdfc_tool.PACKAGES.values())))}\n")
-    # One that this system has, but not in the folders where it lies: the wheel knows whose it is.
+    # A library that this system has, where the loader does not look: the wheel knows its package.
     program.write_bytes(right)
     known = call + "t.PACKAGES['libembree3.so.9'] = 'libembree3-9'; sys.argv[1:] = []; t.main()"
     program.write_bytes(right.replace(b"libembree3.so.3\0", b"libembree3.so.9\0"))
@@ -154,7 +154,7 @@ def test_what_is_missing_is_said(environment, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(not shutil.which("dpkg-query"), reason="packages are those of Debian")
 def test_the_packages_that_are_named_hold_the_libraries():
-    """All that the program is linked to, but for the C library, which every system has."""
+    """All libraries that the program is linked to, except the C library, which every system has."""
     linked = re.findall(r"NEEDED.*\[(.*)\]", succeeded(["readelf", "--dynamic", "--wide", TOOL]))
     everywhere = {"libc.so.6", "libm.so.6", "libmvec.so.1", "libgcc_s.so.1"}
     assert set(linked) - everywhere == set(brdfc_tool.PACKAGES)

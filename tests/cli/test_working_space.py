@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes that name their working space: the reference renderer computes in it, and what reads its
-pictures knows."""
+"""Scenes that name their working space: the reference renderer computes in it, and readers of its
+pictures know it."""
 
 import json
 import sys
@@ -18,8 +18,8 @@ REC709, REC2020, ACESCG = SPACES
 
 
 def mirrors(folder, **changes):
-    """A mirror of gold, one of copper and a picture of one colour side by side under a white sky,
-    without noise."""
+    """A mirror of gold, one of copper, and a picture of a single colour, side by side under a white
+    sky, without noise."""
     color = np.array([0.18, 0.4, 0.05], np.float32)
     buffer = oiio.ImageBuf(oiio.ImageSpec(2, 2, 3, oiio.FLOAT))
     buffer.set_pixels(oiio.ROI(), np.broadcast_to(color, (2, 2, 3)).copy())
@@ -62,7 +62,7 @@ def in_file(path):
 
 
 def test_a_scene_has_one_look_in_every_working_space(tmp_path):
-    """But for gold's red in Rec.709, which does not hold it."""
+    """Except gold's red in Rec.709, which is outside that space."""
     numbers = {s: in_file(render(tmp_path, s))[0] for s in SPACES}
     looks = {s: converted(v, s, REC709) for s, v in numbers.items()}
     assert np.abs(numbers[REC2020] - numbers[REC709]).max() > 0.05, "numbers are the space's own"
@@ -105,13 +105,13 @@ def test_compare_and_previews_convert_from_what_a_file_says(tmp_path):
     files = {s: render(tmp_path, s, "--preview", tmp_path / f"{s}.png") for s in SPACES}
     shown = [in_file(tmp_path / f"{s}.png")[0] for s in SPACES]
     assert np.ptp(shown[0]) > 0.5
-    for other in shown[1:]:  # of gold's red a display shows no more than white
+    for other in shown[1:]:  # a display can't show more of gold's red than of white
         np.testing.assert_allclose(other, shown[0], atol=1.01 / 255)
     assert comparison(files[ACESCG], files[REC2020])["max"] < 1e-3
     assert comparison(files[REC2020], files[ACESCG])["max"] < 1e-3
     same = comparison(files[REC2020], files[REC2020])
     assert same["max"] == 0 and same["noise_mse"] is not None
-    # A file that says nothing is in the configuration's working space.
+    # A file that states no space is in the configuration's working space.
     silent = render(tmp_path, None)
     assert comparison(files[REC2020], silent)["max"] == pytest.approx(0.039, abs=2e-3)
     assert comparison(files[REC709], silent)["max"] == 0
@@ -143,7 +143,7 @@ def test_spaces_that_there_are_not_are_errors(tmp_path):
         assert expected in told(bad)
     config = tmp_path / "small.ocio"
     text = CONFIG.read_text(encoding="utf-8").replace("name: ACEScg", "name: Other")
-    config.write_text(text.replace("lin_ap1_scene", "other"))  # else its alias would do
+    config.write_text(text.replace("lin_ap1_scene", "other"))  # otherwise its alias would match
     error = told(ACESCG, config)
     assert "mirrors.json: working_space: " in error
     assert "small.ocio has no colour space 'ACEScg', expected one of Linear Rec.709, sRGB" in error

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Closures of Cycles by their definitions: tests/blender/conformance.py holds the definitions against Cycles.
+// The definitions of Cycles' closures; tests/blender/conformance.py compares them with Cycles.
 #include "closures/closure.h"
 
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ TEST(Closure, ASmoothMatteSurfaceIsLamberts) {
   }
 }
 
-/// Light that facets of albedo 1 reflect again is all of what is lost at the first reflection.
+/// Interreflection between facets of albedo 1 returns all the light that single reflection loses.
 TEST(Closure, ARoughMatteSurfaceOfWhiteFacetsLosesNoLight) {
   for (const double roughness : {0.1, 0.5, 1.})
     for (const double degrees : {0., 40., 60., 75.}) {
@@ -52,7 +52,7 @@ TEST(Closure, ARoughMatteSurfaceOfWhiteFacetsLosesNoLight) {
     }
 }
 
-/// Values of the formula that agrees with Cycles 4.5 and 5.2 to 1e-7, worked out in another language.
+/// Values of an independent implementation that agrees with Cycles 4.5 and 5.2 to 1e-7.
 TEST(Closure, ARoughMatteSurfaceHasTheValuesOfCycles) {
   const Closure<double> c = rough_matte(0.7, Rgb<double>(0.8, 0.5, 0.2));
   const Rgb<double> beside = evaluate(c, at(30, 1), at(70, 1.5)), opposite = evaluate(c, at(50, 0.4), at(75, 3));
@@ -70,7 +70,7 @@ TEST(Closure, ARoughMatteSurfaceIsReciprocal) {
   EXPECT_NEAR(there.b, back.b, 1e-14);
 }
 
-/// The model as its authors print it, with the exact albedo of facets; f cos.
+/// f cos of the model as published, with the exact albedo of facets.
 Rgb<double> eon(const Rgb<double>& rho, double r, const Vec3<double>& wi, const Vec3<double>& wo) {
   const double c1 = 0.5 - 2 / (3 * kPi), c2 = 2. / 3 - 28 / (15 * kPi), AF = 1 / (1 + c1 * r), BF = r * AF;
   const auto E = [&](double mu) {
@@ -93,7 +93,7 @@ TEST(Closure, LosslessRoughFacetsAreASumOfTwo) {
       EXPECT_NEAR(found.r, expected.r, 2e-5 * expected.r) << r;
       EXPECT_NEAR(found.g, expected.g, 2e-5 * expected.g) << r;
       EXPECT_NEAR(found.b, expected.b, 2e-5 * expected.b) << r;
-      // One closure of this colour reflects too little again.
+      // A single closure of this colour has too little interreflection.
       EXPECT_LT(evaluate(rough_matte(r, rho), wi, wo).g, expected.g * (1 - 1e-3 * r));
     }
 }
@@ -108,7 +108,7 @@ TEST(Closure, RoughFacetsReflectOnce) {
   }
 }
 
-/// Its loss in the form that Cycles' source has, which divides by the cosine.
+/// Compared with the form in Cycles' source, which divides by the cosine.
 TEST(Closure, TheLossOfARoughMatteSurfaceKeepsItsDigitsNearTheHorizon) {
   for (const double c : {1., 0.7, 0.2, 1e-2}) {
     const double s = std::sqrt(1 - c * c), theta = std::acos(c);

@@ -26,7 +26,7 @@ TEST(ForAll, ThrowsWhatOneThrows) {
                std::runtime_error);
 }
 
-/// Whoever goes on with what a loop within has filled would find it half empty.
+/// Otherwise the code after an inner loop would find its results incomplete.
 TEST(ForAll, EndsWhatIsWithinOneThatIsLeft) {
   constexpr std::size_t kOuter = 4, kInner = 200;
   for (int round = 0; round < 20; ++round) {

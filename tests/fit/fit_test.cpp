@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Closures fitted to a model come as close to it as they say.
+// Fitted closures approximate a model as well as they claim.
 #include "fit/fit.h"
 
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ struct Row {
   std::vector<std::string> values;
   double median, worst;  ///< relative L1 over views
 };
-/// Bounds are a quarter above what was measured.
+/// Bounds are 25 % above the measured errors.
 const Row kRows[] = {{"modified_phong", {"ks=1", "e=50"}, 0.006, 0.06},
                      {"phong", {"ks=1", "e=20"}, 0.007, 0.2},
                      {"phong", {"e=1000"}, 0.007, 0.14},
@@ -62,7 +62,7 @@ TEST(Fit, ComesAsCloseAsMeasured) {
   }
 }
 
-/// By another quadrature: a grid over the angles from the mirror direction.
+/// Compared with another quadrature: a grid over the angles from the mirror direction.
 TEST(Fit, StatesItsError) {
   const std::pair<const char*, std::vector<std::string>> materials[] = {
       {"phong", {"e=20"}}, {"blinn", {}}, {"ward", {}}};
@@ -108,8 +108,8 @@ TEST(Fit, WeightsAddUpToTheAlbedo) {
   }
 }
 
-/// Between two views the light that a fixed direction gets changes little more than in the model; of ramps alone, and
-/// of facets that lean.
+/// Between two views, the light reflected to a fixed direction changes little more than in the model; for ramps alone
+/// and for tilted microfacets.
 TEST(Fit, HasNoStepsBetweenViews) {
   for (const auto& [name, text] : {std::pair("max_phong", "e=50"), {"ward", "ax=0.15"}}) {
     const Model& m = find_model(name);
@@ -132,8 +132,8 @@ TEST(Fit, HasNoStepsBetweenViews) {
   }
 }
 
-/// Lower than the lowest view of the tables: as there, about a normal that is turned. Otherwise, of colours that are a
-/// hundred times what they add up to, some are left alone.
+/// Below the lowest view of the tables, closures are as there, about a rotated normal. Otherwise closures with opposite
+/// weights of a hundred times their sum would no longer cancel.
 TEST(Fit, LowViewsAreLikeTheLowestFitted) {
   for (const auto& [name, text] : {std::pair("phong", "e=20"), {"max_phong", "e=50"}, {"ward", "ax=0.15"}}) {
     const Model& m = find_model(name);
@@ -205,7 +205,7 @@ TEST(Fit, LeavesOutColoursThatMultiplyAll) {
   EXPECT_THAT(of("glossy_reflector"), ElementsAre("cr", "kr")) << "a number that multiplies all";
 }
 
-/// Between the knots of the axis a fit is about as close as one that is made there.
+/// Between the knots of the axis, a fit is about as close as one made for that value.
 TEST(Fit, RunsAlongANumber) {
   const Model& m = find_model("oren_nayar");
   ParamValues values = values_of(m, {"form=qualitative"});
@@ -223,7 +223,7 @@ TEST(Fit, RunsAlongANumber) {
   }
   EXPECT_EQ(l1.size(), 64 * numbers.size());
   EXPECT_GE(numbers.size(), 6u);
-  // Of one value it says what is so beside it, of all the worst.
+  // For one value the fit states the error at that value, for all values the largest.
   std::map<double, double> mean;
   for (const ViewError& e : fit.errors()) mean[e.number] += e.relative_l1 / 64;
   const auto next = std::next(mean.begin());
@@ -246,7 +246,7 @@ TEST(Fit, RunsAlongANumber) {
     }
     EXPECT_LE(off, 0.02 * sum) << sigma;
   }
-  // Beyond its ends a fit is what it is there.
+  // Beyond the ends of the axis, the fit is the one at the end.
   const Vec3<double> wo = direction(0.6, 0), wi = direction(0.4, 2);
   EXPECT_EQ(evaluate(fit.closures(wo, 0.9), wi, wo).r, evaluate(fit.closures(wo, 0.66), wi, wo).r);
 
@@ -266,8 +266,7 @@ TEST(Fit, RunsAlongANumber) {
   EXPECT_THROW(fit_of(lafortune, two), std::logic_error);
 }
 
-/// Lobe is what the conformance tests hold against Cycles, with any tangent; shaders give the viewer's direction for
-/// it.
+/// The conformance tests compare Lobe, with any tangent, with Cycles; shaders provide the viewer's direction for it.
 TEST(Fit, StretchesFacetsAsCyclesDoes) {
   const Fit& fit = fit_of(find_model("ward"), values_of(find_model("ward"), {"ax=0.2", "ay=0.2"}));
   measure::Random random(4);
@@ -293,7 +292,7 @@ TEST(Fit, StretchesFacetsAsCyclesDoes) {
   }
 }
 
-/// A reflectance at normal incidence whatever it is: closures of the same shapes, coloured by it.
+/// For any reflectance at normal incidence, closures have the same shapes and are coloured by it.
 TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
   for (const auto& [model, open] : {std::pair{"cook_torrance", "f0"}, {"oren_nayar", "rho"}}) {
     const Model& m = find_model(model);
@@ -318,17 +317,17 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
         const Rgb<double> again = fit.f_cos(wi, wo, varied);
         EXPECT_NEAR(again.r, found.r, 1e-9 * (1 + truth.r));
         EXPECT_NEAR(again.b, found.b, 1e-9 * (1 + truth.b));
-        // Nearly along the surface f is large, so that few pairs would decide.
+        // At grazing angles f is so large that a few pairs would dominate.
         if (wo.z < 0.05) continue;
         off += magnitude(found - truth);
         off_known += magnitude(evaluate(of_known.closures(wo), wi, wo) - truth);
         sum += truth;
       }
-      // Nearly as close as closures for this colour alone.
+      // Almost as close as closures fitted for this colour alone.
       EXPECT_LE(max_component(off / sum), 1.3 * max_component(off_known / sum) + 0.002) << model;
       EXPECT_LE(max_component(off / sum), 0.15) << model;
     }
-    // A weight by channel is the albedo.
+    // The sum of the weights in a channel is the albedo.
     const Vec3<double> wo = direction(0.7, 0);
     ParamValues whole = values;
     whole[open] = std::array<double, 3>{1, 0.5, 0.1};
@@ -337,7 +336,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
     for (const auto& closure : fit.closures(wo, fit.varied(whole))) weights += closure.weight;
     EXPECT_NEAR(weights.r, albedo.r, 0.01 * albedo.r) << model;
     EXPECT_NEAR(weights.b, albedo.b, 0.01 * albedo.b) << model;
-    // No share of nothing.
+    // Must not divide by 0.
     whole[open] = std::array<double, 3>{0, 0, 0};
     const Rgb<double> none = evaluate(fit.closures(wo, fit.varied(whole)), {0, 0, 1}, wo);
     EXPECT_LE(max_component(magnitude(none)), 1e-4) << model;
@@ -352,7 +351,7 @@ TEST(Fit, ServesAnyValueOfWhatThereAreTermsBy) {
   }
 }
 
-/// A known colour takes the fit for all of them.
+/// A known colour uses the fit for all colours.
 TEST(StoredFits, ServeColoursThatAreKnown) {
   const Model& m = find_model("cook_torrance");
   ParamValues known = values_of(m, {"f0=0.9,0.5,0.1"}), open = known;
@@ -374,7 +373,7 @@ TEST(StoredFits, ServeColoursThatAreKnown) {
   EXPECT_THAT(s.source, testing::Not(HasSubstr("f0")));
 }
 
-/// An axis goes by factors where a number does.
+/// An axis has the scale of the number's slider.
 TEST(Fit, AxesAreSliders) {
   for (const auto& [model, number, scale] : {std::tuple{"phong", "e", AxisScale::Log},
                                              {"blinn", "e", AxisScale::Log1p},
@@ -387,7 +386,8 @@ TEST(Fit, AxesAreSliders) {
   }
 }
 
-/// Models that declare a number to fit over, without it, their factors and what there are terms by.
+/// Models that declare a number to fit over, with fixed values for all parameters except the number, the factors and
+/// the parameters of terms.
 std::vector<std::pair<const Model*, ParamValues>> stored() {
   std::vector<std::pair<const Model*, ParamValues>> out;
   for (const auto& [name, model] : models()) {
@@ -399,7 +399,7 @@ std::vector<std::pair<const Model*, ParamValues>> stored() {
   return out;
 }
 
-/// script/fits makes them anew.
+/// script/fits makes them again.
 TEST(StoredFits, BelongToTheFormulas) {
   std::set<std::filesystem::path> expected, found;
   for (const auto& [model, values] : stored()) expected.insert(stored_fit(*model, values).path());
@@ -408,9 +408,9 @@ TEST(StoredFits, BelongToTheFormulas) {
   EXPECT_EQ(found, expected);
 }
 
-/// Of errors over views and the whole slider, both to its ends.
+/// Errors over views and the whole slider.
 struct Spread {
-  double median, most, worst;  ///< `most`: of 95 %
+  double median, most, worst;  ///< `most`: the 95th percentile
 };
 Spread spread(std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
@@ -420,8 +420,8 @@ struct StoredRow {
   const char* model;
   Spread relative_l1, albedo;
 };
-/// What was measured. The albedo's error is absolute, with factors of 1. Where it is worst, glossy_reflector nearly
-/// along the surface, a lobe is wide and most of it lies below.
+/// Measured errors. That of the albedo is absolute, with factors of 1. The largest, of glossy_reflector at grazing
+/// views, occurs where the lobe is wide and mostly below the surface.
 const StoredRow kStored[] = {{"blinn", {0.0221, 0.06755, 0.161}, {0.000687, 0.004371, 0.01198}},
                              {"cook_torrance", {0.04856, 0.1198, 0.2081}, {0.001148, 0.009879, 0.02324}},
                              {"glossy_reflector", {0.01101, 0.1127, 0.2641}, {0.001935, 0.009183, 0.06801}},
@@ -432,7 +432,7 @@ const StoredRow kStored[] = {{"blinn", {0.0221, 0.06755, 0.161}, {0.000687, 0.00
                              {"radziszewski_alda", {0.02576, 0.08314, 0.2364}, {0.001096, 0.01113, 0.02702}},
                              {"schlick", {0.06832, 0.1267, 0.2092}, {0.002764, 0.009457, 0.01051}}};
 
-/// They are offered for any value of their number.
+/// They are used for any value of their number.
 TEST(StoredFits, AreAsCloseAsMeasuredAlongTheWholeSlider) {
   constexpr double kWorse = 1.05;
   const auto all = stored();
@@ -455,7 +455,7 @@ TEST(StoredFits, AreAsCloseAsMeasuredAlongTheWholeSlider) {
   }
 }
 
-/// A build of a model of one's own makes it once.
+/// For a user's own model, it is made only once.
 TEST(Fit, OfConstantsIsKeptInTheCache) {
   const TempFolder folder;
   const Environment environment("BRDFC_CACHE", folder.path().string());
@@ -464,7 +464,7 @@ TEST(Fit, OfConstantsIsKeptInTheCache) {
   const Fit made(model, values);
   const auto path = find_cached(stored_fit(model, values));
   ASSERT_TRUE(path);
-  // A file that is written anew takes its place.
+  // A new file replaces the old one.
   std::filesystem::create_hard_link(*path, folder.path() / "same");
   const Fit read(model, values);
   EXPECT_EQ(std::filesystem::hard_link_count(*path), 2u);
@@ -475,7 +475,7 @@ TEST(Fit, OfConstantsIsKeptInTheCache) {
   EXPECT_NE(stored_fit(model, complete(model.info(), {{"sigma", 0.124}})).hash(), stored_fit(model, values).hash());
 }
 
-/// The errors that are kept with a fit are those of what is kept: in the middle of each slider, measured anew.
+/// The errors stored with a fit are those of the fit, measured again at the middle of each slider.
 TEST(StoredFits, StateTheirErrors) {
   for (const auto& [model, values] : stored()) {
     const Fit& fit = fit_of(*model, values);
@@ -505,11 +505,11 @@ TEST(StoredFits, StateTheirErrors) {
   }
 }
 
-/// Under a slider that moves slowly the light that a fixed direction gets shows no step. One would be a difference that
-/// its neighbours have not: of a function without steps, also where its slope changes, none is much larger than the
-/// larger beside it. What is steep over several differences may be little steeper than the model. Both but for what no
-/// screen shows: of its 255 steps a quarter at once, and one under a thousandth of the slider. Of ramps alone, of
-/// facets that lean and of terms.
+/// While a slider moves slowly, the light reflected to a fixed direction must not jump. A jump is a difference that is
+/// much larger than both neighbouring differences: for continuous functions, even at kinks, that does not occur. Over
+/// several differences the slope may exceed the model's only slightly. Both conditions ignore what no screen shows:
+/// less than a quarter of one of its 255 steps, or less than a thousandth of the slider. For ramps alone, tilted
+/// microfacets and terms.
 TEST(StoredFits, HaveNoStepsAlongTheSlider) {
   constexpr std::size_t kSteps = 1000;
   constexpr double kShown = 1.0 / 255;
@@ -554,8 +554,8 @@ TEST(StoredFits, HaveNoStepsAlongTheSlider) {
   EXPECT_EQ(seen.size(), 3u);
 }
 
-/// A closure whose normal lies below the surface is another in Blender 5.0 and 5.2 than the one that was fitted. Lobes
-/// that are nearly matte lean as far.
+/// In Blender 5.0 and 5.2, a closure whose normal is below the surface differs from the one that was fitted. Almost
+/// diffuse lobes are tilted that far.
 TEST(StoredFits, NormalsOfClosuresLieAboveTheSurface) {
   const auto lowest = [](const Fit& fit, Varied<double> varied, int steps) {
     double z = 1;
@@ -575,10 +575,10 @@ TEST(StoredFits, NormalsOfClosuresLieAboveTheSurface) {
   EXPECT_GT(lowest(fit_of(lambert, complete(lambert.info(), {})), {}, 0), 0.1);
 }
 
-/// Another processor finds other closures: where several sums are about as close, how its library rounds decides, and
-/// mean errors of the same cell were found 13 % apart. Those that are stored are as close as those that are made here
-/// but for that. One cell, of a model and a knot, by what BRDFC_CELL is: script/test sets it to the commit, so that in
-/// time all are made.
+/// Different processors give different fits: if several sums are about equally close, rounding in the math library
+/// decides, and mean errors of one cell differed by 13 %. Apart from that, stored fits are as close as fits made here.
+/// Tests one cell (a model and a knot), selected by BRDFC_CELL: script/test sets it to the commit, so that all are
+/// tested in the course of time.
 TEST(StoredFits, AreAsCloseAsWhatIsMadeAnew) {
   const char* given = std::getenv("BRDFC_CELL");
   const std::string choice = given ? given : "";

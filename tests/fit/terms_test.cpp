@@ -45,7 +45,7 @@ TEST(Terms, AreFoundByEvaluatingTheModel) {
   EXPECT_THAT(names("glass", {"r0"}), IsEmpty()) << "nothing is scattered";
 }
 
-/// For all models and any value of all that there are terms by.
+/// For all models, and any values of the parameters that terms are powers of.
 TEST(Terms, AddUpToTheModel) {
   int models_with_terms = 0;
   measure::Random random(8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Twins come as close to their models as they say, with weights that Blender's nodes take.
+// Twins approximate their models as well as they claim, with weights that Blender's nodes accept.
 #include "fit/twin.h"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ namespace {
 struct Row {
   const char* model;
   std::vector<std::string> values;
-  double median;  ///< relative L1 over views, a quarter above what was measured
+  double median;  ///< median of the relative L1 error over views, 25 % above the measured value
 };
 const Row kRows[] = {{"blinn", {"e=100"}, 0.017}, {"phong", {"ks=0.9,0.5,0.1", "e=50"}, 0.05}, {"coupled", {}, 0.048}};
 
@@ -43,7 +43,8 @@ TEST(Twin, ComesAsCloseAsMeasured) {
   }
 }
 
-/// Relative L1 and albedo over that of the model, red channel, by another quadrature: a grid over heights and azimuths.
+/// Relative L1 error, and albedo relative to the model's, in the red channel, by another quadrature: a grid over
+/// heights and azimuths.
 std::array<double, 2> by_grid(const Brdf<double>& brdf, const ClosureSum<double>& sum, const Vec3<double>& wo) {
   double difference = 0, albedo = 0, of_twin = 0;
   constexpr int kHeights = 600, kTurns = 600;
@@ -73,8 +74,8 @@ TEST(Twin, StatesItsError) {
   }
 }
 
-/// What the extension has, between two places of its tables, and with mixed parameters at the worst of the values that
-/// are judged.
+/// For the twins of the extension, between two rows of their tables, with mixed parameters at the worst of the values
+/// that are evaluated.
 TEST(Twin, StatesItsErrorAlongANumber) {
   for (const char* name : {"max_phong", "cook_torrance", "schlick"}) {
     const Model& m = find_model(name);
@@ -98,7 +99,7 @@ TEST(Twin, StatesItsErrorAlongANumber) {
   }
 }
 
-/// script/fits keeps one of each model that the extension has a twin of.
+/// script/fits stores one for each model that has a twin in the extension.
 TEST(Twin, IsKept) {
   for (const auto& [name, model] : models()) {
     const forms::Form& form = *forms::form("twin");
@@ -112,7 +113,7 @@ TEST(Twin, TakesWhatNodesAccept) {
     const Model& m = find_model(row.model);
     const auto j = nlohmann::json::parse(forms::form("twin")->write(m, {}, {values_of(m, row.values)}).source);
     for (const auto& closure : j.at("closures")) {
-      // Without an axis and mixed parameters one term of one row.
+      // Without an axis and mixed parameters, there is one term with one row.
       ASSERT_EQ(closure.at("weight").size(), 1u);
       for (const auto& channel : closure.at("weight")[0]) {
         ASSERT_EQ(channel.size(), 1u);
@@ -122,7 +123,7 @@ TEST(Twin, TakesWhatNodesAccept) {
       if (!closure.contains("roughness")) continue;
       for (const double r : closure.at("roughness")[0]) EXPECT_TRUE(r > 0 && r <= 1) << row.model << " " << r;
     }
-    // A mirror beside it has a colour of its own.
+    // A mirror has its own colour.
     EXPECT_EQ(j.at("albedo")[0].size(), m.has_mirror() ? 3u : 1u) << row.model;
     EXPECT_EQ(j.at("closures").back().at("kind") == "mirror", m.has_mirror()) << row.model;
   }

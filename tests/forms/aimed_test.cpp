@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Base, lamps and rest add up to the model.
+// The sum of base, lamps and rest equals the model.
 #include "forms/aimed.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace brdfc::forms {
 namespace {
 
-/// Axes across a direction, of any length.
+/// A disk with arbitrary axes perpendicular to a direction.
 LampPatch<double> disk(const Vec3<double>& centre, double radius, double ratio = 1) {
   const Vec3<double> away = std::abs(centre.z) < 0.9 * length(centre) ? Vec3<double>{0, 0, 1} : Vec3<double>{1, 0, 0};
   const Vec3<double> across = normalize(cross(centre, away));
@@ -30,10 +30,10 @@ bool meets(const LampPatch<double>& p, const Vec3<double>& w) {
   return t > 0 && (p.disk > 0.5 ? x * x + y * y < 1 : std::max(std::abs(x), std::abs(y)) < 1);
 }
 
-/// Light from everywhere, without an edge.
+/// Smooth light from all directions.
 double sky(const Vec3<double>& w) { return 0.6 + 0.3 * w.x - 0.2 * w.y * w.z; }
 
-/// Integral of g over the directions of a patch that is lit evenly, times `light`.
+/// Integral of g over the directions of a uniformly lit patch, times `light`.
 template <class G> double over_patch(const LampPatch<double>& p, double light, const G& g) {
   constexpr int kSteps = 96;
   const double area = length(cross(p.across, p.along));
@@ -52,7 +52,7 @@ template <class G> double over_patch(const LampPatch<double>& p, double light, c
   return sum * light;
 }
 
-/// Integral over the sky above the surface, of something that is not 0 within an angle of an axis.
+/// Integral over the sky above the surface, for an integrand that is 0 outside an angle about an axis.
 template <class G> double over_sky(const Vec3<double>& axis, double cosEnd, const G& g) {
   constexpr int kHeights = 256, kTurns = 256;
   const Vec3<double> t = normalize(cross(axis, std::abs(axis.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0})),
@@ -68,7 +68,7 @@ template <class G> double over_sky(const Vec3<double>& axis, double cosEnd, cons
   return sum * 2 * kPi * (1 - cosEnd) / (kHeights * kTurns);
 }
 
-/// What reaches the viewer from a sky and lamps of even radiance, of one sample: closures by quadrature, the drawn
+/// The light that reaches the viewer from a sky and uniform lamps, for one sample: closures by quadrature, the sampled
 /// direction by its weight.
 struct Scene {
   std::vector<LampPatch<double>> patches;
@@ -86,8 +86,8 @@ struct Scene {
   }
 };
 
-/// Lamps by the mirror direction and off it, large, small, and covering one another's lobes, but not nearer each other
-/// than their seams (against()).
+/// Lamps near the mirror direction and away from it, large, small, and inside one another's lobes, but no closer to one
+/// another than their seams (against()).
 Scene scene_for(const Vec3<double>& wo) {
   const Vec3<double> mirror = reflect(wo), beside = normalize(mirror + Vec3<double>{0.05, 0.12, 0.1});
   Scene scene;
@@ -105,9 +105,9 @@ struct Case {
   std::vector<std::string> values;
 };
 
-/// Sum of base, lamps and rest against the model, each lit by a sky and five lamps. The mean of so many draws is
-/// compared at 4.5 of its standard errors, or to 0.2 %, which quadrature may be off by. The base is that which the
-/// model declares, or a fit.
+/// Compares the sum of base, lamps and rest with the model, under a sky and five lamps. The mean over the samples must
+/// agree within 4.5 standard errors, or within 0.2 % to allow for quadrature errors. The base is declared by the model,
+/// or a fit.
 void expect_model(const Model& m, const ParamValues& values, AimedBase from = AimedBase::Declared) {
   constexpr int kDraws = 20000;
   const auto brdf = m.make_double(values);
@@ -119,7 +119,7 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
     const ClosureSum<double> base = from == AimedBase::Fitted
                                         ? fit::fit_of(m, values).closures(wo, fit::fit_of(m, values).varied(values))
                                         : brdf->base(wo);
-    // The sky's part is drawn both ways: what differs is how lamps are met.
+    // Both ways sample the sky in the same way; they differ in how lamps are found.
     const double base_lamps = base.empty() ? 0 : scene.of_lamps([&](const auto& w) { return evaluate(base, w, wo).g; });
     const double lamps = scene.of_lamps(f_cos);
     measure::Random random(7);
@@ -134,7 +134,7 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
         pair = {number.x, number.y};
       }
       const AimedSum s = aimed_sum(*brdf, base, scene.patches, wo, u, v);
-      if (lobes.empty()) {  // they do not depend on what was drawn
+      if (lobes.empty()) {  // independent of the sampled direction
         lobes = s.lobes;
         for (const AimedLobe<double>& lobe : lobes) {
           const auto value = [&](const Vec3<double>& w) { return evaluate(lobe, w); };
@@ -143,7 +143,7 @@ void expect_model(const Model& m, const ParamValues& values, AimedBase from = Ai
       }
       double given = s.rest.g * scene.radiance(s.wi) + base_lamps;
       for (std::size_t k = 0; k < s.lobes.size(); ++k) given += s.values[k].g * of_lobe[k];
-      // The base under the sky, by the same density, so that its noise is small: drawn directions see f cos - base.
+      // The base under the sky, with the same pdf to reduce noise: the sampled directions carry f cos - base.
       if (!base.empty() && s.density > 0 && s.drawn.z > 0)
         given += evaluate(base, s.drawn, wo).g / s.density * sky(s.drawn);
       sum += given / kDraws;
@@ -193,8 +193,8 @@ TEST(Aimed, AddsUpToTheModelWhereTheBaseIsAFit) {
 }
 
 TEST(Aimed, NoPointOfALampStandsForTheWholeOfIt) {
-  // Seen from beside the horizon over which the lamp stands opposite, where the closure's normal is nearly across to
-  // both: a point below its horizon once made a pixel of 1e24.
+  // A grazing view towards a lamp just above the opposite horizon, where the closure's normal is almost perpendicular
+  // to both: a point below the closure's horizon once made a pixel of 1e24.
   measure::Random random(3);
   int aimed = 0;
   for (int i = 0; i < 20000; ++i) {
@@ -209,8 +209,9 @@ TEST(Aimed, NoPointOfALampStandsForTheWholeOfIt) {
   EXPECT_GT(aimed, 5000);
 }
 
-/// A lamp of ten degrees in the flank of a lobe that falls by half over it: its points and where light sampling meets
-/// it are drawn apart, so the mean of f over the points times that of the aimed lobe over the lamp must be that of f.
+/// A lamp of ten degrees on the flank of a lobe that falls by half across it. The points on the lamp and the directions
+/// of light sampling are independent; so the product of the mean of f over the points and the mean of the aimed lobe
+/// over the lamp must be the mean of f.
 TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
   constexpr int kSteps = 64;
   const Model& m = find_model("glossy_reflector");
@@ -222,7 +223,7 @@ TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
       for (const double disk_or_not : {1.0, 0.0}) {
         LampPatch<double> lamp = disk(normalize(mirror + offset), 0.17);
         lamp.disk = disk_or_not;
-        if (lamp.centre.z < 0.3) continue;  // wholly above the surface
+        if (lamp.centre.z < 0.3) continue;  // entirely above the surface
         double mean = 0;
         AimedLamp<double> aimed;
         for (int i = 0; i < kSteps * kSteps; ++i) {
@@ -237,7 +238,8 @@ TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
   }
 }
 
-/// Lamps of which only a part shines on the point, by spread or the cone of a spot: f is averaged over that.
+/// Lamps that only partly light the point, because of their spread or the cone of a spot: f is averaged over the
+/// visible part.
 TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
   constexpr int kSteps = 64;
   double worst = 0, worst_whole = 0;
@@ -253,7 +255,7 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
                                towards = normalize(reflect(wo) + Vec3<double>{0, 0, 0.3});
             LampPatch<double> lamp = disk(towards * 5.0, 0.8);
             lamp.disk = blend > 0;
-            // Of spread the axis is the lamp's normal: the point is moved instead.
+            // The axis of the spread is the lamp's normal, so the point is moved instead.
             if (blend < 0) lamp.centre = lamp.centre + lamp.across * (5 * aside.x) + lamp.along * (5 * aside.y);
             const LampBeam<double> beam{blend < 0 ? towards : normalize(towards + aside), std::cos(angle), blend};
             const auto light = [&](const Vec3<double>& w) { return beam(w); };
@@ -261,7 +263,7 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
             const LitPart<double> part = lit_part(lamp, beam);
             if (all < 1e-4) continue;
             ASSERT_GT(dot(part.mean.across, part.mean.across), 0) << angle << " " << blend << " " << aside.x;
-            // No light is left out.
+            // No light is lost.
             EXPECT_NEAR(over_patch(part.lamp, 1, [&](const auto& w) { return meets(lamp, w) ? beam(w) : 0; }), all,
                         0.02 * all);
             const auto off = [&](const LampPatch<double>& patch, const LampPatch<double>& shining) {
@@ -286,7 +288,7 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
   std::printf("worst %.4f, with the whole lamp %.4f\n", worst, worst_whole);
 }
 
-/// Lamps that reach below the horizon, whose light from there no lobe meets: f is averaged over the part above.
+/// Lamps that reach below the horizon, from where no lobe receives light: f is averaged over the part above.
 TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
   constexpr int kSteps = 32;
   int tested = 0;
@@ -296,10 +298,10 @@ TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
     const Model& m = find_model(model);
     const auto brdf = m.make_double(values_of(m, {values}));
     for (const double cosTheta_o : {0.4, 0.8})
-      // Shaders aim at no lamp whose centre is below.
+      // Shaders do not aim at lamps whose centre is below the horizon.
       for (const double height : {0.14, 0.02, 0.0})
         for (const double turn : {kPi, 2.0})
-          // The last one rolled about its centre, so that its sides are oblique to the horizon.
+          // The last one is rotated about its centre, so that its sides are oblique to the horizon.
           for (const double roll : {-1.0, 0.0, 0.6}) {
             const Vec3<double> wo = direction(cosTheta_o, 0.3);
             LampPatch<double> lamp = disk(direction(height, 0.3 + turn) * 2.0, 0.4, 0.7);
@@ -333,7 +335,7 @@ TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
                 }
                 const double lit =
                     over_patch(lamp, 1, [&](const auto& w) { return above(w, evaluate(aimed.lobe, w)); });
-                return mean == 0 ? 0 : std::abs(mean * lit / truth - 1);  // or it is left to drawn directions
+                return mean == 0 ? 0 : std::abs(mean * lit / truth - 1);  // or it is left to random directions
               };
               const double found = off(true);
               tested += found > 0;
@@ -349,8 +351,8 @@ TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
   std::printf("%d, worst %.4f, with the whole lamp %.4f\n", tested, worst, worst_whole);
 }
 
-/// What the drawn direction carries of a lamp is a lobe 1e-3 wide: it must lie on the lamp as a whole, and beside it
-/// not at all.
+/// The sampled direction carries a lamp's light in a lobe 1e-3 wide, which must be either completely on the lamp or
+/// completely outside.
 TEST(Aimed, NothingOfTheRestReachesOverTheEdgeOfALamp) {
   measure::Random random(5);
   const auto around = [](const Vec3<double>& w, double by, const auto& all) {
@@ -401,7 +403,7 @@ TEST(Aimed, DirectionsUnderALobeHaveTheirDensity) {
       EXPECT_NEAR(pdf_under(lobe, w) * lobe.extent, 1, 1e-12);
       mean += dot(w, lobe.towards) / kSteps;
     }
-    // Over a cap the cosine is even.
+    // The cosine is uniformly distributed over a cap.
     EXPECT_NEAR(mean, (1 + lobe.cosEnd) / 2, 1e-9);
     EXPECT_NEAR(lobe.extent, 2 * kPi * (1 - lobe.cosEnd), 1e-9);
     EXPECT_EQ(pdf_under(lobe, lobe.towards * -1.0), 0);
@@ -414,7 +416,7 @@ TEST(Aimed, DirectionsFromEverywhereHaveTheirDensity) {
   for (int i = 0; i < kSteps; ++i) {
     const double z = (i + 0.5) / kSteps;
     all += 2 * kPi * everywhere_pdf(Vec3<double>{std::sqrt(1 - z * z), 0, z}) / kSteps;
-    // The share of directions below is what u gives.
+    // The fraction of directions below equals the random number.
     const Vec3<double> w = sample_everywhere(z, 0.3);
     EXPECT_NEAR((w.z * w.z + w.z) / 2, z, 1e-12);
     EXPECT_NEAR(length(w), 1, 1e-12);
@@ -428,7 +430,7 @@ TEST(Aimed, DirectionsFromEverywhereHaveTheirDensity) {
 TEST(Aimed, ProfileIsLevelAndFalls) {
   for (int i = 0; i <= 1000; ++i) {
     const double x = i / 1000.0, y = aimed_profile(x);
-    // The ramp as Cycles reads it.
+    // The ramp as Cycles evaluates it.
     const double position = 7 * x;
     const int k = std::min(int(position), 6);
     const auto ramp = aimed_ramp();

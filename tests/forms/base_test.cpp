@@ -32,7 +32,7 @@ void give(Inputs& inputs, const std::string& name, const Vec3<double>& v) {
   inputs[name + "_z"] = {v.z, v.z, v.z};
 }
 
-/// Lobe is what the conformance tests hold against Cycles, with any tangent.
+/// The conformance tests compare Lobe, with any tangent, with Cycles.
 TEST(Closure, StretchesFacetsAlongATangentOfTheSurface) {
   measure::Random random(4);
   for (const auto& [kind, lobe_kind] :
@@ -82,7 +82,7 @@ TEST(Closure, IsLevelWithinAConeAndFallsBesideIt) {
   const auto at = [&](double angle) {
     return evaluate(c, normalize(about_axis(mirror, {0, std::sin(angle), std::cos(angle)})), wo).g;
   };
-  // Over the solid angle of all of the cone.
+  // Relative to the solid angle of the whole cone.
   const double height = 0.5 / (2 * kPi * (1 - std::cos(0.25 * kPi)));
   EXPECT_NEAR(at(0), height, 1e-12);
   EXPECT_NEAR(at(0.09 * kPi), height, 1e-12);
@@ -125,9 +125,9 @@ TEST(Closure, LooksARampUpWithoutAnIndex) {
 struct Row {
   const char* model;
   std::vector<std::string> values;
-  double above, low;  ///< relative L1 seen at 10 and 75 degrees
+  double above, low;  ///< relative L1 error seen at 10 and 75 degrees
 };
-/// Bounds are a quarter above what was measured.
+/// Bounds are 25 % above the measured errors.
 const Row kRows[] = {{"ashikhmin_shirley", {}, 0.008, 0.18},
                      {"ashikhmin_shirley", {"part=specular", "rs=0.9", "nu=100", "nv=1000"}, 0.03, 0.2},
                      {"ashikhmin_shirley", {"diffuse=tabulated"}, 0.035, 0.15},
@@ -173,8 +173,8 @@ TEST(Base, CarriesWhatWasMeasured) {
   for (const auto& [name, m] : models()) EXPECT_EQ(m->has_base(), seen.count(name) == 1) << name;
 }
 
-/// In double and float, whatever the parameters and the view; over the sliders' ranges the base is never much more than
-/// the model.
+/// In double and float, for all parameters and views; within the sliders' ranges the base never exceeds the model by
+/// much.
 TEST(Base, HasWeightsThatClosuresMayHave) {
   measure::Random random(8);
   for (const auto& [name, m] : models()) {
@@ -208,7 +208,7 @@ TEST(Base, HasWeightsThatClosuresMayHave) {
   }
 }
 
-/// As the generator needs it, which prints one shader for all choices, and with few operations.
+/// The generator requires this, as it prints one shader for all choices; and it requires few operations.
 TEST(Base, IsRecordedAlikeForAllChoices) {
   measure::Random random(9);
   for (const auto& [name, m] : models()) {
@@ -223,7 +223,7 @@ TEST(Base, IsRecordedAlikeForAllChoices) {
       const ClosureSum<Expr> base = brdf->base(wo);
       std::vector<std::tuple<ClosureKind, bool, Tangent>> here;
       for (const Closure<Expr>& c : base) here.push_back({c.kind, c.turned, c.stretched});
-      if (here.empty()) continue;  // a choice without one
+      if (here.empty()) continue;  // a choice without a base
       if (kinds.empty()) kinds = here;
       EXPECT_EQ(here, kinds) << name;
       Program program;

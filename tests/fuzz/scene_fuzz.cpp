@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scene files: JSON, then meaning. What asks for many pixels or triangles is read no differently and takes long: such
-// sizes are left out, so that the time goes into what is new.
+// Scene files: JSON, then its meaning. Inputs that ask for many pixels or triangles are skipped: reading them is no
+// different but takes long.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -22,7 +22,7 @@ bool is_large(const nlohmann::json& j) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace brdfc;
-  // Depth is judged by the reader; this parser is given flat texts alone.
+  // The reader checks the nesting depth; this parser only gets inputs that are not deeply nested.
   if (std::count(data, data + size, '[') + std::count(data, data + size, '{') < 1000 &&
       is_large(nlohmann::json::parse(data, data + size, nullptr, false)))
     return 0;

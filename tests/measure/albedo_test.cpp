@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Quadrature against closed forms, and tables against quadrature.
+// Quadrature compared with closed forms, and tables compared with quadrature.
 #include "measure/albedo.h"
 
 #include <OpenImageIO/imageio.h>
@@ -28,9 +28,9 @@ namespace brdfc::measure {
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace albedo_test {
 
-// Matte, but for a spike of half a hundredth of the light in a place that no convention leads to.
+// Diffuse, except for a spike with half a percent of the light at a place that no heuristic finds.
 template <class T> struct Spiked {
-  static constexpr double kShare = 0.005, kHeight = 1e-6;  // of the light; 1 - cosine at the spike's rim
+  static constexpr double kShare = 0.005, kHeight = 1e-6;  // fraction of the light; 1 - cosine at the spike's rim
   static ModelInfo info() {
     return {.name = "spiked", .label = "", .paper = "", .equations = "", .doc = "", .properties = {}, .params = {}};
   }
@@ -98,12 +98,12 @@ TEST(Cubature, PartitionCoversTheRectangleAndClosesInOnCrowds) {
   }
   EXPECT_NEAR(area, 2, 1e-12);
   EXPECT_LT(smallest, 1e-7);
-  // Points that coincide end the search.
+  // Coinciding points end the subdivision.
   EXPECT_LT(partition({0, 1, 0, 1}, std::vector<Point2>(100, {0.3, 0.3}), 4).size(), 200u);
 }
 
 TEST(Cubature, FindsAPeakFarNarrowerThanTheNodesAreApart) {
-  // A density on the hemisphere that only its sampler knows the place of.
+  // A pdf on the hemisphere whose location only its sampler knows.
   const Model& m = find_model("radziszewski_alda");
   const BoundModel b = bind_model(m, parse_values(m.info(), {"n=1e7", "tint=1"}));
   const Vec3<double> wo = direction(0.6, 2);
@@ -120,7 +120,7 @@ TEST(Lobes, OfAChoiceThatDependsOnTheHalfVectorHaveNoCommonBorders) {
   const BoundModel b = bind_model(model, {});
   const Vec3<double> wo = direction(0.5, 1);
   EXPECT_TRUE(lobe_borders(*b.brdf, wo).empty());
-  // What Fresnel's equations give for a half vector, which these two numbers draw.
+  // The Fresnel equations for the half vector that these two numbers sample.
   const std::vector<double> one = lobe_borders(*b.brdf, wo, {0.2, 0.1}), two = lobe_borders(*b.brdf, wo, {0.9, 0.1});
   ASSERT_EQ(one.size(), 3u);
   ASSERT_EQ(two.size(), 3u);
@@ -150,7 +150,7 @@ TEST(AlbedoValue, CountsMirrorApart) {
 }
 
 TEST(AlbedoValue, IsGoodToItsErrorForRidgesThatAreThinAndCurved) {
-  // Extreme anisotropy: no reference but another method; the mean over many samples.
+  // Extreme anisotropy: the only reference is another method, the mean over many samples.
   const Model& m = find_model("ashikhmin_shirley");
   for (const auto& values : {std::vector<std::string>{"nu=1e8", "nv=1"}, {"nu=1", "nv=1e5"}, {"nu=10", "nv=1e5"}})
     for (const double c : {1., 0.5, 0.05}) {
@@ -162,7 +162,7 @@ TEST(AlbedoValue, IsGoodToItsErrorForRidgesThatAreThinAndCurved) {
     }
 }
 
-/// Mean weight of samples drawn with independent numbers, which no cubature has a part in.
+/// The mean weight of samples with independent random numbers, which does not involve cubature.
 TEST(AlbedoValue, OfALobeThatIsChosenByTheHalfVectorIsTheMeanOfSamples) {
   const detail::ModelOf<testing_models::RoughDielectric> model;
   for (const auto& [alpha, c] : {std::pair{0.3, 0.9}, {0.3, 0.2}, {0.6, -0.7}, {0.1, -0.75}}) {
@@ -208,7 +208,7 @@ TEST(AlbedoValue, AdmitsASpikeThatItMissed) {
   for (const double c : {1., 0.5, 0.05}) {
     const Albedo a = albedo(*b.brdf, c, 0.3, b.label);
     EXPECT_NEAR(a.scattered.r, 1, a.error) << c;
-    // It is not spread over the whole range either.
+    // Nor is it spread over the whole range.
     EXPECT_LT(a.error, 0.01) << c;
   }
 }
@@ -241,7 +241,7 @@ TEST(AlbedoTableOf, CoupledHasTheClosedFormsTermsAndStatedError) {
     const std::array<double, 3> rm{u(random), u(random), u(random)};
     const Rgb<double> a = lookup(t, m, {{"r0", r0}, {"rm", rm}}, c);
     const double rf = r0 + (1 - r0) * std::pow(1 - c, 5);
-    // The stated error was met at other random points: the same law, not the same numbers.
+    // The stated error was measured at other random points, so it is only statistically the same.
     EXPECT_NEAR(a.r, rf + rm[0] * (1 - rf), 1.5 * t.error);
     EXPECT_NEAR(a.b, rf + rm[2] * (1 - rf), 1.5 * t.error);
   }
@@ -261,7 +261,7 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
   std::set<int> in_both;
   for (const AlbedoTerm& term : both) in_both.insert(term.grid);
   for (const AlbedoTerm& term : specular) EXPECT_TRUE(in_both.count(term.grid));
-  // Of the tabulated diffuse term the grids are those of the specular term, taken from 1: nothing is left to lose.
+  // The tables of the tabulated diffuse term are 1 minus those of the specular term: no light is lost.
   const auto& same = t.terms_for(m, parse_values(m.info(), {"part=specular", "diffuse=tabulated"}));
   ASSERT_EQ(same.size(), specular.size());
   for (std::size_t i = 0; i < same.size(); ++i) EXPECT_EQ(same[i].grid, specular[i].grid);
@@ -270,7 +270,7 @@ TEST(AlbedoTableOf, AshikhminShirleyAveragesTheAzimuthAndSharesGridsBetweenParts
       EXPECT_NEAR(lookup(t, m, parse_values(m.info(), {"diffuse=tabulated", "rd=1", "nu=7", "nv=500", rs}), c).g, 1,
                   1e-6);
 
-  // Isotropic exponents in the slider's range, against quadrature.
+  // Equal exponents in the slider's range, compared with quadrature.
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> u;
   double worst = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Kernels drawn with any number of points, and the four heights that stand for them.
+// Kernels given by curves with any number of points, and the four heights that approximate them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -48,7 +48,8 @@ TEST(KernelLobeOf, ManyPointsOfSech2IsItsClosedForm) {
     const auto model = m.make_double({{"n", n}});
     for (const double o : kCosines)
       for (const double i : kCosines) {
-        // A chord of length h misses the curve by a twelfth of h^2 of its second derivative, at most 4 times itself.
+        // The error of a chord of length h is at most h^2 / 12 times the second derivative, which is at most 4 times
+        // the value.
         const double want = model->eval(direction(i, 2), direction(o, 1)).r;
         EXPECT_NEAR(lobe.eval(direction(i, 2), direction(o, 1)).r, want, 2 * sqr(n / 4000) * want + 1e-15)
             << n << " " << i << " " << o;
@@ -62,7 +63,7 @@ TEST(KernelLobeOf, UnevenPointsLosesNothingAndIsSampled) {
     for (const double cosine : {1., 0.6, 0.05}) {
       const auto lobe = kernel_lobe(curve, n);
       const Vec3<double> wo = direction(cosine, 0);
-      // The share of light below x = cos^2 theta_i, and the random numbers that give those x.
+      // The fraction of light below x = cos^2 theta_i, and the random numbers that give those x.
       constexpr int kSteps = 20000, kStops = 8;
       const auto drawn = [&](double u) { return sqr(lobe.sample(wo, {0, u, 0}).wi.z); };
       const bool rising = drawn(0.25) < drawn(0.75);
@@ -80,7 +81,7 @@ TEST(KernelLobeOf, UnevenPointsLosesNothingAndIsSampled) {
 }
 
 TEST(KernelFitOf, ADrawnModelGivesItBack) {
-  // Also where the curve is stretched, higher, or has points that change nothing.
+  // Also if the curve is stretched, scaled, or has points that change nothing.
   const KernelCurve curves[] = {{{0, 1, 2, 3}, {1, 0.9, 0.2, 0.3}},
                                 {{0, 0.5, 1, 1.5}, {2, 1.8, 0.4, 0.6}},
                                 {{0, 7, 14, 21, 22}, {10, 9, 2, 3, 3}},
@@ -105,7 +106,7 @@ TEST(KernelFitOf, StatesTheErrorThatSamplesFind) {
     KernelCurve curve;
     double n;
   };
-  // The last has a peak that holds little of the light.
+  // The last one has a peak with little of the light.
   for (const auto& [curve, n] :
        {Case{sech2(5, 50), 4}, Case{sech2(5, 50), 300}, Case{{{0, 0.01, 10}, {1, 0.1, 0.05}}, 4}}) {
     const KernelFit fit = fit_kernel(curve, n);
@@ -114,7 +115,7 @@ TEST(KernelFitOf, StatesTheErrorThatSamplesFind) {
     double worst = 0, mean = 0;
     for (int view = 0; view < 8; ++view) {
       const Vec3<double> wo = direction(std::sqrt((view + 0.5) / 8), 0);
-      // Both lose nothing, so that what one has less than the other is half of the difference.
+      // Both are lossless, so the deficit of one is half of the difference.
       double difference = 0;
       constexpr int kSamples = 1024;
       for (int i = 0; i < kSamples; ++i) {

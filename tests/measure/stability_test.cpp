@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rounding of every model over everything it accepts, and the measure itself against formulas known to be bad.
+// Rounding errors of every model over its whole accepted range; and the measurement itself, tested with formulas known
+// to be unstable.
 #include "measure/stability.h"
 
 #include <fmt/format.h>
@@ -16,7 +17,7 @@ namespace brdfc::measure {
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace fragile {
 
-// What textbooks print, one formula at a time.
+// Formulas as printed in textbooks, one at a time.
 enum Formula { kGood, kSineFromCosine, kSumOfOpposites, kHighPower, kNegativeRarely };
 
 template <Formula F> struct Fragile {
@@ -79,7 +80,8 @@ TEST(Rounding, RareBadValuesAreNamed) {
   }
 }
 
-/// Column `amplified` of cases.csv: units of epsilon that a model's formula may add to what rounding its inputs causes.
+/// Column `amplified` of cases.csv: the error, in units of epsilon, that a model's formula may add to the effect of
+/// rounding its inputs.
 double allowed(const std::string& model) {
   std::ifstream in(std::string(BRDFC_SOURCE_DIR) + "/tests/models/cases.csv");
   for (std::string line; std::getline(in, line);)
@@ -100,12 +102,12 @@ TEST_P(Everywhere, DoubleKeepsItsDigits) {
 }
 
 TEST_P(Everywhere, NoValueIsNanInfiniteOrNegative) {
-  // Over all models more than 1e7.
+  // More than 1e7 over all models.
   const long calls = std::max<long>(20000, long(1.2e7 * effort() / double(models().size())));
   EXPECT_GE(evaluate_everywhere(model(), calls, 1), calls);
 }
 
-/// Rare places where single precision once gave NaN or infinity, which only the long run meets by itself.
+/// Rare inputs at which single precision once gave NaN or infinity, and which only long runs find.
 TEST(SinglePrecision, StaysFiniteWhereALongHuntFoundFaults) {
   const auto at = [](const std::string& model, const ParamValues& values, const Vec3<float>& wi,
                      const Vec3<float>& wo) {
@@ -114,13 +116,13 @@ TEST(SinglePrecision, StaysFiniteWhereALongHuntFoundFaults) {
     EXPECT_TRUE(std::isfinite(brdf->eval(wi, wo).r)) << model << " f=" << brdf->eval(wi, wo).r;
     EXPECT_TRUE(std::isfinite(brdf->pdf(wi, wo))) << model << " pdf=" << brdf->pdf(wi, wo);
   };
-  // The density of half vectors over a cosine of 1e-12.
+  // The pdf of half vectors divided by a cosine of 1e-12.
   at("schlick", {{"rough", 5.3e-33}, {"p", 0.59}}, {-1, 0, 1.1e-12f}, {1, 0, 1.1e-12f});
-  // A Gaussian that underflows, over a norm that does, for facets as steep as there are.
+  // A Gaussian that underflows divided by a norm that does, for the steepest half vectors.
   at("ward", {{"ax", 1.}, {"ay", 0.00325}}, {-0.6f, -0.8f, 2.7e-13f}, {0.6001f, 0.7999f, 1.1e-12f});
 }
 
-/// The same between directions that are opposite but for their heights, where half vectors are differences of rounding.
+/// The same for directions that are opposite except for their heights, where half vectors consist of rounding errors.
 TEST(SinglePrecision, StaysFiniteBetweenOppositeDirectionsLowAboveTheSurface) {
   const auto sweep = [](const std::string& model, const ParamValues& values) {
     const Model& m = find_model(model);
@@ -149,7 +151,7 @@ TEST(SinglePrecision, StaysFiniteBetweenOppositeDirectionsLowAboveTheSurface) {
 TEST_P(Everywhere, SinglePrecisionAndTheRecordedProgramFollow) {
   for (const auto& [decade, row] : single_precision_by_decade(model(), std::max(4, int(40 * effort())), 100, 1)) {
     const double limit = decade <= 5 ? 1e-3 : 1e-2;
-    // What the rounding of the directions alone does to a lobe as narrow as that is no fault of a formula.
+    // For such a narrow lobe, the effect of rounding the directions is not the formula's fault.
     EXPECT_LE(row.native, std::max(limit, 4 * row.inherent)) << "1e" << decade << ": " << row.where;
     EXPECT_LE(row.recorded, std::max(limit, 4 * row.inherent)) << "1e" << decade << ": " << row.where;
   }

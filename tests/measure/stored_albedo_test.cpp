@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of albedos that are kept: those of the models as they are, and what a tabulation would find.
+// Stored albedo tables: they belong to the current models, and equal what a tabulation would give.
 #include "measure/stored_albedo.h"
 
 #include <fmt/format.h>
@@ -62,7 +62,7 @@ std::vector<const Model*> stored() {
   return out;
 }
 
-/// None is of a formula that is no more; script/fits makes them anew. A model without one is tabulated for each pack.
+/// None belongs to an outdated formula; script/fits makes them again. A model without one is tabulated for each pack.
 TEST(StoredAlbedos, BelongToTheFormulas) {
   std::set<std::filesystem::path> expected, found;
   for (const Model* model : stored()) expected.insert(stored_albedo(*model).path());
@@ -95,8 +95,8 @@ TEST(StoredAlbedos, AreReadNumberForNumber) {
   EXPECT_EQ(scales.size(), 3u) << "linear, log and log1p";
 }
 
-/// One model by what BRDFC_CELL is: script/test sets it to the commit, so that in time all are made. Another processor
-/// rounds otherwise, which may move knots: each is as close to the truth as it says.
+/// Tests one model, selected by BRDFC_CELL: script/test sets it to the commit, so that all are tested in the course of
+/// time. Rounding on other processors may move knots, so each table is compared with its stated error.
 TEST(StoredAlbedos, AreWhatIsMadeAnew) {
   const char* given = std::getenv("BRDFC_CELL");
   const std::string choice = given ? given : "";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fresnel's equations, against the textbook's forms. Values of arbitrary precision are in golden.csv.
+// The Fresnel equations compared with their textbook form. golden.csv has values of arbitrary precision.
 #include "model/fresnel.h"
 
 #include <gmock/gmock.h>
@@ -45,7 +45,7 @@ TEST(Fresnel, DielectricEqualsTheConductorWithoutAbsorptionAndLosesNothing) {
 }
 
 TEST(Fresnel, SchlicksErrorForDielectricsIsAsTheyReport) {
-  // Against the full equations over all angles; the approximation was made for these.
+  // Compared with the full equations over all angles; the approximation was made for these parameters.
   const auto error = [](double eta) {
     const double r0 = sqr((eta - 1) / (eta + 1));
     double worst = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shading normals that differ from the surface's own.
+// Shading normals that differ from the geometric normal.
 #include "model/horizon.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ using Vector = Vec3<double>;
 
 Vector unit(const Vector& v) { return v / length(v); }
 
-/// On the side of the z axis.
+/// A random direction on the side of the z axis.
 Vector any_above(std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   return unit({uniform(random), uniform(random), std::abs(uniform(random))});
@@ -32,7 +32,7 @@ TEST(Horizon, ABentNormalBringsTheMirrorDirectionJustAboveTheSurface) {
     ASSERT_NEAR(length(now), 1, 1e-12);
     ASSERT_NEAR(dot(mirrored, geometric), least_mirror_rise(wo.z), 1e-9) << "view " << wo.z;
     ASSERT_GT(dot(now, wo), 0) << "the viewer sees it";
-    // Between both normals, and in their plane.
+    // Between both normals, in their plane.
     ASSERT_NEAR(dot(cross(geometric, n), now), 0, 1e-9);
     ASSERT_GE(dot(now, geometric), dot(n, geometric) - 1e-9);
     ASSERT_GE(dot(now, n), dot(n, geometric) - 1e-9);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Spectra, substances of measured n and k, and the indices that stand for these in three channels, against published
-// numbers and the spectral integral.
+// Spectra, substances with measured n and k, and their approximation by an index for each channel, compared with
+// published numbers and with the spectral integral.
 #include "model/optical.h"
 
 #include <gmock/gmock.h>
@@ -19,13 +19,13 @@ using testing::HasSubstr;
 
 TEST(Spectrum, EachOfXyzIsAMean) {
   for (const double x : xyz_of([](double) { return 0.7; })) EXPECT_NEAR(x, 0.7, 1e-14);
-  // D65's luminous share beyond 555 nm, and that Z has nothing there.
+  // The fraction of D65's luminance beyond 555 nm; Z is 0 there.
   const Xyz red = xyz_of([](double nm) { return nm > 600 ? 1. : 0.; });
   EXPECT_GT(red[0], 0.3);
   EXPECT_LT(red[2], 1e-4);
 }
 
-/// X, Y and Z of white, by D65's chromaticity.
+/// X, Y and Z of white, from D65's chromaticity.
 constexpr double kWhiteX = 0.3127 / 0.3290, kWhiteZ = (1 - 0.3127 - 0.3290) / 0.3290;
 
 std::array<double, 3> rec709(const Xyz& xyz) {
@@ -40,7 +40,7 @@ std::array<double, 3> rec2020(const Xyz& xyz) {
           0.0176399 * X - 0.0427706 * Y + 0.9421031 * Z};
 }
 
-/// X, Y and Z themselves as channels.
+/// Uses X, Y and Z themselves as channels.
 std::array<double, 3> as_it_is(const Xyz& xyz) { return xyz; }
 
 const Substance& substance(const std::string& name) {
@@ -58,7 +58,7 @@ TEST(Substances, AreMeasuredAndHaveASource) {
   EXPECT_EQ(substance("copper").n.at(548.6), 1.02);  // Johnson and Christy's table
   EXPECT_EQ(substance("copper").k.at(548.6), 2.577);
   EXPECT_NEAR(substance("aluminium").reflectance(1)[1], 0.914, 0.003);
-  // SCHOTT's data sheets: n_d 1.51680, 1.78472; Abbe's number 64.17, 25.68.
+  // SCHOTT's data sheets: n_d 1.51680, 1.78472; Abbe numbers 64.17, 25.68.
   EXPECT_NEAR(substance("bk7").index_d(), 1.5168, 2e-5);
   EXPECT_NEAR(substance("bk7").abbe(), 64.17, 0.1);
   EXPECT_NEAR(substance("sf11").index_d(), 1.78472, 5e-5);
@@ -67,7 +67,7 @@ TEST(Substances, AreMeasuredAndHaveASource) {
   for (const char* name : {"water", "diamond", "bk7"}) EXPECT_FALSE(substance(name).conductor());
 }
 
-/// Prints the error of a channel's index against the spectrum, and Schlick's beside it.
+/// Prints the error of a channel's index relative to the spectrum, and that of Schlick's formula.
 TEST(Substances, AnIndexStandsForAChannel) {
   std::printf("largest error of the reflectance over all angles: index, Schlick's formula from R_0\n");
   for (const Substance& s : substances())
@@ -77,7 +77,7 @@ TEST(Substances, AnIndexStandsForAChannel) {
       double own = 0, schlick = 0;
       for (std::size_t c = 0; c < 3; ++c) {
         const bool outside = v.unclipped[c] > kBrightest;
-        // Exactly, from above.
+        // Exact at normal incidence.
         EXPECT_NEAR(fresnel_conductor(1., 0., v.n[c], v.k[c]), std::min(v.unclipped[c], kBrightest), 1e-9) << s.name;
         EXPECT_EQ(outside, s.name == "gold" && !wide && c == 0) << "gold is outside of Rec.709; " << s.name << " " << c;
         if (outside) continue;
@@ -91,7 +91,7 @@ TEST(Substances, AnIndexStandsForAChannel) {
       std::printf("  %-10s %s  %.5f  %.4f   R_0 %.4f %.4f %.4f\n", s.name.c_str(), wide ? "Rec.2020" : "Rec.709 ", own,
                   schlick, v.unclipped[0], v.unclipped[1], v.unclipped[2]);
       EXPECT_LT(own, s.name == "copper" && !wide ? 5.5e-3 : 3e-3) << s.name;
-      // Schlick's formula misses the dip that metals with large k have before grazing.
+      // Schlick's formula lacks the dip that metals with large k have near grazing angles.
       if (s.name == "aluminium" || s.name == "iron" || s.name == "chromium") {
         EXPECT_GT(schlick, 0.1) << s.name;
       }
@@ -102,7 +102,7 @@ TEST(Substances, OfOneIndexKeepIt) {
   const std::vector<double> nm = {400, 700};
   for (const double n : {0.2, 1.33, 1.5, 2.4})
     for (const double k : {0., 0.5, 3.}) {
-      if (n < 1 && k == 0) continue;  // then nothing tells n from 1 / n but what is beyond the critical angle
+      if (n < 1 && k == 0) continue;  // here only the range beyond the critical angle distinguishes n from 1 / n
       const OpticalValues v = optical_values({"", "", "", {nm, {n, n}}, {nm, {k, k}}}, as_it_is);
       for (std::size_t c = 0; c < 3; ++c) {
         EXPECT_NEAR(v.n[c], n, 2e-4) << n << " " << k;
@@ -130,7 +130,7 @@ TEST(Substances, SetWhatAModelHas) {
       EXPECT_THAT(e.what(), AllOf(HasSubstr(model), HasSubstr(name[0] == 'g' ? "which metal" : "which glass")));
     }
   }
-  // The model's values are accepted, and it reflects the substance's light.
+  // The model accepts the values, and reflects the substance's colour.
   const measure::BoundModel b =
       measure::bind_model(find_model("fresnel_conductor"), set("fresnel_conductor", "silver"));
   const auto expected = rec709(substance("silver").reflectance(0.5));
@@ -139,7 +139,7 @@ TEST(Substances, SetWhatAModelHas) {
   EXPECT_NEAR(got.b, expected[2], 1e-3);
 }
 
-/// Against what was measured, where the channels stand.
+/// Compared with measurements, at the channels' wavelengths.
 TEST(Dispersion, CauchysSeriesIsThatOfGlassWaterAndGems) {
   for (const char* name : {"bk7", "f2", "sf11", "silica", "water", "sapphire", "diamond"}) {
     const Substance s = find_substance(name, ".");
@@ -155,7 +155,7 @@ TEST(Dispersion, CauchysSeriesIsThatOfGlassWaterAndGems) {
 
 TEST(Dispersion, WithoutItAllChannelsHaveTheIndex) {
   for (const double index : {0.1, 1.0, 1.5, 10.0}) EXPECT_EQ(dispersed(index, 0.0), (std::array{index, index, index}));
-  // At the end of what is accepted no index is 0.
+  // At the end of the accepted range, no index is 0.
   for (const double n : dispersed(0.1, 2.0)) EXPECT_GT(n, 0);
 }
 
@@ -180,7 +180,7 @@ TEST(Dispersion, EachChannelIsRefractedByItsIndex) {
       EXPECT_EQ(sum[1].weight.g, 0);
       EXPECT_EQ(sum[2].weight.r > 0, dispersion == 0);
       EXPECT_EQ(sum[3].weight.b > 0, dispersion > 0);
-      // By Fresnel's equations for that channel alone.
+      // By the Fresnel equations for that channel alone.
       for (std::size_t c = 0; c < 3; ++c) {
         const auto alone = m.make_double({{"ior", n[c]}});
         EXPECT_DOUBLE_EQ((std::array{through.r, through.g, through.b}[c]), alone->transmit(wo).g);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Models that are declared wrongly.
+// Models with wrong declarations.
 #include "model/registry.h"
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@ namespace registry_test {
 
 enum class Wrong { Nothing, First, Middle, Last, Only, Twice };
 
-/// Minnaert's parameters and a choice, bound as they should be or not.
+/// Minnaert's parameters and a choice, bound correctly or not.
 template <Wrong W> struct Draft {
   template <class T> struct Type {
     Rgb<T> rho;
@@ -34,7 +34,7 @@ template <Wrong W> struct Draft {
 
 template <class T> struct OneNumber {
   T k{1};
-  static constexpr double kOf = 2;  // a constant is no member
+  static constexpr double kOf = 2;  // a constant is not a member
 
   static ModelInfo info() { return {.name = "draft", .look = Look::Matte}; }
   template <class Visitor> void parameters(const Visitor&) {}
@@ -71,7 +71,7 @@ struct Declared : Model {
   ModelInfo own;
 };
 
-/// A first draft, which leaves out what there is nothing to say of: that compiles without a warning.
+/// A first draft, which omits everything optional: it must compile without a warning.
 ModelInfo draft() {
   ModelInfo info{.name = "draft", .look = Look::Matte};
   ParamInfo k;
@@ -82,7 +82,7 @@ ModelInfo draft() {
 void add(Registry& registry, const ModelInfo& info, const char* file = "draft.cpp") {
   registry.add(std::make_unique<Declared>(info), file);
 }
-/// What asking for the models then says.
+/// The error when models are requested.
 std::string complaint(const ModelInfo& info) {
   Registry registry;
   add(registry, info);
@@ -169,7 +169,7 @@ TEST(Registry, RefusesLabelsThatOtherSocketsHave) {
   EXPECT_THAT(complaint(info), HasSubstr("draft: m: expected another label than 'Glossiness'"));
 }
 
-/// What asking for the models says of one whose class this is.
+/// The error when models are requested, for a model of this class.
 template <template <class> class M> std::string complaint_of() {
   Registry registry;
   registry.add(std::make_unique<detail::ModelOf<M>>(), "draft.cpp");

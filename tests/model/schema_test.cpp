@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a schema says of its numbers.
+// How a schema describes its numbers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ TEST(Schema, ASliderMayHaveAnotherScaleThanAllThatIsAccepted) {
   EXPECT_EQ(find_model("coupled").info().param("r0")->accepted().scale, AxisScale::Linear);
 }
 
-/// Nothing is guessed from a range, so a range of many powers of ten is a declaration forgotten.
+/// The scale is not derived from the range, so a range over many powers of ten indicates a missing declaration.
 TEST(Schema, WideRangesGoByFactors) {
   for (const auto& [name, model] : models())
     for (const ParamInfo& p : model->info().params)

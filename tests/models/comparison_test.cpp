@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The faults of the classic models that the papers on their successors name, each as a number. A model that lost its
-// fault would no longer be the model. Albedos were integrated by make_golden.py.
+// The flaws of the classic models, as described by the papers on their successors, each as a number. A model without
+// its flaw would not be that model. Albedos were integrated by make_golden.py.
 #include <gtest/gtest.h>
 
 #include <boost/math/special_functions/ellint_1.hpp>
@@ -19,23 +19,23 @@ measure::BoundModel bind(const char* model, const std::vector<std::string>& valu
 
 double degrees(double angle) { return angle * kPi / 180; }
 
-/// In the plane of incidence, on the far side from the viewer at negative angles.
+/// A direction in the plane of incidence; negative angles are on the side opposite to the viewer.
 Vec3<double> in_plane(double angle) { return {std::sin(angle), 0, std::cos(angle)}; }
 
 double f(const measure::BoundModel& b, const Vec3<double>& wi, const Vec3<double>& wo) {
   return b.brdf->eval(wi, wo).g;
 }
 
-/// Albedo at a polar angle in degrees.
+/// The albedo at a polar angle in degrees.
 double albedo_at(const measure::BoundModel& b, double angle) {
   return measure::albedo(*b.brdf, std::cos(degrees(angle))).total().g;
 }
 
-/// How far the slopes of f on both sides of `angle` differ, as wi moves through the plane of incidence, in units of f.
+/// The difference of f's slopes on both sides of `angle`, as wi moves in the plane of incidence, relative to f.
 double slope_jump(const measure::BoundModel& b, double angle, const Vec3<double>& wo) {
   const double h = 1e-4;
   const auto at = [&](double offset) { return f(b, in_plane(angle + offset), wo); };
-  // Second order on each side.
+  // Second-order differences on each side.
   const double right = (-3 * at(0) + 4 * at(h) - at(2 * h)) / (2 * h);
   const double left = (3 * at(0) - 4 * at(-h) + at(-2 * h)) / (2 * h);
   return std::abs(right - left) / at(0);
@@ -84,7 +84,7 @@ TEST(MaxPhong, HasAHighlightOfOneBrightnessAndAnEdge) {
 }
 
 TEST(Cavities, HaveAnEdgeWhereFacetsBeginToBlock) {
-  // Where the smaller of the terms of G that block reaches 1, by bisection.
+  // Finds by bisection where the smaller of the blocking terms in G reaches 1.
   const Vec3<double> wo = in_plane(degrees(50));
   const auto blocked = [&](double angle) {
     const Vec3<double> wi = in_plane(angle), h = normalize(wi + wo);
@@ -117,7 +117,7 @@ TEST(Ward, OnlyTheBoundedNormalisationKeepsWithinOne) {
   EXPECT_NEAR(at("bounded", 0.001), 0.989784, 1e-5);
   EXPECT_NEAR(at("ward", 0.5), 0.422328, 1e-6);  // half of the light is lost at 60 degrees
   EXPECT_NEAR(at("ward", 0.1), 0.232096, 1e-6);
-  EXPECT_NEAR(at("ward", 0.001), 1.363675, 1e-5);  // and gained beside the horizon
+  EXPECT_NEAR(at("ward", 0.001), 1.363675, 1e-5);  // and gained near the horizon
   EXPECT_NEAR(at("duer", 0.1), 1.160863, 1e-6);
   EXPECT_NEAR(at("duer", 0.01), 7.164212, 1e-5);
 }
@@ -137,7 +137,7 @@ TEST(OrenNayar, GainsAtGrazingAnglesAndBarelyStaysPositive) {
   };
   EXPECT_NEAR(at("form=full", "sigma=0.3"), 1.043471, 2e-6);
   EXPECT_NEAR(at("form=qualitative", "sigma=0.2"), 1.014282, 2e-6);
-  // Opposite to the light, both grazing: what is left of Lambert's 1 at the end of the accepted range.
+  // Both directions grazing and opposite: the remainder of Lambert's 1 at the end of the accepted range.
   const measure::BoundModel b = bind("oren_nayar", {"rho=1e-6", "sigma=0.66"});
   const double left = f(b, in_plane(degrees(-89.999)), in_plane(degrees(89.999))) * kPi / 1e-6;
   EXPECT_GT(left, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ways to ask a bound model for the same thing.
+// Different ways to evaluate a bound model give the same result.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -19,7 +19,7 @@ Vec3<double> any_direction(std::mt19937_64& random) {
   return direction(std::max(u(random), 1e-6), 2 * kPi * u(random));
 }
 
-/// Defaults, both ends of each number that artists are offered, every choice.
+/// The defaults, both ends of each number's slider, and every choice.
 std::vector<ParamValues> corners(const Model& m) {
   std::vector<ParamValues> out{values_of(m, {})};
   for (const ParamInfo& p : m.info().params) {
@@ -45,7 +45,7 @@ Directions any_directions(const Model& m, std::mt19937_64& random) {
   for (std::size_t k = 0; k < kLanes; ++k) {
     d.wi[k] = any_direction(random);
     d.wo[k] = any_direction(random);
-    // Half of them near the mirror direction, where sharp lobes are not 0.
+    // Half of them near the mirror direction, where narrow lobes are not 0.
     if (k % 2) {
       d.wi[k] = {-d.wo[k].x, -d.wo[k].y, d.wo[k].z};
       d.wi[k].x += 1e-3 * number(random), d.wi[k] = normalize(d.wi[k]);
@@ -62,7 +62,7 @@ Vec3<Pack> pack(const std::array<Vec3<double>, kLanes>& from) {
   return out;
 }
 
-/// The vector library's last digits are other ones, which some formulas enlarge.
+/// The vector library differs in the last digits, which some formulas amplify.
 void expect_close(double packed, double alone, const std::string& what) {
   ASSERT_NEAR(packed, alone, 1e-9 * std::abs(alone) + 1e-290) << what;
 }
@@ -109,7 +109,7 @@ TEST_P(EveryModelBound, TakesEightAtOnceAsOneByOne) {
   EXPECT_TRUE(lit > 100 || !m.has_scatter());
 }
 
-/// The light of a path depends on no other path.
+/// A path's light must not depend on other paths.
 TEST_P(EveryModelBound, LanesKnowNothingOfEachOther) {
   const Model& m = find_model(GetParam());
   const auto packed = m.make_packed(values_of(m, {}));
@@ -133,7 +133,7 @@ TEST_P(EveryModelBound, LanesKnowNothingOfEachOther) {
   }
 }
 
-/// A parameter that is assigned later is as good as one that was there from the start.
+/// Assigning a parameter later has the same effect as setting it from the start.
 TEST_P(EveryModelBound, TakesParametersAnew) {
   const Model& m = find_model(GetParam());
   std::mt19937_64 random(2);
@@ -153,7 +153,7 @@ TEST_P(EveryModelBound, TakesParametersAnew) {
       ASSERT_EQ(brdf->eval(wi, wo).g, expected->eval(wi, wo).g) << p.name;
       ASSERT_EQ(brdf->mirror(wo).g, expected->mirror(wo).g) << p.name;
     }
-    // Eight at once, of which one gets the new value and the others keep theirs.
+    // Of eight lanes, one gets the new value and the others keep theirs.
     const auto packed = m.make_packed(values_of(m, {})), all_new = m.make_packed(values);
     const auto old = p.kind == ParamKind::Number ? std::array<double, 3>{std::get<double>(values_of(m, {})[p.name])}
                                                  : std::get<std::array<double, 3>>(values_of(m, {})[p.name]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the papers say of these models in words or pictures, as numbers: also the defects.
+// What the papers state about these models in words or pictures, as numbers; including the flaws.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,7 @@ void expect_albedo(const measure::BoundModel& b, double cosTheta, double wanted)
 }
 
 TEST(GlossyReflector, LostRaysHalveTheSilhouetteAndTurnedRaysDoNot) {
-  // Figs. 25.5 and 25.7. A cosine lobe (e = 1) about r keeps (1 + cos theta) / 2 of itself above the surface.
+  // Figs. 25.5 and 25.7. Of a cosine lobe (e = 1) about r, (1 + cos theta) / 2 is above the surface.
   const measure::BoundModel lose = bound("glossy_reflector", {"kr=0.8", "e=1", "below=lose"}),
                             mirror = bound("glossy_reflector", {"kr=0.8", "e=1", "below=mirror"});
   for (const double c : {1., 0.7, 0.4, 0.1, 0.01, 1e-3}) {
@@ -76,7 +76,7 @@ TEST(GlossySpecular, ScaleDecidesWhetherLightIsGained) {
     EXPECT_NEAR(at_normal("normalisation=book"), 2 * kPi / (e + 2), 1e-6);
     EXPECT_NEAR(at_normal("normalisation=estimator"), (e + 1) / (e + 2), 1e-6);
     EXPECT_NEAR(at_normal("normalisation=conserving"), 1, 1e-6);
-    // Never more at other angles: the cosine that eq. 25.7 leaves out is still there.
+    // It is never higher at other angles, because the cosine that eq. 25.7 omits is still there.
     const measure::BoundModel b = bound("glossy_specular", {"ks=1", exponent, "normalisation=conserving"});
     double before = 1 + 1e-6;
     for (int i = 19; i >= 1; --i) {
@@ -147,7 +147,7 @@ TEST(AshikhminShirley, Eq12WithTheTrueAlbedoLosesNothingWhereEq14LosesHalf) {
     for (const char* rs : {"rs=0", "rs=0.05", "rs=1"}) {
       const measure::BoundModel b = bound("ashikhmin_shirley", {"diffuse=tabulated", "rd=1", rs, nu, nv});
       for (const double c : {1., 0.5, 0.174, 0.05}) {
-        // Samples, because sharp lobes take quadrature long.
+        // By samples, because quadrature of narrow lobes takes long.
         const measure::SampledAlbedo a = measure::sampled_albedo(*b.brdf, c, 0.3, b.label, 1 << 13);
         const double off = std::abs(a.scattered.g - 1);
         EXPECT_LE(off, stated + 4 * a.standard_error) << b.label << " cos_theta_o=" << c;
@@ -169,7 +169,7 @@ TEST(Coupled, Eq6IsInvertedToMachinePrecision) {
   const measure::BoundModel b = bound("coupled", {});
   double worst = 0;
   for (int i = 0; i < 4000; ++i) {
-    // Up to 1 and down to where the shape is 7/2 c^3.
+    // Up to 1, and down to where the function is 7/2 c^3.
     const double xi = i % 2 ? (i + 0.5) / 4000 : std::exp2(-i / 8.);
     const long double c = b.brdf->sample({0.6, 0, 0.8}, {0.5, xi, 0.25}).wi.z;
     const long double F = c * c * c * (3.5L - c * (5.25L - c * (4.2L - c * (1.75L - 0.3L * c))));

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes golden.csv: values by an implementation that shares nothing with the generator.
+"""Writes golden.csv: values of an implementation that shares no code with the generator.
 
-The formulas are typed in from the papers as printed (with their errata, see the models'
-headers) and evaluated with mpmath in as many digits as they need; albedos are integrated by
-mpmath. Run it after adding a model:  python3 tests/models/make_golden.py [MODEL...]
-With models named, the rows of the others stay as they are.
+The formulas are typed in from the papers as printed (with the errata in the models' headers) and
+evaluated by mpmath with as many digits as they need; albedos are integrated by mpmath. Run it after
+adding a model:  python3 tests/models/make_golden.py [MODEL...]
+If models are named, the rows of the others stay as they are.
 
-A row's tolerance is what the rounding of its inputs to double precision can cause (measured
-here, by moving each input by half a unit in the last place), times a small factor, plus a floor.
+A row's tolerance is the error that rounding the inputs to double precision can cause (measured here
+by changing each input by half a unit in the last place), times a small factor, plus a floor.
 """
 
 import csv
@@ -22,7 +22,7 @@ import numpy as np
 
 OUT = Path(__file__).with_name("golden.csv")
 FLOOR = 1e-14
-ROUNDINGS = 16  # how many such roundings a formula may add up
+ROUNDINGS = 16  # number of such rounding errors that a formula may accumulate
 
 
 normalise = True
@@ -103,7 +103,7 @@ def gauss(n, a, b):
 
 @functools.cache
 def as_rest(cos_o, phi_o, nu, nv, rs):
-    """1 - R(k) of eq. 12 over half vectors, for exponents that are not large."""
+    """1 - R(k) of eq. 12, integrated over half vectors, for exponents that are not large."""
     theta, weight = gauss(300, 0, math.pi / 2)
     theta, weight = theta[:, None], weight[:, None]
     phi = 2 * math.pi * (np.arange(360) + 0.5) / 360
@@ -126,7 +126,7 @@ def as_rest_mean(nu, nv, rs):
 
 
 def as_pdf(p, wi, wo):
-    """Of one part alone: how often "both" takes each is the sampler's choice, not the paper's."""
+    """For a single part: the probabilities in "both" are the sampler's choice, not the paper's."""
     k1, k2, h = as_half(wi, wo)
     if p["part"] == "specular":
         return as_ph(p, h) / (4 * dot(h, k2))
@@ -136,7 +136,8 @@ def as_pdf(p, wi, wo):
 
 
 def as_albedo(p, cos_o):
-    """Specular part, rotation 0, view in the x-z plane, over half vectors: p_h is smooth there."""
+    """Specular part, rotation 0, view in the x-z plane; integrated over half vectors, where p_h is
+    smooth."""
     fp, rs, nu, nv = mp.fp, p["rs"][0], p["nu"], p["nv"]
     sin_o = math.sqrt(1 - cos_o**2)
 
@@ -152,9 +153,9 @@ def as_albedo(p, cos_o):
         return p_h * (rs + (1 - rs) * (1 - kh) ** 5) * cos_i / max(cos_i, cos_o) * s
 
     def ring(phi):
-        # cos_i / cos_o = cos 2t + a sin 2t = r cos(2t - s): the edge of the support is where it
-        # is 0, the kink of max() where it is 1. Between these theta_h = t is smooth; the lobe's
-        # own width needs cuts as well.
+        # cos_i / cos_o = cos 2t + a sin 2t = r cos(2t - s): the support ends where it is 0, and
+        # max() has a kink where it is 1. Between these, the integrand is smooth in theta_h = t; the
+        # lobe's width requires cuts as well.
         a = sin_o * math.cos(phi) / cos_o
         r, s = math.hypot(1, a), math.atan(a)
         width = 6 / math.sqrt(max(nu, nv) + 1)
@@ -191,7 +192,7 @@ def coupled_albedo(p, cos_o):
 
 
 def full_fresnel(r0, c):
-    """Unpolarised reflectance by Snell's law and Fresnel's equations; the index is that of R_0."""
+    """Unpolarised reflectance by Snell's law and the Fresnel equations, with the index for R_0."""
     s = mp.sqrt(mp.mpf(r0))
     eta = (1 + s) / (1 - s)
     cos_t = mp.sqrt(1 - (1 - c * c) / eta**2)
@@ -210,7 +211,7 @@ def mean_transmission(r0):
 
 def coupled_full_f(p, wi, wo):
     if isinstance(p["r0"], mp.mpf):
-        mean = mean_transmission(float(p["r0"]))  # as smooth as R_0 itself: not what rounding moves
+        mean = mean_transmission(float(p["r0"]))  # smooth in R_0, so rounding changes nothing
     else:
         mean = mean_transmission(p["r0"])
     through = [1 - full_fresnel(p["r0"], vec(w)[2]) for w in (wi, wo)]
@@ -239,7 +240,7 @@ def gr_pdf(p, wi, wo):
     if c <= 0:
         return mp.mpf(0)
     density = (p["e"] + 1) / (2 * mp.pi) * c ** p["e"]
-    # The ray that is turned to k1 starts out at 2 (r.k1) r - k1.
+    # The ray that is rotated to k1 originally goes to 2 (r.k1) r - k1.
     folded = p["below"] == "mirror" and 2 * c * k2[2] - k1[2] < 0
     return density * (2 if folded else 1)
 
@@ -249,9 +250,11 @@ def gr_f(p, wi, wo):
 
 
 def lobe_above(e, cos_o, cosine):
-    """Integral of cos^e alpha, times the cosine if wanted, over the lobe's part above the surface.
+    """Integral of cos^e alpha, optionally times the cosine, over the part of the lobe above the
+    surface.
 
-    About r the cosine is a + b cos(phi), positive on an arc that is known for each alpha.
+    On a circle about r the cosine is a + b cos(phi), which is positive on an arc known for each
+    alpha.
     """
     cos_o, e = mp.mpf(cos_o), mp.mpf(e)
     sin_o = mp.sqrt(1 - cos_o**2)
@@ -262,7 +265,7 @@ def lobe_above(e, cos_o, cosine):
         arc = 2 * (a * half + b * mp.sin(half)) if cosine else 2 * half
         return mp.cos(alpha) ** e * mp.sin(alpha) * arc
 
-    whole = mp.acos(sin_o) if sin_o < 1 else mp.mpf(0)  # rings up to here are whole
+    whole = mp.acos(sin_o) if sin_o < 1 else mp.mpf(0)  # rings up to here are complete
     width = min(mp.pi / 2, 8 / mp.sqrt(e))
     cuts = sorted({mp.mpf(0), width / 3, width, whole, mp.pi / 2})
     return mp.quad(ring, cuts)
@@ -295,7 +298,7 @@ def gs_albedo(p, cos_o):
 
 
 def pm_parts(p):
-    """The material's highlight and reflection as the models of those names have them."""
+    """The material's highlight and reflection as in the models of those names."""
     specular = {"ks": p["ks"], "cs": p["cs"], "e": p["es"], "normalisation": "book"}
     return specular, {"kr": p["kr"], "cr": p["cr"], "e": p["e"], "below": "mirror"}
 
@@ -308,7 +311,7 @@ def pm_f(p, wi, wo):
 
 
 def pm_pdf(p, wi, wo):
-    """Where one term is alone: how often each is drawn is the sampler's choice."""
+    """For a single term: the probabilities of the terms are the sampler's choice."""
     specular, reflection = pm_parts(p)
     of_terms = {"kd": lambert_pdf, "ks": gs_pdf, "kr": gr_pdf}
     terms = [k for k in of_terms if p[k] > 0]
@@ -380,9 +383,9 @@ def ra_f(p, wi, wo):
     ki, ko = vec(wi), vec(wo)
     factor = mp.mpf(1)
     if p["around"] == "refraction":
-        # Snell's law carries what is inside (z < 0) to the thin side.
+        # Snell's law maps directions inside (z < 0) to the outside.
         if ki[2] * ko[2] >= 0:
-            return [mp.mpf(0)] * 3  # pairs beyond the critical angle are not among these tests
+            return [mp.mpf(0)] * 3  # pairs beyond the critical angle are not tested
         if ki[2] < 0:
             factor = mp.mpf(p["ior"]) ** 2
         carried = []
@@ -448,8 +451,9 @@ def kernel(name, heights, u):
 
 @functools.cache
 def lossless_place(name, heights, n, x):
-    """x' with marginal x, the marginal's density there, the kernel's integral over the square."""
-    # Cut at the peak, at a curve's knots and where it has faded.
+    """x' whose marginal is x, the marginal's density there, and the kernel's integral over the
+    square."""
+    # Cuts at the peak, at a curve's knots, and where it has decayed.
     peak = [s * w / n for s in (-1, 1) for w in (1, 2, 3, 4, 5, 12, 30, 60)] + [0]
 
     def integral(of, low, high, *cuts):
@@ -460,7 +464,8 @@ def lossless_place(name, heights, n, x):
         return integral(lambda d: kernel(name, heights, n * d), -t, 1 - t)
 
     def mass(t):
-        """Of the strip below t: by the difference d, and the length of the line where it is d."""
+        """Integral over the strip below t: by the difference d, weighted by the length of the line
+        on which it is d."""
         return integral(
             lambda d: kernel(name, heights, n * d) * (min(t, 1 - d) - max(0, -d)),
             -t,
@@ -469,7 +474,7 @@ def lossless_place(name, heights, n, x):
         )
 
     whole = mass(mp.mpf(1))
-    # Newton's steps from a bracket: the density is known.
+    # Newton's method in a bracket, as the density is known.
     low, high, at = mp.mpf(0), mp.mpf(1), x
     for _ in range(60):
         error = mass(at) / whole - x
@@ -502,7 +507,7 @@ def lossless_pdf(p, wi, wo):
 
 
 def fresnel(c, eta):
-    """Both polarisations' mean reflectance for a complex relative index."""
+    """Mean reflectance of both polarisations for a complex relative index."""
     c = mp.mpf(c)
     root = mp.sqrt(eta**2 - 1 + c**2)
     rs, rp = (c - root) / (c + root), (eta**2 * c - root) / (eta**2 * c + root)
@@ -510,7 +515,7 @@ def fresnel(c, eta):
 
 
 def dielectric_albedo(p, cos_o):
-    """A boundary keeps nothing: what is not reflected goes through."""
+    """A boundary absorbs nothing: what is not reflected is transmitted."""
     return [mp.mpf(1)] * 3
 
 
@@ -551,8 +556,8 @@ def phong_pdf(p, wi, wo):
 def lobe_albedo(e, axis_cos, ring, breaks=()):
     """Integral over directions above the horizon of cos^e alpha times a function of cos theta_i.
 
-    ring(up, side, a) is that function's integral over the circle at alpha, where
-    cos theta_i = up + side cos b, for |b| < a."""
+    ring(up, side, a) is that function's integral over the circle at alpha, where cos theta_i = up +
+    side cos b, for |b| < a."""
     c, s = mp.mpf(axis_cos), mp.sqrt(1 - mp.mpf(axis_cos) ** 2)
 
     def circle(t):
@@ -619,8 +624,8 @@ def blinn_d(p, hn):
     return (e + 2) / (2 * mp.pi) * hn**e
 
 
-# Mitsuba 3.9's Beckmann distribution agrees with beckmann_d, and stretched with ward_gaussian, to
-# single precision (1.5e-6).
+# Mitsuba 3.9's Beckmann distribution agrees with beckmann_d, and its anisotropic version with
+# ward_gaussian, to single precision (1.5e-6).
 def beckmann_d(p, hn):
     m2 = mp.mpf(p["m"]) ** 2
     return mp.exp(-(1 - hn**2) / hn**2 / m2) / (mp.pi * m2 * hn**4)
@@ -637,7 +642,7 @@ def facet_f(d, fresnel):
 
 
 def facet_pdf(d):
-    """Facets drawn from D (n.h), reflected."""
+    """Half vectors sampled from D (n.h), then reflection."""
 
     def pdf(p, wi, wo):
         _, _, h, oh = half(wi, wo)
@@ -655,8 +660,8 @@ def schlick_fresnel(name):
 
 
 def half_albedo(density, width):
-    """Albedo over half vectors, by Gauss-Legendre panels that close in on the lobe and on kinks:
-    density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h."""
+    """Albedo by integration over half vectors, with Gauss-Legendre panels refined around the lobe
+    and around kinks: density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h."""
 
     def albedo(p, cos_o):
         sin_o = math.sqrt(1 - cos_o**2)
@@ -688,7 +693,8 @@ def half_albedo(density, width):
                             else:
                                 b = m
                         cuts.add(a)
-                        # Towards the horizon there may be a root, of which all derivatives grow.
+                        # Near the horizon there may be a root at which all derivatives are
+                        # unbounded.
                         cuts |= {a + d * 10.0**-k for k in (1, 2, 3, 4) for d in (-1, 1) if j == 0}
             ends = sorted(t for t in cuts if 0 <= t <= math.pi / 2)
             total = 0.0
@@ -715,7 +721,7 @@ def gauss_legendre(n):
     out = []
     for k in range(n):
         x = mp.cos(mp.pi * (k + 0.75) / (n + 0.5))
-        for _ in range(8):  # Newton
+        for _ in range(8):  # Newton's method
             d = n * (x * mp.legendre(n, x) - mp.legendre(n - 1, x)) / (x * x - 1)
             x -= mp.legendre(n, x) / d
         out.append((float((1 + x) / 2), float(1 / ((1 - x * x) * d * d))))
@@ -766,7 +772,7 @@ def ward_pdf(p, wi, wo):
 
 
 def ward_albedo(p, cos_o):
-    """View in the x-z plane, over half vectors."""
+    """View in the x-z plane; integrated over half vectors."""
 
     def one(p, hn, oh, ni, no, phi):
         s2 = (1 - hn**2) / hn**2
@@ -811,8 +817,8 @@ def schlick_f(p, wi, wo):
 
 
 def schlick_pdf(p, wi, wo):
-    """Of the glossy lobe, where it is alone: half vectors by Z, azimuths by the mean of a circle's
-    and of a squeezed circle's."""
+    """For the glossy lobe alone: half vectors by Z; azimuths by the mean of a uniform pdf and that
+    of a scaled circle."""
     a, _, _ = schlick_shares(p)
     if a:
         return None
@@ -845,7 +851,7 @@ def schlick_albedo(p, cos_o):
 
 
 def oren_nayar_terms(p, ti, to, c, lib):
-    """What rho / pi and rho^2 / pi are multiplied with, as printed: a formula of angles."""
+    """The factors of rho / pi and rho^2 / pi as printed: formulas of angles."""
     s2 = p["sigma"] * p["sigma"]
     al, be = max(ti, to), min(ti, to)
     c1 = 1 - 0.5 * s2 / (s2 + 0.33)
@@ -956,7 +962,7 @@ MODELS = {
             {"diffuse": "tabulated", "rs": (0.05, 0.5, 1), "rd": (1, 1, 1), "nu": 10, "nv": 10},
             {"diffuse": "tabulated", "part": "diffuse", "nu": 4, "nv": 90, "rotation": 0.7},
         ],
-        # Interpolation in the model's tables: of 1 - R at either direction.
+        # Interpolation in the model's tables, of 1 - R for either direction.
         floor=lambda p: 0.04 if p.get("diffuse") == "tabulated" else 0,
         albedo_cases=[
             {"part": "specular", "rs": (1, 1, 1), "nu": 10, "nv": 10},
@@ -1268,7 +1274,8 @@ def direction(theta, phi):
 
 
 def pairs(rng):
-    """Anywhere, near the mirror direction at several distances, near the normal, near grazing."""
+    """Anywhere; near the mirror direction at several distances; near the normal; near grazing
+    angles."""
     out = []
     for _ in range(3):
         out.append([direction(rng.uniform(0, 1.5), rng.uniform(0, 6.28)) for _ in range(2)])
@@ -1290,10 +1297,11 @@ def values(function, p, wi, wo):
 
 
 def tolerance(function, p, wi, wo, base):
-    """What half a unit in the last place of every input changes, relatively, added up.
+    """The sum of the relative changes of the result when each input changes by half a unit in the
+    last place.
 
-    Rounded components make a vector whose length is 1 only nearly: formulas that are equal on the
-    sphere may differ then, which counts as well.
+    Vectors with rounded components have a length only close to 1. Formulas that are equal on the
+    sphere may then differ, which is included.
     """
     global normalise
     ulp = mp.mpf(2) ** -53
@@ -1337,7 +1345,7 @@ def main():
         rng = random.Random(name)
         for case in m["cases"]:
             p = {**m["defaults"], **case}
-            # A model without f has delta terms alone.
+            # A model without f has only delta terms.
             for wi, wo in pairs(rng) if "f" in m else []:
                 if p.get("around") == "refraction":
                     wi = (wi[0] / p["ior"], wi[1] / p["ior"])
@@ -1348,12 +1356,12 @@ def main():
                     wo = (-wo[0], -wo[1], wo[2])
                 for kind in ("f", "pdf"):
                     v = values(m[kind], p, wi, wo)
-                    # Below the normal numbers of double precision there is nothing to compare.
+                    # Values below the normal range of double precision can't be compared.
                     if v is None or max(v) < mp.mpf("1e-290"):
                         continue
                     t = tolerance(m[kind], p, wi, wo, v)
                     if t > 1e-3:
-                        continue  # says nothing: the inputs' own rounding decides the value
+                        continue  # meaningless: the inputs' rounding determines the value
                     if kind == "f" and "floor" in m:
                         t += m["floor"](p)
                     rows.append(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every registered model against its row in cases.csv, against golden.csv (values of an independent implementation,
-// see make_golden.py), and against landmarks of the papers.
+// Compares every registered model with its row in cases.csv, with golden.csv (values of an independent implementation,
+// see make_golden.py), and with numbers from the papers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
@@ -52,7 +52,7 @@ std::vector<std::map<std::string, std::string>> read_table(const std::string& na
   return rows;
 }
 
-/// strtod, not stod: a number that underflows in the file is 0 here.
+/// strtod, not stod: a number in the file that underflows is 0 here.
 double number(const std::string& text) { return std::strtod(text.c_str(), nullptr); }
 
 /// Scales the counts of the checks: script/evidence doubles it, and lowers it for the sanitizers, which look for other
@@ -62,7 +62,7 @@ double effort() {
   return text ? number(text) : 1;
 }
 
-/// "a=1 b=0.1:0.2:0.3" as parameters.
+/// Parses "a=1 b=0.1:0.2:0.3".
 ParamValues parameters(const Model& m, const std::string& text) {
   std::vector<std::string> assignments;
   for (std::string a : split(text, ' ')) {
@@ -75,7 +75,7 @@ ParamValues parameters(const Model& m, const std::string& text) {
 /// One set of parameters from a column of cases.csv.
 struct Case {
   std::string model, text;
-  double lossless, amplified;  // lossless < 0: no claim
+  double lossless, amplified;  // lossless < 0: not claimed
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.model << " " << c.text; }
 
@@ -95,7 +95,7 @@ std::vector<Case> cases(const std::string& column) {
   return out;
 }
 
-/// Directions in which a histogram of samples is compared with the density, for each row of column `cases`.
+/// View cosines at which histograms of samples are compared with the pdf, for each row of column `cases`.
 constexpr double kHistogramCosines[] = {1, 0.7, 0.3, 0.1};
 
 std::string test_name(const testing::TestParamInfo<Case>& info) {
@@ -125,13 +125,13 @@ class ModelCase : public testing::TestWithParam<Case> {
 TEST_P(ModelCase, HistogramOfSamplesFollowsThePdf) {
   if (!model().has_scatter()) return;
   const measure::BoundModel b = bound();
-  // Sidak: the chance that a right sampler fails anywhere in this suite is 1 %.
+  // Sidak correction: a correct sampler fails anywhere in this suite with a probability of 1 %.
   const double threshold = 1 - std::pow(0.99, 1. / double(std::size(kHistogramCosines) * cases("cases").size()));
   std::uint64_t seed = 1;
   for (const double c : kHistogramCosines) {
     const check::ChiSquare r =
         check::chi_square(b, direction(c, 0.4 + c), std::max(10000, int(20000 * effort())), seed++);
-    // More samples ask for more digits of the density than quadrature may have.
+    // More samples require a more precise pdf than quadrature can give.
     if (!r.converged && effort() > 1) continue;
     ASSERT_TRUE(r.converged) << b.label << " cos_theta_o=" << c;
     EXPECT_GT(r.degrees, 20) << b.label << ": too few cells to tell anything";
@@ -158,8 +158,8 @@ TEST_P(ModelCase, AlbedoConservesAndAgreesWithSampling) {
 INSTANTIATE_TEST_SUITE_P(Cases, ModelCase, testing::ValuesIn(cases("cases")), test_name);
 
 TEST(Sampling, FollowsThePdfAtTheExtremesToo) {
-  // Stiff parameters, and all at grazing views. Where the density is a ridge that no quadrature resolves there is
-  // nothing to compare with.
+  // Extreme parameters, and all parameters at grazing views. Where the pdf is a ridge that no quadrature resolves,
+  // nothing can be compared.
   std::vector<std::pair<Case, double>> asked;
   std::size_t elsewhere = 0;
   for (const Case& c : cases("stiff"))
@@ -268,7 +268,7 @@ TEST_P(GoldenModel, HasGoldenValuesOfEveryKindAndMatchesThem) {
 }
 
 std::vector<std::string> golden_models() {
-  // Those that make_golden.py knows; a model dropped in by a user need not be there.
+  // The models in make_golden.py; a user's model need not be there.
   std::set<std::string> names;
   for (auto& row : read_table("golden.csv")) names.insert(row["model"]);
   return {names.begin(), names.end()};
@@ -295,23 +295,23 @@ TEST(Landmarks, CoupledWithWhiteMatteIsAPerfectFurnaceAtEveryAngle) {
 }
 
 TEST(Landmarks, TheConstructionFromSech2IsTheClosedForm) {
-  // Two ways to the same function: a kernel with its marginal inverted, and eq. 17.
+  // Two ways to compute the same function: from a kernel by inverting its marginal, and by eq. 17.
   for (const double n : {0., 1e-9, 0.001, 0.3, 0.99, 1.01, 4., 25., 1e3, 1e4}) {
     const auto made = find_model("lossless").make_double({{"n", n}});
     const auto closed = find_model("radziszewski_alda").make_double({{"n", n}, {"part", std::string("latitudinal")}});
     measure::Random random(7);
     for (const auto& [wi, wo] : measure::direction_pairs(*closed, 500, random)) {
       const double want = closed->eval(wi, wo).r;
-      // Both know x - y only to the rounding of the directions, which the gloss magnifies.
-      // Below 1e-300 numbers have few digits or none.
+      // Both know x - y only up to the rounding of the directions, which the glossiness amplifies. Below 1e-300 numbers
+      // have few significant digits.
       EXPECT_NEAR(made->eval(wi, wo).r, want, want * (1e-14 + 2e-15 * n) + 1e-300) << n;
     }
   }
 }
 
 TEST(Landmarks, EveryKernelLosesNothing) {
-  // Over x = cos^2 theta_i alone, in small steps: the kernels' edges mislead a quadrature over directions by up to
-  // 1e-5.
+  // Over x = cos^2 theta_i alone, in small steps: because of the kernels' edges, quadrature over directions has errors
+  // of up to 1e-5.
   const Model& m = find_model("lossless");
   for (const char* shape : {"kernel=exponential", "kernel=table", "kernel=sech2"})
     for (const char* n : {"n=3", "n=60"})

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the generator writes: shaders, closure counts, refusals and the extension's files.
+// The generator's output: shaders, closure counts, refusals and the extension's files.
 #include "pack/pack.h"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::ThrowsMessage;
 
-/// Depth of the left spine of a printed sum: what Cycles' stack of 16 has to hold.
+/// Depth of the left spine of a printed sum, which must fit Cycles' stack of 16.
 int nesting(const std::string& sum) {
   int depth = 0, most = 0;
   for (char c : sum) {
@@ -60,7 +60,7 @@ std::string read(const fs::path& p) {
 // Not anonymous: templates of other files are instantiated with these.
 namespace pack_test {
 
-/// Lambert with faults that a build must not hide.
+/// Lambert with errors that a build must report.
 template <class T> struct Broken {
   Rgb<T> rho;
   static ModelInfo info() {
@@ -78,14 +78,14 @@ template <class T> struct Broken {
   }
 };
 
-/// An exact form that needs more slots than Cycles keeps.
+/// An exact form that needs more closure slots than Cycles has.
 template <class T> struct Greedy : Broken<T> {
   ClosureSum<T> exact(const Vec3<T>&) const {
     return ClosureSum<T>(22, Closure<T>(ClosureKind::DiffuseRamp, this->rho));
   }
 };
 
-/// Delta terms alone.
+/// Only delta terms.
 template <class T> struct MirrorOnly {
   Rgb<T> ks;
   static ModelInfo info() {
@@ -98,7 +98,7 @@ template <class T> struct MirrorOnly {
   Rgb<T> mirror(const Vec3<T>& wo) const { return ks * (T(1) - wo.z / T(2)); }
 };
 
-/// A number that no formula reads, whose name is a word of a comment in the shader's text.
+/// A number that no formula reads, whose name occurs in a comment in the shader's text.
 template <class T> struct Unread : MirrorOnly<T> {
   T viewer;
   template <class Visitor> void parameters(const Visitor& v) {
@@ -138,15 +138,15 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       if (kind->native()) continue;
       const forms::Shader s = kind->write(*model, empty_table(*model));
       EXPECT_LE(s.slots, kMaxClosures) << s.name;
-      // Aimed forms hold what is done with lamps (also with those cut off by the horizon), a base and the model's value
-      // beside its sampling; lossless' value is a long sum, and its base has eight.
+      // In addition to sampling, aimed forms contain the computations for lamps (including those cut off by the
+      // horizon), a base and the model's value; lossless' value is a long sum, and its base has eight colours.
       const bool aimed = kind == forms::form("aimed");
       EXPECT_LT(s.operations, !aimed ? 600 : name == "lossless" ? 2900 : 1400) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
 }
 
-/// Sizes by hand from Cycles' structs: see pool_bytes().
+/// Sizes computed by hand from Cycles' structs: see pool_bytes().
 TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
   const auto bytes = [](const char* name, const forms::Form* kind, int lamps = forms::kMaxLamps) {
     const Model& m = find_model(name);
@@ -157,9 +157,9 @@ TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
   // burley_diffuse_bsdf, diffuse_ramp and a mirror
   EXPECT_EQ(bytes("coupled", forms::form("exact")), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
   EXPECT_EQ(bytes("lambert", forms::form("exact")), std::pair(kDiffuse, 0));
-  // A mirror and a refraction for each channel.
+  // A mirror, and a refraction for each channel.
   EXPECT_EQ(bytes("glass", forms::form("exact")), std::pair(kMirror + 3 * (16 + 24 + kNode), 0));
-  // A lamp's lobe is one of the sum. A direction through the surface is one of three closures, times a weight.
+  // A lamp's lobe is one closure in the sum. A direction through the surface is one of three closures, times a weight.
   EXPECT_EQ(bytes("lambert", forms::form("sampled")), std::pair(kLobe, 0));
   EXPECT_EQ(bytes("phong", forms::form("aimed")), std::pair(5 * (kCone + kNode) + kLobe, kLobe + kNode));
   EXPECT_EQ(bytes("phong", forms::form("aimed"), 0), std::pair(5 * (kCone + kNode) + kLobe, 0));
@@ -237,7 +237,7 @@ TEST(Shader, TablesThatChoicesShareStandThereOnce) {
   EXPECT_GT(count(s.source, "specular_loss, "), 1u) << "more than one look-up reads it";
 }
 
-/// A file holds the text and what it is compiled to, whether or not something is linked to the output.
+/// A file contains the text and its bytecode, whether or not the output is linked.
 TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
   const Model& m = find_model("ward");
   const measure::AlbedoTable table = measure::albedo_table_of(m);
@@ -257,7 +257,7 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
     for (const forms::Form* kind : forms::forms_of(*model)) {
       if (kind->made_of_fit()) continue;  // holds tables of its own
       const std::string text = kind->write(*model, measure::albedo_table_of(*model)).source;
-      // What two aimed forms hold for each of their many choices is more than it should be.
+      // Two aimed forms still contain too much for each of their many choices.
       const bool longer = kind == forms::form("aimed") && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
       EXPECT_LE(text.size(), longer || kind->native() ? 200000u : 116000u) << name << " " << kind->name();
     }
@@ -463,14 +463,14 @@ TEST_F(PackFiles, AFailedBuildLeavesTheOldPackAsItWas) {
   EXPECT_EQ(read(pack.zip), before);
   int files = 0;
   for (const auto& entry : fs::directory_iterator(temp.path())) files += entry.exists();
-  EXPECT_EQ(files, 2);  // the zip and the folder: nothing half-written
+  EXPECT_EQ(files, 2);  // the zip and the folder: no incomplete files
 }
 
 TEST_F(PackFiles, NothingIsDeletedThatThisToolDidNotWrite) {
   const fs::path folder = temp.path() / "brdfc_shaders";
   fs::create_directory(folder);
-  build_pack(options(temp.path()));  // empty: nobody's
-  build_pack(options(temp.path()));  // its own
+  build_pack(options(temp.path()));  // an empty folder may be overwritten
+  build_pack(options(temp.path()));  // and so may an earlier pack
   for (const char* manifest : {"", "{\"generator\": \"other 1.0\"}"}) {
     fs::remove_all(folder);
     fs::create_directory(folder);

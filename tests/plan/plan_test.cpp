@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A pack cut to a scene holds what its materials need, and computes the same.
+// A pack cut to a scene contains what its materials need, and computes the same.
 #include "plan/plan.h"
 
 #include <gmock/gmock.h>
@@ -173,7 +173,7 @@ TEST(Plan, FitsWhereTheErrorIsAllowed) {
   EXPECT_EQ(plan[0].fixed.count("ks"), 0u);
 }
 
-/// One number that varies is an axis of the tables of fits and twins.
+/// A single number that varies becomes the axis of the tables of fits and twins.
 TEST(Plan, FitsAlongANumber) {
   auto textured = need("b", "oren_nayar", {"sigma=0.1"}, "fitted");
   textured.textured.insert("sigma");
@@ -187,7 +187,7 @@ TEST(Plan, FitsAlongANumber) {
   EXPECT_EQ(why(plan_scene({textured}, {{}, false, true})[0], forms::form("twin")), "form varies over b");
 }
 
-/// What f is a polynomial of may vary beside a number, in fits and twins.
+/// In addition to a number, parameters in which f is a polynomial may vary, in fits and twins.
 TEST(Plan, FitsWhatThereAreTermsBy) {
   auto textured = need("b", "cook_torrance", {"m=0.4"});
   textured.textured.insert("f0");
@@ -197,7 +197,7 @@ TEST(Plan, FitsWhatThereAreTermsBy) {
   EXPECT_TRUE(plan.fixed.empty());
   EXPECT_THAT(plan_scene(needs, {0.02, false})[0].forms, ElementsAre(forms::form("aimed")));
 
-  // Its shares add up, whatever they are; its exponents are two numbers.
+  // The weights of its terms may vary, as they add up; its exponents are two numbers.
   const auto phong = [](const char* id, const char* value) { return need(id, "phong_material", {value}, "fitted"); };
   EXPECT_THAT(plan_scene({phong("a", "kd=0.1"), phong("b", "kd=0.3")})[0].forms, ElementsAre(forms::form("fitted")));
   EXPECT_THROW(plan_scene({phong("a", "es=10"), phong("b", "e=20")}), InputError);
@@ -228,7 +228,7 @@ TEST(Plan, KeepsATimeWithTheLeastErrorThatIsAllowed) {
   EXPECT_THAT(plan(coupled, 1.25).forms, ElementsAre(kExact));
   EXPECT_THAT(plan(coupled, 1.1).forms, ElementsAre(kFitted));
 
-  // With an error, too, both hold.
+  // Both limits apply together.
   EXPECT_THAT(plan(phong, 1.15, 0.03).forms, ElementsAre(kFitted));
   EXPECT_THAT(plan(phong, 1, 0.03).forms, ElementsAre(kFitted));
   EXPECT_THAT(plan(phong, 1.15, 0.001).forms, ElementsAre(kAimed));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recorded program as Blender's nodes: run as Cycles' SVM runs them, it gives what the recording gives.
+// A recorded program as Blender's nodes: evaluated as in Cycles' SVM, it gives the same result as the recording.
 #include "print/node_program.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ namespace {
 using Value = std::array<float, 3>;
 using Values = std::map<std::string, Value>;
 
-/// One operation as kernel/svm/math_util.h and mix.h have it.
+/// One operation, as in kernel/svm/math_util.h and mix.h.
 Value compute(const NodeOperation& o, const std::vector<Value>& a) {
   const auto each = [&](const auto& f) { return Value{f(0), f(1), f(2)}; };
   const auto grey = [](float x) { return Value{x, x, x}; };
@@ -139,7 +139,7 @@ TEST(NodeProgram, WhatDoesNotVaryIsComputedOnce) {
   EXPECT_FLOAT_EQ(run(made.each, values).at("y")[0], std::exp(4.f) * 3 + std::sqrt(2.f));
 }
 
-/// Every model: values and samples of nodes are finite, and those of the recording in single precision.
+/// For every model, values and samples of nodes are finite and equal those of the recording in single precision.
 class NodesOfModels : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(NodesOfModels, AreTheRecording) {
@@ -174,7 +174,7 @@ TEST_P(NodesOfModels, AreTheRecording) {
       set_inputs(inputs, with_choices(model.info(), choices, complete(model.info(), values)));
       const Vec3<double> out = direction_at(0.02 + 0.98 * unit(random));
       set_input(inputs, "wo", out);
-      // Every other one near the highlight.
+      // Every second one near the highlight.
       Vec3<double> in = direction_at(trial % 4 < 2 ? 0.02 + 0.98 * unit(random) : out.z);
       if (trial % 4 == 3) in = normalize(Vec3<double>{-out.x, -out.y, out.z} + direction_at(0.5) * 0.05);
       set_input(inputs, "wi", in);
@@ -193,7 +193,7 @@ TEST_P(NodesOfModels, AreTheRecording) {
         for (std::size_t c = 0; c < 3; ++c) {
           const float scale = std::max(std::abs(value[c]), name == "value" ? 1e-5f : 1e-3f);
           EXPECT_TRUE(std::isfinite(found.at(name)[c])) << name;
-          // Series and products with reciprocals are rounded elsewhere, and powers amplify that.
+          // Series and products with reciprocals round differently, and powers amplify that.
           EXPECT_NEAR(found.at(name)[c] / scale, value[c] / scale, 2e-3)
               << name << " of " << format_values(model.info(), values) << " " << in.x << " " << in.y << " " << in.z
               << " / " << out.x << " " << out.y << " " << out.z;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The list of names that a shader's text uses itself: complete, and kept from models.
+// The list of names that a shader's own text uses is complete, and models can't use these names.
 #include "print/osl_words.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ namespace brdfc {
 // Not in the anonymous namespace: the model adapter has members of these types.
 namespace osl_words_test {
 
-/// All names that a shader has for something else, also those that it numbers.
+/// All names that a shader uses otherwise, including numbered ones.
 std::vector<std::string> all_words() {
   std::vector<std::string> words(print::osl_words().begin(), print::osl_words().end());
   for (const std::string& stem : print::numbered_osl_words())
@@ -33,7 +33,7 @@ std::vector<std::string> all_words() {
   return words;
 }
 
-/// Every statement has such a name, and two others that follow the rule which names are made unique by.
+/// Gives every statement such a name, and two more that follow the rule for making names unique.
 template <class T> struct Hinted {
   Rgb<T> rho;
   T unread;
@@ -44,7 +44,7 @@ template <class T> struct Hinted {
     v(rho, ColorSpec{"rho", "Reflectance", {0.5, 0.5, 0.5}, ""});
     v(unread, NumberSpec{"unread", "Unread", 1, 0, 1, 0, 1, ""});
   }
-  /// 1, the long way.
+  /// 1, in many statements.
   T one(const T& x) const {
     T y = x;
     for (const std::string& word : all_words()) y = named(word.c_str(), sin(y));
@@ -67,7 +67,7 @@ template <class T> struct Hinted {
   Rgb<T> mirror(const Vec3<T>& wo) const { return rho * (one(wo.z) - T(1)); }
 };
 
-/// A model with one parameter, of any name.
+/// A model with one parameter, whose name can be set.
 std::string name_of_parameter;
 template <class T> struct OfName : Hinted<T> {
   static ModelInfo info() {
@@ -112,7 +112,7 @@ std::vector<std::string> declared_in(const std::string& statements) {
   return matches(statements, R"((?:float|color|int) (\w+)(?:\[\d+\])? = )");
 }
 
-/// What a model's statements declare, for all choices.
+/// The variables that a model's statements declare, for all choices.
 std::set<std::string> declared_by(const Model& model, const forms::Form* kind, const ParamValues& fixed) {
   std::set<std::string> names;
   const auto add = [&](const forms::Recording& r) {
@@ -138,7 +138,7 @@ TEST(OslWords, AreAllThatShadersUseBesideTheirModelsNames) {
       for (const ParamInfo& p : model->info().params) own.insert(p.name);
       const std::string text = without_comments_and_strings(shader.source);
       std::set<std::string> unknown;
-      // A number's exponent, or a vector's component, is no name.
+      // An exponent of a number, or a component of a vector, is not a name.
       for (const std::string& word :
            matches(text.substr(text.find("\n{\n", text.find("\nshader "))), R"((\b[A-Za-z_]\w*))"))
         if (!own.count(word) && !print::is_osl_word(word)) unknown.insert(word);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements as data: what is printed of a tree, and what is read from it without printing.
+// Statements as data: how a tree is printed, and what can be found in it without printing.
 #include "print/statement.h"
 
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@ using ::testing::Contains;
 using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
-/// y = log1p(x) by a look-up, recorded.
+/// y = log1p(x) from a table look-up, recorded.
 Run recorded(const char* input = "x") {
   Recorder recorder;
   Program program;
@@ -78,7 +78,7 @@ TEST(Statements, KeepTheGroupingOfTheirValues) {
   EXPECT_EQ(osl_value(choice(choice(a, b, c), a, b)), "(a ? b : c) ? a : b");
 }
 
-/// Of what a shader reads its parameters are those that have to be kept within their ranges.
+/// Of the parameters, those that a shader reads have to be clamped to their ranges.
 TEST(Statements, TellWhatTheyReadAndCall) {
   const Statements tree = {
       Comment{"Neither this word nor that."},
@@ -88,7 +88,7 @@ TEST(Statements, TellWhatTheyReadAndCall) {
   };
   EXPECT_THAT(names_in(tree), UnorderedElementsAre("e", "part", "roughness", "n", "type", "ramp", "entry"));
   EXPECT_THAT(functions_in(tree), UnorderedElementsAre("max", "brdfc_frame", "brdfc_log1p", "brdfc_table1"));
-  // What stands in a longer name, a comment, a text or the condition of the last case is not read.
+  // Occurrences in longer names, comments, texts or the condition of the last case are not reads.
   EXPECT_THAT(names_in({declare("float", "rough", "roughness_2")}), Not(Contains("roughness")));
 }
 

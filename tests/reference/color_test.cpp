@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Colour spaces of our OpenColorIO configuration against the standards' own numbers, and what is said of others.
+// Colour spaces of our OpenColorIO configuration compared with the standards; and messages about other configurations.
 #include "reference/color.h"
 
 #include <gmock/gmock.h>
@@ -33,7 +33,7 @@ TEST(Color, SrgbIsThatOfTheStandard) {
   for (double x = 0; x <= 1; x += 0.01) {
     Image image = pixel(srgb_encode(x), 0, 1);
     config.to_scene_linear(image, "sRGB");
-    // The standard's two pieces meet within 1e-7 of each other's slope and value.
+    // The standard's two pieces agree in slope and value to 1e-7.
     EXPECT_NEAR(image.rgb[0], x, 2e-6);
     image = pixel(x, 2, -1);
     config.to_display(image, "Standard");
@@ -53,7 +53,7 @@ Eigen::Matrix3d to_xyz(const Eigen::Vector3d& red, const Eigen::Vector3d& green,
   return primaries * Eigen::Vector3d(primaries.inverse() * white).asDiagonal();
 }
 
-/// Bradford's adaptation.
+/// Bradford's chromatic adaptation.
 Eigen::Matrix3d to_d65(const Eigen::Vector3d& white) {
   Eigen::Matrix3d bradford;
   bradford << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
@@ -85,7 +85,7 @@ TEST(Color, MatricesAreThoseOfThePrimaries) {
   EXPECT_EQ(data.rgb, pixel(0.2, 5, -1).rgb);
 }
 
-/// What EXR files say of a space is what the configuration converts by.
+/// The chromaticities in EXR files are those of the configuration's conversion.
 TEST(Color, ChromaticitiesAreThoseOfTheWorkingSpaces) {
   const ColorConfig config = ours();
   EXPECT_EQ(config.working_space(), working_spaces()[0].name);
@@ -99,7 +99,7 @@ TEST(Color, ChromaticitiesAreThoseOfTheWorkingSpaces) {
       config.with_working_space("Linear CIE-XYZ D65").to_scene_linear(image, s.name);
       for (int i = 0; i < 3; ++i) EXPECT_NEAR(image.rgb[i], matrix(i, c), 1e-6) << s.name;
     }
-    // White is white, and pixels of the space itself stay as they are.
+    // White is unchanged, and so are pixels that are in the space itself.
     Image image = pixel(1, 1, 1);
     other.to_scene_linear(image, "sRGB");
     for (const float v : image.rgb) EXPECT_NEAR(v, 1, 1e-6) << s.name;

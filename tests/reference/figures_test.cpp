@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the papers say of their pictures, as numbers measured on ours: scenes/*.json by the reference renderer, smaller,
-// with fixed seeds. Each bound is several times the noise of what is measured.
+// What the papers state about their pictures, as numbers measured in ours: scenes/*.json by the reference renderer, in
+// a smaller size, with fixed seeds. Each bound is several times the noise of the measurement.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -28,12 +28,12 @@ Image picture(const Scene& s, int width, int spp) {
 
 using Point = std::array<double, 2>;
 
-/// A pixel's middle in units of the picture's height from its middle, x to the right and y upwards.
+/// A pixel's centre relative to the picture's, in units of the picture's height, x to the right and y upwards.
 Point place(const Image& image, int x, int y) {
   return {(x + 0.5 - image.width / 2.0) / image.height, (image.height / 2.0 - y - 0.5) / image.height};
 }
 
-/// Mean luminance of the pixels whose place is wanted.
+/// Mean luminance of the selected pixels.
 double mean(const Image& image, const std::function<bool(const Point&)>& wanted) {
   double sum = 0;
   int count = 0;
@@ -47,7 +47,7 @@ double mean(const Image& image, const std::function<bool(const Point&)>& wanted)
   return sum / count;
 }
 
-/// Between two distances from `centre`, in units of `radius`.
+/// Selects pixels between two distances from `centre`, in units of `radius`.
 std::function<bool(const Point&)> ring(const Point& centre, double radius, double from, double to) {
   return [=](const Point& p) {
     const double r = hypot(p[0] - centre[0], p[1] - centre[1]) / radius;
@@ -58,8 +58,8 @@ std::function<bool(const Point&)> ring(const Point& centre, double radius, doubl
 /// Figure 25.5 of Suffern's book, "only half as bright at the silhouette as it is in the center",
 /// and 25.7, where it is even.
 TEST(Figures, LostRaysDarkenTheRimOfASphereAndTurnedRaysDoNot) {
-  // The sphere of radius 1 stands in a picture 2.4 high. At 0.98 of its radius theta is 78.5 degrees, and of a cosine
-  // lobe about the mirror direction (1 + cos theta) / 2 stays above the surface.
+  // The sphere of radius 1 is in a picture 2.4 high. At 0.98 of its radius theta is 78.5 degrees, and (1 + cos theta) /
+  // 2 of a cosine lobe about the mirror direction is above the surface.
   const Point middle{0, 0};
   const auto at_rim = ring(middle, 1 / 2.4, 0.97, 0.99), inside = ring(middle, 1 / 2.4, 0, 0.2);
   const Image lost = picture(scene("gl-fig5"), 192, 64);
@@ -69,11 +69,11 @@ TEST(Figures, LostRaysDarkenTheRimOfASphereAndTurnedRaysDoNot) {
   EXPECT_NEAR(mean(even, inside) / mean(even, ring(middle, 1 / 2.4, 1.05, 1.15)), 0.8, 0.003);
 }
 
-/// Figure 25.13 of Suffern's book: one sample a pixel. The one Hammersley point is the middle of the lobe, whatever its
-/// width, so a matte sphere looks like a mirror; a regular point leads every pixel aside in the same way; random ones
-/// are noise.
+/// Figure 25.13 of Suffern's book: one sample per pixel. The single Hammersley point is the centre of the lobe,
+/// whatever its width, so a diffuse sphere looks like a mirror; a regular point deflects all pixels in the same way;
+/// random points cause noise.
 TEST(Figures, OneSampleAPixelMakesAMirrorOfAMatteSphere) {
-  const auto roughness = [](const Image& image) {  // mean step between neighbours on the sphere
+  const auto roughness = [](const Image& image) {  // mean difference of neighbours on the sphere
     double sum = 0;
     int count = 0;
     const auto on_sphere = ring({0, 0}, 1 / 2.4, 0, 0.8);
@@ -94,7 +94,7 @@ TEST(Figures, OneSampleAPixelMakesAMirrorOfAMatteSphere) {
   EXPECT_GT(random, 3 * roughness(picture(scene("gl-fig13-regular"), 128, 1)));
 }
 
-/// Radziszewski and Alda: a model that loses no light can't be told from an even world.
+/// Radziszewski and Alda: a lossless model is invisible in a uniform world.
 TEST(Figures, ALosslessSphereVanishes) {
   const Image image = picture(scene("ra-vanish"), 96, 64);
   const auto all = [](const Point&) { return true; };
@@ -109,7 +109,8 @@ TEST(Figures, AFurnaceShowsWhatAshikhminShirleyLoses) {
   const Image image = picture(scene("as-fig2"), 192, 64);
   double last = 0;
   for (int i = 0; i < 4; ++i) {
-    // From the lower left, where both exponents are 10, to the upper right. Spheres are 2.2 apart in 8.8.
+    // From the lower left, where both exponents are 10, to the upper right. The spheres' distance is 2.2 in a height of
+    // 8.8.
     const double at = (i - 1.5) * 2.2 / 8.8;
     const double here = mean(image, ring({at, at}, 1 / 8.8, 0, 0.15));
     EXPECT_GT(here, last - 0.005) << i;
@@ -131,8 +132,8 @@ TEST(Figures, TheLargestExponentIsAMirror) {
     m.values = complete(model.info(), {{"rd", std::array<double, 3>{0, 0, 0}}, {"rs", 0.9}});
   }
   const Image a = picture(glossy, 180, 64), b = picture(mirror, 180, 64);
-  // Red and green alone: the colour of the reflection is (1, 1, 0.3), that of the mirror grey. The spheres stand 2.2
-  // apart in a picture 4.4 high; e = 1 is on the upper left, e = 100000 on the lower right.
+  // Only red and green: the reflection's colour is (1, 1, 0.3), the mirror's is grey. The spheres' distance is 2.2 in a
+  // height of 4.4; e = 1 is at the upper left, e = 100000 at the lower right.
   const auto difference = [&](double x, double y) {
     double sum = 0, squares = 0;
     const auto wanted = ring({x / 4.4, y / 4.4}, 1 / 4.4, 0, 0.9);
@@ -149,14 +150,14 @@ TEST(Figures, TheLargestExponentIsAMirror) {
   EXPECT_GT(difference(-2.2, 1.1), 0.5) << "e = 1 is no mirror: the measure tells them apart";
 }
 
-/// Suffern, figure 25.9: reflections on all blocks are sharp where they touch the plane, whatever their exponent.
+/// Suffern, figure 25.9: reflections of all blocks are sharp where they touch the plane, whatever the exponent.
 TEST(Figures, ReflectionsAreSharpAtContact) {
   Scene sharp = scene("gl-fig9"), blurred = sharp;
   for (Scene* s : {&sharp, &blurred})
     for (Material& m : s->materials)
       if (m.model->info().name == "phong_material") m.values["e"] = s == &sharp ? 1e5 : 100.;
   const Image a = picture(sharp, 320, 32), b = picture(blurred, 320, 32);
-  // The blocks stand from row 25 to 112 of 160; the plane's reflection ends at row 65. Means over 4 x 4 pixels.
+  // The blocks are in rows 25 to 112 of 160; the plane's reflection ends at row 65. Means over 4 x 4 pixels.
   const auto difference = [&](int from, int to) {
     double sum = 0, total = 0;
     for (int y = from; y + 4 <= to; y += 4)
@@ -183,8 +184,8 @@ TEST(Figures, BumpsBlurALowReflectionMostlyUpwards) {
   struct Spread {
     double x, y;
   };
-  // Root of the second moments of what the mirror term reflects of the lamp, below the horizon: of what is above four
-  // times the median, which is the tiles' own colour.
+  // Square root of the second moments of the lamp's reflection below the horizon: of pixels above four times the
+  // median, which is the tiles' own colour.
   const auto spread = [](const Image& image) {
     const int top = image.height * 55 / 100;
     std::vector<float> blue;
@@ -206,25 +207,25 @@ TEST(Figures, BumpsBlurALowReflectionMostlyUpwards) {
   EXPECT_GT(along, 2 * std::max(across, 0.0)) << rough.x << ' ' << rough.y << ' ' << smooth.x << ' ' << smooth.y;
 }
 
-/// Radziszewski and Alda, figure 1, in an even world: reciprocal Phong and microfacets lose light at the rim, theirs
-/// none.
+/// Radziszewski and Alda, figure 1, in a uniform world: reciprocal Phong and microfacets lose light at the rim, their
+/// model does not.
 TEST(Figures, OnlyTheLosslessModelKeepsItsRim) {
   Scene row = scene("ra-fig1");
   row.lights.clear();
   row.environment.color = {1, 1, 1};
   const Image image = picture(row, 400, 32);
-  // The spheres stand 2.2 apart in a picture 2.2 high.
+  // The spheres' distance is 2.2 in a height of 2.2.
   const auto rim = [&](int i) { return mean(image, ring({double(i - 2), 0}, 1 / 2.2, 0.95, 0.99)); };
   EXPECT_NEAR(rim(0), 1, 0.01) << "Lambert";
   EXPECT_NEAR(rim(4), 1, 0.01) << "Radziszewski and Alda";
   for (const int other : {1, 3}) EXPECT_LT(rim(other), 0.95) << other;
 }
 
-/// All white balls of the scene furnace but three fail visibly: the rivals lose light at the rim or, Schlick's double
-/// term, gain it.
+/// In the scene furnace, all white balls but three are visible: the other models lose light at the rim or, for
+/// Schlick's double term, gain it.
 TEST(Figures, RivalsFailVisiblyInAFurnace) {
   const Image image = picture(scene("furnace"), 250, 64);
-  // Balls of radius 1, 2.2 apart in a picture 4.4 high.
+  // Balls of radius 1 at a distance of 2.2 in a height of 4.4.
   const auto rim = [&](int column, int row) {
     const Point at{(column - 2) * 2.2 / 4.4, (row == 0 ? 1.1 : -1.1) / 4.4};
     return mean(image, ring(at, 1 / 4.4, 0.9, 0.98)) / 0.45;

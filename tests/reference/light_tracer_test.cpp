@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light followed from the lamps gives the picture that is found from the camera.
+// Tracing light from the lamps gives the same picture as tracing paths from the camera.
 //
-// Statistics: seeds are fixed. A pixel is judged by the standard errors of both pictures, and the mean of all likewise;
-// with correct code 5 standard errors are exceeded with probability 6e-7 for each number compared.
+// Statistics: seeds are fixed. Pixels and means are compared by the standard errors of both pictures; with correct code
+// a number differs by more than 5 standard errors with a probability of 6e-7.
 #include "reference/light_tracer.h"
 
 #include <gmock/gmock.h>
@@ -32,8 +32,8 @@ struct Estimate {
   double mean = 0, error = 0;
 };
 
-/// Mean of the pixels that `wanted` takes, of the green channel, and its standard error. Particles reach many pixels,
-/// but no two pixels share much of their noise.
+/// Mean of the selected pixels' green channel, and its standard error. Particles reach many pixels, but no two pixels
+/// share much of their noise.
 template <class Wanted> Estimate mean(const Rendering& r, const Wanted& wanted) {
   double sum = 0, variance = 0;
   int count = 0;
@@ -48,7 +48,7 @@ template <class Wanted> Estimate mean(const Rendering& r, const Wanted& wanted) 
   return {sum / count, std::sqrt(variance) / count};
 }
 
-/// Their difference in standard errors; where there is no noise they may be equal.
+/// The difference in standard errors; 0 if equal, which it may be if there is no noise.
 double sigmas(const Estimate& a, const Estimate& b) {
   if (a.mean == b.mean) return 0;
   return std::abs(a.mean - b.mean) / std::sqrt(a.error * a.error + b.error * b.error);
@@ -56,7 +56,7 @@ double sigmas(const Estimate& a, const Estimate& b) {
 
 const auto everywhere = [](int, int) { return true; };
 
-/// A box on a plane, matte and glossy, seen from the side under nothing yet.
+/// A box on a plane, diffuse and glossy, seen from the side, without lights.
 Scene still_life(bool orthographic) {
   Scene s;
   s.settings = {.width = 16, .height = 16, .spp = 256, .seed = 3, .max_bounces = 2};
@@ -129,7 +129,7 @@ TEST(LightTracer, EveryLampGivesThePictureOfThePathTracer) {
     const Estimate a = mean(path, everywhere), b = mean(particles, everywhere);
     EXPECT_LT(a.error + b.error, 0.02 * a.mean) << c.name << ": the test has no power";
     EXPECT_LT(sigmas(a, b), kSigmas) << c.name << ' ' << a.mean << ' ' << b.mean;
-    // Rows and columns, where a wrong falloff or a wrong place would show.
+    // Rows and columns, in which a wrong falloff or position would be visible.
     for (int i = 0; i < 16; ++i) {
       const auto row = [&](int, int y) { return y == i; };
       const auto column = [&](int x, int) { return x == i; };
@@ -139,8 +139,8 @@ TEST(LightTracer, EveryLampGivesThePictureOfThePathTracer) {
   }
 }
 
-/// Of the papers' argument: swap the directions, and models that are not reciprocal become others. Each ball of
-/// rc-light alone under a sun from where the lamp is, so that particles meet it.
+/// An argument of the papers: swapping the directions changes models that are not reciprocal. Uses each ball of
+/// rc-light alone, under a sun in place of the lamp, so that particles hit it.
 TEST(LightTracer, SwappedDirectionsShowWhichModelsAreNotReciprocal) {
   const Scene whole = load_scene(std::filesystem::path(BRDFC_SOURCE_DIR) / "scenes" / "rc-light.json");
   int tried = 0;
@@ -157,8 +157,8 @@ TEST(LightTracer, SwappedDirectionsShowWhichModelsAreNotReciprocal) {
     s.camera.up = cross(s.camera.right, s.camera.forward);
     s.camera.half_height = 0.75 / length(view);
     s.settings.width = s.settings.height;
-    // Over the whole ball both ways round add up to the same, since it is a mirror image of itself: the rim on the side
-    // of the light.
+    // Averaged over the whole ball, both directions agree because of its symmetry: compares the rim on the light's
+    // side.
     const auto lit = [](int x, int) { return x < 8; };
     const Estimate a = mean(picture(s, Origin::Camera, 32, 256), lit);
     const Estimate b = mean(picture(s, Origin::Lamps, 32, 1024), lit);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Choosing one of many lamps, and meeting them, against all lamps one by one.
+// Choosing one of many lamps, and hitting them, compared with examining all lamps one by one.
 #include "reference/light_tree.h"
 
 #include <gmock/gmock.h>
@@ -21,13 +21,13 @@ namespace {
 
 using Vector = Vec3<double>;
 
-/// The tree as it is asked for however few lamps there are, and never.
+/// Use the tree for any number of lamps, or never.
 constexpr std::size_t kAlways = 0, kNever = std::numeric_limits<std::size_t>::max();
 
 Vector direction(Random& random) { return sample_cone({0, 0, 1}, 2, random.uniform(), random.uniform()); }
 
-/// Lamps of all kinds in a box of half that size about the origin: points, spheres, flat ones, thin ones, suns, some in
-/// the same place; with powers over three decades. `least`: added to all sizes, in half sizes of the box.
+/// Lamps of all kinds in a box of this half size about the origin: points, spheres, flat ones, thin ones, suns, some at
+/// the same position; with powers over three decades. `least`: added to all sizes, in units of the half size.
 std::vector<Light> lamps_of_all_kinds(int count, double half, std::uint64_t seed, double least = 0) {
   Random random(seed, 0, 0);
   std::vector<Light> lamps;
@@ -68,7 +68,7 @@ Scene scene_with(std::vector<Light> lamps) {
   return s;
 }
 
-/// Places on surfaces in the midst of lamps in a box of that half size, at their edge and far away.
+/// Points on surfaces among lamps in a box of that half size, at its edge and far away.
 template <class Use> void for_places(double half, int count, const Use& use) {
   Random random(7, 7, 7);
   for (int i = 0; i < count; ++i) {
@@ -77,7 +77,7 @@ template <class Use> void for_places(double half, int count, const Use& use) {
   }
 }
 
-/// A block of one point, as it is shaded.
+/// A block with a single point to be shaded.
 struct Place {
   const Lights& lights;
   Vectors p, normal;
@@ -95,7 +95,7 @@ struct Place {
   double chance(std::size_t light) const { return lights.chance(light, kept[0]); }
 };
 
-// Numbers in [0, 1) fall into one interval for each lamp, which is as long as its chance.
+// Numbers in [0, 1) are divided into intervals, one for each lamp, whose lengths are the probabilities.
 TEST(LightTree, ChancesAreThoseWithWhichLampsAreChosen) {
   for (const int count : {1, 2, 9, 300}) {
     Random random(3, std::uint64_t(count), 0);
@@ -134,7 +134,7 @@ TEST(LightTree, ChancesAreThoseWithWhichLampsAreChosen) {
         EXPECT_NEAR(chosen[i], chance * numbers, 1 + 1e-6) << i << " of " << count;
         sum += chance;
       }
-      // The rest is that of bounds wider than what they hold.
+      // The remainder belongs to bounds that are wider than their contents.
       EXPECT_NEAR(sum + none, 1, double(count + 1) / numbers);
     });
     EXPECT_GT(lit, 0);
@@ -150,7 +150,7 @@ TEST(LightTree, LeavesOutNoLampThatContributes) {
     const Place here(tree, p, n), there(list, p, n);
     EXPECT_EQ(here.lit[0], there.lit[0]);
     for (std::size_t i = 0; i < s.lights.size(); ++i) {
-      // The list takes a disk for the rectangle about it, of which the corners may rise above the horizon.
+      // The list treats a disk as its bounding rectangle, whose corners may be above the horizon.
       const Light& l = s.lights[i];
       const bool below = l.kind == Light::Kind::Disk && dot(l.position - p, n) < -std::max(length(l.u), length(l.v));
       EXPECT_TRUE(here.chance(i) > 0 || there.chance(i) == 0 || below) << i << " of kind " << int(l.kind);
@@ -158,7 +158,7 @@ TEST(LightTree, LeavesOutNoLampThatContributes) {
     }
     ++places;
   });
-  // About the same chances, though never by looking at all lamps.
+  // The probabilities are similar, though not all lamps are examined.
   EXPECT_GT(likeness / places, 0.5);
 }
 
@@ -192,7 +192,7 @@ TEST(LightTree, RaysMeetTheSameLamps) {
   EXPECT_GT(met, 5000);
 }
 
-// The density of a direction is the same whether it was drawn towards a lamp or met the lamp by chance.
+// The pdf of a direction is the same whether it was sampled towards a lamp or hit the lamp by BSDF sampling.
 TEST(LightTree, DensitiesOfDrawnAndMetDirectionsAreEqual) {
   Scene s = scene_with(lamps_of_all_kinds(300, 5, 4));
   s.environment.image = std::make_shared<const Image>(procedural_environment("interior", 64));
@@ -222,7 +222,7 @@ TEST(LightTree, DensitiesOfDrawnAndMetDirectionsAreEqual) {
     nearest.fill(-1);
     lights.meet(rays, distance, kBlock, here.normal, kept, false,
                 [&](std::size_t k, const Rgb<double>& radiance, double pdf) {
-                  // Others may lie on the way.
+                  // Other lamps may be in the way.
                   if (abs(radiance.r - out.radiance.r[k]) <= 1e-3 * radiance.r &&
                       abs(pdf - out.pdf[k]) < abs(nearest[k] - out.pdf[k]))
                     nearest[k] = pdf;
@@ -231,7 +231,7 @@ TEST(LightTree, DensitiesOfDrawnAndMetDirectionsAreEqual) {
       if (out.pdf[k] > 0 && !out.delta[k]) (abs(nearest[k] / out.pdf[k] - 1) < 1e-6 ? same : other) += 1;
   });
   EXPECT_GT(same, 1000);
-  EXPECT_LE(other, same / 200);  // at a lamp's rim rounding decides whether a ray meets it
+  EXPECT_LE(other, same / 200);  // at a lamp's rim, rounding decides whether a ray hits it
 }
 
 Material material(const char* model, ParamValues values) {
@@ -242,7 +242,7 @@ Material material(const char* model, ParamValues values) {
   return m;
 }
 
-/// A floor, a ball and a wall, matte and glossy, orthographic from above.
+/// A floor, a ball and a wall, diffuse and glossy, seen orthographically from above.
 Scene room(std::vector<Light> lamps) {
   Scene s = scene_with(std::move(lamps));
   s.camera.orthographic = true;
@@ -274,11 +274,11 @@ Rendering picture(const Scene& s, std::size_t most_weighed, Strategy strategy, i
   return render(s, o).rendering;
 }
 
-// Blocks of 4 x 4 pixels, three channels, three pairs of pictures: 144 comparisons. Correct code fails one at 4.5
-// standard errors with probability 7e-6, any of them with 1e-3; seeds are fixed.
+// Blocks of 4 x 4 pixels, three channels, three pairs of pictures: 144 comparisons. With correct code, one exceeds 4.5
+// standard errors with a probability of 7e-6, and any of them with 1e-3; seeds are fixed.
 TEST(LightTree, PicturesAgreeWithThoseWhereEachLampIsWeighed) {
   Scene s = room(lamps_of_all_kinds(60, 3, 5, 0.1));
-  // Not near surfaces, where the light of a point has no bound.
+  // Away from surfaces, where the light of a point lamp is unbounded.
   for (Light& l : s.lights) l.position.z = 3 + 0.5 * l.position.z;
   s.environment.image = std::make_shared<const Image>(procedural_environment("interior", 64));
   const Rendering list = picture(s, kNever, Strategy::Mis, 2000, 1);
@@ -318,8 +318,8 @@ double mean_of_variance(const Rendering& r) {
   return sum;
 }
 
-// At equal noise: seconds times variance. The noise of one lamp is not that of many; so that of many is held against
-// what weighing each lamp leaves.
+// At equal noise, that is, seconds times variance. One lamp has other noise than many; so the noise of many is compared
+// with that of weighting every lamp.
 TEST(LightTree, AThousandLampsCostAtMostThreeTimesOne) {
   std::vector<Light> lamps;
   Random random(8, 8, 8);

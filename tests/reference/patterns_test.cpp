@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What defines each sampling pattern, and what patterns are worth behind a lobe.
+// The defining property of each sampling pattern, and the benefit of patterns with a lobe.
 #include "reference/patterns.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ std::vector<Point> points(Pattern pattern, int count, std::uint64_t key) {
   return out;
 }
 
-/// The cells of a grid that hold points.
+/// The cells of a grid that contain points.
 std::set<std::pair<int, int>> cells(const std::vector<Point>& points, int columns, int rows) {
   std::set<std::pair<int, int>> out;
   for (const Point& p : points) {
@@ -52,10 +52,10 @@ TEST(Patterns, PermutedIsAPermutationThatDependsOnItsKey) {
       ASSERT_LT(*seen.rbegin(), n);
       first_places.insert(permuted(0, n, key));
     }
-    // 200 keys leave none of 16 places out, and 14 of 100 on average.
+    // With 200 keys all of 16 positions occur, and on average all but 14 of 100.
     EXPECT_GE(first_places.size(), n <= 16 ? n : 70u);
   }
-  // Each place about equally often: chi-square of 9 degrees of freedom, whose 1 - 1e-6 quantile is 46.
+  // All positions are about equally frequent: chi-square with 9 degrees of freedom, whose 1 - 1e-6 quantile is 46.
   std::array<int, 10> counts{};
   for (std::uint64_t key = 0; key < 5000; ++key) ++counts[permuted(3, 10, key)];
   double chi2 = 0;
@@ -84,7 +84,7 @@ TEST(Patterns, JitteredHasOneInEachCell) {
     const PatternPoints p(Pattern::Jittered, n);
     EXPECT_EQ(int(cells(points(Pattern::Jittered, n, 3), p.columns(), p.rows()).size()), n);
   }
-  // Anywhere in it: the mean of a coordinate inside its cell is 1/2, within 4.5 standard errors.
+  // Uniform inside the cell: the mean of a coordinate is 1/2, within 4.5 standard errors.
   double sum = 0;
   for (std::uint64_t key = 0; key < 4000; ++key) {
     const double x = PatternPoints(Pattern::Jittered, 25).point(7, key)[0] * 5;
@@ -117,8 +117,8 @@ TEST(Patterns, RandomHasNoSuchOrder) {
 }
 
 TEST(Patterns, DimensionsOfAPathKnowNothingOfEachOther) {
-  // All samples of a pixel, two dimensions: the pattern in each, and no correlation between them, beyond 4.5 standard
-  // errors over 2,000 pixels of 16 samples.
+  // Each pair of dimensions of a pixel's samples has the pattern, and there is no correlation between pairs beyond 4.5
+  // standard errors over 2,000 pixels of 16 samples.
   const PatternPoints p(Pattern::MultiJittered, 16);
   double sum = 0;
   for (std::uint64_t pixel = 0; pixel < 2000; ++pixel) {
@@ -133,7 +133,7 @@ TEST(Patterns, DimensionsOfAPathKnowNothingOfEachOther) {
   EXPECT_NEAR(sum / std::sqrt(32000.0), 0, 4.5);
 }
 
-/// Variance of the mean of 64 radiances that a cos^e lobe about r draws from a world, the mean of that over many r.
+/// Variance of the mean of 64 radiances that a cos^e lobe about r samples from a world, averaged over many r.
 double variance(Pattern pattern, double e, const Environment& world) {
   const PatternPoints p(pattern, 64);
   constexpr int kLobes = 64, kPatterns = 64;
@@ -156,9 +156,9 @@ double variance(Pattern pattern, double e, const Environment& world) {
   return total;
 }
 
-/// How many times less noise patterns have than random points, behind lobes from a matte to a mirror's. Cells of the
-/// square become pieces of the lobe: the narrower it is, the more pieces have but one colour, and the more a pattern is
-/// worth.
+/// By which factor patterns reduce the noise of random points, for lobes from diffuse to mirror. Cells of the square
+/// become pieces of the lobe: the narrower the lobe, the more pieces have a single colour, and the more a pattern
+/// helps.
 TEST(Patterns, StratificationSurvivesTheLobe) {
   Environment world;
   world.image = std::make_shared<const Image>(procedural_environment("interior", 256));

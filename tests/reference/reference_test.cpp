@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The path tracer against closed forms and against itself, and the picture files.
+// The path tracer compared with closed forms and with itself; and picture files.
 //
-// Statistics: seeds are fixed, so a test always gives the same answer. A deviation is judged by its standard
-// error; with correct code 4.5 standard errors are exceeded with probability 7e-6 for each number compared.
+// Statistics: seeds are fixed, so results are reproducible. Deviations are compared with their standard errors; with
+// correct code a number differs by more than 4.5 standard errors with a probability of 7e-6.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -19,7 +19,7 @@
 namespace brdfc::reference {
 namespace reference_test {
 
-/// Reflects like Lambert, but not a number where the light comes from the left.
+/// Reflects like Lambert, but returns NaN for light from the left.
 template <class T> struct Broken {
   T dummy{};
   static ModelInfo info() {
@@ -45,7 +45,7 @@ using testing::HasSubstr;
 
 constexpr double kSigmas = 4.5;
 
-/// White unless told otherwise.
+/// White by default.
 Material material(const std::string& model, ParamValues values) {
   Material m;
   m.id = model;
@@ -64,7 +64,7 @@ Object object(Mesh mesh, Vec3<double> at = {0, 0, 0}, int material = 0) {
   return o;
 }
 
-/// Orthographic, straight down on the origin, y upwards in the picture.
+/// Orthographic, looking straight down on the origin, y upwards in the picture.
 Camera camera_above(double height, double z = 50) {
   Camera c;
   c.orthographic = true;
@@ -76,7 +76,7 @@ Camera camera_above(double height, double z = 50) {
   return c;
 }
 
-/// A large horizontal plane through the origin, seen in a spot so small that all its points are alike.
+/// A large horizontal plane through the origin, of which so small a spot is seen that all its points are alike.
 Scene plane(Material m) {
   Scene s;
   s.camera = camera_above(1e-3);
@@ -95,7 +95,7 @@ struct Estimate {
   double mean = 0, error = 0;
 };
 
-/// Mean over all pixels and channels, and its standard error; channels of one path are not independent.
+/// Mean over all pixels and channels, and its standard error; the channels of a path are not independent.
 Estimate total(const Rendering& r) {
   Estimate e;
   const std::size_t n = r.mean.rgb.size();
@@ -135,7 +135,7 @@ Light sun_light(Vec3<double> direction, double irradiance, double half_angle) {
   return l;
 }
 
-/// Shines down from height h; half axes a and b along x and y.
+/// Emits downwards from height h, with half axes a and b along x and y.
 Light flat_light(Light::Kind kind, double h, double a, double b, double radiance) {
   Light l;
   l.kind = kind;
@@ -153,11 +153,11 @@ TEST(Reference, PointLightOnAPlane) {
   Scene s = plane(lambert(0.6));
   s.lights = {point_light(at, 5, 0)};
   expect_radiance(s, expected, 1e-5, 16);
-  // A sphere wholly above the horizon gives the same irradiance as a point.
+  // A sphere entirely above the horizon gives the same irradiance as a point.
   s.lights = {point_light(at, 5, 1.2)};
   for (const Strategy strategy : {Strategy::Mis, Strategy::Light, Strategy::Brdf})
     expect_radiance(s, expected, 0.01, 4096, strategy);
-  // Inside the sphere its radiance comes from all sides.
+  // Inside the sphere, its radiance comes from all sides.
   s.lights = {point_light({0, 0, 0.3}, 5, 10)};
   expect_radiance(s, s.lights[0].radiance.r * 0.6, 0.01);
 }
@@ -167,7 +167,7 @@ TEST(Reference, SunOnAPlane) {
   const double expected = 3 * (2 / std::sqrt(4 + 1 + 0.25)) * 0.6 / kPi;
   s.lights = {sun_light({1, 0.5, -2}, 3, 0)};
   expect_radiance(s, expected, 1e-6, 4);
-  // Irradiance of a sun above the horizon does not depend on its size.
+  // The irradiance of a sun above the horizon is independent of its size.
   for (const double half_angle : {1e-3, 0.3}) {
     s.lights = {sun_light({1, 0.5, -2}, 3, half_angle)};
     expect_radiance(s, expected, 0.01);
@@ -178,7 +178,7 @@ TEST(Reference, SunOnAPlane) {
 TEST(Reference, AreaLightsOnAPlane) {
   const double h = 1.5, a = 1.1, b = 0.4, radiance = 4;
   Scene s = plane(lambert(0.6));
-  // Disk above its axis: E = pi L r^2 / (r^2 + h^2).
+  // A disk centred above the point: E = pi L r^2 / (r^2 + h^2).
   s.lights = {flat_light(Light::Kind::Disk, h, a, a, radiance)};
   for (const Strategy strategy : {Strategy::Mis, Strategy::Light, Strategy::Brdf})
     expect_radiance(s, radiance * a * a / (a * a + h * h) * 0.6, 0.01, 4096, strategy);
@@ -204,7 +204,7 @@ TEST(Reference, ManyLightsAddUp) {
 }
 
 TEST(Reference, EnvironmentImageOnAPlane) {
-  // A few bright texels over dim ones; expected value from fine quadrature over the upper hemisphere.
+  // A few bright texels among dim ones; the expected value is from fine quadrature over the upper hemisphere.
   Image image(16, 8);
   for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = 0.1f + 0.01f * float(i % 7);
   for (int c = 0; c < 3; ++c) image.pixel(3, 1)[c] = 40, image.pixel(15, 3)[c] = 25, image.pixel(5, 6)[c] = 1000;
@@ -222,7 +222,7 @@ TEST(Reference, EnvironmentImageOnAPlane) {
     }
   for (const Strategy strategy : {Strategy::Mis, Strategy::Light, Strategy::Brdf})
     expect_radiance(s, irradiance * 0.6 / kPi, 0.02, 8192, strategy);
-  // What the camera sees of it is the picture itself.
+  // The camera sees the image itself.
   s.objects[0] = object(make_quad(1, 1), {0, 0, 1000});
   s.camera.orthographic = false;
   const double u = 3.5 / 16, v = 1 - 1.5 / 8;
@@ -261,7 +261,7 @@ TEST(Reference, EnvironmentDensityIsNormalised) {
 }
 
 TEST(Reference, WhiteFurnace) {
-  // Lambert with reflectance 1 weighs every path 1: no noise, also between several objects.
+  // With Lambert of reflectance 1, every path has weight 1: no noise, also between several objects.
   Scene s;
   s.camera = camera_above(3);
   s.materials = {lambert(1)};
@@ -269,7 +269,7 @@ TEST(Reference, WhiteFurnace) {
   s.environment.color = Rgb<double>(1);
   const Image white = render(s, options(24, 8, 1000)).rendering.mean;
   for (const float x : white.rgb) EXPECT_FLOAT_EQ(x, 1);
-  // The coupled model divides the light between mirror and matte by chance.
+  // The coupled model chooses between mirror and diffuse at random.
   s.objects = {object(make_sphere(1, 256, 128, true))};
   s.materials = {material("coupled", {{"r0", 0.05}, {"rm", grey(1)}})};
   const Estimate e = total(render(s, options(24, 512, 1)).rendering);
@@ -296,7 +296,7 @@ TEST(Reference, MirrorAndRestTogetherAreUnbiased) {
   for (const Strategy strategy : {Strategy::Mis, Strategy::Light}) expect_radiance(s, albedo, 0.01, 8192, strategy);
 }
 
-/// Glossy spheres, a wall, and lights of every kind that can be met by a ray.
+/// Glossy spheres, a wall, and lights of every kind that a ray can hit.
 Scene busy_scene() {
   Scene s;
   s.camera = camera_above(4);
@@ -316,7 +316,7 @@ Scene busy_scene() {
 TEST(Reference, StrategiesAgree) {
   const Scene s = busy_scene();
   const int size = 16;
-  // The BRDF alone finds small lamps rarely: it gets more samples.
+  // BRDF sampling alone rarely hits small lamps, so it gets more samples.
   RenderOptions mis = options(size, 512, 1), light = mis, brdf = mis;
   light.settings.seed = 8;
   light.settings.spp = 1024;
@@ -326,7 +326,7 @@ TEST(Reference, StrategiesAgree) {
   brdf.settings.strategy = Strategy::Brdf;
   const Rendering a = render(s, mis).rendering, b = render(s, light).rendering, c = render(s, brdf).rendering;
   EXPECT_LT(total(a).error, 0.01 * total(a).mean);
-  // Whole picture, and blocks of 4 x 4 pixels, in which the central limit theorem has set in.
+  // The whole picture, and blocks of 4 x 4 pixels, for which the central limit theorem applies.
   for (const Rendering* other : {&b, &c}) {
     const Estimate x = total(a), y = total(*other);
     EXPECT_LT(y.error, 0.02 * y.mean);
@@ -342,7 +342,7 @@ TEST(Reference, StrategiesAgree) {
         EXPECT_LT(std::abs(difference), kSigmas * std::sqrt(variance)) << bx << " " << by;
       }
   }
-  // Using both ways must be worth it.
+  // MIS must be worth its cost.
   EXPECT_LT(total(a).error * std::sqrt(512), total(c).error * std::sqrt(4096));
 }
 
@@ -358,7 +358,7 @@ TEST(Reference, PictureDoesNotDependOnThreads) {
   EXPECT_NE(a.mean.rgb, render(s, other).rendering.mean.rgb);
 }
 
-/// busy_scene() with what bends, absorbs, mirrors and lets through, a texture, and a wall for the camera alone.
+/// busy_scene() with bump maps, absorption, mirrors and transmission, a texture, and a wall that only the camera sees.
 Scene crowded_scene() {
   Scene s = busy_scene();
   s.materials.push_back(material("glass", {{"density", 0.7}}));
@@ -373,7 +373,7 @@ Scene crowded_scene() {
   return s;
 }
 
-// One path at a time is traced by single rays, many together by packets: both find the same to the last bit.
+// Single paths are traced by single rays, many paths by packets: both results are equal to the last bit.
 TEST(Reference, PictureDoesNotDependOnHowManyPathsAreFollowedTogether) {
   const Scene s = crowded_scene();
   for (const bool scaled : {false, true}) {
@@ -391,7 +391,7 @@ TEST(Reference, PictureDoesNotDependOnHowManyPathsAreFollowedTogether) {
   }
 }
 
-// Shared meshes are met by rays that are turned into their object space, also in packets.
+// Shared meshes are intersected by rays transformed to object space, also in packets.
 TEST(Reference, SharedMeshesLookAsCopiesDo) {
   Scene s = crowded_scene();
   for (Object& o : s.objects)
@@ -405,7 +405,7 @@ TEST(Reference, SharedMeshesLookAsCopiesDo) {
   o.most_copies = 0;
   const Rendering shared = render(s, o).rendering;
   EXPECT_NE(copied.mean.rgb, shared.mean.rgb) << "nothing was shared";
-  // Random numbers are the same, so paths are but for rounding, which decides at edges.
+  // Random numbers are the same, and so are paths except for rounding, which decides at edges.
   int differ = 0;
   for (std::size_t i = 0; i < copied.mean.rgb.size(); ++i)
     differ += std::abs(copied.mean.rgb[i] - shared.mean.rgb[i]) > 1e-3 * copied.mean.rgb[i] + 1e-6;
@@ -417,7 +417,7 @@ TEST(Reference, SharedMeshesLookAsCopiesDo) {
 }
 
 TEST(Reference, VarianceLayerIsRight) {
-  // Spread of many small renderings against what one of them says.
+  // The variance of many small renderings compared with the one that a single rendering states.
   const Scene s = busy_scene();
   const int runs = 40;
   std::vector<double> sum, sum2, claimed;
@@ -457,11 +457,11 @@ TEST(Reference, CancelKeepsWhatIsDone) {
   ASSERT_GE(r.samples, 7);
   EXPECT_LT(r.samples, 1000);
   EXPECT_EQ(r.rendering.metadata["samples"], r.samples);
-  // It was stopped between two passes, so it equals a rendering with that many samples.
+  // It was stopped between two passes, so it equals a rendering with that number of samples.
   const RenderResult whole = render(s, options(16, r.samples, 1));
   EXPECT_FALSE(whole.cancelled);
   EXPECT_EQ(whole.rendering.mean.rgb, r.rendering.mean.rgb);
-  // Cancelled before it begins: a black picture without variance, and it says that it has no samples.
+  // Cancelled before it begins: a black picture without variance, with 0 samples.
   const RenderResult none = render(s, o);
   EXPECT_EQ(none.samples, 0);
   EXPECT_FALSE(none.rendering.variance);
@@ -478,7 +478,7 @@ TEST(Reference, StopsAfterTheGivenTime) {
 }
 
 TEST(Reference, BouncesCountScatteringsAfterTheFirst) {
-  // The seen spot lies in shadow of a lid and gets light only by way of the floor's other points and the lid.
+  // The visible spot is in the shadow of a lid, and receives light only through the lid and other points of the floor.
   Scene s = plane(lambert(0.5));
   s.objects.push_back(object(make_quad(2, 2), {0, 0, 0.5}));
   s.camera.position = {0, 0, 0.3};
@@ -486,7 +486,7 @@ TEST(Reference, BouncesCountScatteringsAfterTheFirst) {
   std::vector<double> means;
   for (int bounces = 0; bounces <= 4; ++bounces)
     means.push_back(total(render(s, options(4, 2000, bounces)).rendering).mean);
-  // From the spot by the lid to the lit floor are two scatterings after the first; once more to and fro, four.
+  // From the spot by the lid to the lit floor takes two further scattering events; another round trip, four.
   EXPECT_EQ(means[0], 0);
   EXPECT_EQ(means[1], 0);
   EXPECT_GT(means[2], 0);
@@ -541,8 +541,8 @@ TEST(Reference, TexturesAreUprightAndLinear) {
 }
 
 TEST(Reference, AnisotropyFollowsTheTangent) {
-  // A horizontal plane has its z axis along the normal, so the tangent is its x axis: a lamp's highlight stretches
-  // in the direction of the smaller exponent.
+  // On a horizontal plane the z axis is the normal, so the tangent is the x axis: a lamp's highlight is wider in the
+  // direction of the smaller exponent.
   const auto width_ratio = [](double degrees) {
     Scene s;
     s.camera = camera_above(2);
@@ -609,7 +609,7 @@ TEST_F(ImageTest, RenderingRoundTrip) {
   ASSERT_TRUE(s.variance);
   EXPECT_EQ(s.variance->rgb, r.variance->rgb);
   EXPECT_EQ(s.metadata, r.metadata);
-  // Nothing is left beside it.
+  // No other file is left in the folder.
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "deep"), fs::directory_iterator()), 1);
   r.variance.reset();
   write_rendering(folder_ / "deep" / "r.exr", r);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scene files: what is accepted, what is refused and with which words, and the resolved form.
+// Scene files: what is accepted, what is refused with which message, and the resolved form.
 #include "reference/scene.h"
 
 #include <gmock/gmock.h>
@@ -65,7 +65,7 @@ class SceneTest : public testing::Test {
     return "";
   }
   std::string error_with(const json& scene) const { return error_of(write(scene.dump())); }
-  /// With the value at a JSON pointer replaced or added.
+  /// The error with the value at a JSON pointer replaced or added.
   std::string error_at(const std::string& pointer, const json& value) const {
     json scene = valid();
     scene[json::json_pointer(pointer)] = value;
@@ -135,7 +135,7 @@ TEST_F(SceneTest, NamesFileKeyAndExpectation) {
       {"/lights/0/position/2", 1e300, {"lights[0].position[2]: expected a number in [-1e+06, 1e+06]"}},
       {"/materials/red/parameters/rho", {2, 0, 0}, {"materials.red.parameters.rho[0]: expected a number in [0, 1]"}},
       {"/environment/strength", -1, {"environment.strength: expected a number in [0, 1e+09]"}},
-      // what does not fit together
+      // contradictions
       {"/camera/look_at", {0, -5, 1}, {"camera.look_at: expected a point away from the camera"}},
       {"/camera/up", {0, 5, -1}, {"camera: expected \"up\" not to be parallel to the view"}},
       {"/lights/1/direction", {0, 0, 0}, {"lights[1].direction: expected a direction that is not zero"}},
@@ -295,7 +295,7 @@ TEST_F(SceneTest, ReadsMeshFiles) {
   EXPECT_EQ(read_mesh(folder_ / "t.ply", false).triangles.size(), 1u);
 }
 
-/// Twice the signed volume for a closed mesh whose triangles face outwards is 6 times its volume.
+/// The sum of signed volumes; for a closed mesh whose triangles face outwards it is 6 times its volume.
 double volume(const Mesh& m) {
   double sum = 0;
   for (const auto& t : m.triangles) {
@@ -317,7 +317,7 @@ TEST(Mesh, ShapesFaceOutwards) {
   EXPECT_EQ(make_sphere(1, 3, 2, true).triangles.size(), 6u);
 }
 
-/// Normals as the triangles have them: of each, the largest angle between a corner's normal and the triangle's own.
+/// The largest angle between a corner's normal and its triangle's.
 double largest_lean(const Mesh& m) {
   double largest = 0;
   for (const auto& t : m.triangles) {
@@ -338,7 +338,7 @@ TEST(Mesh, ACylinderIsClosedAndRoundOnlyOnItsSide) {
   EXPECT_LT(largest_lean(flat), 1e-3);
 }
 
-/// Pappus: a tube of radius r(t) about a curve has the volume pi r^2 along the curve, whatever its bends.
+/// Pappus: a tube of radius r(t) about a curve has the volume pi r^2 along the curve, whatever its curvature.
 TEST(Mesh, AKnotIsClosedAndHasNormalsOfItsSurface) {
   const Mesh knot = make_knot(2, 3, 0.2, 48, 4096, 64);
   check_mesh(knot, "knot");
@@ -432,7 +432,7 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
   struct Case {
     const char* definition;  // "" for the scene itself
     const char* pointer;     // of an object of this kind
-    json value;              // put there first, unless null
+    json value;              // added first, unless null
   };
   const json checker{{"procedural", "checker"}, {"a", {0, 0, 0}}, {"b", {1, 1, 1}}, {"cells", 2}};
   const std::vector<Case> cases{

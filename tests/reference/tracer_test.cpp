@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What rays meet where objects share meshes, and what memory that takes.
+// What rays hit if objects share meshes, and the memory that takes.
 #include "reference/tracer.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ using Vector = Vec3<double>;
 constexpr Vector kOne{1, 1, 1};
 constexpr std::size_t kCopyAll = std::numeric_limits<std::size_t>::max();
 
-/// Turned about all axes, then moved.
+/// Rotated about all axes, then moved.
 Transform transform(const Vector& scale, double turn, const Vector& to) {
   const double c = std::cos(turn), s = std::sin(turn), d = std::cos(2 * turn), t = std::sin(2 * turn);
   const std::array<std::array<double, 3>, 3> r{{{c * d, -s, c * t}, {s * d, c, s * t}, {-t, 0, d}}};
@@ -29,7 +29,7 @@ Transform transform(const Vector& scale, double turn, const Vector& to) {
   return out;
 }
 
-/// Objects of one mesh, each in a place of its own.
+/// Objects with a common mesh, each at its own place.
 Scene scene_of(Mesh mesh, const std::vector<Transform>& places) {
   Scene scene;
   const auto shared = std::make_shared<const Mesh>(std::move(mesh));
@@ -61,7 +61,7 @@ TEST(Tracer, StoresEqualMeshesOnce) {
   const std::size_t places = 1000;
   EXPECT_LT(places * mesh.triangles.size() / 2, kMostCopies) << "the next lines have to ask for sharing";
   EXPECT_LT(Tracer(scene_of(mesh, row(int(places))), 0).memory(), 5 * one);
-  // As many copies as no one asks for are too many without being told.
+  // Shared without being requested, as a large number of copies would need too much memory.
   const Mesh fine = make_sphere(1, 512, 256, true);
   EXPECT_LT(Tracer(scene_of(fine, row(12))).memory(), 2 * Tracer(scene_of(fine, row(1))).memory());
 }
@@ -96,7 +96,7 @@ TEST(Tracer, SharedMeshesAreMetWhereCopiesAre) {
     shared.occluded(rays, hidden_b);
     int met = 0, differ = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      // One ray alone finds the same as many together.
+      // A single ray finds the same as a packet.
       Meeting alone;
       shared.intersect({&rays[i], 1}, from_camera, {&alone, 1});
       ASSERT_EQ(alone.part, b[i].part);
@@ -127,7 +127,7 @@ TEST(Tracer, SharedMeshesAreMetWhereCopiesAre) {
   }
 }
 
-// Rounding must be within the step that rays take off a surface, wherever that is and whatever its size.
+// Rounding errors must be smaller than the offset of rays from a surface, whatever its position and size.
 TEST(Tracer, RaysLeaveASharedMesh) {
   for (const Vector& place : {Vector{0, 0, 0}, Vector{1000, -1000, 1000}, Vector{1e5, 3, -2e4}}) {
     const double size = std::max(0.1, maximum(abs(place.x), abs(place.z)) * 1e-3);
@@ -144,7 +144,7 @@ TEST(Tracer, RaysLeaveASharedMesh) {
       ++met;
       const Vector out = direction(random);
       const bool outwards = dot(out, hit.geometric) > 0;
-      // From a convex body a ray outwards meets nothing, one inwards meets the other side.
+      // From a convex body, an outward ray hits nothing and an inward ray the other side.
       Hit next;
       const bool found = shared.intersect({Tracer::leave(hit.p, hit.geometric, out), out}, false, next);
       if (outwards)

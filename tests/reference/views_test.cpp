@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a scene is seen from, against points on its triangles; and forms that are cut to it.
+// The view angles at which a scene is seen, compared with points on its triangles; and forms that are cut to them.
 #include "reference/views.h"
 
 #include <gmock/gmock.h>
@@ -55,7 +55,7 @@ Scene scene(const Camera& camera, std::vector<Object> objects, int max_bounces =
   return s;
 }
 
-/// What points of a mesh that the picture shows are seen at, whatever hides them.
+/// View cosines of points on a mesh in the picture, ignoring occlusion.
 Cosines at_points(const Scene& s, const Mesh& mesh, std::mt19937_64& rng) {
   std::uniform_real_distribution<double> uniform(0, 1);
   const auto to_vector = [](const std::array<float, 3>& a) { return Vector{a[0], a[1], a[2]}; };
@@ -134,7 +134,7 @@ TEST(Views, AreAllWhereScatteredRaysCanComeBack) {
   EXPECT_TRUE(all(scene(camera({0, 0, 0}, {1, 0, 0}, false, 1), {box}, 1))) << "from inside";
   EXPECT_TRUE(all(scene(camera({1, 2, -3}, {9, 9, -9}, false, 0.1), {floor}, 0))) << "out of sight";
 
-  // Two sides of a roof: rays from within meet the other.
+  // Two sides of a roof: rays from inside hit the other side.
   Mesh roof;
   roof.vertices = {{-1, 0, 0}, {0, -1, 1}, {0, 1, 1}, {1, 0, 0}};
   roof.triangles = {{0, 1, 2}, {3, 2, 1}};
@@ -184,7 +184,7 @@ TEST(Views, CutFitsHoldTheSameNumbers) {
     const ParamValues values = fit::roles_of(m, known).fitted();
     const fit::Fit& whole = fit::fit_of(m, values);
     const fit::Varied<double> varied(20);
-    // Also less than what lies between two knots, and what ends at the last.
+    // Also for ranges between two knots, and ranges that end at the last knot.
     for (const Cosines& views : {kSome, Cosines{0.5, 0.501}, Cosines{0, 0.1}, Cosines{0.99, 1}}) {
       const fit::Fit cut = fit::fit_of(m, values, views);
       EXPECT_LT(cut.size(), whole.size());
@@ -203,7 +203,7 @@ TEST(Views, CutFitsHoldTheSameNumbers) {
         }
       }
     }
-    // Grazing views are what is off.
+    // The error is largest at grazing views.
     const double of_all = whole.mean_l1(20.0);
     EXPECT_LT(fit::fit_of(m, values, {0.7, 1}).mean_l1(20.0), of_all);
     EXPECT_GT(fit::fit_of(m, values, {0, 0.1}).mean_l1(20.0), of_all);
@@ -227,7 +227,7 @@ TEST(Views, OfAllMaterialsOfAModelArePlannedFor) {
               testing::Contains("view angles beyond 67 degrees: never seen"));
   const plan::PlannedModel all = plan::plan_scene({need("a", {0.4, 0.6}), need("b", {})})[0];
   EXPECT_THAT(all.reasons, testing::Each(Not(HasSubstr("never seen"))));
-  // What is off at views that nobody has does not count.
+  // Errors at views that do not occur do not count.
   plan::Budget budget;
   budget.error = 0.006;
   EXPECT_EQ(plan::plan_scene({need("a", {})}, budget)[0].forms[0], forms::form("aimed"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report measures what it says, against pictures whose error and noise are known by construction.
+// The report's measurements, of pictures whose error and noise are known by construction.
 #include "report/report.h"
 
 #include <gmock/gmock.h>
@@ -100,9 +100,9 @@ TEST_F(ReportTest, SeparatesErrorFromNoise) {
   EXPECT_GT(glossy.difference.rel_mse, 2 * glossy.difference.noise);
   EXPECT_NEAR(exact.difference.bias, 0, 5 * exact.difference.bias_error);
   EXPECT_NEAR(exact.difference.rel_mse / exact.difference.noise, 1, 0.05);
-  // Four pictures, so the standard deviation of a pixel is half that of one; then the mean over all pixels, whose
-  // channels are taken to err together: of the products of two channels' deviations there are twice as many as squares,
-  // and the deviation of four normal numbers is sqrt(8 / (3 pi)) of the true one on average.
+  // With four pictures, the standard deviation of a pixel is half that of one picture. Then the mean over all pixels:
+  // the channels are assumed to be correlated, so there are twice as many products of deviations as squares; and the
+  // standard deviation estimated from four normal numbers is on average sqrt(8 / (3 pi)) of the true one.
   EXPECT_NEAR(exact.difference.bias_error, kNoise / 2 / kSize / 0.5 * std::sqrt((1 + 2 * 8 / (3 * kPi)) / 3), 2e-5);
   EXPECT_EQ(exact.spp, 64);
 }
@@ -127,7 +127,7 @@ TEST_F(ReportTest, RelMseOfKnownPictures) {
 TEST_F(ReportTest, CostIsTheMedianOfPairs) {
   const auto scenes = load();
   EXPECT_DOUBLE_EQ(scenes[0].forms[0].cost.value(), 1);
-  EXPECT_DOUBLE_EQ(scenes[0].forms[1].cost.value(), 1.5);  // 1.5, 1.5, 1.5, 9: one disturbed run changes nothing
+  EXPECT_DOUBLE_EQ(scenes[0].forms[1].cost.value(), 1.5);  // 1.5, 1.5, 1.5, 9: one disturbed run has no effect
   for (json& run : runs_["runs"])
     for (json& time : run["cpu_seconds"]) time = 0.1 * time.get<double>();
   EXPECT_FALSE(load()[0].forms[1].cost.has_value()) << "chance";
@@ -206,7 +206,7 @@ TEST_F(ReportTest, NamesInTheChartLieBesideEachOther) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     EXPECT_GT(names[i].y, 12) << names[i].text << " lies above the picture";
     for (std::size_t j = 0; j < i; ++j)
-      // Letters of 12 pixels, which are about half as wide.
+      // Letters are 12 pixels high, and about half as wide.
       EXPECT_TRUE(std::abs(names[i].y - names[j].y) >= 12 ||
                   names[i].x + 6.0 * double(names[i].text.size()) < names[j].x ||
                   names[j].x + 6.0 * double(names[j].text.size()) < names[i].x)
@@ -317,7 +317,7 @@ std::vector<Rendering> noisy(double factor, int count, unsigned seed) {
   return out;
 }
 
-/// A picture with grey noise of its own, which its variance layer tells.
+/// A picture with grey noise, which is stated in its variance layer.
 Rendering noisy_reference() {
   Rendering out = reference();
   std::mt19937 random(99);
@@ -345,7 +345,7 @@ TEST(Welch, PValuesAreUniformWhereTheReferenceHasNoNoise) {
 }
 
 TEST(Welch, RejectsABiasThatNoiseHides) {
-  // Seven times less than the noise of a pixel's mean: no pixel shows it, every tile does.
+  // A seventh of the noise of a pixel's mean: no pixel shows it, but every tile does.
   const std::vector<Rendering> pictures = noisy(1.01, 8, 1);
   const WelchTest t = welch_test(pictures, reference(), "a", "b");
   EXPECT_FALSE(t.passed());
@@ -364,7 +364,7 @@ TEST(Welch, RejectsAFewWrongPixels) {
   EXPECT_LT(t.p.pixel(3, 5)[0], 1e-6);
 }
 
-/// Light that comes to one pixel in a hundred: the others are dimmer than the mean by more than rounding, and agree.
+/// Light that reaches one pixel in a hundred: the others are darker than the mean by more than rounding, and agree.
 TEST(Welch, RareLightIsNoise) {
   constexpr double kChance = 0.01, kDot = 0.2;
   std::vector<Rendering> pictures(4, picture(1, 0, 0));
@@ -378,7 +378,7 @@ TEST(Welch, RareLightIsNoise) {
   Rendering expected = reference();
   for (float& v : expected.mean.rgb) v += float(kChance * kDot);
   EXPECT_TRUE(welch_test(pictures, expected, "a", "b").passed());
-  // Without it nothing is left that could be noise.
+  // Without it, nothing remains that could be noise.
   pictures.assign(4, picture(1, 0, 0));
   EXPECT_EQ(welch_test(pictures, expected, "a", "b").rejected_pixels, kSize * kSize);
 }
@@ -392,7 +392,7 @@ TEST(Welch, WithoutNoiseOnlyRoundingIsForgiven) {
   EXPECT_EQ(welch_test(pictures, reference(), "a", "b").rejected_pixels, kSize * kSize);
 }
 
-/// Blender's picture of scenes/gl-fig11.json has 1e-33 beside a lobe where the reference has 0, always the same.
+/// Next to a lobe, Blender's picture of scenes/gl-fig11.json always has 1e-33 where the reference has 0.
 TEST(Welch, WhatNobodySeesIsNoDifference) {
   Rendering dark = reference();
   std::vector<Rendering> pictures(2, picture(1, 0, 0));
@@ -414,7 +414,7 @@ TEST(Welch, RefusesWhatItCannotJudge) {
 }
 
 TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
-  // Noise falls as 1/n for both forms; "exact" starts at twice the noise and costs as much a sample.
+  // Noise decreases as 1/n for both forms; "exact" starts with twice the noise and costs the same per sample.
   runs_["convergence"] = json::array();
   for (const int spp : {16, 256, 1024})
     for (const char* form : {"glossy", "exact"}) {
@@ -436,7 +436,7 @@ TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
   for (const auto& cost : glossy.equal_error) EXPECT_NEAR(cost.value(), 1, 1e-9);
   for (const auto& cost : exact.equal_error) EXPECT_NEAR(cost.value(), 2, 0.1);
   EXPECT_EQ(exact.cost, 1) << "of the longest renders, not the short ones";
-  // A rare bright path can keep noise from falling where it was measured: that is not carried on for ever.
+  // A rare bright path can keep the measured noise from decreasing: that must not be extrapolated.
   for (json& point : runs_["convergence"])
     if (point["form"] == "exact" && point["spp"] == 1024)
       for (json& image : point["images"]) image = "exact-256-" + image.get<std::string>().substr(11);
@@ -446,7 +446,8 @@ TEST_F(ReportTest, EqualErrorCountsTheSamplesThatAFormNeeds) {
 }
 
 TEST_F(ReportTest, EqualTimeTakesTheImagesThatFit) {
-  // The exact form costs 1.5 times as much: 4 / 1.5 = 2.7 images, of whose mean the noise is 4 / 3 that of all four.
+  // The exact form costs 1.5 times as much: in the same time it gets 4 / 1.5 = 2.7 images, whose mean has 4 / 3 of the
+  // noise of all four.
   const auto scenes = load();
   const FormReport &glossy = scenes[0].forms[0], &exact = scenes[0].forms[1];
   EXPECT_EQ(glossy.equal_time_images, 4);

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Following docs/add-a-model.md adds a model: its example, dropped into a copy of the sources,
-builds, equals its formula, and renders in Blender as it does in the reference renderer. Following
-docs/add-a-form.md adds a form, in the same copy."""
+"""Tests that following docs/add-a-model.md adds a model: the page's example, added to a copy of the
+sources, builds, equals its formula, and renders in Blender as in the reference renderer. Likewise,
+in the same copy, docs/add-a-form.md adds a form."""
 
 import csv
 import json
@@ -35,14 +35,14 @@ def page_of(page):
 
 
 def examples_of(page):
-    """[(path, text)] of the sources that a page shows."""
+    """[(path, text)] of the sources on a page."""
     return re.findall(
         r"<!-- example: (\S+) -->\n```cpp\n(.*?)```\n<!-- end of example", page_of(page), re.S
     )
 
 
 def example_of(page):
-    """The first one."""
+    """The first of them."""
     return examples_of(page)[0]
 
 
@@ -60,8 +60,8 @@ def with_base(text):
 
 @pytest.fixture(scope="module")
 def tool(tmp_path_factory):
-    """The tool, built from a copy of the sources with the examples of the docs as a new model and
-    a new form."""
+    """The tool, built from a copy of the sources with the documented examples as a new model and a
+    new form."""
     source = tmp_path_factory.mktemp("example") / "source"
     skip = shutil.ignore_patterns("build", ".env", ".git", "__pycache__", ".*_cache")
     shutil.copytree(ROOT, source, ignore=skip)
@@ -71,7 +71,7 @@ def tool(tmp_path_factory):
     for path, text in sources.items():
         assert not (source / path).exists()
         (source / path).write_text(text, encoding="utf-8")
-    # The form's page says to declare it and to list it.
+    # The page says to declare the form and to list it.
     registry = source / "generator" / "forms" / "registry.cpp"
     page = (ROOT / "docs" / "add-a-form.md").read_text(encoding="utf-8")
     declared, listed = re.findall(
@@ -83,7 +83,7 @@ def tool(tmp_path_factory):
     assert after.count("flat()") == 2
     registry.write_text(after, encoding="utf-8")
     build = source / "build"
-    # As script/test builds it, so that the compiler's cache has all but what is new.
+    # Built as by script/test, so that the compiler cache contains all but the new files.
     run("cmake", "-S", source, "--preset", "release", "-DBUILD_TESTING=OFF")
     run("cmake", "--build", build, "--target", "brdfc")
     return build / "brdfc"
@@ -112,7 +112,7 @@ def scene(environment, camera, shape):
 
 @pytest.fixture
 def renderers(tool, extension, tmp_path):
-    """(reference, blender, compare) for the scene that reference() was given."""
+    """(reference, blender, compare) for the scene that was passed to reference()."""
 
     def reference(content, spp):
         source = tmp_path / "example.json"
@@ -169,7 +169,7 @@ def test_checks_find_no_fault(tool, model):
 
 
 def test_the_base_carries_the_model(tool):
-    """As the page says: all but what lies between the colours of a ramp."""
+    """As the page says: everything except what lies between the colours of a ramp."""
     rows = list(csv.DictReader(run(tool, "base", "minnaert").splitlines()))
     assert rows
     for row in rows:
@@ -178,7 +178,7 @@ def test_the_base_carries_the_model(tool):
 
 
 def test_four_lines_make_a_picture(tool, tmp_path):
-    """The page's own, but for the compiler, with the folders of this test."""
+    """The page's own lines, except the compiler, with the folders of this test."""
     page = page_of("add-a-model.md")
     ((name, content),) = re.findall(
         r"<!-- scene: (\S+) -->\n```json\n(.*?)```\n<!-- end of scene", page, re.S
@@ -224,7 +224,7 @@ def test_uniform_light_gives_the_albedo(renderers):
 
 
 def test_structured_light_agrees_with_the_reference(renderers):
-    """Under light with structure a wrong distribution of directions would show."""
+    """Under light with structure, a wrong distribution of directions would be visible."""
     reference, blender, compare = renderers
     camera = {
         "type": "perspective",
@@ -238,7 +238,7 @@ def test_structured_light_agrees_with_the_reference(renderers):
     one, two = blender(seed=1), blender(seed=2)
     against_truth = compare(one, truth)
     assert against_truth["bias"] / against_truth["mean_b"] == pytest.approx(0, abs=0.01)
-    # Two pictures with independent noise are twice as far apart as one is from the truth.
+    # The difference of two pictures with independent noise has twice the variance of a single one.
     assert against_truth["relmse"] < 0.75 * compare(one, two)["relmse"]
 
 
@@ -265,7 +265,7 @@ def test_a_new_form_is_listed_built_and_measured(tool, tmp_path):
     manifest = json.loads((pack / "manifest.json").read_text(encoding="utf-8"))
     forms = {name: m["representations"]["flat"] for name, m in manifest["models"].items()}
     assert set(forms) == {"lambert", "phong"}
-    # A Diffuse BSDF is Lambert's model, and far from a highlight.
+    # A Diffuse BSDF equals Lambert's model, and is far from a highlight.
     assert forms["lambert"]["error"]["relative_l1"] < 1e-6
     assert forms["phong"]["error"]["relative_l1"] > 0.1
     assert forms["phong"]["warnings"] == []
@@ -275,8 +275,8 @@ def test_a_new_form_is_listed_built_and_measured(tool, tmp_path):
 
 @pytest.fixture
 def compiled(tool, tmp_path):
-    """Compiles a text in place of the example, as the build does: the object and what the compiler
-    said."""
+    """Compiles a text in place of the example, as the build does: returns the object and the
+    compiler's messages."""
     build = tool.parent
     commands = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
     (entry,) = (
@@ -299,7 +299,7 @@ def compiled(tool, tmp_path):
 
 
 def test_two_classes_of_one_name_do_not_link(compiled):
-    """They would be one, and one of the two models destroyed."""
+    """They would be merged, and one of the two models lost."""
     _, text = example_of("add-a-model.md")
     one, _ = compiled(text, "one.o")
     two, _ = compiled(text.replace('"minnaert"', '"other"'), "two.o")
@@ -320,7 +320,7 @@ def test_two_classes_of_one_name_do_not_link(compiled):
 
 
 def test_a_first_draft_compiles(compiled):
-    """Without what info() has nothing to say of, and with a direction that eval() does not need."""
+    """With nothing in info() but the necessary, and with a direction that eval() does not use."""
     _, text = example_of("add-a-model.md")
     for left_out in (".label", ".paper", ".equations", ".doc", ".properties"):
         text = re.sub(rf"^ *\{left_out} = .*,(?: *//.*)?\n", "", text, flags=re.M)
@@ -344,7 +344,7 @@ def test_an_if_on_data_says_what_to_write(compiled):
 
 
 def test_a_name_taken_twice_is_an_error_of_every_command(tool):
-    """Said by main(), which is not there yet when models register."""
+    """Reported by main(), which has not started when models register."""
     _, text = example_of("add-a-model.md")
     twice = tool.parents[1] / "generator" / "models" / "twice.cpp"
     twice.write_text(text.replace("Minnaert", "Twice"), encoding="utf-8")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report's pictures on a farm: two workers, one of which is killed during its task, against one
-process. And what is kept, and what errors say."""
+"""Compares the report's pictures from a farm of two workers, one of which is killed during its
+task, with those of one process. Also tests what is kept, and error messages."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from support import ROOT, TOOL, scene
 
 FARM = ROOT / ".env" / "farm" / "bin" / "python"
 BLENDER = ROOT / ".env" / "blender-4.5" / "bin" / "python"
-#: The tool; its first render never ends, and leaves the number of the worker's process.
+#: A tool whose first render never ends, and which records the process id of the worker.
 STUCK_ONCE = """#!/bin/sh
 if [ "$1" = render ] && mkdir "{folder}" 2>/dev/null; then
   echo $PPID $$ >"{folder}/part" && mv "{folder}/part" "{folder}/processes"
@@ -32,7 +32,7 @@ exec "{tool}" "$@"
 
 
 def ball():
-    """A sphere under a lamp, which a seed makes a difference to."""
+    """A sphere under a lamp, whose picture depends on the seed."""
     lamp = {"type": "point", "position": [2, -4, 3], "power": 500, "radius": 0.5}
     settings = {"width": 8, "height": 8, "spp": 8, "seed": 1, "max_bounces": 1}
     environment = {"color": [0.2, 0.3, 0.4]}
@@ -40,7 +40,7 @@ def ball():
 
 
 def until(what, seconds=30):
-    """What a function gives, once that is something."""
+    """Waits until a function returns a true value, and returns it."""
     end = time.monotonic() + seconds
     while not (found := what()):
         assert time.monotonic() < end, "took too long"
@@ -50,7 +50,7 @@ def until(what, seconds=30):
 
 def alive(process):
     try:
-        # A zombie is none.
+        # a zombie does not count
         return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
         return False
@@ -58,8 +58,8 @@ def alive(process):
 
 @pytest.fixture
 def farm(tmp_path):
-    """farm(worker=...): starts the script with these arguments, in a group of processes; all end
-    with the test."""
+    """farm(worker=...): starts the script with these arguments in its own process group; all
+    processes end with the test."""
     started = []
 
     def start(*arguments):
@@ -93,7 +93,7 @@ def command_of(python, tool, extension, out, source, *more):
 
 
 def told(folder):
-    """runs.json without times, and without what names files and machines."""
+    """runs.json without times and without names of files and machines."""
     runs = json.loads((folder / "runs.json").read_text())
     for run in (runs["reference"], *runs["runs"]):
         for key in ("cpu_seconds", "wall_seconds"):
@@ -118,7 +118,7 @@ def test_a_farm_renders_what_one_process_does_though_a_worker_is_killed(farm, tm
     extension = max(packed, key=lambda path: path.stat().st_mtime)
     source = tmp_path / "ball.json"
     source.write_text(json.dumps(ball()))
-    # One program for both, for its bytes are in the provenance.
+    # The same program for both, because its bytes are part of the provenance.
     tool, stuck = tmp_path / "brdfc", tmp_path / "stuck"
     tool.write_text(STUCK_ONCE.format(folder=stuck, tool=TOOL))
     tool.chmod(tool.stat().st_mode | stat.S_IXUSR)
@@ -150,7 +150,7 @@ def test_a_farm_renders_what_one_process_does_though_a_worker_is_killed(farm, tm
         assert pixels(folders[0] / name) == pixels(folders[1] / name), name
     assert told(folders[0]) == told(folders[1])
 
-    # Stopped on the way: what has no record is made again, and nothing else.
+    # An interrupted run: only the task without a record is run again.
     before = {f: f.stat().st_mtime_ns for f in folders[0].glob("*.exr")}
     (folders[0] / "tasks" / "blender-2.json").unlink()
     again = subprocess.run(far, check=True, capture_output=True, text=True)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lists of docs/add-a-model.md are those of the sources: the functions that formulas may call,
-what to write in place of others, the headers that models share, the closures of bases."""
+"""The lists in docs/add-a-model.md agree with the sources: functions that formulas may call,
+replacements for others, headers that models share, and closures for bases."""
 
 import math
 import re
@@ -11,12 +11,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 GENERATOR = ROOT / "generator"
 PAGE = (ROOT / "docs" / "add-a-model.md").read_text(encoding="utf-8")
-#: Of no use to formulas: for tests and tables, in double precision alone.
+#: Functions for tests and tables in double precision, which formulas don't need.
 NOT_FOR_FORMULAS = {"direction"}
 
 
 def part(name):
-    """What stands between the comments of this name."""
+    """The text between the comments with this name."""
     (found,) = re.findall(rf"<!-- {name} -->\n(.*?)<!-- end of {name} -->", PAGE, re.S)
     return found
 
@@ -32,12 +32,12 @@ def source(path):
 
 
 def functions_of(*paths):
-    """Names of the functions that headers have for all scalar types."""
+    """Names of the functions that headers define for all scalar types."""
     found = set()
     for path in paths:
         text = source(path)
         found |= set(re.findall(r"^using std::(\w+);", text, re.M))
-        # A template at the start of a line, of which the list of parameters may end elsewhere.
+        # A template at the start of a line; its parameter list may end on another line.
         found |= set(re.findall(r"^template <[^\n]*?>[\s]+[\w:<>, &]*?[ &](\w+)\(", text, re.M))
     return {name for name in found if not name.startswith("operator")}
 
@@ -54,7 +54,7 @@ def test_the_functions_are_those_of_the_sources():
 
 
 def python(expression):
-    """An expression of a formula in Python."""
+    """Converts a formula's expression to Python."""
     plain = expression.replace("tiny<T>()", "1e-30")
     return re.sub(r"\bT\(([^()]*)\)", r"(\1)", plain)
 

@@ -133,7 +133,7 @@ def test_a_model_s_page_says_what_its_schema_claims():
 
 
 def noisy(rng, factor=1.0):
-    """A picture of bright and dark parts, with noise."""
+    """A picture with bright and dark parts, and noise."""
     light = np.linspace(0.1, 2, 40 * 30)[:, None].repeat(3, 1).reshape(30, 40, 3)
     return light * factor * rng.gamma(4, 1 / 4, light.shape)
 

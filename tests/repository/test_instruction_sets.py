@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Models are compiled for several instruction sets, and their functions keep apart."""
+"""Models are compiled for several instruction sets, whose functions must not be mixed up."""
 
 import re
 import subprocess
@@ -13,8 +13,8 @@ SETS = ["x86_64_v3", "x86_64_v4"]
 
 @pytest.mark.parametrize("instructions", SETS)
 def test_code_for_a_newer_processor_has_names_of_its_own(instructions):
-    """Of two functions of one name the linker keeps any: on an older processor the wrong one ends
-    in an illegal instruction."""
+    """Of two functions with the same name, the linker keeps an arbitrary one: on an older
+    processor, the wrong one causes an illegal instruction."""
     folder = Path(TOOL).parent / "generator" / "CMakeFiles" / f"brdfc_models_{instructions}.dir"
     objects = sorted(folder.rglob("*.o"))
     if not objects:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tests can fail: each deliberate fault is caught by a test that is named here.
+"""Tests the tests: each deliberate fault must be caught by a test that is named here.
 
-Faults in generated code are put into a copy of the extension's zip, which tests in Blender then
-run. Faults in formulas are put into copies of some models' sources, compiled anew and linked with
-the other objects of the unit tests. Faults that can't disturb each other's tests share a copy.
+Faults in generated code are made in a copy of the extension's zip, with which tests in Blender then
+run. Faults in formulas are made in copies of some models' sources, which are compiled and linked
+with the other objects of the unit tests. Faults that can't affect each other's tests share a copy.
 """
 
 import json
@@ -37,8 +37,8 @@ WHITE = "test_sampled_form_in_a_world and white"
 SUN = "test_exact_form_under_a_sun"
 ALBEDO = "test_albedo_output_panel_and_model_agree"
 
-#: What is broken: number of the copy, member of the zip, pattern, replacement, test that catches it
-#: as words of its name.
+#: Fault: number of the copy, member of the zip, pattern, replacement, and the test that catches it,
+#: given by words of its name.
 PACK_FAULTS = {
     "a line of generated code": (
         1,
@@ -83,13 +83,13 @@ PACK_FAULTS = {
         f"{ALBEDO} and coupled",
     ),
 }
-#: A furnace sees weights alone: hence the worlds with structure.
+#: A furnace test depends on weights only, so it misses these: hence the worlds with structure.
 BLIND = {"a distribution": f"{WHITE} and lambert"}
 
 
 def run_in_blender(zip_file, tests):
-    """Runs tests, given as words of their names, with that extension. By test "passed", "failed" of
-    an assertion in at least one case, or the text of another error."""
+    """Runs tests, given by words of their names, with that extension. Returns for each test
+    "passed", "failed" (an assertion failed in at least one case), or the text of another error."""
     report = zip_file.with_suffix(".xml")
     expression = " or ".join(f"({t})" for t in tests)
     command = [BLENDER_PYTHON, "-m", "pytest", "-q", "--show-capture=no", f"--junitxml={report}"]
@@ -119,7 +119,7 @@ def run_in_blender(zip_file, tests):
 
 @pytest.fixture(scope="module")
 def extension(tmp_path_factory):
-    """Two models are enough, and quicker installed than all."""
+    """Two models suffice, and install faster than all."""
     out = tmp_path_factory.mktemp("extension")
     command = [TOOL, "build", "--model", "coupled", "--model", "lambert", "--out", out]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -130,7 +130,7 @@ def extension(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outcomes(extension, tmp_path_factory):
-    """By number of the copy, 0 without a fault: outcome of each test that its faults name."""
+    """By number of the copy (0: without a fault): the outcome of each test that its faults name."""
     found = {}
     for copy in (0, 1, 2):
         mine = {n: f for n, f in PACK_FAULTS.items() if copy in (0, f[0])}
@@ -161,7 +161,7 @@ def test_tests_in_blender_pass_without_a_fault(outcomes):
 
 # ---- formulas ---------------------------------------------------------------------------------
 
-#: What is broken: source, pattern, replacement, unit tests of which at least one catches it.
+#: Fault: source, pattern, replacement, and unit tests of which at least one must catch it.
 MODEL_FAULTS = {
     "a formula": (
         "generator/models/lambertian_specular.cpp",
@@ -201,7 +201,7 @@ def faulty_program():
         check=True,
     ).stdout.splitlines()
     (link,) = (c for c in commands if re.search(r" -o brdfc_tests\b", c))
-    # Beside the build, so that a compiler's cache finds the objects in the next run.
+    # In the build folder, so that the compiler cache finds the objects in the next run.
     folder = build / "mutations"
     folder.mkdir(exist_ok=True)
     compilers = []
@@ -210,7 +210,7 @@ def faulty_program():
         source = folder / original.name
         text = original.read_text(encoding="utf-8")
         source.write_text(replaced_once(text, pattern, replacement, path), encoding="utf-8")
-        # Not the objects for further instruction sets, which hold no formula over double.
+        # Only the baseline object: those for further instruction sets contain no formula in double.
         (old,) = re.findall(rf"\S*/brdfc_models\.dir/\S*/{re.escape(original.name)}\.o\b", link)
         (compile_,) = (c for c in commands if c.endswith(f"-o {old} -c {original}"))
         new = source.with_suffix(".o")
@@ -219,7 +219,7 @@ def faulty_program():
         compilers.append(subprocess.Popen([*words, source], cwd=build))
     assert [c.wait() for c in compilers] == [0] * len(compilers)
     program = folder / "brdfc_tests"
-    # Only what links: the rule goes on to list the tests.
+    # Only the link command: the rule continues by listing the tests.
     link = link.removeprefix(": && ").split(" && ")[0]
     words = shlex.split(link.replace(" -o brdfc_tests ", f" -o {program} "))
     subprocess.run(words, cwd=build, check=True)

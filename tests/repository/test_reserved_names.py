@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that a model's parameters may not have, since functions in Python that take parameters by
-name have arguments of these names: generator/print/reserved.cpp lists them all."""
+"""Parameter names that models may not use, because Python functions that take parameters by name
+have arguments with these names: generator/print/reserved.cpp must list them all."""
 
 import ast
 import re

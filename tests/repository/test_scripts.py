@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the scripts of the report and of the conditions' page decide without Blender."""
+"""Decisions of the scripts for the report and for the page of conditions that need no Blender."""
 
 from importlib import import_module as script
 
@@ -53,7 +53,7 @@ def test_the_page_keeps_what_was_not_measured():
     assert "| clamp | **-20.0% ± 0.1%** (panel warns) |" in merged
     kept = table.sections_of(page)
     assert kept == {k: v for k, v in table.sections_of(merged).items() if k in kept}
-    # Measured again, a form's rows are the new ones.
+    # When a form is measured again, its rows are replaced.
     again = table.markdown({"4.5": [row("a (exact)", "clamp", 0.5, True)]}, merged)
     assert table.sections_of(again)["a (exact)"].endswith("| clamp | **+50.0% ± 0.1%** |")
     assert "b (aimed)" in table.sections_of(again)

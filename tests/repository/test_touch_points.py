@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A new model is one file, one row of cases and one row of docs; all else that names every model is
-made by a script or a build."""
+"""A new model needs one file, one row of test cases and one row in the docs; everything else that
+lists models is made by a script or the build."""
 
 import re
 import subprocess
@@ -8,14 +8,15 @@ import subprocess
 import pytest
 from support import LISTED, MODELS, ROOT
 
-#: Models that are delta terms alone have no fit and no noise to measure.
+#: Models with only delta terms have no fit, and no noise to measure.
 SCATTERING = [m["name"] for m in LISTED if m["scatter"]]
-#: Files with a row for each, and how a row begins.
+#: Files with a row for each model, and how a row begins.
 BY_HAND = {"tests/models/cases.csv": "{},", "docs/models.md": "| `{}` |"}
-#: Values of arbitrary precision, of the paper's formula typed a second time: who adds a model may.
+#: Values of arbitrary precision, from a second implementation of the paper's formula: optional for
+#: a new model.
 A_SECOND_TIME = {"tests/models/make_golden.py", "tests/models/golden.csv"}
-#: A picture of the models that there were, and materials made of them: a new one is welcome there,
-#: and in the library it is anyway, with its defaults.
+#: A picture of the models that existed then, and materials made from models: optional for a new
+#: one, which is in the library with its defaults anyway.
 PICTURE = {"scenes/as-fig8.json", "blender_addon/library/materials.json"}
 #: Made by scripts.
 GENERATED = {
@@ -31,7 +32,7 @@ GENERATED_OF_SCATTERING = {
     "docs/noise.csv": "{},",
     "docs/noise-cost.csv": "{},",
 }
-#: A file that names as large a part of all models is a list of them.
+#: A file that names at least this fraction of all models counts as a list of models.
 MOST = 0.8
 
 
@@ -47,7 +48,8 @@ def test_a_model_is_a_file():
 
 @pytest.mark.parametrize("room", ["forms", "plan", "pack"])
 def test_no_form_is_asked_for_by_name(room):
-    """What differs between forms is asked of them: a new one has nothing else to change."""
+    """Differences between forms are properties of the forms, so a new form requires no other
+    changes."""
     sources = [p for p in (ROOT / "generator" / room).iterdir() if p.suffix in (".cpp", ".h")]
     assert sources
     named = [p.name for p in sources if re.search(r'\bform\("', p.read_text(encoding="utf-8"))]
@@ -83,7 +85,7 @@ def test_no_other_file_is_a_list_of_models():
         file = ROOT / name
         if file.suffix in (".exr", ".jpg", ".png") or not file.is_file():
             continue
-        if name.startswith("docs/gallery/"):  # made of what scenes say of themselves
+        if name.startswith("docs/gallery/"):  # generated from what scenes state
             continue
         words = set(re.findall(r"\w+", file.read_text(encoding="utf-8", errors="ignore")))
         if name not in known and len(words & set(MODELS)) >= MOST * len(MODELS):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every catalogue has every text of the extension, and nothing else; every text that people see is
-one that can be translated."""
+"""Every catalogue contains exactly the texts of the extension; and every text that is shown to
+users can be translated."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from support import TOOL
 
 FOLDER = texts.ADDON / "translations"
 LOCALES = sorted(path.stem for path in FOLDER.glob("*.json"))
-#: The form that Blender's own nodes are, which packs have where it was asked for.
+#: The form made of Blender's own nodes that packs contain only on request.
 ASKED_FOR = {"twin"}
 
 
@@ -67,8 +67,8 @@ def test_no_text_has_the_terms_of_the_code(english):
 
 
 def test_no_text_has_words_of_this_project_alone(english):
-    """Who has not read the pages does not know them; names of render methods are explained in their
-    tooltips."""
+    """Users who have not read the documentation would not understand them; names of render methods
+    are explained in tooltips."""
     known = re.compile(r"\{\w+(!r)?\}|\b(Aimed|Sampled|Fitted|Exact)\b")
     unknown = re.compile(r"\b(forms?|twins?|aim(s|ed|ing)?|drawn|misplac\w*)\b|% off|off by", re.I)
     found = {text: place for text, place in english.items() if unknown.search(known.sub("", text))}

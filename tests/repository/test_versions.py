@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The version stands in CMakeLists.txt, and no other file names one but the changes."""
+"""The version is in CMakeLists.txt; no other file states one, except the list of changes."""
 
 import re
 import subprocess

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the extension says to people, as its sources have it: every text that is translated, and
-every place where a text would be shown that is not."""
+"""Finds, in the sources, every text of the extension that is translated, and every place that would
+show a text that is not."""
 
 import ast
 import re
@@ -8,14 +8,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ADDON = ROOT / "blender_addon"
-#: Functions whose first argument is a text, and keywords that are texts, by the function's name.
+#: Functions whose first argument is a text; and keywords that are texts, by function name.
 SAYING = {"say", "button"}
 SHOWN = {"label": {"text"}, "operator": {"text"}, "menu": {"text"}}
 OF_PROPERTIES = {"name", "description"}
 OF_CLASSES = {"bl_label", "bl_description"}
-#: Calls that show an argument of that place to people: it must have come from one of the above.
+#: Calls that show the argument at this position to users: it must come from one of the above.
 MUST_BE_SAID = {"Finding": 2, "Refused": 0, "PlanError": 0, "CompileError": 0, "report": 1}
-#: Names, which are the same in every language.
+#: Names, which are the same in all languages.
 NAMES = {"brdfc", "Text", ""}
 
 
@@ -47,8 +47,8 @@ def sources():
 
 
 def texts(forms):
-    """{text: place} of all that is translated; `forms`: names of the models' forms, of which
-    Blender's own nodes have another where people see it."""
+    """{text: place} of everything that is translated; `forms`: names of the models' forms, of which
+    those of Blender's own nodes are displayed differently."""
     found = {form.capitalize(): "a form" for form in forms if form not in ("nodes", "twin")}
     for file, tree in sources():
         for node in ast.walk(tree):
@@ -66,14 +66,14 @@ def texts(forms):
 
 
 def _is_bare(node):
-    """A text that no catalogue can have, or that none is asked for."""
+    """Whether a text is one that no catalogue can contain, or that is not looked up."""
     if isinstance(node, ast.JoinedStr) or _literal(node) is not None:
         return True
     return isinstance(node, ast.Call) and _name(node) == "str"
 
 
 def unsaid():
-    """Places where a text is shown that is not looked up."""
+    """Places that show a text without looking it up."""
     found = []
     for file, tree in sources():
         for node in ast.walk(tree):
@@ -98,7 +98,7 @@ def _looked_up(node):
 
 
 def _of_class(node):
-    """A tooltip of a docstring has its line breaks and indents."""
+    """A docstring used as a tooltip would contain its line breaks and indentation."""
     bases = {getattr(b, "id", getattr(b, "attr", "")) for b in node.bases}
     has = {getattr(s.targets[0], "id", "") for s in node.body if isinstance(s, ast.Assign)}
     if "Operator" not in bases:

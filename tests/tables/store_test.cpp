@@ -21,7 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Hashes of keys of settings of which one word is another, and of those as they are.
+/// Hashes of the unchanged settings, and of settings with one word changed.
 template <class Settings> std::set<std::string> variants(const Settings& settings) {
   std::set<std::string> hashes = {StoreKey("fits", "phong").add_settings(settings).hash()};
   for (std::size_t i = 0; i < sizeof(Settings) / 8; ++i) {
@@ -56,7 +56,7 @@ TEST(Store, KindModelAndPartsAreInTheKey) {
     EXPECT_NE(hash, other.hash());
 }
 
-/// The tool's data in a folder of the test.
+/// The tool's data, in a folder of the test.
 class OwnData {
  public:
   OwnData() {
@@ -93,7 +93,7 @@ TEST(Store, SaysWhatItHasNotAndReplacesWhatIsOld) {
   EXPECT_TRUE(std::filesystem::exists(other.path())) << "a model whose name begins alike";
 }
 
-/// A result that is a word, and how often it was made.
+/// A result that is a word, and the number of times it was made.
 struct Word {
   int made = 0;
 
@@ -126,13 +126,13 @@ TEST(Store, KeepsInTheCacheWhatTheDataLack) {
   EXPECT_EQ(word(key), "new");
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "nothing is made, and nothing is said";
   EXPECT_EQ(word.made, 1);
-  // Damaged: made anew.
+  // Damaged: made again.
   std::ofstream(*key.cached_path(), std::ios::trunc).close();
   EXPECT_EQ(word(key), "new");
   EXPECT_EQ(word.made, 2);
   EXPECT_EQ(word(key), "new");
   EXPECT_EQ(word.made, 2);
-  // The data come first, and a damaged file of theirs is an error.
+  // The installed data takes precedence, and a damaged file in it is an error.
   replace_stored(key, [](const std::filesystem::path& path) { std::ofstream(path) << "kept"; });
   EXPECT_EQ(word(key), "kept");
   std::ofstream(key.path(), std::ios::trunc).close();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables: interpolation, their algebra, and rows of files.
+// Tables: interpolation, arithmetic, and rows of files.
 #include "tables/table.h"
 
 #include <gtest/gtest.h>
@@ -82,7 +82,7 @@ TEST(Tables, APartIsTheTableBetweenItsKnots) {
   const Table t = random_grid(3);
   const Table uneven = part(t, 0, 1, 2);
   expect_near(interpolate(uneven, {2, 20, 0.4}), interpolate(t, {2, 20, 0.4}), 1e-12);
-  // Even axes are from 0 to 1 again: knots 1 to 3 of 0 to 3.
+  // Evenly spaced axes are rescaled to 0 to 1: knots 1 to 3 of 0 to 3.
   const Table even = part(t, 2, 1, 3);
   EXPECT_EQ(even.axes[2], even_axis("c", 3));
   expect_near(interpolate(even, {2, 20, 0.25}), interpolate(t, {2, 20, 1 / 3. + 0.25 * 2 / 3}), 1e-12);

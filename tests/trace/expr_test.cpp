@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The recorded scalar: folding, sharing, pruning, loops, and what it refuses.
+// The recorded scalar: constant folding, sharing, pruning, loops, and errors.
 #include "trace/expr.h"
 
 #include <gmock/gmock.h>
@@ -72,7 +72,7 @@ TEST(Expr, ALoopStaysALoop) {
   Recorder recorder;
   Program program;
   const Expr x = Expr::input("x");
-  // Heron's square root.
+  // Heron's method for square roots.
   const auto result = iterate(5, std::array<Expr, 1>{Expr(1.0)}, [&](const std::array<Expr, 1>& s) {
     return std::array<Expr, 1>{(s[0] + x / s[0]) / Expr(2.0)};
   });
@@ -127,7 +127,7 @@ TEST(Expr, ALookUpOverFourAxesIsTheSameRecordedAndComputed) {
   program.output("v", lookup(table, inputs));
   EXPECT_THAT(print::osl_program(program, 0, {}),
               HasSubstr("brdfc_table4(grid, 2, 3, 2, 4, 1.0 * clamp(x, 0.0, 1.0), 2.0 * "));
-  // At a knot, and in the middle between two on the last axis.
+  // At a knot, and halfway between two knots on the last axis.
   EXPECT_EQ(lookup(table, std::array<double, 4>{1, 0.5, 0, 2 / 3.}), values[((1 * 3 + 1) * 2 + 0) * 4 + 2]);
   EXPECT_DOUBLE_EQ(lookup(table, std::array<double, 4>{1, 1, 1, 0.5}), 0.5 * (values[45] + values[46]));
   for (const double x : {0., 0.3, 1.7})
@@ -176,9 +176,8 @@ TEST(Expr, ColoursAreOneNode) {
   EXPECT_THAT(print::osl_program(program, 0, {}), HasSubstr("z = c + (1.0 - c) * f;"));
 }
 
-/// Every model's recorded eval, pdf and sample, executed in float, against its
-/// float instantiation: the same bits, but for constants, which the recording
-/// folds in double and rounds once.
+/// Compares every model's recorded eval, pdf and sample, executed in float, with its float instantiation: the same bits
+/// except for constants, which the recording folds in double and rounds once.
 class RecordedFormula : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
@@ -234,7 +233,7 @@ TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
       compare(out.at("p")[0], p);
       compare(out.at("w")[0], brdf->sample(wo, un).weight.r);
     }
-    // A rounding of a constant may grow with the exponent: 50 here.
+    // The exponent, 50 here, may amplify the rounding of a constant.
     EXPECT_LT(worst, 2e-5) << model.info().name;
   }
 }

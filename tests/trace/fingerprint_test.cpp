@@ -30,7 +30,7 @@ TEST(Fingerprint, SeesWhatIsComputedAlone) {
   const std::string wanted = of([] { return in("x") * in("y") + sqrt(in("z")); });
   EXPECT_EQ(wanted.size(), 64u);
   EXPECT_EQ(wanted, of([] {
-              // Nodes in another order, the other way round, with names and a node that nothing needs.
+              // Nodes and operands in another order, with names and an unused node.
               const Expr z = in("z"), root = named("root", sqrt(z));
               static_cast<void>(exp(z));
               return root + in("y") * in("x");

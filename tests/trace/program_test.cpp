@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program owns what it was recorded of.
+// A program owns its recorded nodes.
 #include "trace/program.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-/// x^2 + 3, `unread` operations after others that no output depends on.
+/// x^2 + 3, recorded after `unread` other operations that no output depends on.
 Program squared(const char* name, int unread = 0) {
   const Expr x = Expr::input("x");
   Expr other = x;
