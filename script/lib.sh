@@ -9,9 +9,10 @@ TOOL=$BUILD/brdfc
 # The oiiotool of the tools' environment, because the first in PATH may be any version.
 OIIOTOOL=$ENVS/tools/bin/oiiotool
 
-# An inherited PYTHONPATH or virtual environment would leak packages into ours (and break that of bpy).
-unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
-export PYTHONNOUSERSITE=1
+# An inherited PYTHONPATH or virtual environment would leak packages into ours (and break that of bpy). Evidence is made with
+# modules of script/.
+unset PYTHONHOME VIRTUAL_ENV
+export PYTHONPATH=$ROOT/script PYTHONNOUSERSITE=1
 
 say() { printf '\n==> %s\n' "$*"; }
 note() { printf '    %s\n' "$*"; }

@@ -7,7 +7,7 @@ import pytest
 
 # Each run computes results anew, whatever earlier ones left in the user's cache.
 os.environ["BRDFC_CACHE"] = ""
-#: script/evidence runs every case of the tests that are marked `sample`.
+#: evidence/run runs every case of the tests that are marked `sample`.
 EVERY_CASE = os.environ.get("BRDFC_EVIDENCE") == "all"
 
 
@@ -17,7 +17,7 @@ def evenly(cases, count):
 
 def few_of(cases, count):
     """This many of a test's cases, chosen evenly and including the first and the last;
-    script/evidence runs all. For cases that are rendered in one picture; cases that are separate
+    evidence/run runs all. For cases that are rendered in one picture; cases that are separate
     tests are marked `sample`."""
     cases = list(cases)
     return cases if EVERY_CASE else evenly(cases, min(count, len(cases)))

@@ -18,7 +18,7 @@ from . import lamp_checks
 FAR_PIXEL = 1e-5
 #: A lower clamp on indirect light is visible in the highlights of Blender's own closures.
 LOW_CLAMP = 10
-#: Brighter highlights are clamped earlier. Measured (script/conditions) under a sun of irradiance
+#: Brighter highlights are clamped earlier. Measured (evidence/conditions) under a sun of irradiance
 #: 3: a clamp at 10 takes 6 % of the light of a highlight of f cos = 14, and nothing of one of 2.
 CLAMP_OF_HIGHLIGHT = 5
 

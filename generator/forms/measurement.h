@@ -32,9 +32,9 @@ class Measurement {
     return {};
   }
   /// How lamps without a size shine on it, as the rest of a sentence, where a scene has so many and it aims at up to
-  /// `slots`; empty where they do as on Blender's own nodes. Measured by script/conditions.
+  /// `slots`; empty where they do as on Blender's own nodes. Measured by evidence/conditions.
   virtual std::string under_sizeless_lamps(int /*lamps*/, int /*slots*/) const { return {}; }
-  /// Whether the costs that script/bench measures are those of the form with this setting.
+  /// Whether the costs that evidence/bench measures are those of the form with this setting.
   virtual bool cost_is_measured(const Setting&) const { return true; }
   /// What its closures are looked up in, made at first use; nullptr for a form without tables of its own.
   virtual const fit::Fit* fit(const Model&, const Setting&) const { return nullptr; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The render cost of forms, as script/bench measured it.
+// The render cost of forms, as evidence/bench measured it.
 #pragma once
 
 #include <filesystem>
@@ -19,7 +19,7 @@ class Costs {
  public:
   /// No costs are known.
   Costs() = default;
-  /// Reads the table of script/bench, ignoring further columns. If there is no file, no costs are known. Throws
+  /// Reads the table of evidence/bench, ignoring further columns. If there is no file, no costs are known. Throws
   /// InputError naming file, line, column and what was expected.
   explicit Costs(const std::filesystem::path&);
 

@@ -2,8 +2,9 @@
 """Measures the conditions in conditions.py: settings and scenes as users have them.
 
 If a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all, every condition is
-measured, and the rows go to conditions/<version>.json beside the tool, from which script/conditions
-makes its table; otherwise only a few. BRDFC_CONDITIONS_FORM=aimed measures only that form.
+measured, and the rows go to conditions/<version>.json beside the tool, from which
+evidence/conditions makes its table; otherwise only a few. BRDFC_CONDITIONS_FORM=aimed measures
+only that form.
 """
 
 import json

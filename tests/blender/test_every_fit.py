@@ -4,7 +4,7 @@ suns, in a white world and in worlds that vary with the direction.
 
 A fitted form and a twin must equal the sum of closures that `brdfc fit` evaluates; an aimed form
 with a fit as its base must equal the model. With BRDFC_EVERY_FIT=all, every model is measured, as
-in script/conditions; otherwise only some, because their fits take minutes.
+in evidence/conditions; otherwise only some, because their fits take minutes.
 """
 
 import json
@@ -50,7 +50,7 @@ TOO_BRIGHT = 0.08
 
 @pytest.fixture(scope="module")
 def folder(lean_pack, tool):
-    """A pack with every form that needs a fit, as in `script/forms`."""
+    """A pack with every form that needs a fit, as in `evidence/forms`."""
     models = {m["name"]: m["representations"] for m in json.loads(tool("list", "--json"))}
     materials = {
         f"{name} {form}": {"model": name, "representation": form}

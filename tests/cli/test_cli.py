@@ -11,6 +11,7 @@ import functools
 import io
 import json
 import math
+import os
 import re
 import shutil
 import subprocess
@@ -496,7 +497,7 @@ def test_check_markdown_is_the_table_of_its_page():
     assert result.returncode == 0, result.stderr
     text = page_of_table("properties")
     table = text[text.index("| Model |") :]
-    assert result.stdout == table, "run script/properties"
+    assert result.stdout == table, "run evidence/properties"
     for name in MODELS:
         assert f"| `{name}` |" in table
 
@@ -512,11 +513,12 @@ def test_check_scales_with_the_effort_asked_for():
 
 
 def test_errors_of_stored_fits_are_the_table_of_their_page():
-    script = ROOT / "script" / "forms_table.py"
+    script = ROOT / "evidence" / "forms_table.py"
     command = [sys.executable, script, "--tool", TOOL, "fits-over"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "script")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
     assert done.returncode == 0, done.stderr
-    assert done.stdout == page_of_table("fits-over"), "run script/forms fits-over"
+    assert done.stdout == page_of_table("fits-over"), "run evidence/forms fits-over"
 
 
 # ---- stability --------------------------------------------------------------------------------

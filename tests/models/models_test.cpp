@@ -55,7 +55,7 @@ std::vector<std::map<std::string, std::string>> read_table(const std::string& na
 /// strtod, not stod: a number in the file that underflows is 0 here.
 double number(const std::string& text) { return std::strtod(text.c_str(), nullptr); }
 
-/// Scales the counts of the checks: script/evidence doubles it, and lowers it for the sanitizers, which look for other
+/// Scales the counts of the checks: evidence/run doubles it, and lowers it for the sanitizers, which look for other
 /// faults.
 double effort() {
   const char* text = std::getenv("BRDFC_EFFORT");

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page that script/noise makes from its rows."""
+"""The page that evidence/noise makes from its rows."""
 
 import noise_page
 import noise_table

@@ -12,7 +12,7 @@ from markdown_table import heading, line
 INTRODUCTION = """\
 # What settings and scenes do to the forms
 
-Made by `script/conditions`. Each row changes one thing in a clean scene: a grid of grooves, in
+Made by `evidence/conditions`. Each row changes one thing in a clean scene: a grid of grooves, in
 which light bounces, under a sun and a bright sky. A cell is the resulting change in the mean
 radiance of a form, with its standard error. It is bold if it exceeds 2 % and 5 standard errors;
 "panel warns" follows if the panel warns of it. The forms represent all others of their kind: exact

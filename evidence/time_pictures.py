@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes pictures of equal CPU time: one model in every form, and Blender's own Glossy node.
 
-    python script/time_pictures.py scene - OUT            OUT/ball.json
-    python script/time_pictures.py jobs COSTS.csv OUT     OUT/jobs.json, with the fits that
+    python evidence/time_pictures.py scene - OUT            OUT/ball.json
+    python evidence/time_pictures.py jobs COSTS.csv OUT     OUT/jobs.json, with the fits that
                                                           native_nodes.py wrote to OUT/fitted.json
-    python script/time_pictures.py page OUT DOCS          DOCS/time-pictures.png, OUT/pictures.md
+    python evidence/time_pictures.py page OUT DOCS          DOCS/time-pictures.png, OUT/pictures.md
 
 The numbers of samples take as much time as SPP samples of the Glossy node, by the costs that
-script/bench measured. So the noise is what any machine reaches in that time.
+evidence/bench measured. So the noise is what any machine reaches in that time.
 """
 
 import csv
@@ -123,7 +123,7 @@ def page(out, docs):
         *table,
         "",
         "relMSE and mean of the picture are against the reference with 256 samples.",
-        "`script/times --pictures` renders them.",
+        "`evidence/times --pictures` renders them.",
     ]
     (out / "pictures.md").write_text("\n".join(text) + "\n", encoding="utf-8")
 

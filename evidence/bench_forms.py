@@ -20,7 +20,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-RENDER_SCENE = Path(__file__).resolve().parent / "render_scene.py"
+RENDER_SCENE = Path(__file__).resolve().parents[1] / "script" / "render_scene.py"
 
 
 #: Forms whose scene has a lamp.

@@ -3,8 +3,8 @@
 """Measures noise and CPU time of every form of every model under many kinds of light, in units of
 Blender's own Glossy node in the same scene.
 
-Runs in a Python that has `bpy`. The scenes are in script/noise_scenes.py, the page is made by
-script/noise_page.py. Noise is the variance between pictures with different seeds, so it needs no
+Runs in a Python that has `bpy`. The scenes are in evidence/noise_scenes.py, the page is made by
+evidence/noise_page.py. Noise is the variance between pictures with different seeds, so it needs no
 reference picture. Only the mean that it is divided by does: it is taken from the model's form with
 the least noise. Measurements are stored beside the pictures, keyed by the contents of the
 extension, so that an interrupted run can be continued.

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plots what the papers state about their models in words, with the Python package `brdfc`.
 
-    python script/landmarks.py crescents CHOICE FILE.json   a scene, with that choice of `below`
-    python script/landmarks.py page TOOL PICTURES DOCS      DOCS/gallery/landmarks.md, its pictures
+    python evidence/landmarks.py crescents CHOICE FILE.json a scene, with that choice of `below`
+    python evidence/landmarks.py page TOOL PICTURES DOCS    DOCS/gallery/landmarks.md, its pictures
 
 TOOL is the program brdfc. PICTURES contains mirror.png and lose.png, which the reference renderer
 made of those scenes.
@@ -239,7 +239,7 @@ def main():
     text = [
         "# What papers say, as curves",
         "",
-        "`script/landmarks` made this page from the [Python package](../python.md) and the tool.",
+        "`evidence/landmarks` made this page from the [Python package](../python.md) and the tool.",
         "",
         "## Shirley, Smits, Hu and Lafortune 1997: R and SPDF",
         "",

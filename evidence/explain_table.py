@@ -22,11 +22,11 @@ SCENES = {
 INTRODUCTION = """\
 # What a build leaves out, and why: three scenes
 
-Made by `script/explain` from the JSON that the commands below print. An arrow leads from the whole
-extension to the one cut to the scene. In the first table of a scene it leads from the form that a
-material gets without a budget to the one that is chosen. In the second it leads from the whole
-shader of the chosen form, which has all parameters and samples up to eight directions, to the
-shader for the scene. Without an arrow both are the same.
+Made by `evidence/explain` from the JSON that the commands below print. An arrow leads from the
+whole extension to the one cut to the scene. In the first table of a scene it leads from the form
+that a material gets without a budget to the one that is chosen. In the second it leads from the
+whole shader of the chosen form, which has all parameters and samples up to eight directions, to
+the shader for the scene. Without an arrow both are the same.
 
 - Costs are those in [what each form takes](tables/forms.md), measured for each model and form with
   default parameters: they change with the form, but do not include the savings by constants. Errors

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the page of error against run time, from measurements by script/noise, script/bench and
-script/forms.
+"""Makes the page of error against run time, from measurements by evidence/noise, evidence/bench and
+evidence/forms.
 
-    python script/time_page.py DOCS COSTS.csv [PICTURES.md]
+    python evidence/time_page.py DOCS COSTS.csv [PICTURES.md]
 
 Reads DOCS/noise.csv and DOCS/tables/forms.md and writes DOCS/time.md, time-noise.png and
-time-error.png. PICTURES.md is the part that script/time_pictures.py wrote; without it, the page
+time-error.png. PICTURES.md is the part that evidence/time_pictures.py wrote; without it, the page
 keeps its current one.
 """
 
@@ -156,9 +156,9 @@ def text(names, found, diffuse, rows, days):
     lines = [
         "# Error against run time",
         "",
-        "Made by `script/times` of the tables that `script/noise` ([noise.csv](noise.csv),",
-        f"{days[0]}), `script/bench --forms`",
-        f"(`blender_addon/costs.csv`, {days[1]}) and `script/forms`",
+        "Made by `evidence/times` of the tables that `evidence/noise` ([noise.csv](noise.csv),",
+        f"{days[0]}), `evidence/bench --forms`",
+        f"(`blender_addon/costs.csv`, {days[1]}) and `evidence/forms`",
         f"([what each form takes](tables/forms.md), {days[2]})",
         "measured, in Blender 4.5 on one thread of",
         "an x86-64 server. Times are ratios of CPU time to Blender's",

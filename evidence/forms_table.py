@@ -160,7 +160,7 @@ PAGES = {
 Closures, error and cost with default parameters. Error: the part of the reflected light that goes
 in other directions than the model says, mean over all views; 0 where a form is right, or right on
 average. Cost: CPU time at equal samples in units of Blender's Glossy node, by
-`script/bench --forms`. `-`: there is none.
+`evidence/bench --forms`. `-`: there is none.
 
 Fitted forms are made for the default parameters here, as `brdfc build --error` makes them for those
 of a scene. The ones that the extension holds serve all values of a number and are further off:
@@ -200,7 +200,7 @@ extension.
 
 def page(tool, name):
     table, title, text = PAGES[name]
-    return f"# {title}\n\nMade by `script/forms {name}`.\n\n{text}\n\n{table(tool)}"
+    return f"# {title}\n\nMade by `evidence/forms {name}`.\n\n{text}\n\n{table(tool)}"
 
 
 def main():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the page of the measurements by script/noise_table.py."""
+"""Makes the page of the measurements by evidence/noise_table.py."""
 
 import math
 import statistics
@@ -18,12 +18,12 @@ BLOCK = 6
 INTRODUCTION = """\
 # Noise and CPU time by model and lamp
 
-Made by `script/noise` in Blender 4.5; the figures, with their errors, are in [noise.csv](noise.csv)
-and [noise-cost.csv](noise-cost.csv). A ball with the model lies on a grey floor under one kind of
-light and, where that is a lamp, the dim grey world of a new file. Settings are those of a new file
-(indirect light clamped at 10, Filter Glossy 1, light tree, caustics) with adaptive sampling and
-denoising off, so that samples are equal, OSL on, and one thread. Parameters have their defaults but
-for those named.
+Made by `evidence/noise` in Blender 4.5; the figures, with their errors, are in
+[noise.csv](noise.csv) and [noise-cost.csv](noise-cost.csv). A ball with the model lies on a grey
+floor under one kind of light and, where that is a lamp, the dim grey world of a new file.
+Settings are those of a new file (indirect light clamped at 10, Filter Glossy 1, light tree,
+caustics) with adaptive sampling and denoising off, so that samples are equal, OSL on, and one
+thread. Parameters have their defaults but for those named.
 
 **Noise** is the mean over the ball's pixels of the variance over the squared radiance + 0.01:
 relMSE, 64 samples a pixel unless said otherwise. The variance is that between pictures of {seeds}

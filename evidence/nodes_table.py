@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures cost and noise of the form made of Blender's nodes; script/nodes runs it.
+"""Measures cost and noise of the form made of Blender's nodes; evidence/nodes runs it.
 
 Needs `bpy`. Cycles reports the number of words in its instructions and of floats on its stack in
 its log, which GLOG_v=3 enables and which is read from stderr. The CPU time is user time; forms take
 turns in one process, and the minimum of several runs counts. Scenes and the unit of noise are those
-of script/noise.
+of evidence/noise.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scenes in which script/noise_table.py measures noise: a ball on a floor, each under one kind
-of light, with the settings of a new Blender file except for those in settings().
+"""The scenes in which evidence/noise_table.py measures noise: a ball on a floor, each under one
+kind of light, with the settings of a new Blender file except for those in settings().
 
 Needs `bpy`. Lamps have similar brightness: a white diffuse surface that faces one has a radiance of
 about 1.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares `brdfc render` with Mitsuba 3, in paths per second: same triangles, lamp and camera.
 
-    python script/bench_reference.py [--brdfc build/brdfc] [--json out.json]
+    python evidence/bench_reference.py [--brdfc build/brdfc] [--json out.json]
 
 Needs the Python packages mitsuba and numpy. Mitsuba's llvm_ad_rgb also needs a compatible LLVM
 library (19 works, 14 does not; DRJIT_LIBLLVM_PATH selects one). In the scene everything is grey and
