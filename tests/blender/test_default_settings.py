@@ -85,7 +85,7 @@ def test_every_model_in_a_new_file(extension, new_file, few_of):
     In a new file, with its lamp, world and settings, the form without Open Shading Language is
     compared with the one with it, which is known to match the reference renderer: means of balls,
     and blocks of pixels within the noise."""
-    models = few_of(extension.api.models(), 8)
+    models = few_of(extension.api.models(), 6)
     materials = [extension.api.new_material(model) for model in models]
     few_samples(new_file, 24)
     gallery(new_file, materials)

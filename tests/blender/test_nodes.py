@@ -22,14 +22,15 @@ def settings(extension, scene, samples, osl, size=64):
     scene.render.resolution_x = scene.render.resolution_y = size
 
 
-@IN_ONE_VERSION
+@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
-def test_a_sun_without_an_angle(extension, empty, tool, towards):
+def test_a_sun_without_an_angle(extension, empty, tool, few_of, towards):
     """Every model with default, extreme and random values: f cos to 1e-3 (relative L1)."""
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     empty.cycles.shading_system = False
-    found = off_under_a_sun(extension, empty, tool, "nodes", towards, 32, pictures=4)
+    found = off_under_a_sun(extension, empty, tool, "nodes", towards, 32, few_of, pictures=4)
     assert {name for name, *_ in found} == {
         name for name, model in extension.api.models().items() if model["scatter"]
     }
