@@ -11,8 +11,6 @@ from helpers import add_camera, add_lamp, add_sphere, add_world, albedo, render,
 from test_aimed import SUNS, off_under_a_sun
 
 SLOW = pytest.mark.slow
-#: For slow tests: script/test runs them in one version, evidence/run in all.
-IN_ONE_VERSION = SLOW if bpy.app.version < (5, 0, 0) else pytest.mark.evidence
 BLOCK = 8
 
 
