@@ -485,5 +485,7 @@ def make_local(material):
     nodes.make_local(material.node_tree)
     lamps.follow()
     automatic.follow()
-    nodes.unite(nodes.with_parts({node.node_tree for node in nodes.group_nodes(material)}))
+    nodes.merge_duplicates(
+        nodes.with_parts({node.node_tree for node in nodes.group_nodes(material)})
+    )
     return material

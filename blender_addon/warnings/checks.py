@@ -297,14 +297,14 @@ def of_scene(ours, scene):
     scripted = [node for node in ours if not nodes.runs_anywhere(node)]
     found = scene_warnings(scene) if scripted else []
     takes_nodes = scene.render.engine == "CYCLES" or device.is_eevee(scene)
-    if not takes_nodes or not all(map(nodes.is_stood_in_for, scripted)):
+    if not takes_nodes or not all(map(nodes.has_stand_in, scripted)):
         return found
     return [_by_twin(f, scripted) if f.code in UNABLE else f for f in found]
 
 
 def is_stood_in(node, scene):
     """Whether a scene shows a node's twin in its place."""
-    return nodes.is_stood_in_for(node) and any(f.code in UNABLE for f in of_scene([node], scene))
+    return nodes.has_stand_in(node) and any(f.code in UNABLE for f in of_scene([node], scene))
 
 
 def why_not_run(material, scene):

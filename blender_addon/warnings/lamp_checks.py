@@ -152,7 +152,7 @@ def _others_lamps(node):
     tree = node.node_tree
     if tree.library is None:
         return None
-    inner = (getattr(n, "node_tree", None) for n in nodes.made_of(tree).nodes)
+    inner = (getattr(n, "node_tree", None) for n in nodes.content_group(tree).nodes)
     return next((group for group in inner if group is not None and lamps.is_group(group)), None)
 
 
