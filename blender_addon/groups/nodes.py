@@ -429,11 +429,11 @@ def get_value(node, name):
 def varying(node):
     """Parameters of a group node that are not constant: linked, animated or driven. Links that
     Cycles ignores do not count."""
-    moved = animation.inputs(node)
+    animated = animation.animated_inputs(node)
     return {
         name
         for name, s in sockets(node).items()
-        if s.identifier in moved or shader_trees.is_driven(s)
+        if s.identifier in animated or shader_trees.is_driven(s)
     }
 
 
@@ -599,7 +599,7 @@ def replace_group(node, group):
         return
     tree = node.id_data
     names = {s.identifier: name for name, s in sockets(node).items()}
-    animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.hold(node)]
+    animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.capture(node)]
     values = all_values(node)
     incoming = [
         (link.from_socket, name, link.is_muted)
@@ -621,6 +621,6 @@ def replace_group(node, group):
         tree.links.new(node.outputs[name], target).is_muted = muted
     for curve, owner, name in animated:  # curves address sockets by index
         if name in present:
-            animation.follow(curve, owner, present[name])
+            animation.retarget(curve, owner, present[name])
         else:
             curve.mute = True

@@ -225,7 +225,7 @@ def draw_node(layout, node, scene):
     """Shows model, form, error, cost, energy and values of a group node."""
     model_name, _ = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
-    changes = editable.stays(node.id_data)
+    changes = editable.keeps_changes(node.id_data)
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         column = layout.column(align=True)
