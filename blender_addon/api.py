@@ -433,7 +433,7 @@ def see_lamps(scene):
     are examined here only. Returns every lamp as a Lamp: its name, its slot (from 1, or None), its
     irradiance at the subject, by which lamps are ranked, and why it was left out.
     """
-    return lamps.see(argument_checks.scene(scene))
+    return lamps.refresh(argument_checks.scene(scene))
 
 
 def warnings(material, scene):

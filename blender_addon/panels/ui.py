@@ -251,7 +251,7 @@ def draw_lamps(layout, material, scene):
     if slots == 0:
         return
     box = layout.box()
-    found = lamps.seen(scene)
+    found = lamps.last_found(scene)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
         said = say("Free of noise under {lamps}", lamps=", ".join(taken))

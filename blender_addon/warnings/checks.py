@@ -62,7 +62,9 @@ def _slot_findings(use, scene):
         )
         return
     room = use.lamps(on_optix=False)
-    if room is not None and any(lamp.why == lamps.too_many(room) for lamp in lamps.seen(scene)):
+    if room is not None and any(
+        lamp.why == lamps.too_many(room) for lamp in lamps.last_found(scene)
+    ):
         yield Finding(
             "closures",
             "WARNING",
@@ -91,7 +93,7 @@ def _pool_findings(material, scene):
                 more=f"{use.size} bytes of closures, and there is room for {room}",
             ),
         )
-    elif use.shared:
+    elif use.has_others:
         yield Finding(
             "closure_pool_shared",
             "WARNING",
