@@ -160,7 +160,11 @@ def _set(node, what, parameters):
     _, values = _checked(model, "auto" if lean_node else representation, parameters)
     present = nodes.sockets(node)
     for name, value in values.items():
-        if lean_node and name not in present and not pack.same(value, nodes.get_value(node, name)):
+        if (
+            lean_node
+            and name not in present
+            and not pack.equal_in_float32(value, nodes.get_value(node, name))
+        ):
             raise ValueError(
                 f"{name!r} of {what} is {nodes.get_value(node, name)!r}, the only value of a lean "
                 f"material; switch_representation() brings the others back; got {value!r}"

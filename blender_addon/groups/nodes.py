@@ -317,7 +317,7 @@ def _lacks_choice(node):
     if tag.get(AUTO, tag["representation"]) == tag["representation"]:
         return False
     only = pack.canonical(json.loads(tag["native_only"]))
-    return any(not pack.same(get_value(node, name), value) for name, value in only.items())
+    return any(not pack.equal_in_float32(get_value(node, n), value) for n, value in only.items())
 
 
 def runs_anywhere(node):

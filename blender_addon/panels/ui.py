@@ -35,7 +35,7 @@ def menu_label(name):
 
 def _draw_models(layout, operator):
     layout.operator("brdfc.search", icon="VIEWZOOM")
-    for look, names in pack.by_look().items():
+    for look, names in pack.models_by_look().items():
         layout.separator()
         layout.label(text=iface(LOOKS[look]), translate=False)
         for name in names:
@@ -185,7 +185,7 @@ def _draw_form(layout, node, form, scene, changes):
     if pack.native_form(model_name):
         _add_method(row, node, "auto", automatic)
     for name in entry["representations"]:
-        refusal = pack.refusal(model_name, name, values)
+        refusal = pack.reason_unavailable(model_name, name, values)
         if refusal := refusal or checks.device_refusal(model_name, name, scene):
             refusals.append(refusal)
             continue

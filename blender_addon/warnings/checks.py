@@ -135,8 +135,8 @@ def _twin(node):
 
 def _twin_error(node):
     """Error of a node's twin; None if it is not known at the node's values."""
-    entry = _twin(node)
-    if not entry or pack.refusal(nodes.identity(node)[0], "twin", nodes.all_values(node)):
+    entry, (model_name, _) = _twin(node), nodes.identity(node)
+    if not entry or pack.reason_unavailable(model_name, "twin", nodes.all_values(node)):
         return None
     return entry["error"]["relative_l1"]
 
@@ -249,7 +249,7 @@ def node_warnings(node, material, scene):
                 )
                 found.append(Finding("out_of_range", "ERROR", _of(label, said)))
     values = nodes.all_values(node)
-    for name, choice in pack.unread(schema, values).items():
+    for name, choice in pack.unused_parameters(schema, values).items():
         said = say(
             "{parameter} has no effect while {choice} is {value}",
             parameter=schema[name]["label"],
