@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 from . import convert, lamps, lean, library
-from .common import editable, expected
+from .common import argument_checks, editable
 from .common.i18n import say
 from .content.compiler import CompileError
 from .groups import automatic, bump_correction, nodes, update, usage
@@ -97,7 +97,7 @@ def prepare_material(material):
 
     Raises ValueError for a linked material, as every function here does that changes a material.
     """
-    editable.check(expected.material(material))
+    editable.check(argument_checks.material(material))
     return bump_correction.prepare(material)
 
 
@@ -132,7 +132,7 @@ def new_material(model, representation="auto", **parameters):
 
 def _the_node(material):
     """The only model node of a material."""
-    expected.material(material)
+    argument_checks.material(material)
     ours = nodes.group_nodes(material)
     if len(ours) != 1:
         raise ValueError(
@@ -160,7 +160,11 @@ def _set(node, what, parameters):
     _, values = _checked(model, "auto" if lean_node else representation, parameters)
     present = nodes.sockets(node)
     for name, value in values.items():
-        if lean_node and name not in present and not pack.same(value, nodes.get_value(node, name)):
+        if (
+            lean_node
+            and name not in present
+            and not pack.equal_in_float32(value, nodes.get_value(node, name))
+        ):
             raise ValueError(
                 f"{name!r} of {what} is {nodes.get_value(node, name)!r}, the only value of a lean "
                 f"material; switch_representation() brings the others back; got {value!r}"
@@ -180,7 +184,7 @@ def set_kernel(group, curve):
     largest. Raises ValueError for a node of another model, and where a height is not positive or
     too small beside the largest; in that case nothing is changed.
     """
-    if not nodes.is_ours(expected.node(group)) or nodes.identity(group)[0] != kernel.MODEL:
+    if not nodes.is_ours(argument_checks.node(group)) or nodes.identity(group)[0] != kernel.MODEL:
         raise ValueError(
             say(
                 "Node {node!r}: expected a node of the model {model!r}",
@@ -189,7 +193,7 @@ def set_kernel(group, curve):
             )
         )
     editable.check(group.id_data)
-    values = {"kernel": "table", **kernel.heights(expected.node(curve))}
+    values = {"kernel": "table", **kernel.heights(argument_checks.node(curve))}
     _set(group, say("node {name!r}", name=group.name), values)
 
 
@@ -209,7 +213,7 @@ def set_substance(material, substance, node=None, thickness=None):
     """
     from .packs import optical
 
-    node = _the_node(material) if node is None else expected.node(node)
+    node = _the_node(material) if node is None else argument_checks.node(node)
     found = optical.find(substance)
     values = optical.parameters(nodes.identity(node)[0], found, thickness)
     for note in found.notes:
@@ -241,7 +245,7 @@ def switch_representation(material, representation):
 
 def _prepare_all():
     for material in bpy.data.materials:
-        if editable.stays(material):
+        if editable.keeps_changes(material):
             prepare_material(material)
 
 
@@ -264,8 +268,11 @@ def plan_conversion(materials, limit=convert.LIMIT):
     the fraction of the light that the replacement misplaces; or, where no model comes within
     `limit`, the reason for the refusal. If no model comes near at all, the error is infinite.
     Changes nothing."""
-    limit = expected.number(limit)
-    return [p.within(limit) for p in convert.plan(expected.each(expected.material, materials))]
+    limit = argument_checks.number(limit)
+    return [
+        p.within(limit)
+        for p in convert.plan(argument_checks.each(argument_checks.material, materials))
+    ]
 
 
 def convert_materials(plans):
@@ -274,7 +281,7 @@ def convert_materials(plans):
     The original nodes stay in the materials, unlinked, for convert_back(). Raises ValueError where
     a node has changed since the plan was made, and CompileError; in both cases nothing is changed.
     """
-    plans = expected.each(functools.partial(expected.plan, convert.Plan), plans)
+    plans = argument_checks.each(functools.partial(argument_checks.plan, convert.Plan), plans)
     count = convert.apply(plans)
     for plan_ in plans:
         if not plan_.refusal:
@@ -286,7 +293,7 @@ def convert_back(material):
     """Restores the original nodes; where they were deleted, uses the model's twin instead.
 
     Returns the number of nodes restored. Raises ValueError where there is neither."""
-    return convert.restore(expected.material(material))
+    return convert.restore(argument_checks.material(material))
 
 
 def add_albedo(material):
@@ -387,7 +394,7 @@ def start_plan(error=None, time=None, fit=False):
     used = {
         name: use
         for name, use in usage.uses().items()
-        if editable.stays(use.material, use.node.id_data)
+        if editable.keeps_changes(use.material, use.node.id_data)
     }
     if not used:
         raise ValueError(_NO_MATERIAL)
@@ -420,7 +427,7 @@ def bake(made):
 
 def start_bake(made):
     """The same as a lean.Job, one model per step. The file changes in the last step only."""
-    return lean.Baking(expected.plan(lean.Plan, made), _prepare_all)
+    return lean.Baking(argument_checks.plan(lean.Plan, made), _prepare_all)
 
 
 def see_lamps(scene):
@@ -430,7 +437,7 @@ def see_lamps(scene):
     are examined here only. Returns every lamp as a Lamp: its name, its slot (from 1, or None), its
     irradiance at the subject, by which lamps are ranked, and why it was left out.
     """
-    return lamps.see(expected.scene(scene))
+    return lamps.refresh(argument_checks.scene(scene))
 
 
 def warnings(material, scene):
@@ -438,13 +445,13 @@ def warnings(material, scene):
 
     Returns an empty list if the material has no group of this extension.
     """
-    return checks.warnings(expected.material(material), expected.scene(scene))
+    return checks.warnings(argument_checks.material(material), argument_checks.scene(scene))
 
 
 def scene_warnings(scene):
     """What keeps every material of this extension from rendering correctly in a scene, and which
     other parts of the scene Open Shading Language would spoil."""
-    return checks.scene_warnings(expected.scene(scene))
+    return checks.scene_warnings(argument_checks.scene(scene))
 
 
 def follow_settings(scene):
@@ -452,7 +459,7 @@ def follow_settings(scene):
 
     The extension does so by itself when a user changes settings, and before each render. A script
     that changes settings and then asks for warnings() must call this function in between."""
-    automatic.follow(expected.scene(scene))
+    automatic.follow(argument_checks.scene(scene))
 
 
 def enable_osl(scene):
@@ -460,7 +467,7 @@ def enable_osl(scene):
 
     Raises RuntimeError when this Blender has no OSL.
     """
-    done = checks.enable_osl(expected.scene(scene))
+    done = checks.enable_osl(argument_checks.scene(scene))
     automatic.follow()
     return done
 
@@ -471,7 +478,7 @@ def enlarge_lamps(scene):
     They become 1 cm large, suns 0.02 rad, and emit as much light as before. Returns two lists of
     names: the enlarged lamps, and the lamps of other files, which stay as they are.
     """
-    return lamp_checks.enlarge(expected.scene(scene))
+    return lamp_checks.enlarge(argument_checks.scene(scene))
 
 
 def make_local(material):
@@ -479,11 +486,13 @@ def make_local(material):
 
     It can then be edited, and aims at this file's lamps. Returns the local material; linked objects
     keep the linked one."""
-    expected.material(material)
+    argument_checks.material(material)
     if editable.refusal(material):
         material = material.make_local()
     nodes.make_local(material.node_tree)
     lamps.follow()
     automatic.follow()
-    nodes.unite(nodes.with_parts({node.node_tree for node in nodes.group_nodes(material)}))
+    nodes.merge_duplicates(
+        nodes.with_parts({node.node_tree for node in nodes.group_nodes(material)})
+    )
     return material

@@ -268,7 +268,7 @@ class Baking(Job):
                         own=before["generator"],
                     )
                 )
-            # pack.refusal() expects None for parameters that vary.
+            # pack.reason_unavailable() expects None for parameters that vary.
             given = {k: None if v == usage.VARIES else v for k, v in entry["parameters"].items()}
             model = entry["model"]
             form = pack.resolve(model, entry["representation"], given)

@@ -78,7 +78,7 @@ def forms(tool):
     return "\n".join(lines)
 
 
-def by_view(tool, *arguments):
+def errors_by_view(tool, *arguments):
     """Relative error, one number per view; None if the tool reports that the model has no fit."""
     command = [str(tool), "fit", *arguments]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -89,18 +89,18 @@ def by_view(tool, *arguments):
     return [float(row["relative_l1"]) for row in csv.DictReader(io.StringIO(done.stdout))]
 
 
-def spread(off):
+def spread(view_errors):
     """Median, 95th percentile and maximum over views."""
-    off = sorted(off)
-    parts = (off[math.ceil(q * len(off)) - 1] for q in (0.5, 0.95, 1))
+    view_errors = sorted(view_errors)
+    parts = (view_errors[math.ceil(q * len(view_errors)) - 1] for q in (0.5, 0.95, 1))
     return [percent(part) for part in parts]
 
 
 def errors(columns, found):
     """A table of errors. `found` has the first cells of a row, and the errors of its views."""
     lines = heading(*columns, "half of the views below", "95 % of the views below", "worst view")
-    for first, off in sorted(found, key=lambda row: sorted(row[1])[len(row[1]) // 2]):
-        lines.append(line(*first, *spread(off)))
+    for first, view_errors in sorted(found, key=lambda row: sorted(row[1])[len(row[1]) // 2]):
+        lines.append(line(*first, *spread(view_errors)))
     return lines
 
 
@@ -110,15 +110,20 @@ def at_defaults(tool, *options):
     for model in listed(tool):
         for values in [(), *ELSEWHERE.get(model["name"], [])]:
             named = (model["name"], *values)
-            if off := by_view(tool, *named, *options):
-                yield model, (f"`{' '.join(named)}`",), off
+            if view_errors := errors_by_view(tool, *named, *options):
+                yield model, (f"`{' '.join(named)}`",), view_errors
 
 
 def fits(tool):
     found = list(at_defaults(tool))
     lines = errors(("Model",), [row[1:] for row in found])
     # A fit is for models that have no other form with light sampling.
-    needed = [e for model, _, off in found if "exact" not in model["representations"] for e in off]
+    needed = [
+        e
+        for model, _, view_errors in found
+        if "exact" not in model["representations"]
+        for e in view_errors
+    ]
     lines.append(line("all that have no exact form", *spread(needed)))
     return "\n".join(lines)
 
@@ -131,7 +136,7 @@ def fits_any(tool):
     found = []
     for name, parameters in ANY.items():
         first = (f"`{name}`", " ".join(f"`{p}`" for p in parameters))
-        found.append((first, by_view(tool, name, "--any", *parameters)))
+        found.append((first, errors_by_view(tool, name, "--any", *parameters)))
     return "\n".join(errors(("Model", "parameters"), found))
 
 
@@ -141,7 +146,7 @@ def fits_over(tool):
     for model in listed(tool):
         if over := model["properties"]["fit_axis"]:
             first = (f"`{model['name']}`", f"`{over}`")
-            found.append((first, by_view(tool, model["name"], "--over", over)))
+            found.append((first, errors_by_view(tool, model["name"], "--over", over)))
     return "\n".join(errors(("Model", "number"), found))
 
 

@@ -26,7 +26,7 @@ UNIT = (noise_table.Case(noise_table.UNIT), noise_table.NODE)
 def set_up(condition, case, form, size):
     scene, ball, mask = noise_table.set_up(condition, size, None)
     scene.cycles.shading_system = form not in (NODES, noise_table.NODE)
-    noise_table.dress(scene, ball, lambda: noise_table.material_of(case, form))
+    noise_table.set_material(scene, ball, lambda: noise_table.material_of(case, form))
     return scene, mask
 
 

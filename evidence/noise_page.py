@@ -9,9 +9,9 @@ from markdown_table import heading, line
 UNIT, NODE = "Glossy", "node"
 #: The form whose picture is the divisor of noise: of those that a model has, the one with least
 #: noise.
-STEADY = ("exact", "aimed", "fitted", "twin")
-#: Forms that are right on average without an assumption about lamps.
-RIGHT = ("exact", "sampled")
+LEAST_NOISE = ("exact", "aimed", "fitted", "twin")
+#: Forms that are unbiased without an assumption about lamps.
+UNBIASED = ("exact", "sampled")
 #: Side, in pixels, of the blocks whose means are compared.
 BLOCK = 6
 
@@ -41,13 +41,13 @@ the same noise takes.
 
 
 #: The noise of a form whose pictures lack light that would appear as rare bright pixels.
-UNMET = math.inf
+MISSES_LIGHT = math.inf
 #: If a form shows less than this share of the light, it missed the lamps.
-MET = 0.8
+MIN_LIGHT_SHARE = 0.8
 
 
 def number(x):
-    if x == UNMET:
+    if x == MISSES_LIGHT:
         return "unmet"
     if x >= 100:
         return f"{float(f'{x:.2g}'):.0f}" if x < 1e5 else f"{x:.0e}".replace("e+0", "e")
@@ -77,7 +77,7 @@ class Page:
         self.by_default = {
             (name, n) for name, entry in conditions.items() for n in entry["samples"]
         }
-        self.forms = [f for f in dict.fromkeys((*STEADY, "sampled")) if f in self.noise]
+        self.forms = [f for f in dict.fromkeys((*LEAST_NOISE, "sampled")) if f in self.noise]
         self.forms += [f for f in self.noise if f not in (*self.forms, NODE)]
 
     def title(self, place):
@@ -89,19 +89,19 @@ class Page:
         row = self.noise.get(NODE, {}).get((UNIT, ""), {}).get(place)
         return float(row["noise"]) if row else None
 
-    def met(self, row):
+    def shows_light(self, row):
         """True if the form shows the light that the model's form with least noise shows."""
         place = row["condition"], int(row["samples"])
-        steady = self.noise.get(row["divided_by"], {}).get(case_key(row), {}).get(place, row)
-        mean, of = float(row["mean"]), float(steady["mean"])
-        error = math.hypot(float(row["mean_error"]), float(steady["mean_error"]))
-        return mean >= MET * of or mean + 5 * error >= of
+        divisor = self.noise.get(row["divided_by"], {}).get(case_key(row), {}).get(place, row)
+        mean, of = float(row["mean"]), float(divisor["mean"])
+        error = math.hypot(float(row["mean_error"]), float(divisor["mean_error"]))
+        return mean >= MIN_LIGHT_SHARE * of or mean + 5 * error >= of
 
     def relative(self, form, case, place):
         row, unit = self.noise[form].get(case, {}).get(place), self.unit(place)
         if not row or not unit:
             return None
-        return float(row["noise"]) / unit if self.met(row) else UNMET
+        return float(row["noise"]) / unit if self.shows_light(row) else MISSES_LIGHT
 
     def cost(self, form, case, place):
         """The cost of the form at the model's defaults, with the same number of lamps."""
@@ -128,7 +128,7 @@ class Page:
             lines.append(line(name_of(case), *("" if c is None else number(c) for c in cells)))
         return [*lines, *percentile_rows(columns), ""]
 
-    def dear(self, form, case, place):
+    def cost_weighted(self, form, case, place):
         noise, cost = self.relative(form, case, place), self.cost(form, case, place)
         return None if noise is None or cost is None else noise * cost
 
@@ -172,9 +172,9 @@ class Page:
             )
         return [*lines, ""]
 
-    def right(self, case, place):
+    def unbiased(self, case, place):
         """(form, row) of the form that is right on average there, with the most samples."""
-        for form in RIGHT:
+        for form in UNBIASED:
             found = self.noise.get(form, {}).get(case, {})
             of = [p for p in found if p[0] == place[0]]
             if of:
@@ -182,14 +182,14 @@ class Page:
                 return form, found[most]
         return None, None
 
-    def off(self, form, case, place):
+    def mean_difference(self, form, case, place):
         """The relative difference of the means, and its standard error."""
         row = self.noise[form].get(case, {}).get(place)
-        name, right = self.right(case, place)
-        if row is None or right is None or name == form or not self.met(right):
+        name, reference = self.unbiased(case, place)
+        if row is None or reference is None or name == form or not self.shows_light(reference):
             return None
-        mean, of = float(row["mean"]), float(right["mean"])
-        error = math.hypot(float(row["mean_error"]), float(right["mean_error"]))
+        mean, of = float(row["mean"]), float(reference["mean"])
+        error = math.hypot(float(row["mean_error"]), float(reference["mean_error"]))
         return ((mean - of) / of, error / of) if of > 0 else None
 
     def means(self):
@@ -207,7 +207,7 @@ class Page:
             places = self.common()
             rows = []
             for case in self.noise[form]:
-                found = [self.off(form, case, p) for p in places]
+                found = [self.mean_difference(form, case, p) for p in places]
                 if any(found):
                     rows.append(line(name_of(case), *(percent(f) for f in found)))
             if rows:
@@ -221,11 +221,13 @@ class Page:
         for place in places:
             for form in self.forms:
                 for case in self.noise[form]:
-                    if not (off := self.off(form, case, place)):
+                    if not (difference := self.mean_difference(form, case, place)):
                         continue
                     row = self.noise[form][case][place]
                     apart = [f"{100 * float(row[k]):.2f}" if row[k] else "" for k in APART]
-                    rows.append(line(name_of(case), form, f"{place[1]:,}", percent(off), *apart))
+                    rows.append(
+                        line(name_of(case), form, f"{place[1]:,}", percent(difference), *apart)
+                    )
         if not rows:
             return []
         return [
@@ -249,7 +251,7 @@ class Page:
             lines += [f"## {form}", "", "Noise in units of the Glossy node.", ""]
             lines += self.table(form, self.relative)
             if any(k[2] == form for k in self.costs):
-                lines += ["Noise x cost.", "", *self.table(form, self.dear)]
+                lines += ["Noise x cost.", "", *self.table(form, self.cost_weighted)]
         lines += self.cost_table() + self.means() + self.penumbras()
         return "\n".join(lines)
 
@@ -265,9 +267,9 @@ def name_of(case):
     return f"`{' '.join(case).strip()}`"
 
 
-def percent(off):
-    if off is None:
+def percent(difference):
+    if difference is None:
         return ""
-    value, error = (100 * x for x in off)
+    value, error = (100 * x for x in difference)
     text = f"{value:+.1f} ± {error:.1f}" if error >= 0.05 else f"{value:+.2f} ± {error:.2f}"
     return f"**{text}**" if abs(value) > 1 and abs(value) > 5 * error else text

@@ -30,7 +30,7 @@ INSIDE = 0.95
 class Condition:
     """A light condition. `light` adds lamps to the scene. `samples` is the default list of sample
     counts. `timed_as` names the condition whose run times are used for this one. `picked` restricts
-    it to the cases of noise_table.PICKED unless others are named."""
+    it to the cases of noise_table.REPRESENTATIVE_CASES unless others are named."""
 
     title: str
     light: Callable

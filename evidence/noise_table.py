@@ -29,7 +29,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from noise_page import BLOCK, NODE, RIGHT, STEADY, UNIT, Page
+from noise_page import BLOCK, LEAST_NOISE, NODE, UNBIASED, UNIT, Page
 
 FIELDS = (
     *("model", "values", "form", "condition", "samples", "seeds", "pixels"),
@@ -46,7 +46,7 @@ NATIVE = {
 
 #: Cases in addition to the default values of every model: rough, sharp and anisotropic ones of
 #: some.
-BESIDE = {
+EXTRA_CASES = {
     "ashikhmin_shirley": [
         {"nu": 100, "nv": 1000},
         {"nu": 10, "nv": 10},
@@ -60,7 +60,7 @@ BESIDE = {
 }
 
 #: Cases for the conditions that take too long for all models.
-PICKED = (
+REPRESENTATIVE_CASES = (
     "Glossy",
     "ashikhmin_shirley",
     "cook_torrance",
@@ -143,7 +143,7 @@ def set_up(condition, size, pack):
     return _blender["scene"]
 
 
-def dress(scene, ball, make):
+def set_material(scene, ball, make):
     """Replaces the object's material by the one that `make` returns."""
     bpy = _blender["bpy"]
     last = list(ball.data.materials)
@@ -196,7 +196,7 @@ def pictures(case, form, job):
                 return dict(kept)
     scene, ball, mask = set_up(condition, size, pack_of(case, form, job))
     try:
-        dress(scene, ball, lambda: material_of(case, form))
+        set_material(scene, ball, lambda: material_of(case, form))
     except ValueError:
         return None
     made = np.stack([render(scene, samples, seed)[1] for seed in range(1, seeds + 1)])
@@ -242,17 +242,17 @@ def blocks(values, mask):
 def measure(job):
     """Rows for a case and a condition: every form that is requested."""
     case, forms = Case(*job["case"]), job["forms"]
-    steady = next((f for f in STEADY if f in forms), forms[0])
-    right = next((f for f in RIGHT if f in forms), forms[0])
+    least_noise = next((f for f in LEAST_NOISE if f in forms), forms[0])
+    unbiased = next((f for f in UNBIASED if f in forms), forms[0])
     found = {}
-    for form in dict.fromkeys((steady, right, *job["wanted"])):
+    for form in dict.fromkeys((least_noise, unbiased, *job["wanted"])):
         if (made := pictures(case, form, job)) is not None:
             found[form] = made
     if not found:
         return []
-    by = steady if steady in found else next(iter(found))
+    by = least_noise if least_noise in found else next(iter(found))
     mask, divide = found[by]["mask"], found[by]["mean"]
-    if by not in STEADY and by != NODE:
+    if by not in LEAST_NOISE and by != NODE:
         # Light that is found only occasionally has to be averaged over neighbouring pixels.
         divide = smoothed(divide, mask)
     rows = []
@@ -271,8 +271,8 @@ def measure(job):
             "mean_error": math.sqrt(spread.sum()) / count,
             "divided_by": by,
         }
-        if right in found and form != right:
-            row |= apart(made, found[right], mask)
+        if unbiased in found and form != unbiased:
+            row |= apart(made, found[unbiased], mask)
         rows.append({k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()})
     return rows
 
@@ -300,7 +300,7 @@ def time_forms(job):
         for turn in turns:
             scene, ball, _ = set_up(condition, job["size"], pack_of(*turn, job))
             try:
-                dress(scene, ball, functools.partial(material_of, *turn))
+                set_material(scene, ball, functools.partial(material_of, *turn))
             except ValueError:
                 continue
             render(scene, 1, 1, read=False)  # compiles
@@ -352,7 +352,7 @@ def cases_of(entries, options):
     cases = [Case(name) for name in NATIVE]
     for name in entries:
         if not wanted or name in wanted:
-            cases += [case_of(name, values) for values in ({}, *BESIDE.get(name, []))]
+            cases += [case_of(name, values) for values in ({}, *EXTRA_CASES.get(name, []))]
     return cases
 
 
@@ -394,7 +394,7 @@ def jobs_of(cases, entries, conditions, fitted, options):
         for samples in options.samples or entry["samples"]:
             for case in cases:
                 named = options.model and case.model in options.model
-                if entry["picked"] and not named and case.model not in PICKED:
+                if entry["picked"] and not named and case.model not in REPRESENTATIVE_CASES:
                     continue
                 if case.model in NATIVE:
                     forms, pack, from_pack = [NODE], None, []

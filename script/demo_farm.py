@@ -17,10 +17,10 @@ from demo_tasks import TaskError, run_task
 #: The Dask resource that each worker offers once, so that it runs one task at a time.
 RESOURCE = "render"
 #: Seconds: to wait for a scheduler's answer; between two checks of the workers.
-ANSWER, LOOK = 10, 10
+ANSWER_TIMEOUT, CHECK_INTERVAL = 10, 10
 
 
-class Here:
+class LocalRunner:
     """Runs tasks on this machine, one after the other, each with all cores."""
 
     workers = 1
@@ -63,15 +63,15 @@ class Farm:
         self.address, self.say, self.alone = address, say, False
         self.count = itertools.count()
         try:
-            self.client = Client(address, timeout=ANSWER)
+            self.client = Client(address, timeout=ANSWER_TIMEOUT)
         except (OSError, TimeoutError, ValueError) as error:
             raise TaskError(
                 f"no scheduler answers at {address} ({error}); `script/farm scheduler` starts one"
             ) from error
         self.running = {}
-        self.look()
+        self.check_workers()
 
-    def look(self):
+    def check_workers(self):
         """Counts the workers that take tasks, and prints a message if there are none."""
         known = self.client.scheduler_info(n_workers=-1)["workers"].values()
         self.workers = sum(w["resources"].get(RESOURCE, 0) >= 1 for w in known)
@@ -108,13 +108,15 @@ class Farm:
 
         while self.running:
             try:
-                done, _ = wait(list(self.running), timeout=LOOK, return_when="FIRST_COMPLETED")
+                done, _ = wait(
+                    list(self.running), timeout=CHECK_INTERVAL, return_when="FIRST_COMPLETED"
+                )
             except TimeoutError:
-                self.look()
+                self.check_workers()
                 continue
             except CancelledError as error:
                 raise self.gone() from error
-            self.look()
+            self.check_workers()
             for future in done:
                 task = self.running.pop(future)
                 try:

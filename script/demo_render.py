@@ -19,7 +19,7 @@ import sys
 import zipfile
 from pathlib import Path
 
-from demo_farm import Farm, Here, Progress
+from demo_farm import Farm, LocalRunner, Progress
 from demo_matrix import RENDER_SCENE, USUAL_BLENDER, Scene, folder_of, python_of
 from demo_records import write_runs
 from demo_tasks import ROOT, TaskError, digest, kept, read_json, write_json
@@ -173,7 +173,7 @@ def link_versions(out):
 def main():
     options = parse()
     try:
-        render(options, Farm(options.scheduler, say) if options.scheduler else Here())
+        render(options, Farm(options.scheduler, say) if options.scheduler else LocalRunner())
     except TaskError as error:
         print(f"demo_render: {error}", file=sys.stderr)
         sys.exit(1)

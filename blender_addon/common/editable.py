@@ -35,8 +35,8 @@ def refusal(*blocks):
     return None
 
 
-def stays(*blocks):
-    """Whether refusal() finds no objection."""
+def keeps_changes(*blocks):
+    """Whether changes to these materials or trees are saved: refusal() finds no objection."""
     return refusal(*blocks) is None
 
 

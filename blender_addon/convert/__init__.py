@@ -4,9 +4,9 @@
 Nothing is changed before apply().
 """
 
+from .apply_restore import apply, is_converted, restore
 from .node_values import KNOWN_SOCKETS, natives
 from .plans import LIMIT, Plan, plan
-from .there_and_back import apply, is_converted, restore
 
 __all__ = [
     "KNOWN_SOCKETS",

@@ -93,7 +93,7 @@ class Inputs:
     follow."""
 
     def __init__(self, node):
-        self._node, self._moved = node, animation.moved(node)
+        self._node, self._animated = node, animation.animated_properties(node)
         self._values = shader_values.Constants(), shader_values.Constants(images=True)
         self._found = {}
 
@@ -143,7 +143,7 @@ class Inputs:
 
     def setting(self, name):
         """A setting of the node itself."""
-        if (self._node.as_pointer(), name) in self._moved:
+        if (self._node.as_pointer(), name) in self._animated:
             label = self._node.bl_rna.properties[name].name
             raise Refused(say("{socket} is animated", socket=Sentence(label)))
         return getattr(self._node, name)
@@ -155,7 +155,7 @@ class Inputs:
             if socket.name in known or not socket.enabled:
                 continue
             fresh = _fresh(self._node.bl_idname).get(socket.identifier)
-            animated = animation.value_of(socket) in self._moved
+            animated = animation.value_key(socket) in self._animated
             if self.reaches(socket.name) or animated or _held(socket) != fresh:
                 raise Refused(say("it has {what}", what=Sentence(socket.name)))
         for setting in self._node.bl_rna.properties:

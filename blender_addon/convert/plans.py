@@ -129,7 +129,7 @@ def _is_shown(model, values):
     form = pack.native_form(model)
     if form is None or not device.lacks_osl(lamps.current_scene()):
         return True
-    return pack.refusal(model, form, pack.canonical(values)) is None
+    return pack.reason_unavailable(model, form, pack.canonical(values)) is None
 
 
 def _part(inputs, native, fit):

@@ -10,12 +10,12 @@ from ..trees import animation, shader_trees, shader_values
 
 def _settings(node):
     """{(identifier, label): value} of everything that affects the node's appearance."""
-    moved, values = animation.moved(node), shader_values.Constants()
+    properties, values = animation.animated_properties(node), shader_values.Constants()
     settings = {("distribution", "Distribution"): getattr(node, "distribution", None)}
     for socket in node.inputs:
         value = values.told(socket)
         if value is None:
-            animated = animation.value_of(socket) in moved
+            animated = animation.value_key(socket) in properties
             value = "animated" if animated else "linked"
         settings[socket.identifier, socket.name] = (shader_trees.is_driven(socket), value)
     return settings
@@ -33,11 +33,11 @@ class SeenNode:
         tree = material.node_tree if material is not None else None
         node = tree.nodes.get(self._name) if tree is not None else None
         if node is None or node.bl_idname != self._kind:
-            raise usage.stale(self._of, say("there is no such node any more"))
+            raise usage.stale_error(self._of, say("there is no such node any more"))
         if node not in [shown.node for shown in shader_trees.shown(material)]:
-            raise usage.stale(self._of, say("nothing shows the node any more"))
+            raise usage.stale_error(self._of, say("nothing shows the node any more"))
         for key, value in _settings(node).items():
             if value != self._settings.get(key):
                 what = say("{setting} is another one", setting=Sentence(key[1]))
-                raise usage.stale(self._of, what)
+                raise usage.stale_error(self._of, what)
         return node

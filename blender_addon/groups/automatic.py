@@ -40,7 +40,7 @@ def follow(scene=None):
     try:
         lacks_osl = device.lacks_osl(scene)
         for group in groups:
-            if nodes.suit(group, lacks_osl):
+            if nodes.adapt_to_scene(group, lacks_osl):
                 _filled.add(group.session_uid)
     finally:
         _busy = False

@@ -13,7 +13,7 @@ from ..common import app_handlers
 from . import automatic, nodes
 
 
-def _brought(context):
+def _imported_groups(context):
     """The groups of this extension that were imported as dependencies. Those that the user asked
     for by name must stay, as Blender goes on to use them."""
     return [
@@ -29,15 +29,17 @@ def _brought(context):
 
 @persistent
 def _after_import(context):
-    brought = _brought(context)
-    groups = [group for group in brought if nodes.TAG in group]
+    imported = _imported_groups(context)
+    groups = [group for group in imported if nodes.TAG in group]
     known = {group.session_uid for group in groups}
-    if groups or any(lamps.is_group(group) for group in brought):
+    if groups or any(lamps.is_group(group) for group in imported):
         lamps.follow()
         automatic.follow()
     if any(item.id_type == "NODETREE" for item in context.import_items):
         # Some may be gone already: the parts of a group that has changed its form.
-        nodes.unite([group for group in bpy.data.node_groups if group.session_uid in known])
+        nodes.merge_duplicates(
+            [group for group in bpy.data.node_groups if group.session_uid in known]
+        )
 
 
 def register():

@@ -80,7 +80,7 @@ def with_parts(groups):
     return found
 
 
-def unite(groups):
+def merge_duplicates(groups):
     """Replaces groups that came from another file by equal ones of the open file."""
     stand_in.keep_one_text()
 
@@ -89,10 +89,10 @@ def unite(groups):
         return 2 if AUTO in group[TAG] else int(group[TAG]["representation"] != "twin")
 
     for group in sorted(groups, key=depth):
-        _give_way(group)
+        _replace_by_local_equal(group)
 
 
-def _give_way(group):
+def _replace_by_local_equal(group):
     """Replaces a group by the equal one of the open file, if there is one."""
     tag = group[TAG].to_dict()
     for other in bpy.data.node_groups:
@@ -103,7 +103,7 @@ def _give_way(group):
             return
 
 
-def _let_go(group):
+def _clear_fake_users(group):
     """Removes the fake users of a group's texts, which older versions set, so that they are deleted
     with their last user."""
     for text in (n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script):
@@ -114,9 +114,9 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
     """Finds or makes the node group of a model. Raises ValueError, CompileError.
 
     Leaves nothing in the file on failure. A group of "auto" adapts to the scene if the model has a
-    form for that; see suit(). `values` of the parameters decide which forms are available. `baked`:
-    hash of the extension in whose place the pack of the open file is in use (see pack.use).
-    `albedo`: adds the Albedo output even if that takes a script with large tables.
+    form for that; see adapt_to_scene(). `values` of the parameters decide which forms are
+    available. `baked`: hash of the extension in whose place the pack of the open file is in use
+    (see pack.use). `albedo`: adds the Albedo output even if that takes a script with large tables.
     """
     if representation == "auto" and not baked:
         with_osl = pack.automatic(model_name, values)
@@ -124,7 +124,7 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
             return _ensure_automatic(model_name, with_osl, albedo)
     representation = pack.resolve(model_name, representation, values)
     if group := find_group(model_name, representation, albedo):
-        _let_go(group)
+        _clear_fake_users(group)
         return group
     with _new_group(model_name, representation, representation, albedo) as group:
         if baked:
@@ -144,14 +144,14 @@ def _ensure_automatic(model_name, with_osl, albedo):
     native = pack.native_form(model_name)
     for form in (with_osl, native):
         if group := find_group(model_name, form, albedo, with_osl):
-            _let_go(group)
-            suit(group, device.lacks_osl(lamps.current_scene()))
+            _clear_fake_users(group)
+            adapt_to_scene(group, device.lacks_osl(lamps.current_scene()))
             return group
     with _new_group(model_name, "auto", with_osl, albedo) as group:
         tag = group[TAG]
         tag[AUTO], tag["with_albedo"] = with_osl, albedo and has_albedo_script(model_name, with_osl)
         tag["native_only"] = json.dumps(pack.form_values(model_name, native))
-        _suit(group, native if device.lacks_osl(lamps.current_scene()) else with_osl)
+        _change_form(group, native if device.lacks_osl(lamps.current_scene()) else with_osl)
     return group
 
 
@@ -243,7 +243,7 @@ def _is_current(group):
         return False
 
 
-def suit(group, lacks_osl):
+def adapt_to_scene(group, lacks_osl):
     """Changes an automatic group to the form that a scene with or without OSL can render, if the
     installed version made the group; sockets stay. Returns whether the form has changed. If it
     raises CompileError, the group is as it was."""
@@ -256,11 +256,11 @@ def suit(group, lacks_osl):
     wanted = pack.native_form(tag["model"]) if lacks_osl else tag[AUTO]
     if wanted is None:
         return False
-    _suit(group, wanted)
+    _change_form(group, wanted)
     return True
 
 
-def _suit(group, form):
+def _change_form(group, form):
     tag, before = group[TAG].to_dict(), list(group.nodes)
     inner = {n.node_tree.session_uid for n in before if is_ours(n)}
     texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
@@ -282,7 +282,7 @@ def _suit(group, form):
 
 
 def empty(group):
-    """Removes all nodes of an automatic group; suit() makes them again."""
+    """Removes all nodes of an automatic group; adapt_to_scene() makes them again."""
     group.nodes.clear()
 
 
@@ -317,7 +317,7 @@ def _lacks_choice(node):
     if tag.get(AUTO, tag["representation"]) == tag["representation"]:
         return False
     only = pack.canonical(json.loads(tag["native_only"]))
-    return any(not pack.same(get_value(node, name), value) for name, value in only.items())
+    return any(not pack.equal_in_float32(get_value(node, n), value) for n, value in only.items())
 
 
 def runs_anywhere(node):
@@ -325,15 +325,15 @@ def runs_anywhere(node):
     return is_native(node.node_tree) and not _lacks_choice(node)
 
 
-def is_stood_in_for(node):
+def has_stand_in(node):
     """Whether Blender's own nodes replace a node where its form does not run."""
     inner = [n.node_tree[TAG]["representation"] for n in node.node_tree.nodes if is_ours(n)]
     has_twin = "twin" in inner
     return stand_in.is_in(node.node_tree) or (has_twin and _lacks_choice(node))
 
 
-def made_of(group):
-    """The group with the nodes of the form: an automatic group may hold another group."""
+def content_group(group):
+    """The group that has the nodes of the form: an automatic group may contain another group."""
     if AUTO in group[TAG] and group[TAG][AUTO] != group[TAG]["representation"]:
         form = group[TAG]["representation"]
         inner = (n.node_tree for n in group.nodes if is_ours(n))
@@ -429,11 +429,11 @@ def get_value(node, name):
 def varying(node):
     """Parameters of a group node that are not constant: linked, animated or driven. Links that
     Cycles ignores do not count."""
-    moved = animation.inputs(node)
+    animated = animation.animated_inputs(node)
     return {
         name
         for name, s in sockets(node).items()
-        if s.identifier in moved or shader_trees.is_driven(s)
+        if s.identifier in animated or shader_trees.is_driven(s)
     }
 
 
@@ -599,7 +599,7 @@ def replace_group(node, group):
         return
     tree = node.id_data
     names = {s.identifier: name for name, s in sockets(node).items()}
-    animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.hold(node)]
+    animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.capture(node)]
     values = all_values(node)
     incoming = [
         (link.from_socket, name, link.is_muted)
@@ -621,6 +621,6 @@ def replace_group(node, group):
         tree.links.new(node.outputs[name], target).is_muted = muted
     for curve, owner, name in animated:  # curves address sockets by index
         if name in present:
-            animation.follow(curve, owner, present[name])
+            animation.retarget(curve, owner, present[name])
         else:
             curve.mute = True

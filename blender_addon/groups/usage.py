@@ -107,7 +107,7 @@ def _change(before, after):
     return say("it has another shader") if before.shader != after.shader else None
 
 
-def stale(material, what):
+def stale_error(material, what):
     """The exception for a plan that no longer matches the material."""
     return ValueError(
         say(
@@ -123,5 +123,5 @@ def check(before):
     now = uses()
     for name, use in before.items():
         if what := _change(use, now.get(name)):
-            raise stale(name, what)
+            raise stale_error(name, what)
     return {name: now[name] for name in before}

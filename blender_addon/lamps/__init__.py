@@ -7,7 +7,7 @@ is not installed and scripts may not run. An outdated list causes noise, and los
 lamps without a size that are missing from it; apart from that, forms stay correct.
 """
 
-from .filling import count, current_scene, ensure_group, follow, limit_by, see, seen
+from .filling import count, current_scene, ensure_group, follow, last_found, limit_by, refresh
 from .handlers import register, unregister
 from .lights import has_importance, is_sizeless
 from .scenes import lamps_of
@@ -31,12 +31,12 @@ __all__ = [
     "is_group",
     "is_sizeless",
     "lamps_of",
+    "last_found",
     "limit_by",
     "part_names",
+    "refresh",
     "register",
     "remove_unused_group",
-    "see",
-    "seen",
     "too_many",
     "unregister",
 ]

@@ -70,10 +70,11 @@ def _listed(survey, chosen, why=None):
     taken = {id(c) for c in chosen}
     why = why or slots.too_many(len(chosen))
     placed = sorted(enumerate(chosen, 1), key=lambda item: -item[1].rank)
-    return [slots.Lamp(c.name, slot, c.rank, "", c.sizeless, c.met) for slot, c in placed] + [
-        slots.Lamp(c.name, None, c.rank, c.why or why, c.sizeless, c.met)
-        for c in survey.candidates
-        if id(c) not in taken
+    listed = [(c, slot, "") for slot, c in placed]
+    listed += [(c, None, c.why or why) for c in survey.candidates if id(c) not in taken]
+    return [
+        slots.Lamp(c.name, slot, c.rank, reason, c.sizeless, c.hit_by_bsdf_sampling)
+        for c, slot, reason in listed
     ]
 
 
@@ -85,12 +86,13 @@ memory = SimpleNamespace(
 
 
 def _survey(scene, depsgraph, subject=None):
-    """scenes.look(), including the lamps of scenes that appear in the scene's pictures, because
-    Blender calls handlers for the main scene only. Lamps are ranked within their own scene."""
-    survey = scenes.look(scene, depsgraph, subject)
+    """scenes.survey_lamps(), including the lamps of scenes that appear in the scene's pictures,
+    because Blender calls handlers for the main scene only. Lamps are ranked within their own
+    scene."""
+    survey = scenes.survey_lamps(scene, depsgraph, subject)
     for other in scenes.shown_with(scene):
         known = [(c.name, c.values) for c in survey.candidates]
-        found = scenes.look(other, None).candidates
+        found = scenes.survey_lamps(other, None).candidates
         survey.candidates += [c for c in found if (c.name, c.values) not in known]
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
     return survey
@@ -101,7 +103,7 @@ def _fill(scene, depsgraph, subject=None, keep=True):
     slots where possible."""
     survey = _survey(scene, depsgraph, subject)
     limit = limit_of(scene)
-    group = shared_group.the_one()
+    group = shared_group.deduplicate()
     now = shared_group.written(group) if group else []
     chosen = _arranged(_worth_aiming(survey)[:limit], _by_slot(now) if group and keep else [])
     if group:
@@ -164,7 +166,7 @@ def follow():
         quietly(scene)
 
 
-def see(scene):
+def refresh(scene):
     """Fills the slots of the shared group from a scene, and examines environment images anew.
     Returns every lamp of the scene as a slots.Lamp; those with a slot come first, then the
     brightest."""
@@ -172,13 +174,13 @@ def see(scene):
     return quietly(scene, keep=False)
 
 
-def seen(scene, group=None):
-    """Result of the last survey of a scene, for panels, which must not change anything. `group`: a
-    shared group of another file, for materials that are linked from there."""
-    looked = memory.scene == scene.session_uid
-    if looked and group is None:
+def last_found(scene, group=None):
+    """[slots.Lamp] of the last survey of a scene, for panels, which must not change anything.
+    `group`: a shared group of another file, for materials that are linked from there."""
+    surveyed = memory.scene == scene.session_uid
+    if surveyed and group is None:
         return memory.lamps
-    survey = memory.survey if looked else _survey(scene, scene.view_layers[0].depsgraph)
+    survey = memory.survey if surveyed else _survey(scene, scene.view_layers[0].depsgraph)
     worth = _worth_aiming(survey)
     if group is None:
         return _listed(survey, _arranged(worth[: limit_of(scene)], []))

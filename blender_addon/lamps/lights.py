@@ -83,14 +83,14 @@ def _irradiance(light, matrix):
 
 def _looks(light, matrix):
     if light.type == "SUN":
-        return slots.looks_alike(light.angle)
+        return slots.angular_size_distant(light.angle)
     if light.type != "AREA":
-        return slots.looks_like(matrix.translation, light.shadow_soft_size)
+        return slots.angular_size_at(matrix.translation, light.shadow_soft_size)
     scaled = (
         getattr(light, side) * scale
         for side, scale in zip(emission.sides(light), matrix.to_scale(), strict=False)
     )
-    return slots.looks_like(matrix.translation, math.hypot(*scaled) / 2)
+    return slots.angular_size_at(matrix.translation, math.hypot(*scaled) / 2)
 
 
 def candidate_of(item, name, light, matrix):
@@ -103,7 +103,7 @@ def candidate_of(item, name, light, matrix):
         _irradiance(light, matrix),
         _looks(light, matrix),
         sizeless=is_sizeless(light),
-        met=has_importance(light) and not is_sizeless(light),
+        hit_by_bsdf_sampling=has_importance(light) and not is_sizeless(light),
         # A non-uniformly scaled spot has no circular cone, which shaders can't represent.
         uneven=not emission.is_even(light) or (light.type == "SPOT" and slots.is_stretched(matrix)),
     )

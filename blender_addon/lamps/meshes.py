@@ -205,7 +205,7 @@ def instances(depsgraph, emitting, subject, sources):
         if others[1:]:
             name = say("{lamps} and {count} more", lamps=name, count=len(others) - 1)
         all_light = sum(copy[0] for copy in others)
-        nothing = slots.looks_alike(0.0)
+        nothing = slots.angular_size_distant(0.0)
         yield slots.Candidate(
             name,
             None,
@@ -245,8 +245,8 @@ def _candidate(item, name, shape, matrix):
         squared = ((points - middle) ** 2).sum(-1)
         return radiance * math.pi * size**2 / np.maximum(squared, max(size**2, 1e-12))
 
-    looks = slots.looks_like(middle, size)
-    candidate = slots.Candidate(name, values, irradiance, looks, uneven=uneven)
+    angular_size = slots.angular_size_at(middle, size)
+    candidate = slots.Candidate(name, values, irradiance, angular_size, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
     if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
         extent = 0.0  # an open surface: only part of a ball
@@ -272,8 +272,8 @@ def _sheet(name, radiance, kind, middle, frame, sizes):
         squared = np.maximum((to**2).sum(-1), max(area / math.pi, 1e-12))
         return radiance * area * np.abs(to @ frame[2]) / squared**1.5
 
-    looks = slots.looks_like(middle, math.hypot(*sizes) / 2)
-    candidate = slots.Candidate(name, (), irradiance, looks)
+    angular_size = slots.angular_size_at(middle, math.hypot(*sizes) / 2)
+    candidate = slots.Candidate(name, (), irradiance, angular_size)
 
     def judge(points):
         # Lamps emit along their own -z.

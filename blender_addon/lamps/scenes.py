@@ -13,10 +13,10 @@ from . import emission, instancers, lights, meshes, slots, world
 
 #: Above this angular radius, uneven emission of a lamp matters: a lobe carries the mean of the
 #: model over the lamp.
-_LOOKS_UNEVEN = 0.05
+_MAX_UNEVEN_SIZE = 0.05
 #: Ratio of radius to distance from which shaders leave a lamp to random rays (kNearest in
 #: generator/forms/aimed.h).
-_LOOKS_TOO_WIDE = 0.85
+_MAX_ANGULAR_SIZE = 0.85
 
 
 @dataclass
@@ -108,7 +108,7 @@ def shown_with(scene):
     return list(dict.fromkeys(s for s in found if s is not None and s != scene))
 
 
-def look(scene, depsgraph, subject=None):
+def survey_lamps(scene, depsgraph, subject=None):
     """A Survey of a scene. `subject`: points of an earlier survey, so that they need not be
     determined."""
     survey = Survey(subject=subject)
@@ -155,13 +155,14 @@ def look(scene, depsgraph, subject=None):
         if candidate.judge is not None:
             candidate.judge(survey.subject)
         candidate.rank = float(np.mean(candidate.irradiance(survey.subject)))
-        angle = float(np.mean(candidate.looks(survey.subject)))
+        angle = float(np.mean(candidate.angular_size(survey.subject)))
         if not math.isfinite(candidate.rank + angle):  # a mesh with invalid coordinates
             candidate.rank = angle = 0.0
         candidate.width = round(math.log2(max(angle, 1e-4)))
-        if candidate.uneven and angle > _LOOKS_UNEVEN and candidate.met and not candidate.why:
+        uneven, hit = candidate.uneven, candidate.hit_by_bsdf_sampling
+        if uneven and angle > _MAX_UNEVEN_SIZE and hit and not candidate.why:
             candidate.why = say("its light is not the same all over it")
-        elif not candidate.met and angle > _LOOKS_TOO_WIDE:
+        elif not hit and angle > _MAX_ANGULAR_SIZE:
             candidate.why = say("it looks too large for a closure")
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
     return survey

@@ -53,7 +53,7 @@ def remove_unused():
             bpy.data.node_groups.remove(group)
 
 
-def the_one():
+def deduplicate():
     """The shared group. Copies, which appended materials bring, are replaced by it.
 
     If one of them was appended, that one is kept: Blender recognizes it, and appends neither it nor

@@ -57,7 +57,7 @@ class Lamp:
     irradiance: float
     why: str = ""
     sizeless: bool = False
-    met: bool = True
+    hit_by_bsdf_sampling: bool = True
 
 
 @dataclass(frozen=True)
@@ -78,34 +78,34 @@ class Driven:
 @dataclass
 class Candidate:
     """A lamp with the twelve numbers of its slot; irradiance(points), (n, 3) to (n,); and
-    looks(points), the tangent of its angular radius seen from there."""
+    angular_size(points), the tangent of its angular radius seen from there."""
 
     name: str
     values: tuple
     irradiance: object
-    looks: object
+    angular_size: object
     why: str = ""
     rank: float = 0.0
     width: int = 0  # doublings of its angular radius
     sizeless: bool = False
-    met: bool = True  # random rays hit it
+    hit_by_bsdf_sampling: bool = True  # random rays hit it
     uneven: bool = False  # its emission is not uniform
     #: For a mesh: judge(points) sets the values and `why`, given points (n, 3) of the subject.
     judge: object = None
 
 
-def looks_like(place, radius):
-    """looks() of a lamp with this position and radius."""
+def angular_size_at(place, radius):
+    """angular_size() of a lamp with this position and radius."""
     middle = np.array(place)
 
-    def looks(points):
+    def angular_size(points):
         return radius / np.maximum(np.sqrt(((points - middle) ** 2).sum(-1)), 1e-9)
 
-    return looks
+    return angular_size
 
 
-def looks_alike(angle):
-    """looks() of a distant lamp with this full angle."""
+def angular_size_distant(angle):
+    """angular_size() of a distant lamp with this full angle."""
     return lambda points: np.full(len(points), math.tan(angle / 2))
 
 

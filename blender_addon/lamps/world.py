@@ -88,8 +88,8 @@ def _sky(node, strength):
     power = _SKY_SUN_IRRADIANCE * strength * node.sun_intensity
     turn = (node.sun_elevation, node.sun_rotation, 0.0)
     values = slots.numbers(slots.SKY_SUN, turn=turn, sizes=(node.sun_size, 0.0))
-    looks = slots.looks_alike(node.sun_size)
-    return slots.Candidate(name, values, lambda p: np.full(len(p), power), looks)
+    angular_size = slots.angular_size_distant(node.sun_size)
+    return slots.Candidate(name, values, lambda p: np.full(len(p), power), angular_size)
 
 
 def _environment(shown, strength):
@@ -103,7 +103,10 @@ def _environment(shown, strength):
         which = say("{image}, bright spot {number}", image=name, number=index + 1)
         power = irradiance * strength
         candidate = slots.Candidate(
-            which, None, lambda p, power=power: np.full(len(p), power), slots.looks_alike(angle)
+            which,
+            None,
+            lambda p, power=power: np.full(len(p), power),
+            slots.angular_size_distant(angle),
         )
         back = None
         if turn is not None and abs(turn.determinant()) > 1e-9:

@@ -56,19 +56,19 @@ def dielectric(f0, cosine):
     return 0.5 * a**2 * (1 + b**2)
 
 
-def _of_facets(color):
+def _clamp_to_one(color):
     """Cycles clamps the colour of metal microfacets and of multiple scattering to 1."""
     return np.minimum(color, 1)
 
 
 def schlick(color, cosine):
-    color = _of_facets(color)
+    color = _clamp_to_one(color)
     return color + (1 - color) * (1 - np.clip(cosine, 0, 1)[..., None]) ** 5
 
 
 def mean_schlick(color):
     """The cosine-weighted mean of schlick() over the hemisphere."""
-    return (20 * _of_facets(color) + 1) / 21
+    return (20 * _clamp_to_one(color) + 1) / 21
 
 
 def _shadow(w, alpha, beckmann):
@@ -136,7 +136,7 @@ def mean_facet_albedo(alpha):
     return (facet_albedo(views, alpha, False) * _SHARE).sum()
 
 
-def sent_to_and_fro(average, mean, seen):
+def multiple_scattering_factor(average, mean, seen):
     """The factor by which multiple scattering between microfacets raises the albedo. `average`:
     mean reflectance of a microfacet. `mean` and `seen`: albedo of microfacets that reflect
     everything, averaged over views and from the viewer."""
@@ -148,10 +148,11 @@ def _multiscatter(wo, native, average):
     if not native.multiscatter or native.beckmann:
         return np.ones((len(wo), 3))
     seen = facet_albedo(wo, native.alpha, False)[:, None]
-    return sent_to_and_fro(np.asarray(average), mean_facet_albedo(native.alpha), seen)
+    return multiple_scattering_factor(np.asarray(average), mean_facet_albedo(native.alpha), seen)
 
 
-def _grooves(cosine):
+def _oren_nayar_G(cosine):
+    """The same as bsdf_oren_nayar_G() of Cycles."""
     c = np.clip(cosine, 1e-6, 1)
     s, theta = np.sqrt(1 - c * c), np.arccos(c)
     return s * (theta - 2 / 3 - s * c) + 2 / 3 * (s / c) * (1 - s**3)
@@ -169,14 +170,14 @@ def matte(wi, wo, color, roughness):
     t = np.where(t > 0, t / np.maximum(np.maximum(nl, nv), 1e-9), t)
     mean = a * np.pi + (2 * np.pi - 5.6) / 3 * b
     # Only this term clamps the colour. With OSL on, all terms do; but new files have OSL off.
-    held = _of_facets(color)
+    held = _clamp_to_one(color)
     again = held**2 * (mean / (1 - mean)) / (1 - held * (1 - mean)) / np.pi
-    lost = (1 - a * np.pi - b * _grooves(nv)) * (1 - a * np.pi - b * _grooves(nl))
+    lost = (1 - a * np.pi - b * _oren_nayar_G(nv)) * (1 - a * np.pi - b * _oren_nayar_G(nl))
     # The second term already contains the colour; Cycles multiplies both terms by it nevertheless.
     return nl[..., None] * ((a + b * t)[..., None] + again * lost[..., None]) * color
 
 
-def by_view(native, each):
+def view_terms(native, each):
     """The quantities of Glossy and Principled that depend on the view alone, for each view (k, 3):
     the fraction of light that the dielectric interface keeps from the base, (k,), and the factor of
     multiple scattering between metal microfacets, (k, 3)."""
@@ -199,12 +200,12 @@ def f_cos(native, wi, wo, views):
     if native.kind == "diffuse":
         return matte(wi, wo, native.color, native.roughness)
     each, which = views
-    taken, scale = by_view(native, each)
+    taken, scale = view_terms(native, each)
     return f_cos_of_view(native, wi, wo, taken[which], scale[which])
 
 
 def f_cos_of_view(native, wi, wo, taken, scale):
-    """The same for Glossy and Principled, given by_view() of each wo."""
+    """The same for Glossy and Principled, given view_terms() of each wo."""
     lobe = np.zeros(len(wi)) if native.is_mirror else facets(wi, wo, native.alpha, native.beckmann)
     lobe = lobe[:, None]
     color = np.asarray(native.color, np.float64)
@@ -219,7 +220,7 @@ def f_cos_of_view(native, wi, wo, taken, scale):
 
 def albedo(native, each, taken, scale):
     """Directional albedo (k, 3) of a Principled node with a smooth base, including ideal mirror
-    reflection, given by_view() of each view (k, 3)."""
+    reflection, given view_terms() of each view (k, 3)."""
     color = np.asarray(native.color, np.float64)
     plastic, metal = taken[:, None] + color * (1 - taken)[:, None], 0.0
     if native.is_mirror:

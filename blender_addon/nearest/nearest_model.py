@@ -23,11 +23,11 @@ DIRECTIONS = 256
 LAMP, LAMPS = 0.1, 512
 #: A candidate is examined closely if its error at a roughly fitted width is at most this times the
 #: smallest one.
-_AS_NEAR = 1.1
+_CANDIDATE_MARGIN = 1.1
 #: While widths are still far apart, one direction in this many suffices to compare them.
-_FEW = 8
+_ROUGH_STRIDE = 8
 #: Limit of parabola steps, and the distance of log widths below which another step is of no use.
-_PARABOLAS, _NO_NEWS = 4, 0.02
+_PARABOLAS, _LOG_WIDTH_TOLERANCE = 4, 0.02
 #: Alpha (as in Cycles) of the narrowest lobe by which directions are sampled.
 _NARROWEST = 5e-4
 
@@ -260,8 +260,8 @@ class Target:
         f = formula.eval(at.wi, at.wo, **values) * at.wi[:, 2:]
         return f - self.f_cos, formula.mirror(at.each, **values) - self.mirror
 
-    def _mean(self, off):
-        return float((off.sum(1) / np.maximum(self.total.sum(1), 1e-9)).mean())
+    def _mean(self, differences):
+        return float((differences.sum(1) / np.maximum(self.total.sum(1), 1e-9)).mean())
 
     def misplaced(self, model, values):
         """Fraction of the light of point lamps that the model misplaces, mean over views and
@@ -274,7 +274,7 @@ class Target:
         far apart."""
         from ..brdfc import model as formulas
 
-        at, few = self.at, slice(None, None, _FEW)
+        at, few = self.at, slice(None, None, _ROUGH_STRIDE)
         f = formulas(model).eval(at.wi[few], at.wo[few], **values) * at.wi[few, 2:]
         return float((np.abs(f - self.f_cos[few]).sum(1) * at.weight[few]).sum())
 
@@ -336,7 +336,7 @@ def nearest(natives, colors, colored, has):
         return None
     best, fits = min(f[:2] for f in found), []
     for lost, error, between, candidate in found:
-        if lost == best[0] and error <= _AS_NEAR * best[1]:
+        if lost == best[0] and error <= _CANDIDATE_MARGIN * best[1]:
             key = candidate.model, candidate.width
             if key not in closely:
                 closely[key] = _factor(candidate, targets, between)
@@ -374,18 +374,18 @@ def _rough_width(candidate, targets):
     if width is None:
         return 0.0, 0.0, 0.0
 
-    def off(x):
+    def error_of_log_width(x):
         return _mean(Target.roughly_misplaced, candidate, targets, math.exp(x))
 
     r = np.array([max(t.native.roughness, 1e-3) for t in targets])
     ends = np.log([width.low, width.high])[:, None] - width.power * np.log(r)[None]
     grid, step = np.linspace(ends.min(), ends.max(), 16, retstep=True)
     usual = math.log(width.usual)
-    below, best, above = (off(x) for x in (usual - step, usual, usual + step))
+    below, best, above = (error_of_log_width(x) for x in (usual - step, usual, usual + step))
     # Searches the whole range if the minimum is not near the typical value.
-    best = usual if below > best < above else min(grid, key=off)
+    best = usual if below > best < above else min(grid, key=error_of_log_width)
     low, high = max(best - step, grid[0]), min(best + step, grid[-1])
-    best = _lowest(off, low, best, high)
+    best = _lowest(error_of_log_width, low, best, high)
     return max(best - step / 3, grid[0]), best, min(best + step / 3, grid[-1])
 
 
@@ -398,9 +398,9 @@ def _factor(candidate, targets, between):
     )
 
 
-def _lowest(off, low, best, high):
+def _lowest(function, low, best, high):
     """Minimizes a function between two ends, by parabolas through three points."""
-    points = {x: off(x) for x in {low, best, high}}
+    points = {x: function(x) for x in {low, best, high}}
     for _ in range(_PARABOLAS):
         middle = min(points, key=points.get)
         below, above = ([x for x in points if x < middle], [x for x in points if x > middle])
@@ -410,9 +410,9 @@ def _lowest(off, low, best, high):
             x = (middle + other) / 2
         else:
             x = _vertex(points, max(below), middle, min(above))
-        if min(abs(x - y) for y in points) < _NO_NEWS:
+        if min(abs(x - y) for y in points) < _LOG_WIDTH_TOLERANCE:
             break
-        points[x] = off(x)
+        points[x] = function(x)
     return min(points, key=points.get)
 
 

@@ -157,7 +157,9 @@ class Search:
         # iterations.
         color = np.full((1, 1, 1, 3), 0.8)
         for _ in range(3):
-            more = native_bsdf.sent_to_and_fro(native_bsdf.mean_schlick(color), mean, seen)
+            more = native_bsdf.multiple_scattering_factor(
+                native_bsdf.mean_schlick(color), mean, seen
+            )
             slope, rest = {0: matte, 1: m * more}, {2: m * more, 3: 1 - m}
             square = dot(slope, slope)
             with_curve = sum(x * along(i) for i, x in slope.items()) - dot(slope, rest)
@@ -246,7 +248,7 @@ def _smooth_node(curve, search, cosines, shares, here):
     native = _native(0.0, metallic, ior, tuple(float(c) for c in color))
     each = search.wo[None]
     mirror = native_bsdf.mirror(native, each)[0]
-    base = (1 - metallic) * (1 - native_bsdf.by_view(native, each)[0]) * color
+    base = (1 - metallic) * (1 - native_bsdf.view_terms(native, each)[0]) * color
     refracted, scattered = (base, 0 * base) if through else (0 * base, base)
     found = np.zeros_like(curve) if through else node_slice(native, search.wi, search.wo)
     off = np.abs(mirror - here.mirror).sum() + np.abs(refracted - here.refracted).sum()

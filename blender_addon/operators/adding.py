@@ -9,7 +9,7 @@ from .. import api
 from ..common.i18n import rpt, say, tip
 from ..groups import nodes
 from ..packs import pack
-from .common import ERRORS, refused, report_osl, stays
+from .common import ERRORS, keeps_changes, refused, report_osl
 
 
 def _doc(properties):
@@ -46,7 +46,7 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
             and space.type == "NODE_EDITOR"
             and space.tree_type == "ShaderNodeTree"
             and space.edit_tree is not None
-            and stays(cls, *filter(None, (space.id, space.edit_tree)))
+            and keeps_changes(cls, *filter(None, (space.id, space.edit_tree)))
         )
 
     def execute(self, context):
@@ -92,7 +92,7 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
             cls.poll_message_set(tip(say("Objects of this type show no surface of a material")))
             return False
         # The material slots of an overridden mesh are saved with the file.
-        return target.data.is_editable or stays(cls, target.data)
+        return target.data.is_editable or keeps_changes(cls, target.data)
 
     def execute(self, context):
         try:

@@ -33,10 +33,10 @@ class OfActiveMaterial:
 class ChangesActiveMaterial(OfActiveMaterial):
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and stays(cls, context.object.active_material)
+        return super().poll(context) and keeps_changes(cls, context.object.active_material)
 
 
-def stays(operator, *blocks):
+def keeps_changes(operator, *blocks):
     """Whether changes to these are saved with the file; if not, the disabled button explains
     why."""
     if why := editable.refusal(*blocks):
@@ -54,7 +54,7 @@ def model_node(material, name):
     )
 
 
-class Long:
+class ModalJob:
     """An operator whose work is a jobs.Job. It runs while the interface, which shows its progress,
     stays usable; Esc cancels it, and then nothing is changed."""
 
@@ -64,10 +64,10 @@ class Long:
         self.timer = manager.event_timer_add(0.1, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
-        self.tell(context, 0)  # before the first step, so that users can cancel at once
+        self.show_progress(context, 0)  # before the first step, so that users can cancel at once
         return {"RUNNING_MODAL"}
 
-    def tell(self, context, share):
+    def show_progress(self, context, share):
         context.window_manager.progress_update(100 * share)
         said = say("{work}: {share}   Esc: cancel", work=self.work(), share=f"{share:.0%}")
         context.workspace.status_text_set(iface(said))
@@ -91,7 +91,7 @@ class Long:
         if share is None:
             self.end(context)
             return self.finish(context, self.job.result)
-        self.tell(context, share)
+        self.show_progress(context, share)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):

@@ -8,7 +8,7 @@ from bpy.types import Operator
 from .. import api
 from ..common.i18n import rpt, say
 from ..panels.labels import wrapped
-from .common import ERRORS, Long, refused
+from .common import ERRORS, ModalJob, refused
 
 
 class BRDFC_OT_write_materials(Operator):
@@ -61,7 +61,7 @@ class _Budget:
         return {"error": self.error or None, "fit": self.fit}
 
 
-class BRDFC_OT_bake(Long, _Budget, Operator):
+class BRDFC_OT_bake(ModalJob, _Budget, Operator):
     bl_idname = "brdfc.bake"
     bl_label = "Bake Lean Materials"
     bl_description = (
@@ -120,7 +120,7 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_bake_apply(Long, Operator):
+class BRDFC_OT_bake_apply(ModalJob, Operator):
     bl_idname = "brdfc.bake_apply"
     bl_label = "Bake Lean Materials"
     bl_description = "Put the lean shaders of a plan into the materials"

@@ -46,12 +46,12 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
             node = model_node(material, self.node)
             identity = nodes.identity(node)
             editable.check(node.id_data)
-            for user in filter(editable.stays, materials):
+            for user in filter(editable.keeps_changes, materials):
                 # All nodes are found before any is changed.
                 alike = [
                     other
                     for other in nodes.group_nodes(user)
-                    if editable.stays(other.id_data) and nodes.identity(other) == identity
+                    if editable.keeps_changes(other.id_data) and nodes.identity(other) == identity
                 ]
                 for other in alike if self.all_users else [node]:
                     nodes.switch(other, self.representation)

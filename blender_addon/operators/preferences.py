@@ -7,10 +7,10 @@ from bpy.types import AddonPreferences, Operator
 from .. import api, library
 from ..common.extension import PACKAGE
 from ..common.i18n import rpt, say
-from .common import ERRORS, Long, refused
+from .common import ERRORS, ModalJob, refused
 
 
-class BRDFC_OT_add_library(Long, Operator):
+class BRDFC_OT_add_library(ModalJob, Operator):
     bl_idname = "brdfc.add_library"
     bl_label = "Add the brdfc Materials to the Asset Browser"
     bl_description = (

@@ -89,7 +89,7 @@ def model(name):
     return models[name]
 
 
-def by_look():
+def models_by_look():
     """{look: identifiers of models}, both in the order of menus; looks without a model are left
     out."""
     names = {look: [] for look in manifest()["looks"]}
@@ -111,18 +111,18 @@ def citation(entry):
     return f"{', '.join(surnames)} {cited[2]}"
 
 
-def same(value, only):
-    """Whether a socket, in single precision, holds this value."""
+def equal_in_float32(value, only):
+    """Whether two values of a parameter are equal in single precision, which sockets have."""
     if isinstance(only, str) or value is None:
         return value == only
     pairs = zip(value, only, strict=True) if isinstance(only, tuple) else [(value, only)]
     return all(math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-9) for a, b in pairs)
 
 
-def refusal(model_name, name, values):
+def reason_unavailable(model_name, name, values):
     """Why a form that exists for some values only is not available for these; None if it is."""
     for key, only in form_values(model_name, name).items():
-        if key in values and not same(values[key], only):
+        if key in values and not equal_in_float32(values[key], only):
             got = values[key]
             shown = say("a linked or animated value") if got is None else value_text(got)
             given = "a linked or animated value" if got is None else repr(got)
@@ -172,7 +172,7 @@ def automatic(model_name, values=None, osl=True):
     order = [entry["auto"], *others]
     if not osl:
         order = [n for n in (native, "twin") if n in forms] + order
-    return next((n for n in order if refusal(model_name, n, values) is None), order[0])
+    return next((n for n in order if reason_unavailable(model_name, n, values) is None), order[0])
 
 
 def resolve(model_name, representation, values=None):
@@ -192,7 +192,7 @@ def resolve(model_name, representation, values=None):
                 form=representation,
             )
         )
-    if problem := refusal(model_name, name, values):
+    if problem := reason_unavailable(model_name, name, values):
         raise ValueError(problem)
     return name
 
@@ -207,13 +207,13 @@ def parameters(model_name):
     return {p["name"]: p for p in model(model_name)["parameters"]}
 
 
-def unread(schema, values):
+def unused_parameters(schema, values):
     """Parameters that differ from their default though no formula reads them under these choices:
     {name: a choice that causes it}. The value of a linked parameter is None."""
     found = {}
     for name, parameter in schema.items():
         value, needs = values.get(name), parameter.get("needs", {})
-        if needs and not same(value, canonical(parameter)["default"]):
+        if needs and not equal_in_float32(value, canonical(parameter)["default"]):
             for choice, needed in needs.items():
                 if choice in schema and values.get(choice) not in (None, *needed):
                     found[name] = choice

@@ -35,7 +35,7 @@ def menu_label(name):
 
 def _draw_models(layout, operator):
     layout.operator("brdfc.search", icon="VIEWZOOM")
-    for look, names in pack.by_look().items():
+    for look, names in pack.models_by_look().items():
         layout.separator()
         layout.label(text=iface(LOOKS[look]), translate=False)
         for name in names:
@@ -185,7 +185,7 @@ def _draw_form(layout, node, form, scene, changes):
     if pack.native_form(model_name):
         _add_method(row, node, "auto", automatic)
     for name in entry["representations"]:
-        refusal = pack.refusal(model_name, name, values)
+        refusal = pack.reason_unavailable(model_name, name, values)
         if refusal := refusal or checks.device_refusal(model_name, name, scene):
             refusals.append(refusal)
             continue
@@ -225,7 +225,7 @@ def draw_node(layout, node, scene):
     """Shows model, form, error, cost, energy and values of a group node."""
     model_name, _ = nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
-    changes = editable.stays(node.id_data)
+    changes = editable.keeps_changes(node.id_data)
     if made := nodes.manifest_entry(node):
         entry = pack.model(model_name)
         column = layout.column(align=True)
@@ -251,7 +251,7 @@ def draw_lamps(layout, material, scene):
     if slots == 0:
         return
     box = layout.box()
-    found = lamps.seen(scene)
+    found = lamps.last_found(scene)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
         said = say("Free of noise under {lamps}", lamps=", ".join(taken))

@@ -293,7 +293,7 @@ def _rings():
     return index, np.stack(turned, axis=-1), viewer[:, 0]
 
 
-def displayed(linear):
+def tone_map(linear):
     """Maps linear light to the screen: 1 becomes 0.8, and brighter light never quite white."""
     return color.to_screen(1 - np.exp(-linear))
 
@@ -307,7 +307,7 @@ def _balls(lights):
     on, stroke = _ball()[0], np.arange(BALL // 2)
     for i, (light, (ink, step, part)) in enumerate(shown):
         left = (2 * i + 1) * SIZE // (2 * len(shown)) - BALL // 2
-        picture[KEY:, left : left + BALL][on] = displayed(light)
+        picture[KEY:, left : left + BALL][on] = tone_map(light)
         drawn = left + BALL // 4 + stroke[stroke % step < step * part]
         picture[KEY // 2 : KEY // 2 + 2, drawn] = ink
     return picture
@@ -422,7 +422,7 @@ def _of_form(model, values, form, shares, width):
 def _of_node(near):
     """The same for a Principled node."""
     native, wo = near.native, _directions()
-    taken, scale = native_bsdf.by_view(native, wo)
+    taken, scale = native_bsdf.view_terms(native, wo)
     _, wi, viewers, _ = _ball()
     # np.interp needs increasing cosines, but they decrease from view to view.
     at = [np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in (taken, *scale.T)]

@@ -42,7 +42,7 @@ def _curves(owner):
     return {curve.as_pointer(): curve for curve in curves}.values()
 
 
-def _moves(node):
+def _targets(node):
     """Yields (curve, its data-block, the object it animates, the property's name), for every
     node."""
     for owner in _owners(node.id_data):
@@ -57,46 +57,46 @@ def _moves(node):
                 yield curve, owner, found, name
 
 
-def value_of(socket):
-    """The key of a socket's value in the set that moved() returns."""
+def value_key(socket):
+    """The key of a socket's value in the set that animated_properties() returns."""
     return socket.as_pointer(), _VALUE
 
 
-def moved(node):
+def animated_properties(node):
     """The animated or driven properties of a node: {(pointer of the node or socket, property
     name)}."""
     own = {item.as_pointer() for item in (node, *node.inputs, *node.outputs)}
-    found = {(item.as_pointer(), name) for c, _, item, name in _moves(node) if not c.mute}
+    found = {(item.as_pointer(), name) for c, _, item, name in _targets(node) if not c.mute}
     return {(pointer, name) for pointer, name in found if pointer in own}
 
 
 def _of_inputs(node):
     inputs = {socket.as_pointer(): socket for socket in node.inputs}
-    for curve, owner, found, name in _moves(node):
+    for curve, owner, found, name in _targets(node):
         if name == _VALUE and found.as_pointer() in inputs:
             yield curve, owner, inputs[found.as_pointer()].identifier
 
 
-def inputs(node):
+def animated_inputs(node):
     """Identifiers of the input sockets of a node that are animated or driven.
 
     Muted curves count, so that unmuting one later still has an effect."""
     return {identifier for _, _, identifier in _of_inputs(node)}
 
 
-def hold(node):
+def capture(node):
     """Records what animates a node's inputs before its sockets are renumbered.
 
     Returns [(curve, its data-block, socket identifier)]. Blender 5.2 rewrites the paths by itself,
     and gets them wrong."""
-    for owner in _owners(node.id_data) if inputs(node) else ():
+    for owner in _owners(node.id_data) if animated_inputs(node) else ():
         data = owner.animation_data
         for holder in _holders(data) if data else ():
             _make_own(owner, holder)
     return list(_of_inputs(node))
 
 
-def follow(curve, owner, socket):
+def retarget(curve, owner, socket):
     """Redirects a curve or driver to a socket of a tree."""
     prefix = "" if owner == socket.id_data else "node_tree."
     curve.data_path = prefix + socket.path_from_id(_VALUE)

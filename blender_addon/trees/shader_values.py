@@ -93,7 +93,7 @@ class Constants:
     images of a single colour count as constants, which requires reading them."""
 
     def __init__(self, images=False):
-        self._moved, self._images = {}, images
+        self._animated, self._images = {}, images
 
     def told(self, socket, within=()):
         try:
@@ -111,17 +111,17 @@ class Constants:
         return _as_type(self._own(reached.holder), socket)
 
     def _own(self, socket):
-        if self._is_moved(socket.node, animation.value_of(socket)):
+        if self._is_animated(socket.node, animation.value_key(socket)):
             raise Unknown
         return _own(socket)
 
-    def _moves(self, node):
-        if node not in self._moved:
-            self._moved[node] = animation.moved(node)
-        return self._moved[node]
+    def _animated_properties(self, node):
+        if node not in self._animated:
+            self._animated[node] = animation.animated_properties(node)
+        return self._animated[node]
 
-    def _is_moved(self, node, what):
-        return what in self._moves(node)
+    def _is_animated(self, node, what):
+        return what in self._animated_properties(node)
 
     def _output(self, reached):
         node, output = reached.node, reached.output
@@ -129,12 +129,12 @@ class Constants:
         compute = getattr(self, f"_{kind.lower()}", None)
         if compute is None:
             raise Unknown
-        if self._has_moving_settings(node):
+        if self._has_animated_settings(node):
             raise Unknown
         return compute(node, output, lambda socket: self.of(socket, reached.within))
 
-    def _has_moving_settings(self, node):
-        return any(pointer == node.as_pointer() for pointer, _ in self._moves(node))
+    def _has_animated_settings(self, node):
+        return any(pointer == node.as_pointer() for pointer, _ in self._animated_properties(node))
 
     def _rgb(self, node, output, of):
         return self._own(output)
@@ -240,10 +240,10 @@ class Constants:
 class Current(Constants):
     """current() for several sockets."""
 
-    def _is_moved(self, node, what):
+    def _is_animated(self, node, what):
         return False
 
-    def _has_moving_settings(self, node):
+    def _has_animated_settings(self, node):
         return False
 
 

@@ -62,7 +62,9 @@ def _slot_findings(use, scene):
         )
         return
     room = use.lamps(on_optix=False)
-    if room is not None and any(lamp.why == lamps.too_many(room) for lamp in lamps.seen(scene)):
+    if room is not None and any(
+        lamp.why == lamps.too_many(room) for lamp in lamps.last_found(scene)
+    ):
         yield Finding(
             "closures",
             "WARNING",
@@ -91,7 +93,7 @@ def _pool_findings(material, scene):
                 more=f"{use.size} bytes of closures, and there is room for {room}",
             ),
         )
-    elif use.shared:
+    elif use.has_others:
         yield Finding(
             "closure_pool_shared",
             "WARNING",
@@ -133,8 +135,8 @@ def _twin(node):
 
 def _twin_error(node):
     """Error of a node's twin; None if it is not known at the node's values."""
-    entry = _twin(node)
-    if not entry or pack.refusal(nodes.identity(node)[0], "twin", nodes.all_values(node)):
+    entry, (model_name, _) = _twin(node), nodes.identity(node)
+    if not entry or pack.reason_unavailable(model_name, "twin", nodes.all_values(node)):
         return None
     return entry["error"]["relative_l1"]
 
@@ -247,7 +249,7 @@ def node_warnings(node, material, scene):
                 )
                 found.append(Finding("out_of_range", "ERROR", _of(label, said)))
     values = nodes.all_values(node)
-    for name, choice in pack.unread(schema, values).items():
+    for name, choice in pack.unused_parameters(schema, values).items():
         said = say(
             "{parameter} has no effect while {choice} is {value}",
             parameter=schema[name]["label"],
@@ -297,14 +299,14 @@ def of_scene(ours, scene):
     scripted = [node for node in ours if not nodes.runs_anywhere(node)]
     found = scene_warnings(scene) if scripted else []
     takes_nodes = scene.render.engine == "CYCLES" or device.is_eevee(scene)
-    if not takes_nodes or not all(map(nodes.is_stood_in_for, scripted)):
+    if not takes_nodes or not all(map(nodes.has_stand_in, scripted)):
         return found
     return [_by_twin(f, scripted) if f.code in UNABLE else f for f in found]
 
 
 def is_stood_in(node, scene):
     """Whether a scene shows a node's twin in its place."""
-    return nodes.is_stood_in_for(node) and any(f.code in UNABLE for f in of_scene([node], scene))
+    return nodes.has_stand_in(node) and any(f.code in UNABLE for f in of_scene([node], scene))
 
 
 def why_not_run(material, scene):

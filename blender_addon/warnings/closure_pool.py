@@ -39,7 +39,7 @@ _PRINCIPLED_SLOTS = {
 
 
 @dataclass(frozen=True)
-class Use:
+class ClosureUsage:
     """What the shaders of a material take: closure slots without lamps and for each lamp; likewise
     bytes on OptiX, of the models and of the nodes that combine them; and whether there are other
     shaders, whose sizes are unknown."""
@@ -48,7 +48,7 @@ class Use:
     slots_per_lamp: int
     size: int
     per_lamp: int
-    shared: bool
+    has_others: bool
 
     def lamps(self, on_optix):
         """How many lamps there is room for; None if nothing aims at lamps."""
@@ -89,10 +89,10 @@ def _times(node):
 
 
 def of_material(material):
-    """The Use of a material: of all nodes that its output for Cycles depends on."""
+    """The ClosureUsage of a material: of all nodes that its output for Cycles depends on."""
     pool, a_lamp = pack.manifest()["closure_pool"], pack.manifest()["closure_slots"]["lamp"]
     joining = {"ShaderNodeMixShader": pool["mix"], "ShaderNodeAddShader": pool["add"]}
-    slots, slots_per_lamp, size, per_lamp, shared = 0, 0, 0, 0, False
+    slots, slots_per_lamp, size, per_lamp, has_others = 0, 0, 0, 0, False
     for node in (shown.node for shown in shader_trees.shown(material)):
         if nodes.is_ours(node) and (made := nodes.manifest_entry(node)):
             aimed_at = made[0].get("lamps") or 0
@@ -102,10 +102,10 @@ def of_material(material):
             per_lamp += made[0]["lamp_bytes"]
         elif nodes.is_ours(node) or node.bl_idname not in joining:
             slots += _times(node) * _native_slots(node)
-            shared = True
+            has_others = True
         else:
             size += joining.get(node.bl_idname, 0)
-    return Use(slots, slots_per_lamp, size, per_lamp, shared)
+    return ClosureUsage(slots, slots_per_lamp, size, per_lamp, has_others)
 
 
 def lamps_that_fit(on_optix):

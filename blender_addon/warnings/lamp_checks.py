@@ -83,7 +83,7 @@ def enlarge(scene):
     return done, kept
 
 
-def tiny(material, scene):
+def small_lamps(material, scene):
     if found := [item for item in lamps.lamps_of(scene) if is_tiny(item.data)]:
         return (
             "WARNING",
@@ -152,7 +152,7 @@ def _others_lamps(node):
     tree = node.node_tree
     if tree.library is None:
         return None
-    inner = (getattr(n, "node_tree", None) for n in nodes.made_of(tree).nodes)
+    inner = (getattr(n, "node_tree", None) for n in nodes.content_group(tree).nodes)
     return next((group for group in inner if group is not None and lamps.is_group(group)), None)
 
 
@@ -161,10 +161,10 @@ def _not_aimed(node, count, scene):
     light is lost, and, by reason, lamps that are noisy and bright enough to matter."""
     group = _others_lamps(node)
     elsewhere = lamps.elsewhere(group.library) if group is not None else None
-    found = lamps.seen(scene, group)
+    found = lamps.last_found(scene, group)
     left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > count]
     lost = [lamp for lamp in left_out if lamp.sizeless]
-    unmet = [lamp for lamp in left_out if not lamp.met and not lamp.sizeless]
+    missed = [lamp for lamp in left_out if not lamp.hit_by_bsdf_sampling and not lamp.sizeless]
     total = sum(lamp.irradiance for lamp in found)
 
     def share(some):
@@ -181,20 +181,20 @@ def _not_aimed(node, count, scene):
                 why=why,
             ),
         )
-    if share(unmet) > UNSEEN:
+    if share(missed) > UNSEEN:
         yield (
             "multiple_importance",
             "ERROR",
             say(
                 "Light of lamps without Multiple Importance ({lamps}) is lost: {why}",
-                lamps=_names(unmet),
-                why=unmet[0].why or lamps.too_many(count),
+                lamps=_names(missed),
+                why=missed[0].why or lamps.too_many(count),
             ),
         )
     kinds = {}
     for lamp in left_out:
         why = lamp.why or lamps.too_many(count)
-        if lamp not in lost and lamp not in unmet and why != lamps.NO_NEED:
+        if lamp not in lost and lamp not in missed and why != lamps.NO_NEED:
             kinds.setdefault(why, []).append(lamp)
     for why, noisy in kinds.items():
         if share(noisy) > DIM:

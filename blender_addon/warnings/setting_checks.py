@@ -235,7 +235,7 @@ DECLARED = {
     "path_guiding": _path_guiding,
     "clamp_indirect": _clamp_indirect,
     "clamp_direct": _clamp_direct,
-    "zero_size_lights": lamp_checks.tiny,
+    "zero_size_lights": lamp_checks.small_lamps,
     "multiple_importance": lamp_checks.multiple_importance,
     "orthographic_far": _far_camera,
     "caustics": _caustics,

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from answers import Answers
+from tool_cache import ToolCache
 
 # Blender reads this when bpy is first imported.
 _RESOURCES = tempfile.TemporaryDirectory(prefix="brdfc-test-")
@@ -50,7 +50,7 @@ def program():
 @pytest.fixture(scope="session")
 def answers(program, tmp_path_factory):
     folder = os.environ.get("BRDFC_ANSWERS") or tmp_path_factory.mktemp("answers")
-    return Answers(folder, program)
+    return ToolCache(folder, program)
 
 
 @pytest.fixture(scope="session")
@@ -67,7 +67,7 @@ def tool(answers):
 def kept_program(program, answers, tmp_path_factory):
     """A program that answers like the tool, which computes each answer only once."""
     path = tmp_path_factory.mktemp("program") / "brdfc"
-    command = [sys.executable, Path(__file__).with_name("answers.py"), answers.folder, program]
+    command = [sys.executable, Path(__file__).with_name("tool_cache.py"), answers.folder, program]
     path.write_text(f'#!/bin/sh\nexec {shlex.join(map(str, command))} "$@"\n')
     path.chmod(0o755)
     return path

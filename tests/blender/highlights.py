@@ -188,7 +188,7 @@ class Stage:
                 setattr(item, f"visible_{ray}", False)
         return item
 
-    def dress(self, materials):
+    def set_materials(self, materials):
         for item, material in zip(self.items, materials, strict=True):
             item.data.materials[0] = material
 

@@ -1100,7 +1100,7 @@ def test_add_menu_lists_every_model(extension, empty):
     assert layout.log == ["menu NODE_MT_brdfc"]
     layout = helpers.Layout()
     bpy.types.NODE_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
-    by_look = extension.pack.by_look()
+    by_look = extension.pack.models_by_look()
     models = extension.api.models()
     assert sorted(sum(by_look.values(), [])) == sorted(models)
     assert list(by_look) == [look.lower() for look in LOOKS], "a model of each look, in this order"

@@ -362,7 +362,7 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
     extension.api.enable_osl(scene)
     made = [extension.api.new_material(model, form, **values) for model, values in stage.cases[1:]]
-    stage.dress([node_material("ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1)), *made])
+    stage.set_materials([node_material("ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1)), *made])
     bpy.context.view_layer.update()
     sends = [lamp if callable(lamp) else highlights.of_light(lamp) for lamp in lamps]
     found, variance = measured(scene, stage, samples)

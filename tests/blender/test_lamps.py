@@ -1187,7 +1187,7 @@ def test_scenes_within_the_picture(extension, ball, empty):
     filling = import_module(f"{extension.package}.lamps.filling")
     assert filling.count() == 2, "lean materials have room for both"
     filling.memory.scene = None
-    assert sorted(lamp.name for lamp in filling.seen(empty)) == ["Here", "There"]
+    assert sorted(lamp.name for lamp in filling.last_found(empty)) == ["Here", "There"]
     suns = []
     for scene, turn in ((empty, 0.0), (other, 2.5)):
         suns.append(sky(scene))
@@ -1235,16 +1235,16 @@ def test_nothing_is_written_when_nothing_changed(shared_group, handlers, ball, e
 def test_selecting_is_no_reason_to_look(scenes, ball, empty, monkeypatch):
     add_lamp(empty, "POINT", "Key")
     assert len(slots(empty)) == 1
-    looked, look = [], scenes.look
-    monkeypatch.setattr(scenes, "look", lambda *a: (looked.append(1), look(*a))[1])
+    surveys, survey = [], scenes.survey_lamps
+    monkeypatch.setattr(scenes, "survey_lamps", lambda *a: (surveys.append(1), survey(*a))[1])
     ball.select_set(not ball.select_get())
     bpy.context.view_layer.update()
     ball.location.x = 0.1
     bpy.context.view_layer.update()
-    assert not looked
+    assert not surveys
     bpy.data.objects["Key"].data.energy = 5
     bpy.context.view_layer.update()
-    assert looked
+    assert surveys
 
 
 def test_a_sun_without_a_size_is_seen(extension, ball, empty):
@@ -1279,12 +1279,12 @@ def test_handlers_come_and_go(lamps, handlers, scenes, empty, monkeypatch):
     assert ours() == []
     lamps.register()
     # In a file without such a group, handlers don't examine anything.
-    looked = []
-    monkeypatch.setattr(scenes, "look", lambda *_: looked.append(1))
+    surveys = []
+    monkeypatch.setattr(scenes, "survey_lamps", lambda *_: surveys.append(1))
     add_lamp(empty, "POINT", "Key")
     bpy.context.view_layer.update()
     empty.frame_set(2)
-    assert not looked
+    assert not surveys
 
 
 def test_lean_files_name_the_number_of_lamps(extension, ball, empty):
@@ -1322,7 +1322,7 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
     near = add_lamp(empty, "POINT", "Near", location=(0, 0, 2), shadow_soft_size=1.9)
     near.data.cycles.use_multiple_importance_sampling = False
     (lamp,) = extension.api.see_lamps(empty)
-    assert lamp.slot is None and not lamp.met and "too large" in lamp.why
+    assert lamp.slot is None and not lamp.hit_by_bsdf_sampling and "too large" in lamp.why
     (found,) = extension.api.warnings(material, empty)
     assert (found.code, found.severity) == ("multiple_importance", "ERROR")
     assert "Near" in found.message and lamp.why in found.message

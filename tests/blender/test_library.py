@@ -221,7 +221,7 @@ def assert_aims_at(extension, material, lamp):
     """Checks that the lamp group in the material's model contains the lamp's position."""
     bpy.context.view_layer.update()
     (node,) = extension.nodes.group_nodes(material)
-    content = extension.nodes.made_of(node.node_tree)
+    content = extension.nodes.content_group(node.node_tree)
     inner = {getattr(n, "node_tree", None): n for n in content.nodes}
     inner = inner[bpy.data.node_groups["brdfc Lamps"]]
     group = inner.node_tree.evaluated_get(bpy.context.evaluated_depsgraph_get())

@@ -486,7 +486,8 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
 
     for form in extension.pack.model(model)["representations"]:
         # A twin has its own albedo, which test_every_fit.py measures.
-        if extension.pack.is_native(model, form) or extension.pack.refusal(model, form, values):
+        unavailable = extension.pack.reason_unavailable(model, form, values)
+        if unavailable or extension.pack.is_native(model, form):
             continue
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         scene, material = start(extension, model, form, values, max_bounces=0)

@@ -33,14 +33,14 @@ def test_noise_is_in_units_of_the_node_in_the_same_scene():
 
 def test_a_form_that_did_not_meet_the_lamp_is_not_called_quiet():
     made = page([row("a", "exact", 0.002), row("a", "sampled", 0.0001, mean=0.3)])
-    assert made.relative("sampled", ("a", ""), ("lamp", 64)) == noise_page.UNMET
+    assert made.relative("sampled", ("a", ""), ("lamp", 64)) == noise_page.MISSES_LIGHT
     assert "| `a` | unmet |" in made.text(seeds=4)
 
 
 def test_noise_times_cost():
     cost = {"model": "a", "values": "", "form": "exact", "condition": "lamp", "cost": "1.5"}
     made = page([row("a", "exact", 0.002)], [cost])
-    assert made.dear("exact", ("a", ""), ("lamp", 64)) == pytest.approx(3)
+    assert made.cost_weighted("exact", ("a", ""), ("lamp", 64)) == pytest.approx(3)
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def test_the_extension_imports_downwards_alone():
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("common/expected.py", "from ..groups import nodes"),
+        ("common/argument_checks.py", "from ..groups import nodes"),
         ("trees/animation.py", "def f():\n    from ..lamps import slots"),
         ("new_room/__init__.py", "x = 1"),
     ],

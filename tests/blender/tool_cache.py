@@ -2,7 +2,7 @@
 """Caches results of the tool by their inputs: several tests, and runs in several versions of
 Blender, need the same ones.
 
-As a program it can replace the tool: answers.py FOLDER PROGRAM ARGUMENT...
+As a program it can replace the tool: tool_cache.py FOLDER PROGRAM ARGUMENT...
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from pathlib import Path
 PRINTING = {"albedo", "closure", "eval", "fit", "list", "probe", "sample"}
 
 
-class Answers:
+class ToolCache:
     def __init__(self, folder, program):
         self.folder = Path(folder).resolve()
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -84,6 +84,6 @@ class Answers:
 if __name__ == "__main__":
     folder, program, *arguments = sys.argv[1:]
     try:
-        print(Answers(folder, program).ask(arguments), end="")
+        print(ToolCache(folder, program).ask(arguments), end="")
     except AssertionError as error:
         sys.exit(str(error))

@@ -31,21 +31,21 @@ def apply(plans):
     wanted = [replace(p, node=p.seen.now()) for p in plans if not p.refusal]
     editable.check(*(p.material for p in wanted))
     # A linked parameter may take any value.
-    made = [[_Made(part, _values(part)) for part in p.parts] for p in wanted]
+    prepared = [[_PreparedPart(part, _values(part)) for part in p.parts] for p in wanted]
     known = set(bpy.data.node_groups)
     try:
-        for one in (one for each in made for one in each):
+        for one in (one for each in prepared for one in each):
             nodes.ensure_group(one.part.model, values=one.known)
     except BaseException:
         nodes.remove_unused_groups(known)
         raise
-    for p, parts in zip(wanted, made, strict=True):
+    for p, parts in zip(wanted, prepared, strict=True):
         _replace(p, parts)
     return len(wanted)
 
 
 @dataclass(frozen=True)
-class _Made:
+class _PreparedPart:
     """A Part with the group of its model, and its values as sockets take them."""
 
     part: Part
@@ -70,7 +70,7 @@ def _source(socket):
 
 def _replace(p, parts):
     node = p.node
-    groups = [_add(p, made) for made in parts]
+    groups = [_add(p, prepared) for prepared in parts]
     group, *metal = groups
     group[BEFORE] = node.name
     for other in metal:
@@ -84,22 +84,22 @@ def _replace(p, parts):
     node.location = (node.location.x, node.location.y - 700)
 
 
-def _add(p, made):
+def _add(p, prepared):
     """The group node of a model, with the links of the node that it replaces."""
     tree, node = p.material.node_tree, p.node
-    group = nodes.add_group_node(tree, made.part.model, values=made.known)
+    group = nodes.add_group_node(tree, prepared.part.model, values=prepared.known)
     group.location = node.location
     group[CORRECTED] = bump_correction.recorded(p.material)
-    for name, value in made.values.items():
+    for name, value in prepared.values.items():
         nodes.set_value(group, name, value)
     present = nodes.sockets(group)
-    for name, socket in made.part.links.items():
+    for name, socket in prepared.part.links.items():
         if source := _source(node.inputs[socket]):
             tree.links.new(source, present[name])
     for name in (pack.NORMAL, pack.TANGENT):
         if name in node.inputs and (source := _source(node.inputs[name])):
             tree.links.new(source, present[name])
-    for name, *law in made.part.widths:
+    for name, *law in prepared.part.widths:
         tree.links.new(_follow(tree, group, _source(node.inputs["Roughness"]), *law), present[name])
     return group
 
