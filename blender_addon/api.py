@@ -18,7 +18,7 @@ from pathlib import Path
 
 import bpy
 
-from . import convert, lamps, lean, library
+from . import convert, lamps, lean, library, measured
 from .common import argument_checks, editable
 from .common.i18n import say
 from .content.compiler import CompileError
@@ -27,6 +27,7 @@ from .groups.update import Update
 from .lamps import Lamp
 from .lean import PlanError
 from .library import LibraryError
+from .measured import Measured, MeasuredError
 from .packs import kernel, pack
 from .packs.pack import PackError
 from .trees import shader_trees
@@ -40,6 +41,8 @@ __all__ = [
     "LibraryError",
     "Finding",
     "Lamp",
+    "Measured",
+    "MeasuredError",
     "Update",
     "add_albedo",
     "add_library",
@@ -52,8 +55,10 @@ __all__ = [
     "follow_settings",
     "get_parameters",
     "make_local",
+    "measured_fits",
     "models",
     "new_material",
+    "new_measured_material",
     "plan",
     "plan_conversion",
     "prepare_material",
@@ -64,6 +69,7 @@ __all__ = [
     "set_parameters",
     "set_substance",
     "start_bake",
+    "start_measured_fits",
     "start_plan",
     "substances",
     "switch_representation",
@@ -127,6 +133,41 @@ def new_material(model, representation="auto", **parameters):
     except BaseException:
         bpy.data.materials.remove(material)
         raise
+    return material
+
+
+def start_measured_fits(path):
+    """Starts to fit every model to a file with a measured BRDF, as measured_fits() does, and
+    returns a job: step() returns the fraction done until it is None, and then `result` is set.
+    Raises MeasuredError."""
+    return measured.Fitting(path)
+
+
+def measured_fits(path):
+    """Fits every model to a file with a measured BRDF: MERL (.binary), RGL (.bsdf), UTIA (.bin), or
+    a table (.csv). Takes some ten seconds, by the program brdfc.
+
+    Returns a Measured: its `fits` are the models, the closest first, each with `model`,
+    `parameters`, `matte` and `error`. Raises MeasuredError without the program, and for a file that
+    it refuses.
+    """
+    return start_measured_fits(path).wait()
+
+
+def new_measured_material(found, model=None, representation="auto"):
+    """Makes a material that comes close to a measured BRDF.
+
+    `found`: a file, or what measured_fits() returned of it. `model`: one of the models; without it
+    the closest. Where the fit has a matte part, the light of a Diffuse node is added to the
+    model's. Raises ValueError, and what measured_fits() and new_material() raise.
+    """
+    if not isinstance(found, Measured):
+        found = measured_fits(found)
+    fit = found.fit(model)
+    material = new_material(fit.model, representation, **fit.parameters)
+    material.name = found.path.stem
+    if fit.matte:
+        measured.add_matte(material.node_tree, _the_node(material), fit.matte)
     return material
 
 

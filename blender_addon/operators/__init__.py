@@ -6,6 +6,11 @@ import bpy
 from .adding import BRDFC_OT_add_node, BRDFC_OT_new_material, BRDFC_OT_search
 from .convert import BRDFC_OT_convert, BRDFC_OT_convert_back
 from .lean import BRDFC_OT_bake, BRDFC_OT_bake_apply, BRDFC_OT_bake_plan, BRDFC_OT_write_materials
+from .measured import (
+    BRDFC_FH_measured,
+    BRDFC_OT_choose_measured,
+    BRDFC_OT_new_measured_material,
+)
 from .model import (
     BRDFC_OT_add_albedo,
     BRDFC_OT_details,
@@ -40,6 +45,9 @@ _CLASSES = (
     BRDFC_OT_write_materials,
     BRDFC_OT_add_node,
     BRDFC_OT_new_material,
+    BRDFC_OT_new_measured_material,
+    BRDFC_OT_choose_measured,
+    BRDFC_FH_measured,
     BRDFC_OT_search,
     BRDFC_OT_add_library,
     BRDFC_OT_remove_library,

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured BRDFs: the models that come close to a file of MERL, RGL or UTIA, or to a table.
+
+The program brdfc reads the file and fits the models; the extension does not contain it, see
+lean.program().
+"""
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import lean
+from .common.i18n import say
+from .common.jobs import ProgramJob
+from .packs import pack
+
+#: Endings of the files that the program reads: MERL, RGL, UTIA, and tables.
+ENDINGS = (".binary", ".bsdf", ".bin", ".csv")
+
+
+class MeasuredError(RuntimeError):
+    """The program brdfc is missing, or refused the file."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to a measured BRDF."""
+
+    model: str
+    parameters: dict
+    #: Albedo, (r, g, b), of a Lambert surface whose light is added to the model's; None: no such.
+    matte: tuple | None
+    #: The part of the light that goes in other directions than was measured.
+    error: float
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A file with a measured BRDF."""
+
+    path: Path
+    #: Who publishes such files, and the grid of angles; the program's words, which are English.
+    format: str
+    grid: str
+    isotropic: bool
+    #: What was assumed or repaired, and what the data lack, one sentence each, in English.
+    notes: tuple
+    #: The models of this extension, the one that comes closest first; never empty.
+    fits: tuple
+
+    def fit(self, model=None):
+        """The fit of a model, or the closest one. Raises ValueError."""
+        for fit in self.fits:
+            if model in (None, fit.model):
+                return fit
+        known = ", ".join(fit.model for fit in self.fits)
+        raise ValueError(
+            say("Expected one of the models {models}, got {got!r}", models=known, got=model)
+        )
+
+
+class Fitting(ProgramJob):
+    """Runs the program brdfc to make a Measured of a file, while Blender stays usable."""
+
+    failure = MeasuredError
+
+    def __init__(self, path):
+        """Raises MeasuredError."""
+        self._path = Path(path)
+        if not self._path.is_file():
+            raise MeasuredError(say("There is no file {file}", file=path))
+        try:
+            self._program = lean.program()
+        except lean.PlanError as error:
+            raise MeasuredError(*error.args) from error
+        folder = self._open_folder("brdfc-measured-")
+        self._said = folder / "said.json"
+        command = [self._program, "measured", self._path.resolve(), "--json"]
+        try:
+            self._start(command, self._said)
+        except OSError as failed:
+            more = f"{command[0]}: {failed}"
+            raise MeasuredError(say("The program brdfc does not start", more=more)) from failed
+
+    def _ended(self, status):
+        try:
+            if status != 0:
+                raise MeasuredError(
+                    say(
+                        "{file} can't be read as a measured material",
+                        file=self._path.name,
+                        more=self._last_words(status),
+                    )
+                )
+            return self._found(json.loads(self._said.read_text(encoding="utf-8")))
+        except (ValueError, KeyError, TypeError) as bad:
+            more = f"{self._program}: {bad!r}"
+            raise MeasuredError(
+                say("The program brdfc is of another version than this extension", more=more)
+            ) from bad
+        finally:
+            self._folder.cleanup()
+
+    def _found(self, told):
+        fits = tuple(
+            Fit(
+                entry["model"],
+                {k: tuple(v) if isinstance(v, list) else v for k, v in entry["parameters"].items()},
+                tuple(entry["matte"]) if entry["matte"] else None,
+                entry["error"],
+            )
+            for entry in told["fits"]
+            if entry["model"] in pack.model_names()
+        )
+        if not fits:
+            raise MeasuredError(say("This extension has no model that scatters light"))
+        return Measured(
+            self._path,
+            told["format"],
+            told["grid"],
+            told["isotropic"],
+            (*told["notes"], *told["lacks"]),
+            fits,
+        )
+
+    def _share(self, log):
+        """The fraction of models that, by its log, the program has fitted."""
+        counted = re.findall(r"^brdfc measured: (\d+)/(\d+) ", log, re.M)
+        return int(counted[-1][0]) / max(int(counted[-1][1]), 1) if counted else 0.0
+
+
+def add_matte(tree, node, albedo):
+    """Adds the light of a Lambert surface to that of a model's node: Blender's Diffuse node with a
+    roughness of 0. Links of the node's BSDF lead to the sum afterwards."""
+    targets = [link.to_socket for link in node.outputs["BSDF"].links]
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.location = (node.location.x, node.location.y + 200)
+    diffuse.inputs["Color"].default_value = (*albedo, 1.0)
+    diffuse.inputs["Roughness"].default_value = 0.0
+    both = tree.nodes.new("ShaderNodeAddShader")
+    both.location = (node.location.x + 200, node.location.y + 100)
+    tree.links.new(diffuse.outputs[0], both.inputs[0])
+    tree.links.new(node.outputs["BSDF"], both.inputs[1])
+    for target in targets:
+        tree.links.new(both.outputs[0], target)

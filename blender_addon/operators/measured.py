@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that make materials of files with measured BRDFs, also of files that are dropped."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+from bpy.types import FileHandler, Operator
+
+from .. import api
+from ..common.i18n import Sentence, iface, rpt, say
+from ..groups import nodes
+from ..measured import ENDINGS
+from ..packs import pack
+from ..panels.labels import wrapped
+from .adding import BRDFC_OT_new_material
+from .common import ERRORS, ModalJob, refused, report_osl
+
+#: Models that the dialog offers, the closest first.
+OFFERED = 8
+
+
+def _assign(operator, context, material):
+    target = context.object
+    target.active_material = material  # Blender adds a slot if there is none
+    said = say("{material} assigned to {object}", material=material.name, object=target.name)
+    operator.report({"INFO"}, rpt(said))
+    report_osl(operator, nodes.group_nodes(material), context.scene)
+
+
+class BRDFC_OT_new_measured_material(ModalJob, Operator):
+    bl_idname = "brdfc.new_measured_material"
+    bl_label = "New Measured Material..."
+    bl_description = (
+        "Make a material that comes close to a measured BRDF: a file of MERL (.binary), RGL "
+        "(.bsdf) or UTIA (.bin), or a table (.csv). The program brdfc fits every model to it"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(
+        name="File",
+        description="The file with the measurement",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+    filter_glob: StringProperty(
+        default=";".join(f"*{ending}" for ending in ENDINGS), options={"HIDDEN"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return BRDFC_OT_new_material.poll.__func__(cls, context)
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            context.window_manager.fileselect_add(self)
+            self.browsed = True
+            return {"RUNNING_MODAL"}
+        try:
+            return self.begin(context, api.start_measured_fits(self.filepath))
+        except ERRORS as error:
+            return refused(self, error)
+
+    def work(self):
+        return say("Fitting models to {file}", file=Path(self.filepath).name)
+
+    def finish(self, context, found):
+        BRDFC_OT_choose_measured.found = found
+        bpy.ops.brdfc.choose_measured("INVOKE_DEFAULT")
+        return {"CANCELLED"}  # nothing has changed yet, so there is no undo step
+
+    def execute(self, context):
+        if getattr(self, "browsed", False):
+            return bpy.ops.brdfc.new_measured_material("INVOKE_DEFAULT", filepath=self.filepath)
+        try:
+            _assign(self, context, api.new_measured_material(self.filepath))
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+
+#: Keeps the texts alive: Blender holds no reference to the items of a dynamic list.
+_listed = []
+
+
+def _fits_as_items(_operator, _context):
+    fits = BRDFC_OT_choose_measured.found.fits if BRDFC_OT_choose_measured.found else ()
+    _listed[:] = [
+        (
+            fit.model,
+            iface(
+                say(
+                    "{model}: {percent} % of the light in other directions",
+                    model=pack.model(fit.model)["label"],
+                    percent=f"{100 * fit.error:.2g}",
+                )
+            ),
+            pack.model(fit.model)["doc"],
+        )
+        for fit in fits[:OFFERED]
+    ]
+    return _listed
+
+
+class BRDFC_OT_choose_measured(Operator):
+    bl_idname = "brdfc.choose_measured"
+    bl_label = "New Measured Material"
+    bl_description = "Choose among the models that come close to a measured BRDF"
+    bl_options = {"INTERNAL", "UNDO"}
+
+    found = None  # class attribute, which brdfc.new_measured_material sets
+
+    model: EnumProperty(
+        name="Model", description="The model that the material has", items=_fits_as_items
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return cls.found is not None and BRDFC_OT_new_material.poll.__func__(cls, context)
+
+    def invoke(self, context, event):
+        self.model = self.found.fits[0].model
+        return context.window_manager.invoke_props_dialog(self, width=500)
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        # The format, the grid and the notes are the program's own text, which is in English.
+        for line in (
+            Sentence("{file}: {format}, {grid}", **_facts(self.found)),
+            *self.found.notes,
+        ):
+            wrapped(column, line, pixels=480)
+        self.layout.separator()
+        self.layout.column().prop(self, "model", expand=True)
+        fit = self.found.fit(self.model)
+        if fit.matte:
+            grey = sum(fit.matte) / 3
+            said = say(
+                "A matte surface that reflects {percent} % is added", percent=f"{100 * grey:.2g}"
+            )
+            wrapped(self.layout.column(align=True), said, pixels=480)
+
+    def execute(self, context):
+        try:
+            _assign(self, context, api.new_measured_material(self.found, self.model))
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+
+def _facts(found):
+    return {"file": found.path.name, "format": found.format, "grid": found.grid}
+
+
+class BRDFC_FH_measured(FileHandler):
+    bl_idname = "BRDFC_FH_measured"
+    bl_label = "Measured Material"
+    bl_import_operator = "brdfc.new_measured_material"
+    # Blender imports tables as point clouds.
+    bl_file_extensions = ";".join(ending for ending in ENDINGS if ending != ".csv")
+
+    @classmethod
+    def poll_drop(cls, context):
+        area = context.area
+        shows_shaders = area is not None and area.ui_type == "ShaderNodeTree"
+        shown = area is not None and (area.type == "VIEW_3D" or shows_shaders)
+        return shown and BRDFC_OT_new_measured_material.poll(context)

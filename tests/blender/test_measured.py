@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials of measured BRDFs: files made here from formulas, and what is found in them."""
+
+import itertools
+import math
+import os
+from importlib import import_module
+
+import bpy
+import helpers
+import numpy as np
+import pytest
+
+
+def direction(theta, phi):
+    theta, phi = np.radians(theta), np.radians(phi)
+    return np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    )
+
+
+@pytest.fixture(scope="module")
+def write_table(extension, tmp_path_factory):
+    """write_table(name, model, matte=0, **values): an isotropic table of f of a model, and of a
+    Lambert surface beside it."""
+    formulas = import_module(f"{extension.package}.brdfc")
+    angles = [0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 85]
+    turns = [*range(0, 160, 10), *range(160, 181, 2)]
+
+    def write(name, model, matte=0.0, **values):
+        grid = np.array(list(itertools.product(angles, [0], angles, turns)), float)
+        wi, wo = direction(grid[:, 0], grid[:, 1]), direction(grid[:, 2], grid[:, 3])
+        f = formulas.model(model).eval(wi, wo, **values) + matte / math.pi
+        path = tmp_path_factory.mktemp("measured") / name
+        rows = np.concatenate([grid, f], axis=1)
+        np.savetxt(
+            path,
+            rows,
+            fmt="%.9g",
+            delimiter=",",
+            header="theta_i,phi_i,theta_o,phi_o,r,g,b",
+            comments="",
+        )
+        return path
+
+    return write
+
+
+@pytest.fixture
+def paint(write_table):
+    return write_table("paint.csv", "ward", ks=(0.2, 0.1, 0.05), ax=0.25, ay=0.25)
+
+
+@pytest.fixture(autouse=True)
+def by_the_tool(program, monkeypatch):
+    monkeypatch.setenv("BRDFC_TOOL", str(program))
+
+
+def test_what_a_file_holds(extension, empty, paint):
+    found = extension.api.measured_fits(paint)
+    assert found.isotropic and found.path == paint
+    assert [fit.error for fit in found.fits] == sorted(fit.error for fit in found.fits)
+    ward = found.fit("ward")
+    assert ward.error < 0.02  # what straight lines between angles miss
+    assert ward.parameters["ax"] == pytest.approx(0.25, rel=0.02)
+    assert ward.parameters["ks"] == pytest.approx((0.2, 0.1, 0.05), rel=0.03)
+    with pytest.raises(ValueError, match="Expected one of the models"):
+        found.fit("minnaert")
+
+
+def test_a_material_of_a_file(extension, empty, paint):
+    material = extension.api.new_measured_material(paint, "ward")
+    assert material.name == "paint"
+    (node,) = extension.nodes.group_nodes(material)
+    assert extension.nodes.get_value(node, "ax") == pytest.approx(0.25, rel=0.02)
+
+
+@pytest.mark.slow
+def test_matte_light_is_added(extension, empty, write_table):
+    """In a white world the sum is brighter than the model by the Lambert surface's albedo."""
+    path = write_table("paper.csv", "cook_torrance", matte=0.4, m=0.3)
+    found = extension.api.measured_fits(path)
+    assert found.fit("cook_torrance").matte == pytest.approx((0.4,) * 3, rel=0.05)
+    seen = []
+    for measured in (True, False):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        extension.scene_loader.apply_clean_settings(scene)
+        material = (
+            extension.api.new_measured_material(found, "cook_torrance")
+            if measured
+            else extension.api.new_material("cook_torrance", m=0.3)
+        )
+        helpers.sphere_scene(scene, material, size=8, samples=256)
+        seen.append(helpers.render(scene)[3:5, 3:5, 1].mean())
+    assert seen[0] - seen[1] == pytest.approx(0.4, rel=0.05)
+
+
+def test_the_operator_makes_the_closest(extension, empty, paint):
+    ball = helpers.add_sphere(empty, None)
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.brdfc.new_measured_material(filepath=str(paint)) == {"FINISHED"}
+    (node,) = extension.nodes.group_nodes(ball.active_material)
+    assert extension.nodes.identity(node)[0] == "ward"
+    with pytest.raises(RuntimeError, match="There is no file"):
+        bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
+    handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
+    assert handler.bl_import_operator == "brdfc.new_measured_material"
+    assert ".binary" in handler.bl_file_extensions
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [("theta_i,phi_i\n1,2\n", "can't be read"), ("", "can't be read")],
+)
+def test_a_file_that_is_none_is_refused(extension, empty, tmp_path, content, said):
+    path = tmp_path / "bad.csv"
+    path.write_text(content)
+    materials = len(bpy.data.materials)
+    with pytest.raises(extension.api.MeasuredError, match=said):
+        extension.api.new_measured_material(path)
+    with pytest.raises(extension.api.MeasuredError, match="There is no file"):
+        extension.api.new_measured_material(tmp_path / "none.binary")
+    assert len(bpy.data.materials) == materials
+
+
+def test_without_the_program(extension, empty, paint, monkeypatch):
+    monkeypatch.delenv("BRDFC_TOOL")
+    monkeypatch.setenv("PATH", os.devnull)
+    with pytest.raises(extension.api.MeasuredError, match="The program brdfc was not found"):
+        extension.api.measured_fits(paint)
