@@ -399,6 +399,7 @@ def hold(extension, tool, scene, stage, lamps, form="aimed", samples=SAMPLES, of
 
 
 @pytest.mark.long
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("kind", WITH_MARKS)
 def test_highlights(extension, empty, tool, kind):
     stage = highlights.Stage(empty, WIDE_CASES if kind == "half below the horizon" else CASES)

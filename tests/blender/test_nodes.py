@@ -141,7 +141,7 @@ def test_a_white_world(extension, model, values):
 
 
 @pytest.mark.full
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "light", [lamps, flat_lamps, one_before_the_other], ids=lambda f: f.__name__
 )

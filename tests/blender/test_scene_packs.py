@@ -181,7 +181,7 @@ def stands_in(node):
 @pytest.mark.parametrize("part", FOLDED)
 def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pack, few_of, part):
     api, nodes, pack = extension.api, extension.nodes, extension.pack
-    whole = json.loads(json.dumps(dict(few_of(pack.manifest()["models"].items(), 8))))
+    whole = json.loads(json.dumps(dict(few_of(pack.manifest()["models"].items(), 5))))
     materials = materials_of(whole, part)
     albedos = {
         name: extension.energy.albedo(name, pack.canonical(values_of(entry)), 0.7)
