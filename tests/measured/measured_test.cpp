@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tables of measured BRDFs: indices, and sampling. Files are tested by tests/cli/test_measured.py.
+#include <gtest/gtest.h>
+
+#include "measure/albedo.h"
+#include "measure/probes.h"
+#include "measured/grid_table.h"
+#include "measured/measured_model.h"
+#include "measured/merl.h"
+#include "model/sampling.h"
+
+namespace brdfc::measured {
+namespace {
+
+TEST(Merl, EveryEntryIsFoundFromTheMiddleOfItsCell) {
+  std::size_t above = 0;
+  for (std::size_t entry = 0; entry < kMerlEntries; ++entry) {
+    const HalfDifference angles = merl_angles(entry);
+    ASSERT_EQ(merl_entry(angles), entry);
+    const auto [wi, wo] = directions(angles);
+    ASSERT_NEAR(length(wi), 1, 1e-12);
+    ASSERT_NEAR(length(wo), 1, 1e-12);
+    if (!(wi.z > 0 && wo.z > 0)) continue;
+    ++above;
+    ASSERT_EQ(merl_entry(half_difference(wi, wo)), entry);
+    ASSERT_EQ(merl_entry(half_difference(wo, wi)), entry);  // phi_d is modulo pi
+    // The half vector's azimuth does not matter.
+    ASSERT_EQ(merl_entry(half_difference(rotate_z(wi, 0.6, 0.8), rotate_z(wo, 0.6, 0.8))), entry);
+  }
+  EXPECT_GT(above, kMerlEntries / 2);
+}
+
+TEST(Merl, AnglesAreThoseOfTheDirections) {
+  measure::Random random(5);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3<double> wi = measure::uniform_direction(random), wo = measure::uniform_direction(random);
+    const HalfDifference a = half_difference(wi, wo);
+    EXPECT_NEAR(std::cos(a.theta_h), normalize(wi + wo).z, 1e-12);
+    EXPECT_NEAR(std::cos(a.theta_d), dot(wi, normalize(wi + wo)), 1e-12);
+    const auto [i2, o2] = directions(a);
+    EXPECT_NEAR(i2.z, wi.z, 1e-12);
+    EXPECT_NEAR(o2.z, wo.z, 1e-12);
+    EXPECT_NEAR(dot(i2, o2), dot(wi, wo), 1e-12);
+  }
+}
+
+TEST(AngleAxis, ACircleCloses) {
+  const AngleAxis circle{{0, 90, 270}, AngleAxis::Ends::Circle};
+  EXPECT_EQ(circle.locate(315).first, 2u);
+  EXPECT_EQ(circle.locate(315).second, 0u);
+  EXPECT_DOUBLE_EQ(circle.locate(315).weight, 0.5);
+  EXPECT_DOUBLE_EQ(circle.locate(-45).weight, 0.5);
+  EXPECT_EQ(circle.locate(180 + 720).first, 1u);
+  const AngleAxis ends{{10, 20}, AngleAxis::Ends::Constant};
+  EXPECT_EQ(ends.locate(5).first, 0u);
+  EXPECT_EQ(ends.locate(25).first, 1u);
+  EXPECT_DOUBLE_EQ(ends.locate(12.5).weight, 0.25);
+}
+
+/// A table that is a model of this project.
+class OfModel final : public Table {
+ public:
+  OfModel(const char* name, const ParamValues& values) : brdf_(find_model(name).make_double(values)) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override { return brdf_->eval(wi, wo); }
+
+ private:
+  std::unique_ptr<Brdf<double>> brdf_;
+};
+
+struct Case {
+  const char* model;
+  ParamValues values;
+  bool isotropic;
+  double most;  ///< largest variance of f cos / pdf over its mean squared
+};
+
+measure::BoundModel bound(const Case& c, std::unique_ptr<MeasuredModel>& model) {
+  Measurement m;
+  m.file = c.model;
+  m.isotropic = c.isotropic;
+  m.table = std::make_shared<OfModel>(c.model, complete(find_model(c.model).info(), c.values));
+  model = std::make_unique<MeasuredModel>(m);
+  return {model.get(), {}, model->make_double({}), c.model};
+}
+
+const Case kCases[] = {
+    {"lambert", {}, true, 0.5},
+    {"cook_torrance", {{"m", 0.05}}, true, 4},
+    {"cook_torrance", {{"m", 0.5}}, true, 4},
+    {"ward", {{"ax", 0.3}, {"ay", 0.1}}, false, 6},
+};
+
+/// One of 8 x 4 x 2 cells: by the angle of the half vector, its azimuth, and the height of wi.
+std::size_t cell_of(const Vec3<double>& wi, const Vec3<double>& wo) {
+  const Vec3<double> h = normalize(wi + wo);
+  const double tangent = std::sqrt(sin2_theta(h)) / h.z;
+  const std::size_t t = std::size_t(std::clamp(std::log2(tangent) + 6, 0., 7.)),
+                    p = std::size_t((std::atan2(h.y, h.x) / (2 * kPi) + 0.5) * 3.999);
+  return (t * 4 + p) * 2 + (wi.z > 0.6);
+}
+
+// The pdf has steps, which the quadrature of check::chi_square() does not get along with: its integral over each cell
+// is a mean over other samples here.
+TEST(HalfVectors, SamplesFollowThePdf) {
+  constexpr int kSamples = 200000;
+  for (const Case& c : kCases) {
+    std::unique_ptr<MeasuredModel> model;
+    const measure::BoundModel b = bound(c, model);
+    const auto of_model = find_model(c.model).make_double(complete(find_model(c.model).info(), c.values));
+    for (const double cosine : {1., 0.7, 0.2}) {
+      const Vec3<double> wo = direction(cosine, 0.4);
+      measure::Random random(7);
+      std::array<double, 64> drawn{}, mean{}, square{};
+      double lost = 0, whole = 0, spread = 0;
+      for (int i = 0; i < kSamples; ++i) {
+        const Sample<double> s = b.brdf->sample(wo, measure::uniform_cube(random));
+        if (s.pdf > 0) {
+          ASSERT_DOUBLE_EQ(s.pdf, b.brdf->pdf(s.wi, wo));
+          drawn[cell_of(s.wi, wo)] += 1. / kSamples;
+        } else {
+          lost += 1. / kSamples;
+        }
+        const Vec3<double> u = measure::uniform_cube(random);
+        const Vec3<double> wi = u.x < 0.5 ? sample_cosine(u.y, u.z) : of_model->sample(wo, {2 * u.x - 1, u.y, u.z}).wi;
+        if (!(wi.z > 0)) continue;
+        const double value = b.brdf->pdf(wi, wo) / (0.5 * cosine_pdf(wi) + 0.5 * of_model->pdf(wi, wo)) / kSamples;
+        mean[cell_of(wi, wo)] += value;
+        square[cell_of(wi, wo)] += value * value;
+        whole += value, spread += value * value;
+      }
+      for (std::size_t k = 0; k < mean.size(); ++k)
+        EXPECT_NEAR(drawn[k], mean[k], 5 * std::sqrt(square[k] + drawn[k] / kSamples) + 1e-4)
+            << c.model << " " << cosine << " cell " << k;
+      EXPECT_NEAR(whole + lost, 1, 5 * std::sqrt(spread + lost / kSamples)) << c.model << " " << cosine;
+    }
+  }
+}
+
+TEST(HalfVectors, SamplesHaveTheAlbedoOfTheModelAndLittleVariance) {
+  for (const Case& c : kCases) {
+    std::unique_ptr<MeasuredModel> model;
+    const measure::BoundModel b = bound(c, model);
+    const auto of_model = find_model(c.model).make_double(complete(find_model(c.model).info(), c.values));
+    for (const double cosine : {0.95, 0.6, 0.3}) {
+      const auto sampled = measure::sampled_albedo(*b.brdf, cosine, 0.4, c.model, 1 << 15);
+      const auto exact = measure::albedo(*of_model, cosine, 0.4, c.model);
+      EXPECT_NEAR(sampled.scattered.g, exact.scattered.g, 0.01 * exact.scattered.g + 5 * sampled.standard_error)
+          << c.model << " " << cosine;
+      measure::Random random(3);
+      double mean = 0, square = 0;
+      constexpr int kSamples = 20000;
+      for (int i = 0; i < kSamples; ++i) {
+        const double weight = b.brdf->sample(direction(cosine, 0.4), measure::uniform_cube(random)).weight.g / kSamples;
+        mean += weight, square += weight * weight * kSamples;
+      }
+      EXPECT_LT(square / (mean * mean) - 1, c.most) << c.model << " " << cosine;
+    }
+  }
+}
+
+TEST(MeasuredModel, EightAtOnceAreOneByOne) {
+  std::unique_ptr<MeasuredModel> model;
+  const measure::BoundModel b = bound(kCases[1], model);
+  const auto packed = model->make_packed({});
+  measure::Random random(9);
+  Vec3<Pack> wi, wo, u;
+  std::array<Vec3<double>, kLanes> i, o, v;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    i[k] = measure::uniform_direction(random), o[k] = measure::uniform_direction(random);
+    v[k] = measure::uniform_cube(random);
+    wi.x[k] = i[k].x, wi.y[k] = i[k].y, wi.z[k] = i[k].z;
+    wo.x[k] = o[k].x, wo.y[k] = o[k].y, wo.z[k] = o[k].z;
+    u.x[k] = v[k].x, u.y[k] = v[k].y, u.z[k] = v[k].z;
+  }
+  const PackedEvaluation e = packed->evaluate(wi, wo);
+  const Sample<Pack> s = packed->sample(wo, u);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    EXPECT_EQ(e.f.g[k], b.brdf->eval(i[k], o[k]).g);
+    EXPECT_EQ(e.pdf[k], b.brdf->pdf(i[k], o[k]));
+    EXPECT_EQ(s.pdf[k], b.brdf->sample(o[k], v[k]).pdf);
+    EXPECT_EQ(s.weight.b[k], b.brdf->sample(o[k], v[k]).weight.b);
+  }
+}
+
+}  // namespace
+}  // namespace brdfc::measured
