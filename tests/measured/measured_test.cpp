@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "measure/albedo.h"
+#include "measure/bound_model.h"
 #include "measure/probes.h"
 #include "measured/grid_table.h"
 #include "measured/measured_model.h"
