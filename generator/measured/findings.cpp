@@ -10,15 +10,15 @@
 namespace brdfc::measured {
 namespace {
 
-constexpr int kViewStep = 15, kSamples = 1 << 13, kAzimuths = 8;
+constexpr int kSamples = 1 << 13, kAzimuths = 8;
 constexpr double kVisible = 0.01;
 
 }  // namespace
 
-Findings findings(const Measurement& m, const MeasuredModel& model) {
+Findings findings(const Measurement& m, const MeasuredModel& model, const std::vector<double>& degrees) {
   Findings out;
   const auto brdf = model.make_double({});
-  for (int degrees = 0; degrees <= 90; degrees += kViewStep) out.views.push_back({std::min(degrees, 89) * 1., {}});
+  for (const double at : degrees) out.views.push_back({at, {}});
   std::vector<double> difference(out.views.size()), sum(out.views.size());
   for_all(out.views.size(), [&](std::size_t i) {
     Findings::View& view = out.views[i];
@@ -29,7 +29,7 @@ Findings findings(const Measurement& m, const MeasuredModel& model) {
       const Sample<double> s = brdf->sample(wo, points.next());
       if (!(s.pdf > 0)) continue;
       view.albedo += s.weight / double(kSamples);
-      // Views are spaced evenly in the angle: cos sin is what each stands for.
+      // Views that are spaced evenly in the angle stand for cos sin of it.
       const double weight = s.wi.z / s.pdf * cos_o * std::sqrt(1 - cos_o * cos_o);
       difference[i] += weight * std::abs(luminance(brdf->eval(s.wi, wo)) - luminance(brdf->eval(wo, s.wi)));
       sum[i] += weight * luminance(brdf->eval(s.wi, wo));

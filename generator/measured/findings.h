@@ -20,6 +20,7 @@ struct Findings {
   /// A sentence each for what a user should know.
   std::vector<std::string> sentences;
 };
-Findings findings(const Measurement&, const MeasuredModel&);
+/// `degrees` are the views' angles to the normal, below 90.
+Findings findings(const Measurement&, const MeasuredModel&, const std::vector<double>& degrees);
 
 }  // namespace brdfc::measured

@@ -57,24 +57,22 @@ Warp::Warp(std::vector<float> data, std::size_t width, std::size_t height, bool 
     float* const values = &data_[s * size];
     float* const rows = &rows_[s * height * (width - 1)];
     float* const columns = &columns_[s * (height - 1)];
-    std::vector<double> sums(height);
+    std::vector<double> sums(height), totals(height - 1);
+    for (std::size_t y = 0; y < height; ++y)
+      for (std::size_t x = 0; x + 1 < width; ++x)
+        sums[y] += step_x * (double(values[y * width + x]) + double(values[y * width + x + 1]));
+    double total = 0;
+    for (std::size_t y = 0; y + 1 < height; ++y) totals[y] = total += step_y * (sums[y] + sums[y + 1]);
+    // In double precision, where no quotient of two floats overflows.
+    for (std::size_t y = 0; y + 1 < height; ++y) columns[y] = float(totals[y] / total);
     for (std::size_t y = 0; y < height; ++y) {
       double sum = 0;
       for (std::size_t x = 0; x + 1 < width; ++x) {
         sum += step_x * (double(values[y * width + x]) + double(values[y * width + x + 1]));
-        rows[y * (width - 1) + x] = float(sum);
+        rows[y * (width - 1) + x] = float(sum / total);
       }
-      sums[y] = sum;
     }
-    double total = 0;
-    for (std::size_t y = 0; y + 1 < height; ++y) {
-      total += step_y * (sums[y] + sums[y + 1]);
-      columns[y] = float(total);
-    }
-    const float scale = float(1 / total);
-    for (std::size_t i = 0; i < size; ++i) values[i] *= scale;
-    for (std::size_t i = 0; i < height * (width - 1); ++i) rows[i] *= scale;
-    for (std::size_t i = 0; i + 1 < height; ++i) columns[i] *= scale;
+    for (std::size_t i = 0; i < size; ++i) values[i] = float(double(values[i]) / total);
   }
 }
 

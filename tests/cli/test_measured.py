@@ -6,6 +6,7 @@ import json
 import re
 import struct
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -22,23 +23,28 @@ from measured_files import (
     utia,
     utia_directions,
 )
-from support import ROOT, TOOL, run
+from support import ROOT, TOOL, run, scene
 
 COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
 
 
-def pairs(file, wi, wo):
-    """f (N, 3) and pdf (N,) as the tool has them."""
+def eval_pairs(arguments, wi, wo):
+    """What a command of the tool prints for pairs of directions."""
     rows = "\n".join(",".join(f"{x:.17g}" for x in (*a, *b)) for a, b in zip(wi, wo, strict=True))
-    command = [TOOL, "measured", str(file), "--pairs"]
+    command = [TOOL, *arguments]
     done = subprocess.run(command, input=f"{COLUMNS}\n{rows}\n", capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    found = np.array([line.split(",") for line in done.stdout.splitlines()[1:]], float)
+    return np.array([line.split(",") for line in done.stdout.splitlines()[1:]], float)
+
+
+def pairs(file, wi, wo):
+    """f (N, 3) and pdf (N,) as the tool has them."""
+    found = eval_pairs(["measured", str(file), "--pairs"], wi, wo)
     return found[:, :3], found[:, 3]
 
 
 def told(file):
-    done = run("measured", file, "--json")
+    done = run("measured", file, "--json", "--models", "none")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -96,6 +102,7 @@ def test_merl_is_read_in_two_seconds(merl_file):
     assert np.pi * 0.1 < at_normal[0] < np.pi * 0.1 + 0.5 and found["albedo"][0]["degrees"] == 0
 
 
+@pytest.mark.slow
 def test_holes_are_filled_from_beside_them(merl_file):
     wi, wo = merl_directions()
     f = glossy(wi, wo)
@@ -302,3 +309,169 @@ def test_fields_that_are_not_known_are_named(tmp_path):
 def test_what_is_not_there_is_said(tmp_path):
     done = run("measured", tmp_path / "none.binary")
     assert done.returncode == 2 and "none.binary: expected a file, found none" in done.stderr
+
+
+def lobe_table(folder, matte=0.0):
+    """Blinn's model, as a table in steps of 5 degrees."""
+    file = folder / "lobe.csv"
+    ti, pi, to, po = grid(range(0, 90, 5), [0], range(0, 90, 5), range(0, 181, 5))
+    f = eval_pairs(["eval", "blinn", "ks=0.5,0.3,0.1", "e=10"], vector(ti, pi), vector(to, po))
+    f = f[:, :3] + np.asarray(matte)
+    file.write_text(angle_table(ti, pi, to, po, *f.T), encoding="utf-8")
+    return file
+
+
+@pytest.mark.slow
+def test_models_are_ranked(tmp_path):
+    """The model that the data were made from comes first, with what they were made from."""
+    file = lobe_table(tmp_path)
+    done = run("measured", file, "--json", "--models", "lambert,blinn,ward,phong")
+    assert done.returncode == 0, done.stderr
+    fits = json.loads(done.stdout)["fits"]
+    assert [f["model"] for f in fits][0] == "blinn" and len(fits) == 4
+    assert fits[0]["error"] < 0.01 and fits[1]["error"] > 2 * fits[0]["error"]
+    assert [f["error"] for f in fits] == sorted(f["error"] for f in fits)
+    of_model = json.loads(run("list", "--json").stdout)
+    assert fits[0]["parameters"].keys() == {
+        p["name"] for m in of_model if m["name"] == "blinn" for p in m["parameters"]
+    }
+    text = run("measured", file, "--models", "blinn").stdout
+    assert re.search(r"blinn +0\.\d+ % .*ks=.* e=", text)
+    for names, expected in (("blin", "'blin'"), ("fresnel_conductor", "is a mirror alone")):
+        done = run("measured", file, "--models", names)
+        assert done.returncode == 2 and expected in done.stderr
+
+
+def test_matte_light_is_added_unless_told_otherwise(tmp_path):
+    file = lobe_table(tmp_path, matte=[0.1, 0.05, 0.02])
+    with_matte, alone = (
+        json.loads(run("measured", file, "--json", "--models", "blinn", *more).stdout)["fits"][0]
+        for more in ((), ("--no-matte",))
+    )
+    assert with_matte["matte"] == pytest.approx([np.pi * c for c in (0.1, 0.05, 0.02)], rel=0.02)
+    assert alone["matte"] is None and alone["error"] > 5 * with_matte["error"]
+
+
+PLANE = {
+    "camera": {
+        "type": "orthographic",
+        "height": 1,
+        "position": [0, 0, 4],
+        "look_at": [0, 0, 0],
+        "up": [0, 1, 0],
+    },
+    "objects": [{"name": "o", "shape": {"type": "quad", "size": [4, 4]}, "material": "m"}],
+    "settings": {"width": 8, "height": 8, "spp": 1024, "seed": 1, "max_bounces": 0},
+}
+
+
+def rendered(folder, material, *options, **changes):
+    import OpenImageIO as oiio
+
+    content = scene(materials={"m": material}, **(PLANE | changes))
+    (folder / "s.json").write_text(json.dumps(content), encoding="utf-8")
+    done = run("render", folder / "s.json", "--out", folder / "s.exr", *options)
+    assert done.returncode == 0, done.stderr
+    return oiio.ImageBuf(str(folder / "s.exr")).get_pixels(oiio.FLOAT)[..., :3], done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("strategy", ["brdf", "mis"])
+def test_the_reference_renders_data_as_they_are(tmp_path, merl_file, strategy):
+    """A white world shows the albedo; under a lamp every way of sampling has one mean."""
+    material = {"measured": str(merl_file)}
+    pixels, _ = rendered(tmp_path, material, "--strategy", strategy)
+    expected = told(merl_file)["albedo"][0]["rgb"]
+    np.testing.assert_allclose(pixels.mean((0, 1)), expected, rtol=0.01)
+    lamp = {"type": "area", "position": [1, 0, 2], "direction": [-0.5, 0, -1], "size": [1, 1]}
+    lit = {"lights": [lamp | {"power": 100}], "environment": None}
+    by_lamp, _ = rendered(tmp_path, material, "--strategy", "light", **lit)
+    pixels, _ = rendered(tmp_path, material, "--strategy", strategy, **lit)
+    np.testing.assert_allclose(pixels.mean((0, 1)), by_lamp.mean((0, 1)), rtol=0.01)
+
+
+def test_data_have_one_colour_in_every_working_space(tmp_path, merl_file):
+    import PyOpenColorIO as ocio
+    from support import CONFIG
+
+    pixels, _ = rendered(tmp_path, {"measured": str(merl_file)}, working_space="ACEScg")
+    albedo = np.array([told(merl_file)["albedo"][0]["rgb"]], np.float32)
+    config = ocio.Config.CreateFromFile(str(CONFIG))
+    config.getProcessor("Linear Rec.709", "ACEScg").getDefaultCPUProcessor().applyRGB(albedo)
+    np.testing.assert_allclose(pixels.mean((0, 1)), albedo[0], rtol=0.01)
+    assert abs(albedo[0, 2] / albedo[0, 0] - 1) > 0.02
+
+
+@pytest.mark.slow
+def test_a_scene_has_the_model_that_is_fitted(tmp_path):
+    file = lobe_table(tmp_path)
+    material = {"measured": file.name, "as": "blinn"}
+    pixels, said = rendered(tmp_path, material)
+    raw, _ = rendered(tmp_path, {"measured": file.name})
+    np.testing.assert_allclose(pixels.mean((0, 1)), raw.mean((0, 1)), rtol=0.03)
+    assert re.search(r"lobe.csv: blinn misplaces 0\.\d+ % of the light: ks=", said)
+
+    def resolved(material):
+        content = scene(materials={"m": material}, **PLANE)
+        (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+        return run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+
+    assert resolved(material).returncode == 0
+    found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]["m"]
+    assert found["model"] == "blinn" and found["representation"] == "auto"
+    fit = json.loads(run("measured", file, "--json", "--models", "blinn", "--no-matte").stdout)
+    assert found["parameters"] == fit["fits"][0]["parameters"]
+    for bad, expected in (
+        ({"measured": file.name}, "material m: measured data are rendered by `brdfc render`"),
+        ({"measured": file.name, "as": "bling"}, "materials.m.as: expected"),
+        ({"measured": file.name, "model": "blinn"}, "materials.m.model"),
+        ({"measured": "none.csv"}, "materials.m.measured: "),
+        ({"model": "blinn", "as": "ward"}, "materials.m.as"),
+        ({"measured": file.name, "representation": "exact"}, 'expected "as" beside it'),
+    ):
+        done = resolved(bad)
+        assert done.returncode == 2 and expected in done.stderr, done.stderr
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    out = tmp_path_factory.mktemp("python")
+    done = run("python", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.mark.slow
+def test_the_package_says_what_the_tool_says(tmp_path, package):
+    """In a process of its own, without the package of other tests."""
+    file = lobe_table(tmp_path)
+    script = f"""
+import json
+import brdfc, numpy as np
+data = brdfc.measured({str(file)!r})
+wi, wo = np.load({str(tmp_path / "wi.npy")!r}), np.array([0.6, 0, 0.8])
+fit = data.fit("blinn", matte=False)
+f = brdfc.model("blinn").eval(wi, wo, **fit.parameters)
+try:
+    brdfc.measured("none.binary")
+except ValueError as error:
+    refused = str(error)
+print(json.dumps([data.format, data.isotropic, data.eval(wi, wo).tolist(), f.tolist(),
+    data.albedo(np.cos(np.radians([0, 45]))).tolist(), fit.error, refused]))
+"""
+    wi, wo = hemisphere(50, 20, 0.1), np.tile([0.6, 0, 0.8], (50, 1))
+    np.save(tmp_path / "wi.npy", wi)
+    environment = {"PYTHONPATH": str(package), "BRDFC_TOOL": TOOL, "PATH": ""}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    kind, isotropic, f, of_model, albedo, error, refused = json.loads(done.stdout)
+    assert kind == "CSV" and isotropic and error < 0.01
+    assert f == pairs(file, wi, wo)[0].tolist()
+    np.testing.assert_allclose(of_model, f, rtol=0.1, atol=0.01)
+    expected = [v["rgb"] for v in told(file)["albedo"]]
+    np.testing.assert_allclose(albedo, [expected[0], expected[3]], rtol=0.01)
+    assert refused == "none.binary: expected a file, found none"
+    del environment["BRDFC_TOOL"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert "FileNotFoundError: measured BRDFs are read by the program brdfc" in done.stderr

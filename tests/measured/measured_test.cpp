@@ -5,6 +5,7 @@
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
+#include "measured/fit_models.h"
 #include "measured/grid_table.h"
 #include "measured/measured_model.h"
 #include "measured/merl.h"
@@ -181,6 +182,133 @@ TEST(MeasuredModel, EightAtOnceAreOneByOne) {
     EXPECT_EQ(s.pdf[k], b.brdf->sample(o[k], v[k]).pdf);
     EXPECT_EQ(s.weight.b[k], b.brdf->sample(o[k], v[k]).weight.b);
   }
+}
+
+/// Noise of a few percent that depends on the directions alone.
+class Noisy final : public Table {
+ public:
+  Noisy(std::shared_ptr<const Table> table, double share) : table_(std::move(table)), share_(share) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    const auto noise = [&](double k) { return 1 + share_ * std::sqrt(2.) * std::sin(1e5 * (dot(wi, wo) + k * wi.z)); };
+    return table_->eval(wi, wo) * Rgb<double>(noise(1), noise(2), noise(3));
+  }
+
+ private:
+  std::shared_ptr<const Table> table_;
+  double share_;
+};
+
+Measurement as_measured(std::shared_ptr<const Table> table, bool isotropic = true) {
+  Measurement m;
+  m.file = "made";
+  m.isotropic = isotropic;
+  m.table = std::move(table);
+  return m;
+}
+
+ModelFit fit_of(const Measurement& m, const char* model, Matte matte = Matte::Added) {
+  const MeasuredModel data(m);
+  return fit_models(m, data, {&find_model(model)}, matte).at(0);
+}
+
+struct Found {
+  const char* model;
+  ParamValues values;              ///< those that differ from the defaults
+  std::vector<const char*> names;  ///< numbers and colours that the data determine
+};
+const Found kFound[] = {
+    {"ashikhmin_shirley", {{"nu", 40.}, {"nv", 40.}}, {"rs", "rd", "nu"}},
+    {"blinn", {}, {"ks", "e"}},
+    {"cook_torrance", {}, {"f0", "m"}},
+    {"coupled", {}, {}},  // rm is a factor of what r0 leaves of it: one of the two is not determined
+    {"glossy_reflector", {}, {"e"}},
+    {"glossy_specular", {}, {"e"}},
+    {"lafortune", {}, {"ks", "e", "cxy", "cz"}},
+    {"lambert", {}, {"rho"}},
+    {"lambertian_specular", {}, {}},  // a mirror beside it is not in the data
+    {"lossless", {}, {"tint", "n"}},
+    {"max_phong", {}, {"ks", "e"}},
+    {"modified_phong", {}, {"ks", "e"}},
+    {"oren_nayar", {}, {"rho", "sigma"}},
+    {"phong", {}, {"ks", "e"}},
+    {"phong_material", {{"kr", 0.}}, {"es"}},
+    {"radziszewski_alda", {}, {"tint", "n"}},
+    {"schlick", {{"p", 0.6}}, {"r", "p", "rough"}},
+    {"schlick_double", {}, {}},  // as coupled
+    {"shirley_1991", {}, {}},
+    {"ward", {{"ax", 0.1}, {"ay", 0.3}}, {"ks", "ax", "ay"}},
+};
+
+std::vector<double> numbers_of(const ParamValue& value) {
+  if (const auto* number = std::get_if<double>(&value)) return {*number};
+  const auto& c = std::get<std::array<double, 3>>(value);
+  return {c.begin(), c.end()};
+}
+
+void expect_found(double noise, double tolerance, double most) {
+  for (const Found& c : kFound) {
+    const Model& model = find_model(c.model);
+    const ParamValues truth = complete(model.info(), c.values);
+    const auto table = std::make_shared<Noisy>(std::make_shared<OfModel>(c.model, truth), noise);
+    const ModelFit fit = fit_of(as_measured(table, std::string(c.model) != "ward"), c.model);
+    EXPECT_LT(fit.error, most) << c.model << " " << format_values(model.info(), fit.values);
+    EXPECT_FALSE(fit.matte) << c.model;
+    for (const char* name : c.names) {
+      const auto found = numbers_of(fit.values.at(name)), expected = numbers_of(truth.at(name));
+      for (std::size_t k = 0; k < found.size(); ++k)
+        EXPECT_NEAR(found[k], expected[k], tolerance * std::abs(expected[k]))
+            << c.model << " " << format_values(model.info(), fit.values);
+    }
+  }
+}
+
+TEST(FitModels, ModelsAreFoundToOnePercent) { expect_found(0, 0.01, 2e-3); }
+TEST(FitModels, ModelsAreFoundToFivePercentUnderNoiseOfTwo) { expect_found(0.02, 0.05, 0.025); }
+
+/// A sum of two tables.
+class Sum final : public Table {
+ public:
+  Sum(std::shared_ptr<const Table> a, std::shared_ptr<const Table> b) : a_(std::move(a)), b_(std::move(b)) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    return a_->eval(wi, wo) + b_->eval(wi, wo);
+  }
+
+ private:
+  std::shared_ptr<const Table> a_, b_;
+};
+
+TEST(FitModels, MatteLightIsAddedWhereAModelHasNone) {
+  const auto lobe = std::make_shared<OfModel>("blinn", complete(find_model("blinn").info(), {}));
+  const ParamValues rho{{"rho", std::array<double, 3>{0.1, 0.3, 0.2}}};
+  const auto matte = std::make_shared<OfModel>("lambert", rho);
+  const Measurement m = as_measured(std::make_shared<Sum>(lobe, matte));
+  const ModelFit fit = fit_of(m, "blinn");
+  ASSERT_TRUE(fit.matte);
+  EXPECT_NEAR(fit.matte->r, 0.1, 1e-3);
+  EXPECT_NEAR(fit.matte->g, 0.3, 3e-3);
+  EXPECT_NEAR(fit.matte->b, 0.2, 2e-3);
+  EXPECT_NEAR(std::get<double>(fit.values.at("e")), 50, 0.5);
+  EXPECT_LT(fit.error, 1e-3);
+  const ModelFit alone = fit_of(m, "blinn", Matte::None);
+  EXPECT_FALSE(alone.matte);
+  EXPECT_GT(alone.error, 0.1);
+}
+
+TEST(FitModels, TheErrorIsTheLightThatIsMisplaced) {
+  // A black model misplaces all of it: glossy light from a mirror that is not there.
+  const ParamValues black{{"rho", std::array<double, 3>{0, 0, 0}}};
+  const Measurement m = as_measured(std::make_shared<OfModel>("lambert", black));
+  const MeasuredModel data(m);
+  EXPECT_EQ(fit_models(m, data, {&find_model("blinn")}, Matte::None).at(0).error, 0);
+  // Half of the hemisphere of view is black: Lambert does best with the value of the brighter half or with none.
+  class Half final : public Table {
+   public:
+    Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+      return Rgb<double>(wi.z > 0 && wo.z * wo.z > 0.4 ? 0.2 : 0);
+    }
+  };
+  const ModelFit fit = fit_of(as_measured(std::make_shared<Half>()), "lambert");
+  EXPECT_NEAR(fit.error, 0.4 / 0.6, 0.02);
 }
 
 }  // namespace
