@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
     brdfc::app::add_albedo_command(app);
     brdfc::app::add_kernel_command(app);
     brdfc::app::add_optical_command(app);
+    brdfc::app::add_measured_command(app);
     brdfc::app::add_check_command(app);
     brdfc::app::add_stability_command(app);
     brdfc::app::add_fit_command(app);

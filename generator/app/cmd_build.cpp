@@ -46,6 +46,7 @@ void print_table(const pack::Result& result) {
 
 /// How the materials of a scene use their models.
 std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>& materials) {
+  reference::require_models(materials);
   std::vector<plan::MaterialNeed> needs;
   for (const reference::Material& m : materials) {
     plan::MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation};

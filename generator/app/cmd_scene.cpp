@@ -18,6 +18,7 @@ void add_scene_command(CLI::App& app) {
   command->callback([options] {
     const reference::Scene scene = reference::load_scene(options->scene);
     print_notes(scene.notes);
+    reference::require_models(scene.materials);
     reference::write_resolved(scene, options->out);
     fmt::print(stderr, "{}: {} objects, {} meshes, {} images, hash {} -> {}\n", scene.name, scene.objects.size(),
                scene.mesh_files.size(), scene.image_files.size(), scene.hash,

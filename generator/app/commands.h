@@ -31,6 +31,7 @@ void add_sample_command(CLI::App&);
 void add_albedo_command(CLI::App&);
 void add_kernel_command(CLI::App&);
 void add_optical_command(CLI::App&);
+void add_measured_command(CLI::App&);
 void add_check_command(CLI::App&);
 void add_stability_command(CLI::App&);
 void add_fit_command(CLI::App&);

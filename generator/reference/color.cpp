@@ -270,6 +270,11 @@ std::array<double, 3> ColorConfig::from_xyz(const Xyz& xyz) const {
   return {pixel.rgb[0], pixel.rgb[1], pixel.rgb[2]};
 }
 
+ToRgb ColorConfig::to_rec709() const {
+  auto config = std::make_shared<ColorConfig>(with_working_space(working_spaces()[0].name));
+  return [config](const Xyz& xyz) { return config->from_xyz(xyz); };
+}
+
 void ColorConfig::to_display(Image& image, const std::string& view) const {
   const std::vector<std::string> known = views();
   if (!view.empty() && std::find(known.begin(), known.end(), view) == known.end())

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "model/optical.h"
 #include "model/spectrum.h"
 #include "reference/image.h"
 
@@ -73,6 +74,8 @@ class ColorConfig {
   /// The scene-linear colour for X, Y and Z relative to a perfect reflector, whose colour is 1, 1, 1. Throws InputError
   /// if the configuration has no role aces_interchange, which relates its spaces to measurable quantities.
   std::array<double, 3> from_xyz(const Xyz&) const;
+  /// from_xyz() of this configuration with linear Rec.709 as its working space.
+  ToRgb to_rec709() const;
   /// Converts scene-linear pixels to those of the default display, in [0, 1], through `view`, or through
   /// standard_view() if that is empty. Throws InputError that lists the views.
   void to_display(Image& image, const std::string& view) const;

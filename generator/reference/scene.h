@@ -63,7 +63,11 @@ struct Material {
   std::map<std::string, std::shared_ptr<const Image>> textures;
   std::set<std::string> varying;  ///< parameters whose values vary and are not known here; only from load_materials()
   std::string representation = "auto";
+  std::shared_ptr<const Model> table;  ///< owns `model` if that looks measured data up instead of computing
 };
+
+/// Throws InputError naming the first material that is measured data as such, which no other renderer has.
+void require_models(const std::vector<Material>&);
 
 /// world = matrix * object + translation
 struct Transform {

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the materials of a scene file: models, values, textures and substances.
 #include <algorithm>
+#include <fstream>
+#include <sstream>
 
+#include "core/hash.h"
+#include "measured/fit_models.h"
 #include "model/optical.h"
 #include "reference/procedural.h"
 #include "reference/scene_files.h"
@@ -13,6 +17,34 @@ using nlohmann::json;
 
 namespace {
 
+/// Values of a table in linear Rec.709, in another space.
+class Converted final : public measured::Table {
+ public:
+  Converted(std::shared_ptr<const measured::Table> table, std::array<Rgb<double>, 3> primaries)
+      : table_(std::move(table)), primaries_(primaries) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    const Rgb<double> f = table_->eval(wi, wo);
+    const Rgb<double> out = primaries_[0] * f.r + primaries_[1] * f.g + primaries_[2] * f.b;
+    return {std::max(out.r, 0.), std::max(out.g, 0.), std::max(out.b, 0.)};
+  }
+
+ private:
+  std::shared_ptr<const measured::Table> table_;
+  std::array<Rgb<double>, 3> primaries_;  ///< of Rec.709, in the other space
+};
+
+measured::Measurement in_working_space(measured::Measurement m, const ColorConfig& colors) {
+  if (colors.working_space() == working_spaces()[0].name) return m;
+  Image unit;
+  unit.width = 3, unit.height = 1;
+  unit.rgb = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  colors.to_scene_linear(unit, working_spaces()[0].chromaticities);
+  std::array<Rgb<double>, 3> primaries;
+  for (std::size_t k = 0; k < 3; ++k) primaries[k] = {unit.rgb[3 * k], unit.rgb[3 * k + 1], unit.rgb[3 * k + 2]};
+  m.table = std::make_shared<Converted>(std::move(m.table), primaries);
+  return m;
+}
+
 class MaterialReader {
  public:
   MaterialReader(SceneFiles& files, bool alone) : files_(files), scene_(files.scene), alone_(alone) {}
@@ -20,9 +52,14 @@ class MaterialReader {
   void read(const JsonView& j) {
     json& out = scene_.resolved["materials"] = json::object();
     for (const auto& [id, m] : j.members()) {
-      m.only({"model", "optical", "thickness", "parameters", "representation"});
       Material material;
       material.id = id;
+      if (m.has("measured")) {
+        read_measured(m, material, out[id]);
+        scene_.materials.push_back(std::move(material));
+        continue;
+      }
+      m.only({"model", "optical", "thickness", "parameters", "representation"});
       std::vector<std::string> names;
       for (const auto& [name, model] : models()) names.push_back(name);
       material.model = &find_model(m.at("model").choice(names));
@@ -75,6 +112,49 @@ class MaterialReader {
   }
 
  private:
+  /// Measured data as such, or as a model that is fitted to them.
+  void read_measured(const JsonView& m, Material& material, json& resolved) {
+    m.only({"measured", "as", "representation"});
+    if (alone_) m.at("measured").error("expected \"model\" in a file of materials alone");
+    const JsonView file = m.at("measured");
+    const auto measurement = files_.read_file(file, [&](const fs::path& path) {
+      return in_working_space(measured::read_measurement(path, files_.colors().to_rec709()), files_.colors());
+    });
+    for (const std::string& text : measurement.notes) files_.note(measurement.file + ": " + text);
+    auto table = std::make_shared<measured::MeasuredModel>(measurement);
+    const auto as = m.find("as");
+    if (const auto v = m.find("representation")) {
+      if (!as) v->error("expected \"as\" beside it: measured data themselves have no form in Blender");
+      material.representation = v->text();
+    }
+    if (!as) {
+      material.model = table.get();
+      material.values = {};
+      material.table = std::move(table);
+      std::ifstream in(files_.beside(file.text()), std::ios::binary);
+      std::ostringstream content;
+      content << in.rdbuf();
+      resolved = {{"measured", sha256(content.str())}};
+      return;
+    }
+    std::vector<std::string> names{"best"};
+    std::vector<const Model*> tried;
+    for (const auto& [name, model] : models())
+      if (model->has_scatter()) names.push_back(name), tried.push_back(model.get());
+    if (const std::string name = as->choice(names); name != "best") tried = {&find_model(name)};
+    const auto fits = measured::fit_models(measurement, *table, tried, measured::Matte::None);
+    if (fits.empty()) as->error("lets light through, which no measured BRDF shows: expected another model");
+    const measured::ModelFit& fit = fits.front();
+    material.model = fit.model;
+    material.values = fit.values;
+    const ModelInfo& info = fit.model->info();
+    files_.note(fmt::format("{}: {} misplaces {:.2g} % of the light: {}", measurement.file, info.name, 100 * fit.error,
+                            format_values(info, fit.values)));
+    resolved = {{"model", info.name}, {"parameters", json::object()}, {"representation", material.representation}};
+    for (const auto& [name, value] : fit.values)
+      resolved["parameters"][name] = std::visit([](const auto& v) { return json(v); }, value);
+  }
+
   static std::size_t channels_of(const ParamInfo& info) { return info.kind == ParamKind::Number ? 1 : 3; }
 
   std::shared_ptr<const Image> read_texture(const JsonView& j, const ParamInfo& info, json& resolved) {
@@ -163,5 +243,14 @@ class MaterialReader {
 }  // namespace
 
 void read_materials(const JsonView& j, SceneFiles& files, bool alone) { MaterialReader(files, alone).read(j); }
+
+void require_models(const std::vector<Material>& materials) {
+  for (const Material& m : materials)
+    if (m.table)
+      input_error(
+          "material {}: measured data are rendered by `brdfc render` alone: expected \"as\" with a model beside "
+          "\"measured\"",
+          m.id);
+}
 
 }  // namespace brdfc::reference

@@ -17,6 +17,7 @@ from __future__ import annotations
 import importlib
 
 from . import optics
+from ._measured import Fit, Measured, measured
 from ._model import Choice, Color, Model, Number, Parameter, Sample
 from ._version import __version__
 from .models import NAMES
@@ -24,11 +25,14 @@ from .models import NAMES
 __all__ = [
     "Choice",
     "Color",
+    "Fit",
+    "Measured",
     "Model",
     "Number",
     "Parameter",
     "Sample",
     "__version__",
+    "measured",
     "model",
     "models",
     "optics",

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc measured: what a file with a measured BRDF holds and lacks, and which models come close to it.
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "app/commands.h"
+#include "app/numbers.h"
+#include "core/csv.h"
+#include "measured/findings.h"
+#include "measured/fit_models.h"
+#include "reference/color.h"
+
+namespace brdfc::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json rgb(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
+
+/// For people: four digits are more than a measurement has.
+ParamValues rounded(ParamValues values) {
+  const auto digits = [](double& v) { v = std::stod(fmt::format("{:.4g}", v)); };
+  for (auto& [name, value] : values) {
+    if (auto* number = std::get_if<double>(&value)) digits(*number);
+    if (auto* color = std::get_if<std::array<double, 3>>(&value)) std::ranges::for_each(*color, digits);
+  }
+  return values;
+}
+
+std::vector<const Model*> models_of(const std::vector<std::string>& names) {
+  if (names == std::vector<std::string>{"none"}) return {};
+  if (names == std::vector<std::string>{"all"}) return models_named("");
+  std::vector<const Model*> out;
+  for (const std::string& name : names) {
+    out.push_back(&find_model(name));
+    if (!out.back()->has_scatter())
+      input_error("--models: {} is a mirror alone, which no measured BRDF shows: expected another", name);
+  }
+  return out;
+}
+
+Json describe(const measured::ModelFit& f) {
+  Json parameters = Json::object();
+  for (const auto& [name, value] : f.values) std::visit([&](const auto& v) { parameters[name] = v; }, value);
+  return {{"model", f.model->info().name},
+          {"parameters", parameters},
+          {"matte", f.matte ? rgb(*f.matte) : Json()},
+          {"error", f.error},
+          {"seconds", f.seconds}};
+}
+
+/// f and pdf for pairs of directions from stdin.
+void print_pairs(const Brdf<double>& brdf) {
+  CsvReader in(std::cin, "stdin", {"wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"});
+  if (in.empty()) input_error("stdin: expected a CSV table with the header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z");
+  CsvWriter out("f_r,f_g,f_b,pdf");
+  std::vector<double> row;
+  while (in.next(row)) {
+    const Vec3<double> wi = in.unit_vector(row, 0), wo = in.unit_vector(row, 3);
+    const Rgb<double> f = brdf.eval(wi, wo);
+    out.row({f.r, f.g, f.b, brdf.pdf(wi, wo)});
+  }
+  out.finish();
+}
+
+}  // namespace
+
+void add_measured_command(CLI::App& app) {
+  struct Options {
+    std::string file;
+    bool json = false, pairs = false;
+    std::vector<std::string> models{"all"};
+    std::vector<double> at{0, 15, 30, 45, 60, 75, 89};
+    bool no_matte = false;
+  };
+  auto o = std::make_shared<Options>();
+  CLI::App* cmd = app.add_subcommand(
+      "measured",
+      "What a file with a measured BRDF holds, what it lacks, how much light it reflects, and every model fitted to "
+      "it,\n"
+      "the best first: the share of the light that the model sends in other directions, and its parameters.\n"
+      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), or a table (.csv) with the columns\n"
+      "theta_i,phi_i,theta_o,phi_o in degrees, or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and r,g,b in 1/sr, a row for every\n"
+      "combination of angles. Colours are linear Rec.709.");
+  cmd->add_option("file", o->file, "The file")->required();
+  cmd->add_flag("--json", o->json, "JSON");
+  cmd->add_option("--models", o->models, "Names of the models to fit, separated by commas; all, or none")
+      ->delimiter(',')
+      ->capture_default_str();
+  cmd->add_flag("--no-matte", o->no_matte,
+                "Fits are of the models alone, without light of a Lambert surface beside them");
+  add_numbers(*cmd, "--at", o->at, {0, 90, false, 0, "degrees from 0 to 89.9"},
+              "Views whose reflected light is said: degrees to the normal, separated by commas; 0, 15, 30, ... 89");
+  cmd->add_flag("--pairs", o->pairs,
+                "The BRDF in 1/sr for pairs of directions, and the pdf of the reference renderer's samples, instead.\n"
+                "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
+                "stdout: CSV with header f_r,f_g,f_b,pdf")
+      ->excludes("--json");
+  cmd->callback([o] {
+    const auto start = std::chrono::steady_clock::now();
+    const measured::Measurement m = measured::read_measurement(o->file, reference::ColorConfig::current().to_rec709());
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    const measured::MeasuredModel model(m);
+    if (o->pairs) {
+      print_notes(m.notes);
+      print_pairs(*model.make_double({}));
+      return;
+    }
+    for (const double degrees : o->at)
+      if (degrees > 89.9) input_error("--at: expected degrees from 0 to 89.9, got {:g}", degrees);
+    const measured::Findings found = measured::findings(m, model, o->at);
+    Json j{{"file", m.file},
+           {"format", m.format},
+           {"description", m.description},
+           {"grid", m.grid},
+           {"isotropic", m.isotropic},
+           {"highest", m.highest},
+           {"seconds", seconds.count()},
+           {"notes", m.notes},
+           {"lacks", found.sentences},
+           {"non_reciprocal", found.non_reciprocal}};
+    for (const auto& view : found.views) j["albedo"].push_back({{"degrees", view.degrees}, {"rgb", rgb(view.albedo)}});
+    const auto fits = measured::fit_models(m, model, models_of(o->models),
+                                           o->no_matte ? measured::Matte::None : measured::Matte::Added);
+    j["fits"] = Json::array();
+    for (const measured::ModelFit& f : fits) j["fits"].push_back(describe(f));
+    if (o->json) {
+      fmt::print("{}\n", j.dump(1));
+      return;
+    }
+    fmt::print("{}  {}, {}\n", m.file, m.format, m.isotropic ? "isotropic" : "anisotropic");
+    if (!m.description.empty()) fmt::print("  {}\n", m.description);
+    fmt::print("  {}, read in {:.2f} s\n", m.grid, seconds.count());
+    for (const auto& view : found.views)
+      fmt::print("  reflects, seen at {:2g} degrees  {:.4f} {:.4f} {:.4f}\n", view.degrees, view.albedo.r,
+                 view.albedo.g, view.albedo.b);
+    for (const auto* sentences : {&m.notes, &found.sentences})
+      for (const std::string& sentence : *sentences) fmt::print("  {}\n", sentence);
+    if (!fits.empty()) fmt::print("\n  {:<22}{:>10}  {:>6}  parameters\n", "model", "misplaced", "time");
+    for (const measured::ModelFit& f : fits)
+      fmt::print("  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
+                 format_values(f.model->info(), rounded(f.values)),
+                 f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "");
+  });
+}
+
+}  // namespace brdfc::app

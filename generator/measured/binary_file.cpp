@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/binary_file.h"
+
+namespace brdfc::measured {
+
+BinaryFile::BinaryFile(const std::filesystem::path& path) : name_(path.string()) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) input_error("{}: expected a file, found none", name_);
+  in_.open(path, std::ios::binary);
+  size_ = std::filesystem::file_size(path, error);
+  if (!in_ || error) input_error("{}: cannot be read", name_);
+}
+
+void BinaryFile::seek(std::uint64_t place) {
+  place_ = std::min(place, size_);
+  in_.seekg(std::streamoff(place_));
+}
+
+std::string BinaryFile::text(std::size_t count, const std::string& what) {
+  const std::vector<char> all = numbers<char>(count, what);
+  return {all.begin(), all.end()};
+}
+
+void BinaryFile::read(void* to, std::size_t bytes, const std::string& what) {
+  in_.read(static_cast<char*>(to), std::streamsize(bytes));
+  if (std::size_t(in_.gcount()) != bytes)
+    input_error("{}: {}: expected {} bytes from byte {} on, could not read them", name_, what, bytes, place_);
+  place_ += bytes;
+}
+
+}  // namespace brdfc::measured

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/csv_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "core/csv.h"
+#include "core/error.h"
+#include "measured/grid_table.h"
+
+namespace brdfc::measured {
+namespace {
+
+/// Angles are told apart in these steps, in degrees.
+constexpr double kStep = 1e-4;
+
+using Angles = std::array<long, 4>;  // theta_i, phi_i, theta_o, phi_o in steps
+
+long steps(double degrees) { return std::lround(degrees / kStep); }
+double degrees(long steps) { return double(steps) * kStep; }
+
+/// The same directions with an azimuth of 0 where theta is 0.
+Angles without_pole(Angles a) {
+  for (const std::size_t k : {0, 2})
+    if (a[k] == 0) a[k + 1] = 0;
+  return a;
+}
+
+std::vector<double> axis_of(const std::set<long>& values) {
+  std::vector<double> out;
+  for (const long v : values) out.push_back(degrees(v));
+  return out;
+}
+
+bool has_vectors(const std::string& file) {
+  std::ifstream in(file);
+  std::string line;
+  while (trim(line).empty() && std::getline(in, line)) {
+  }
+  const auto fields = split_fields(line);
+  return std::find(fields.begin(), fields.end(), "wi_x") != fields.end();
+}
+
+/// `theta` and `phi` in steps, phi in [0, 360).
+std::array<long, 2> angles_of(double theta, double phi) {
+  const long circle = steps(360), p = steps(phi - 360 * std::floor(phi / 360));
+  return {steps(theta), p == circle ? 0 : p};
+}
+std::array<long, 2> angles_of(const Vec3<double>& w) {
+  const double s = std::sqrt(sin2_theta(w));
+  return angles_of(std::atan2(s, w.z) * 180 / kPi, s > 1e-9 ? std::atan2(w.y, w.x) * 180 / kPi : 0);
+}
+
+}  // namespace
+
+Measurement read_csv_grid(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  std::ifstream in(path);
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error) || !in)
+    input_error("{}: expected a CSV file that can be read", name);
+  const bool vectors = has_vectors(name);
+  const std::vector<std::string> columns =
+      split_fields(vectors ? "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,r,g,b" : "theta_i,phi_i,theta_o,phi_o,r,g,b");
+  CsvReader csv(in, name, columns);
+  if (csv.empty()) input_error("{}: expected a header with the columns {}", name, fmt::join(columns, ","));
+  std::map<Angles, std::array<float, 3>> rows;
+  std::array<std::set<long>, 4> found;
+  std::size_t negative = 0;
+  std::vector<double> row;
+  while (csv.next(row)) {
+    Angles a;
+    if (vectors) {
+      const Vec3<double> wi = csv.unit_vector(row, 0), wo = csv.unit_vector(row, 3);
+      if (!(wi.z > 0 && wo.z > 0)) input_error("{}: expected directions above the surface", csv.where());
+      const auto i = angles_of(wi), o = angles_of(wo);
+      a = {i[0], i[1], o[0], o[1]};
+    } else {
+      for (const std::size_t theta : {0, 2})
+        if (!(row[theta] >= 0 && row[theta] <= 90))
+          input_error("{}: {}: expected degrees from 0 to 90, got {}", csv.where(), columns[theta], row[theta]);
+      for (const std::size_t phi : {1, 3})
+        if (!(std::abs(row[phi]) <= 1e6))
+          input_error("{}: {}: expected degrees, got {}", csv.where(), columns[phi], row[phi]);
+      const auto i = angles_of(row[0], row[1]), o = angles_of(row[2], row[3]);
+      a = {i[0], i[1], o[0], o[1]};
+    }
+    std::array<float, 3> value;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double v = row[columns.size() - 3 + c];
+      if (!std::isfinite(float(v)))
+        input_error("{}: {}: expected a number up to 1e38, got {}", csv.where(), columns[columns.size() - 3 + c], v);
+      negative += v < 0;
+      value[c] = float(std::max(v, 0.));
+    }
+    const bool pole = a[0] == 0 || a[2] == 0;
+    if (!rows.emplace(without_pole(a), value).second && !pole)
+      input_error(
+          "{}: expected each combination of angles once: theta_i {}, phi_i {}, theta_o {}, phi_o {} stands twice",
+          csv.where(), degrees(a[0]), degrees(a[1]), degrees(a[2]), degrees(a[3]));
+    for (std::size_t k = 0; k < 4; ++k)
+      if (k % 2 == 0 || a[k - 1] != 0) found[k].insert(a[k]);
+  }
+  if (rows.empty()) input_error("{}: expected rows below the header, found none", name);
+  for (std::set<long>& values : found)
+    if (values.empty()) values.insert(0);
+
+  auto table = std::make_shared<GridTable>();
+  AngleAxis* axes[] = {&table->theta_i, &table->phi_i, &table->theta_o, &table->phi_o};
+  // Rows can be shared only where theta is 0, which at least a quarter of the combinations are not.
+  const std::size_t most = 4 * rows.size();
+  std::size_t entries = 1;
+  for (std::size_t k = 0; k < 4; ++k) {
+    axes[k]->at = axis_of(found[k]);
+    entries *= found[k].size();
+    if (entries > most)
+      input_error(
+          "{}: expected a row for every combination of angles: {} theta_i, {} phi_i, {} theta_o and {} phi_o, "
+          "found {} rows",
+          name, found[0].size(), found[1].size(), found[2].size(), found[3].size(), rows.size());
+  }
+  Measurement out;
+  const bool isotropic = found[1].size() == 1;
+  if (isotropic && *found[1].begin() != 0)
+    input_error("{}: phi_i: expected 0 where it has one value, got {}", name, degrees(*found[1].begin()));
+  table->mirrored = isotropic && table->phi_o.at.back() <= 180;
+  table->phi_i.ends = AngleAxis::Ends::Circle;
+  table->phi_o.ends = table->mirrored ? AngleAxis::Ends::Constant : AngleAxis::Ends::Circle;
+  table->values.resize(entries);
+  std::size_t missing = 0, at = 0;
+  Angles first{};
+  for (const long ti : found[0])
+    for (const long pi : found[1])
+      for (const long to : found[2])
+        for (const long po : found[3]) {
+          const Angles angles{ti, pi, to, po};
+          if (const auto found_at = rows.find(without_pole(angles)); found_at != rows.end())
+            table->values[at] = found_at->second;
+          else if (missing++ == 0)
+            first = angles;
+          ++at;
+        }
+  if (missing)
+    input_error(
+        "{}: expected a row for every combination of angles; {} missing, the first theta_i {}, phi_i {}, "
+        "theta_o {}, phi_o {}",
+        name, counted(missing, "is", "are"), degrees(first[0]), degrees(first[1]), degrees(first[2]),
+        degrees(first[3]));
+  if (negative)
+    out.notes.push_back(fmt::format("{} negative: taken for 0", counted(negative, "number is", "numbers are")));
+  if (table->mirrored)
+    out.notes.emplace_back("phi_o lies within half a circle: the other half is taken for its mirror image");
+  out.file = name;
+  out.format = "CSV";
+  out.grid = fmt::format("{} x {} directions of light, {} x {} of view", found[0].size(), found[1].size(),
+                         found[2].size(), found[3].size());
+  out.isotropic = isotropic;
+  out.highest = std::min(table->theta_i.at.back(), table->theta_o.at.back());
+  out.table = std::move(table);
+  return out;
+}
+
+}  // namespace brdfc::measured

@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/fit_models.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "core/sequence.h"
+#include "fit/view.h"
+#include "model/choices.h"
+#include "model/sampling.h"
+
+namespace brdfc::measured {
+namespace {
+
+constexpr std::size_t kCoarse = 256, kFine = 1024, kFinal = 8192;  ///< pairs of directions
+constexpr int kTries = 24;          ///< places where numbers are tried before a search, for each choice
+constexpr std::size_t kStarts = 4;  ///< searches begin at the best of them
+/// A model that misplaces less than this needs no matte light.
+constexpr double kGood = 1e-3;
+/// Matte light is taken if it makes the error at least so many times smaller.
+constexpr double kWorthMatte = 0.95;
+/// Rounds of least squares. Deviations below a floor count as it; it begins at the mean of the data and falls.
+constexpr int kDeviationRounds = 24;
+constexpr double kFloorFalls = 0.6;
+
+using Colors = std::vector<Rgb<double>>;
+
+/// Pairs of directions, and the data there; `weight` makes a sum an integral over both hemispheres of f cos cos.
+struct Pairs {
+  std::vector<Vec3<double>> wi, wo;
+  std::vector<double> weight;
+  Colors data;
+  double light = 0;  ///< the sum of weight * data
+};
+
+Pairs make_pairs(const MeasuredModel& data, std::size_t count, std::uint64_t seed) {
+  const auto brdf = data.make_double({});
+  Sequence3 lights(seed);
+  Sequence2 views(seed + 1);
+  Pairs out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point2 v = views.next();
+    const Vec3<double> wo = sample_cosine(v.x, v.y);
+    const Sample<double> s = brdf->sample(wo, lights.next());
+    if (!(s.pdf > 0) || !(wo.z > 1e-3)) continue;
+    out.wi.push_back(s.wi);
+    out.wo.push_back(wo);
+    out.weight.push_back(s.wi.z / s.pdf / double(count));
+    out.data.push_back(brdf->eval(s.wi, wo));
+    const Rgb<double>& d = out.data.back();
+    out.light += out.weight.back() * (d.r + d.g + d.b);
+  }
+  return out;
+}
+
+double error_of(const Pairs& p, const Colors& f) {
+  double off = 0;
+  for (std::size_t k = 0; k < f.size(); ++k) {
+    const Rgb<double> d = magnitude(f[k] - p.data[k]);
+    off += p.weight[k] * (d.r + d.g + d.b);
+  }
+  return p.light > 0 ? off / p.light : 0;
+}
+
+double channel(const Rgb<double>& c, std::size_t i) { return i == 0 ? c.r : i == 1 ? c.g : c.b; }
+void set_channel(Rgb<double>& c, std::size_t i, double v) { (i == 0 ? c.r : i == 1 ? c.g : c.b) = v; }
+
+/// The x in [0, high] that minimise the sum of weight (target - sum x_j column_j)^2, by descent along one after
+/// another.
+std::vector<double> least_squares(const std::vector<std::vector<double>>& columns, const std::vector<double>& target,
+                                  const std::vector<double>& weight, const std::vector<double>& start,
+                                  const std::vector<double>& high) {
+  const std::size_t n = columns.size();
+  std::vector<double> normal(n * n), right(n), x = start;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j <= i; ++j)
+      for (std::size_t k = 0; k < target.size(); ++k) normal[i * n + j] += weight[k] * columns[i][k] * columns[j][k];
+    for (std::size_t k = 0; k < target.size(); ++k) right[i] += weight[k] * columns[i][k] * target[k];
+    for (std::size_t j = 0; j < i; ++j) normal[j * n + i] = normal[i * n + j];
+  }
+  for (int sweep = 0; sweep < (n > 1 ? 200 : 1); ++sweep)
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!(normal[i * n + i] > 0)) continue;
+      double rest = right[i];
+      for (std::size_t j = 0; j < n; ++j)
+        if (j != i) rest -= normal[i * n + j] * x[j];
+      x[i] = std::clamp(rest / normal[i * n + i], 0., high[i]);
+    }
+  return x;
+}
+
+/// The same for the sum of weight |target - sum x_j column_j|: least squares with weights that follow the deviations.
+/// `scale` is the mean of the data.
+std::vector<double> least_deviations(const std::vector<std::vector<double>>& columns, const std::vector<double>& target,
+                                     const std::vector<double>& weight, double scale, const std::vector<double>& high) {
+  std::vector<double> x(columns.size()), by_deviation(target.size());
+  double floor = scale;
+  for (int round = 0; round < kDeviationRounds; ++round, floor *= kFloorFalls) {
+    for (std::size_t k = 0; k < target.size(); ++k) {
+      double rest = target[k];
+      for (std::size_t j = 0; j < x.size(); ++j) rest -= x[j] * columns[j][k];
+      by_deviation[k] = weight[k] / (std::abs(rest) + floor + 1e-30);
+    }
+    x = least_squares(columns, target, by_deviation, x, high);
+  }
+  return x;
+}
+
+/// A model with its choices made, and what is searched for.
+class Problem {
+ public:
+  Problem(const Model& model, const ParamValues& choices, bool isotropic, const Pairs& pairs)
+      : info_(model.info()), values_(complete(info_, choices)), brdf_(model.make_double(values_)) {
+    for (const ParamInfo& p : info_.params)
+      if (p.kind == ParamKind::Color) colors_.push_back(&p);
+    if (brdf_->scatters_through()) return;
+    std::vector<const ParamInfo*> numbers;
+    for (const ParamInfo& p : info_.params)
+      if (p.kind == ParamKind::Number && !(isotropic && p.unit == "rad")) numbers.push_back(&p);
+    for (const ParamInfo* p : numbers) {
+      if (!matters(*p, numbers, pairs)) continue;
+      // A number that only scales what a colour scales as well is left to the colour.
+      if (std::ranges::any_of(colors_, [&](const ParamInfo* c) { return p->max == 1 && same_at_zero(*p, *c, pairs); }))
+        set(*p, 1);
+      else
+        searched_.push_back(p);
+    }
+  }
+
+  bool through() const { return brdf_->scatters_through(); }
+  const std::vector<const ParamInfo*>& searched() const { return searched_; }
+  const ParamValues& values() const { return values_; }
+  bool has_colors() const { return !colors_.empty(); }
+
+  void set_numbers(const std::vector<double>& t) {
+    for (std::size_t i = 0; i < searched_.size(); ++i) set(*searched_[i], searched_[i]->slider().at(t[i]));
+  }
+
+  Colors eval(const Pairs& p) const {
+    Colors out(p.wi.size());
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = brdf_->eval(p.wi[k], p.wo[k]);
+    return out;
+  }
+
+  /// Finds the colours, and the matte light if it is asked for; returns the error.
+  double solve(const Pairs& p, std::optional<Rgb<double>>& matte) {
+    const std::size_t count = p.wi.size(), n = colors_.size(), all = n + (matte ? 1 : 0);
+    double mean = 0;
+    for (std::size_t k = 0; k < count; ++k) mean += luminance(p.data[k]) / double(count);
+    std::vector<Rgb<double>> found(n, Rgb<double>(0.5));
+    Rgb<double> added(0);
+    Colors f;
+    double best = std::numeric_limits<double>::infinity();
+    std::vector<Rgb<double>> best_found = found;
+    // f is linear in most colours, and then the second round changes nothing.
+    for (int round = 0; round < (n ? 3 : 1); ++round) {
+      for (std::size_t j = 0; j < n; ++j) set(*colors_[j], round == 0 ? Rgb<double>(0) : found[j]);
+      const std::vector<Rgb<double>> base = round == 0 ? std::vector<Rgb<double>>(n, Rgb<double>(0)) : found;
+      const Colors at_base = eval(p);
+      std::vector<Colors> slopes;
+      std::vector<Rgb<double>> steps;
+      for (std::size_t j = 0; j < n; ++j) {
+        Rgb<double> end(0);
+        for (std::size_t c = 0; c < 3; ++c) set_channel(end, c, channel(base[j], c) < 0.5 ? 1 : 0);
+        if (round > 0)
+          for (std::size_t c = 0; c < 3; ++c)
+            set_channel(end, c, channel(base[j], c) < 0.5 ? channel(base[j], c) + 0.01 : channel(base[j], c) - 0.01);
+        set(*colors_[j], end);
+        slopes.push_back(eval(p));
+        steps.push_back(end - base[j]);
+        set(*colors_[j], base[j]);
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        std::vector<std::vector<double>> columns(all, std::vector<double>(count));
+        std::vector<double> target(count);
+        const std::vector<double> high(all, 1.);
+        for (std::size_t k = 0; k < count; ++k) {
+          target[k] = channel(p.data[k], c) - channel(at_base[k], c);
+          for (std::size_t j = 0; j < n; ++j) {
+            columns[j][k] = (channel(slopes[j][k], c) - channel(at_base[k], c)) / channel(steps[j], c);
+            target[k] += columns[j][k] * channel(base[j], c);
+          }
+          if (matte) columns[n][k] = 1 / kPi;
+        }
+        const std::vector<double> x = least_deviations(columns, target, p.weight, mean, high);
+        for (std::size_t j = 0; j < n; ++j) set_channel(found[j], c, x[j]);
+        if (matte) set_channel(added, c, x[n]);
+      }
+      for (std::size_t j = 0; j < n; ++j) set(*colors_[j], found[j]);
+      f = eval(p);
+      if (matte)
+        for (Rgb<double>& v : f) v += added / kPi;
+      const double error = error_of(p, f);
+      if (!(error < best * (1 - 1e-6))) break;
+      best = error;
+      best_found = found;
+      if (matte) matte = added;
+    }
+    for (std::size_t j = 0; j < n; ++j) set(*colors_[j], best_found[j]);
+    return std::isfinite(best) ? best : std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  void set(const ParamInfo& p, double value) {
+    values_[p.name] = value;
+    brdf_->assign(p.name, {value, value, value});
+  }
+  void set(const ParamInfo& p, const Rgb<double>& value) {
+    values_[p.name] = std::array<double, 3>{value.r, value.g, value.b};
+    brdf_->assign(p.name, {value.r, value.g, value.b});
+  }
+
+  static bool differ(const Colors& a, const Colors& b) {
+    double off = 0, most = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      off = std::max(off, max_component(magnitude(a[k] - b[k])));
+      most = std::max(most, max_component(magnitude(a[k])));
+    }
+    return off > 1e-6 * most;
+  }
+
+  /// Whether f depends on a number, with the others at their defaults or elsewhere.
+  bool matters(const ParamInfo& p, const std::vector<const ParamInfo*>& numbers, const Pairs& pairs) {
+    const ParamValues before = values_;
+    bool found = false;
+    for (const double others : {-1., 0.3, 0.7}) {
+      for (std::size_t i = 0; i < numbers.size(); ++i)
+        if (others >= 0) set(*numbers[i], numbers[i]->slider().at(wrap(others + 0.37 * double(i))));
+      set(p, p.slider().at(0.25));
+      const Colors low = eval(pairs);
+      set(p, p.slider().at(0.75));
+      found |= differ(low, eval(pairs));
+      for (const ParamInfo* q : numbers) set(*q, std::get<double>(before.at(q->name)));
+    }
+    return found;
+  }
+
+  bool same_at_zero(const ParamInfo& p, const ParamInfo& color, const Pairs& pairs) {
+    if (p.min > 0) return false;
+    const double before = std::get<double>(values_.at(p.name));
+    const auto c = std::get<std::array<double, 3>>(values_.at(color.name));
+    set(p, 0);
+    const Colors without = eval(pairs);
+    set(p, 1);
+    set(color, Rgb<double>(0));
+    const bool same = !differ(eval(pairs), without);
+    // Also half of the one is as much as half of the other.
+    set(p, 0.5), set(color, Rgb<double>(1));
+    const Colors half = eval(pairs);
+    set(p, 1), set(color, Rgb<double>(0.5));
+    const bool both = same && !differ(eval(pairs), half);
+    set(p, before), set(color, Rgb<double>(c[0], c[1], c[2]));
+    return both;
+  }
+
+  const ModelInfo& info_;
+  ParamValues values_;
+  std::unique_ptr<Brdf<double>> brdf_;
+  std::vector<const ParamInfo*> colors_, searched_;
+};
+
+struct Candidate {
+  std::size_t problem;
+  std::vector<double> t;  ///< places on the sliders
+  double error;
+};
+
+double slider_place(const ParamInfo& p, double value) {
+  const ScaledRange r = p.slider();
+  const double low = to_scale(r.scale, r.low), high = to_scale(r.scale, r.high);
+  return std::clamp((to_scale(r.scale, std::clamp(value, r.low, r.high)) - low) / (high - low), 0., 1.);
+}
+
+std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pairs& coarse, const Pairs& fine,
+                                  const Pairs& last, Matte allowed) {
+  const auto start = std::chrono::steady_clock::now();
+  const ModelInfo& info = model.info();
+  std::vector<Problem> problems;
+  for (const Choices& choices : choice_combinations(info)) {
+    Problem p(model, with_choices(info, choices), isotropic, coarse);
+    if (!p.through()) problems.push_back(std::move(p));
+  }
+  std::optional<ModelFit> best;
+  for (const bool matte : {false, true}) {
+    if (matte && (allowed == Matte::None || info.look == Look::Matte || best->error < kGood)) break;
+    const auto extra = [&] { return matte ? std::optional(Rgb<double>(0)) : std::nullopt; };
+    std::vector<Candidate> candidates;
+    for (std::size_t i = 0; i < problems.size(); ++i) {
+      Problem& problem = problems[i];
+      const std::size_t n = problem.searched().size();
+      std::vector<double> t;
+      for (const ParamInfo* p : problem.searched()) t.push_back(slider_place(*p, p->value[0]));
+      for (int k = 0; k <= (n ? kTries * int(n) : 0); ++k) {
+        problem.set_numbers(t);
+        auto added = extra();
+        candidates.push_back({i, t, problem.solve(coarse, added)});
+        // An additive recurrence with powers of a root, as in core/sequence.h, for any number of dimensions.
+        for (std::size_t d = 0; d < n; ++d) t[d] = wrap(0.5 + double(k + 1) * std::pow(1.22, -double(d + 1)) * 0.7548);
+      }
+    }
+    std::ranges::stable_sort(candidates, {}, &Candidate::error);
+    if (candidates.size() > kStarts) candidates.resize(kStarts);
+    for (Candidate& c : candidates) {
+      Problem& problem = problems[c.problem];
+      for (const double step : {0.08, 0.01}) {
+        if (c.t.empty()) break;
+        std::vector<fit::Variable> variables;
+        for (const double t : c.t) variables.push_back({t, 0, 1, step});
+        c.t = fit::argmin(variables, [&](const std::vector<double>& t) {
+          problem.set_numbers(t);
+          auto added = extra();
+          return std::min(problem.solve(fine, added), 1e6);
+        });
+      }
+      problem.set_numbers(c.t);
+      auto added = extra();
+      const double error = problem.solve(last, added);
+      if (!best || error < best->error * (matte && !best->matte ? kWorthMatte : 1 - 1e-3))
+        best = ModelFit{&model, problem.values(), added, error, 0};
+    }
+    if (!best) return std::nullopt;
+  }
+  best->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return best;
+}
+
+}  // namespace
+
+std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
+                                 const std::vector<const Model*>& models, Matte matte) {
+  const Pairs coarse = make_pairs(data, kCoarse, 1), fine = make_pairs(data, kFine, 2),
+              last = make_pairs(data, kFinal, 3);
+  std::vector<std::optional<ModelFit>> found(models.size());
+  for_all(models.size(), [&](std::size_t i) {
+    if (models[i]->has_scatter()) found[i] = fit_model(*models[i], m.isotropic, coarse, fine, last, matte);
+  });
+  std::vector<ModelFit> out;
+  for (auto& f : found)
+    if (f) out.push_back(std::move(*f));
+  std::ranges::stable_sort(out, {}, &ModelFit::error);
+  return out;
+}
+
+}  // namespace brdfc::measured

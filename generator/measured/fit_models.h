@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fits of models to a measured BRDF.
+//
+// The error is the light that a picture would misplace: the integral of |f - data| cos cos over both hemispheres,
+// divided by that of data cos cos. Colours, and matte light of which a model has none itself, are found by linear least
+// squares with weights that approach this error; numbers are found by search, and choices by trying all.
+#pragma once
+
+#include <optional>
+
+#include "measured/measured_model.h"
+
+namespace brdfc::measured {
+
+struct ModelFit {
+  const Model* model = nullptr;
+  ParamValues values;
+  /// Albedo of a Lambert surface that is added to the model; nullopt if the model does without.
+  std::optional<Rgb<double>> matte;
+  double error = 0;  ///< share of the light that is misplaced
+  double seconds = 0;
+};
+
+/// Whether light of a Lambert surface may be added to the models.
+enum class Matte { None, Added };
+/// The models whose f is not 0, fitted, those with the least error first. Light that passes through is not considered.
+std::vector<ModelFit> fit_models(const Measurement&, const MeasuredModel&, const std::vector<const Model*>&, Matte);
+
+}  // namespace brdfc::measured

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/measured_model.h"
+
+#include <stdexcept>
+
+namespace brdfc::measured {
+namespace {
+
+class MeasuredBrdf final : public Brdf<double> {
+ public:
+  MeasuredBrdf(std::shared_ptr<const Table> table, std::shared_ptr<const HalfVectors> sampling)
+      : table_(std::move(table)), sampling_(std::move(sampling)) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override { return table_->eval(wi, wo); }
+  double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const override { return sampling_->pdf(wi, wo); }
+  Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const override {
+    Sample<double> s = sampling_->sample(wo, u);
+    if (s.pdf > 0) s.weight = eval(s.wi, wo) * (s.wi.z / s.pdf);
+    return s;
+  }
+  Rgb<double> mirror(const Vec3<double>&) const override { return Rgb<double>(0); }
+  Rgb<double> transmit(const Vec3<double>&) const override { return Rgb<double>(0); }
+  double ior() const override { return 1; }
+  std::array<double, 3> channel_iors() const override { return {1, 1, 1}; }
+  Rgb<double> transmittance(const double&) const override { return Rgb<double>(1); }
+  bool scatters_through() const override { return false; }
+  std::optional<ClosureSum<double>> exact(const Vec3<double>&) const override { return std::nullopt; }
+  ClosureSum<double> base(const Vec3<double>&) const override { return {}; }
+  void assign(const std::string&, const std::array<double, 3>&) override {}
+
+ private:
+  std::shared_ptr<const Table> table_;
+  std::shared_ptr<const HalfVectors> sampling_;
+};
+
+template <class T> void set(Rgb<T>& to, std::size_t lane, const Rgb<double>& value) {
+  to.r[lane] = value.r, to.g[lane] = value.g, to.b[lane] = value.b;
+}
+Vec3<double> get(const Vec3<Pack>& v, std::size_t lane) { return {v.x[lane], v.y[lane], v.z[lane]}; }
+
+/// Looks eight directions up, one after the other: reading a table is not computing.
+class PackedMeasured final : public PackedBrdf {
+ public:
+  explicit PackedMeasured(std::unique_ptr<Brdf<double>> brdf) : brdf_(std::move(brdf)) {}
+  PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const override {
+    PackedEvaluation out{Rgb<Pack>(Pack(0)), Pack(0)};
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      set(out.f, k, brdf_->eval(get(wi, k), get(wo, k)));
+      out.pdf[k] = brdf_->pdf(get(wi, k), get(wo, k));
+    }
+    return out;
+  }
+  Sample<Pack> sample(const Vec3<Pack>& wo, const Vec3<Pack>& u) const override {
+    Sample<Pack> out{{Pack(0), Pack(0), Pack(1)}, Rgb<Pack>(Pack(0)), Pack(0)};
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const Sample<double> s = brdf_->sample(get(wo, k), get(u, k));
+      out.wi.x[k] = s.wi.x, out.wi.y[k] = s.wi.y, out.wi.z[k] = s.wi.z;
+      set(out.weight, k, s.weight);
+      out.pdf[k] = s.pdf;
+    }
+    return out;
+  }
+  Rgb<Pack> mirror(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
+  Rgb<Pack> transmit(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
+  Rgb<Pack> transmittance(const Pack&) const override { return Rgb<Pack>(Pack(1)); }
+  Pack ior() const override { return Pack(1); }
+  std::array<Pack, 3> channel_iors() const override { return {Pack(1), Pack(1), Pack(1)}; }
+  void assign(const std::string&, const std::array<Pack, 3>&) override {}
+
+ private:
+  std::unique_ptr<Brdf<double>> brdf_;
+};
+
+[[noreturn]] void no_formula() { throw std::logic_error("a measured BRDF is a table: it has no formula"); }
+
+}  // namespace
+
+MeasuredModel::MeasuredModel(const Measurement& m)
+    : info_{.name = "measured", .label = "Measured", .look = Look::Glossy},
+      table_(m.table),
+      sampling_(std::make_shared<HalfVectors>(*m.table, m.isotropic)) {
+  info_.doc = m.file;
+  info_.properties.isotropic = m.isotropic;
+  info_.properties.exact_sampling = false;
+}
+
+std::unique_ptr<Brdf<double>> MeasuredModel::make_double(const ParamValues&) const {
+  return std::make_unique<MeasuredBrdf>(table_, sampling_);
+}
+std::unique_ptr<PackedBrdf> MeasuredModel::make_packed(const ParamValues& values) const {
+  return std::make_unique<PackedMeasured>(make_double(values));
+}
+std::unique_ptr<Brdf<float>> MeasuredModel::make_float(const ParamValues&) const { no_formula(); }
+std::unique_ptr<Brdf<Wide>> MeasuredModel::make_wide(const ParamValues&) const { no_formula(); }
+std::unique_ptr<Brdf<Expr>> MeasuredModel::record(const ParamValues&) const { no_formula(); }
+
+}  // namespace brdfc::measured

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Measured BRDFs: what a file holds, and its values for any pair of directions.
+//
+// Formats:
+//   MERL .binary    W. Matusik, H. Pfister, M. Brand, L. McMillan: A Data-Driven Reflectance Model, SIGGRAPH 2003
+//   RGL .bsdf       J. Dupuy, W. Jakob: An Adaptive Parameterization for Efficient Material Acquisition and Rendering,
+//                   SIGGRAPH Asia 2018
+//   UTIA .bin       J. Filip, R. Vavra: Template-Based Sampling of Anisotropic BRDFs, Pacific Graphics 2014
+//   CSV             a value for every combination of angles (measured/csv_grid.h)
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "model/optical.h"
+
+namespace brdfc::measured {
+
+/// The values of a file. Directions and units are those of a model (model/model.h).
+class Table {
+ public:
+  virtual ~Table() = default;
+  /// The BRDF in 1/sr, in linear Rec.709; 0 unless both directions are above the surface. Finite and not negative.
+  virtual Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const = 0;
+};
+
+struct Measurement {
+  std::string file;
+  std::string format;              ///< "MERL", "RGL", "UTIA" or "CSV"
+  std::string description;         ///< text that the file has about itself, if any
+  std::string grid;                ///< resolution, for people
+  bool isotropic = true;           ///< unchanged when both directions are rotated about the normal
+  double highest = 90;             ///< largest angle to the normal that was measured, in degrees
+  std::vector<std::string> notes;  ///< a sentence for each thing that was assumed, left out or repaired
+  std::shared_ptr<const Table> table;
+};
+
+/// Reads a file, whose name's extension says the format. Spectra are converted to X, Y and Z under D65, and by `to_rgb`
+/// to linear Rec.709. Throws InputError that names the file, the field or line, and what was expected.
+Measurement read_measurement(const std::filesystem::path&, const ToRgb& to_rgb);
+/// The extensions that read_measurement() knows.
+inline constexpr std::array<const char*, 4> kExtensions{".binary", ".bsdf", ".bin", ".csv"};
+
+/// "1 entry is" or "12 entries are"
+std::string counted(std::size_t count, const std::string& one, const std::string& many);
+
+}  // namespace brdfc::measured

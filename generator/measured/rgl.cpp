@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/rgl.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "measured/tensor_file.h"
+#include "measured/warp.h"
+#include "model/spectrum.h"
+
+namespace brdfc::measured {
+namespace {
+
+/// The angle to the normal, without the loss of digits of acos() near it.
+double elevation(const Vec3<double>& w) { return std::atan2(std::sqrt(sin2_theta(w)), w.z); }
+double theta_to_unit(double theta) { return std::sqrt(theta * (2 / kPi)); }
+double phi_to_unit(double phi) { return (phi + kPi) / (2 * kPi); }
+
+class Rgl final : public Table {
+ public:
+  std::vector<float> phis, thetas;
+  Warp ndf, sigma, vndf;
+  std::array<Warp, 3> rgb;
+  bool isotropic = true, jacobian = true;
+  int reduction = 1;  ///< how many times the azimuths in the file go into a circle
+
+  Rgb<double> eval(const Vec3<double>& light, const Vec3<double>& view) const override {
+    if (!(light.z > 0 && view.z > 0)) return Rgb<double>(0);
+    Vec3<double> wi = view, wo = light;
+    if (reduction >= 2) {
+      const bool y = wi.y < 0, x = reduction == 4 ? wi.x < 0 : y;
+      // The measured azimuths are those of negative y, and of negative x where a quarter was measured.
+      const auto turn = [&](Vec3<double>& w) {
+        if (!y) w.y = -w.y;
+        if (!x) w.x = -w.x;
+      };
+      turn(wi), turn(wo);
+    }
+    const Vec3<double> m = normalize(wi + wo);
+    const double phi = std::atan2(wi.y, wi.x), theta = elevation(wi);
+    const double phi_m = std::atan2(m.y, m.x) - (isotropic ? phi : 0);
+    const Point2 u_wi{theta_to_unit(theta), phi_to_unit(phi)},
+        u_m{theta_to_unit(elevation(m)), wrap(phi_to_unit(phi_m))};
+    const Blend b = blend(phis, thetas, phi, theta);
+    const Point2 place = vndf.invert(u_m, b);
+    double scale = 1 / light.z;
+    if (jacobian) {
+      const Blend all{{0}, {1}, 1};
+      const double area = sigma.eval(u_wi, all);
+      if (!(area > 0)) return Rgb<double>(0);  // no facet faces the viewer
+      scale *= ndf.eval(u_m, all) / (4 * area);
+    }
+    const auto channel = [&](std::size_t c) { return std::max(rgb[c].eval(place, b) * scale, 0.); };
+    return {channel(0), channel(1), channel(2)};
+  }
+};
+
+/// Throws unless the numbers increase.
+void require_increasing(const TensorFile& file, const std::string& field, const std::vector<float>& v) {
+  for (std::size_t i = 1; i < v.size(); ++i)
+    if (!(v[i] > v[i - 1])) file.fail(field, fmt::format("increasing numbers, got {} after {}", v[i], v[i - 1]));
+}
+
+Warp read_warp(TensorFile& file, const std::string& field, std::size_t slices, bool cumulative) {
+  const std::vector<std::size_t>& shape = file.shape(field, cumulative ? 4 : 2);
+  const std::size_t height = shape[shape.size() - 2], width = shape.back();
+  if (width < 2 || height < 2) file.fail(field, "at least 2 x 2 numbers a slice");
+  std::vector<float> data = file.numbers(field);
+  if (data.size() != slices * width * height)
+    file.fail(field,
+              fmt::format("{} slices, one for each phi_i and theta_i, got {}", slices, data.size() / (width * height)));
+  if (const auto bad = std::find_if(data.begin(), data.end(), [](float v) { return v < 0; }); bad != data.end())
+    file.fail(field, fmt::format("no number below 0, got {}", *bad));
+  if (cumulative)
+    if (const std::size_t empty = Warp::empty_slice(data, width, height); empty < slices)
+      file.fail(field, fmt::format("a number above 0 in each slice, found none in slice {}", empty));
+  return Warp(std::move(data), width, height, cumulative);
+}
+
+/// For each wavelength of a file its share in X, Y and Z: spectra are linear between wavelengths and constant beyond.
+std::vector<Xyz> shares(const std::vector<float>& nm) {
+  std::vector<Xyz> out(nm.size(), Xyz{});
+  for (std::size_t i = 0; i < kWavelengths; ++i) {
+    const double at = kWavelengthMin + double(i) * kWavelengthStep;
+    const std::size_t second = std::size_t(std::lower_bound(nm.begin(), nm.end(), at) - nm.begin());
+    const auto add = [&](std::size_t k, double weight) {
+      for (std::size_t c = 0; c < 3; ++c) out[k][c] += weight * xyz_weights()[i][c];
+    };
+    if (second == 0)
+      add(0, 1);
+    else if (second == nm.size())
+      add(second - 1, 1);
+    else {
+      const double w = (at - double(nm[second - 1])) / (double(nm[second]) - double(nm[second - 1]));
+      add(second - 1, 1 - w), add(second, w);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Measurement read_rgl(const std::filesystem::path& path, const ToRgb& to_rgb) {
+  TensorFile file(path);
+  Measurement out;
+  out.file = file.name();
+  out.format = "RGL";
+  auto table = std::make_shared<Rgl>();
+  file.shape("phi_i", 1), file.shape("theta_i", 1);
+  table->phis = file.numbers("phi_i");
+  table->thetas = file.numbers("theta_i");
+  require_increasing(file, "phi_i", table->phis);
+  require_increasing(file, "theta_i", table->thetas);
+  if (table->thetas.front() < 0 || table->thetas.back() > 1.5708f)
+    file.fail("theta_i",
+              fmt::format("radians from 0 to pi / 2, got {} to {}", table->thetas.front(), table->thetas.back()));
+  if (std::abs(table->phis.front()) > 6.2832f || std::abs(table->phis.back()) > 6.2832f)
+    file.fail("phi_i", fmt::format("radians, got {} to {}", table->phis.front(), table->phis.back()));
+  const std::size_t slices = table->phis.size() * table->thetas.size();
+  if (slices > (std::size_t(1) << 24)) file.fail("phi_i", "at most 2^24 directions, together with theta_i");
+  table->ndf = read_warp(file, "ndf", 1, false);
+  table->sigma = read_warp(file, "sigma", 1, false);
+  table->vndf = read_warp(file, "vndf", slices, true);
+  if (file.has("jacobian")) {
+    const auto jacobian = file.bytes("jacobian");
+    if (jacobian.size() != 1) file.fail("jacobian", fmt::format("one byte, got {}", jacobian.size()));
+    table->jacobian = jacobian[0] != 0;
+  } else {
+    out.notes.emplace_back("jacobian: not in the file, taken for 1");
+  }
+  if (file.has("description")) {
+    const auto text = file.bytes("description");
+    for (const std::uint8_t c : text) out.description += c >= ' ' && c < 127 ? char(c) : ' ';
+  }
+  const bool spectral = file.has("wavelengths");
+  const std::string field = spectral ? "spectra" : "rgb";
+  const std::vector<std::size_t> shape = file.shape(field, 5);
+  std::vector<Xyz> to_xyz;
+  if (spectral) {
+    file.shape("wavelengths", 1);
+    const std::vector<float> nm = file.numbers("wavelengths");
+    require_increasing(file, "wavelengths", nm);
+    if (nm.front() > 430 || nm.back() < 650)
+      file.fail("wavelengths", fmt::format("430 to 650 nm at least, got {} to {}", nm.front(), nm.back()));
+    to_xyz = shares(nm);
+  }
+  const std::size_t channels = spectral ? to_xyz.size() : 3, height = shape[3], width = shape[4];
+  if (shape[0] != table->phis.size() || shape[1] != table->thetas.size() || shape[2] != channels || width < 2 ||
+      height < 2)
+    file.fail(field, fmt::format("{} x {} x {} x n x n numbers, n at least 2, got {}", table->phis.size(),
+                                 table->thetas.size(), channels, fmt::join(shape, " x ")));
+  // The conversion of spectra is linear, as interpolation is, so it may come first.
+  std::array<std::vector<float>, 3> planes;
+  {
+    const std::vector<float> data = file.numbers(field);
+    const std::size_t size = width * height;
+    std::array<std::array<double, 3>, 3> rgb_of_xyz{};
+    if (spectral)
+      for (std::size_t c = 0; c < 3; ++c) {
+        Xyz unit{};
+        unit[c] = 1;
+        rgb_of_xyz[c] = to_rgb(unit);
+      }
+    std::size_t negative = 0;
+    for (auto& plane : planes) plane.resize(slices * size);
+    for (std::size_t s = 0; s < slices; ++s)
+      for (std::size_t i = 0; i < size; ++i) {
+        std::array<double, 3> value{};
+        if (spectral) {
+          Xyz xyz{};
+          for (std::size_t k = 0; k < channels; ++k)
+            for (std::size_t c = 0; c < 3; ++c) xyz[c] += to_xyz[k][c] * double(data[(s * channels + k) * size + i]);
+          for (std::size_t c = 0; c < 3; ++c)
+            for (std::size_t k = 0; k < 3; ++k) value[c] += rgb_of_xyz[k][c] * xyz[k];
+        } else {
+          for (std::size_t c = 0; c < 3; ++c) value[c] = data[(s * channels + c) * size + i];
+        }
+        for (std::size_t c = 0; c < 3; ++c) {
+          negative += value[c] < 0;
+          planes[c][s * size + i] = float(value[c]);
+        }
+      }
+    if (negative)
+      out.notes.push_back(fmt::format("{} negative in Rec.709, {:.2g} %: f is taken for 0 where they make it negative",
+                                      counted(negative, "number is", "numbers are"),
+                                      100 * double(negative) / double(3 * slices * size)));
+  }
+  for (std::size_t c = 0; c < 3; ++c) table->rgb[c] = Warp(std::move(planes[c]), width, height, false);
+  table->isotropic = table->phis.size() <= 2;
+  if (!table->isotropic)
+    table->reduction =
+        int(std::lround(std::min(2 * kPi / (double(table->phis.back()) - double(table->phis.front())), 100.)));
+  static const std::set<std::string> known{"phi_i",    "theta_i",     "ndf",     "sigma", "vndf",       "luminance",
+                                           "jacobian", "description", "spectra", "rgb",   "wavelengths"};
+  for (const auto& [name, f] : file.fields())
+    if (!known.count(name)) out.notes.push_back(fmt::format("{}: this field is not known and was not read", name));
+  out.isotropic = table->isotropic;
+  out.highest = double(table->thetas.back()) * 180 / kPi;
+  out.grid = fmt::format("{} x {} directions of view, {} x {} of light{}", table->phis.size(), table->thetas.size(),
+                         height, width, spectral ? fmt::format(", {} wavelengths", channels) : "");
+  out.table = std::move(table);
+  return out;
+}
+
+}  // namespace brdfc::measured

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured BRDFs, by the program `brdfc`: files are read in one place."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._model import real
+
+Array = NDArray[np.float64]
+_COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
+
+
+def _tool() -> str:
+    found = os.environ.get("BRDFC_TOOL") or shutil.which("brdfc")
+    if not found:
+        raise FileNotFoundError(
+            "measured BRDFs are read by the program brdfc, which is not on the path: "
+            'pip install "brdfc[tool]", or name it in the environment variable BRDFC_TOOL'
+        )
+    return found
+
+
+def _run(*arguments: str, text: str = "") -> str:
+    done = subprocess.run(
+        [_tool(), "measured", *arguments], input=text, capture_output=True, text=True
+    )
+    if done.returncode:
+        raise ValueError(done.stderr.strip().removeprefix("brdfc: "))
+    return done.stdout
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model that comes close to a measured BRDF."""
+
+    model: str
+    parameters: dict[str, float | tuple[float, float, float] | str]
+    #: Albedo of a Lambert surface beside the model, or None.
+    matte: tuple[float, float, float] | None
+    #: Share of the light that the model sends in other directions.
+    error: float
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A file with a measured BRDF: RGL, MERL, UTIA or a table."""
+
+    path: str
+    format: str
+    description: str
+    isotropic: bool
+    #: What was assumed or repaired, and what the data lack, a sentence each.
+    notes: tuple[str, ...]
+
+    def _pairs(self, wi, wo) -> Array:
+        wi, wo = real("wi", wi, "vectors"), real("wo", wo, "vectors")
+        wi, wo = np.broadcast_arrays(wi, wo)
+        if wi.ndim == 0 or wi.shape[-1] != 3:
+            raise ValueError(f"wi and wo: expected arrays (..., 3), got {wi.shape}")
+        rows = np.concatenate([wi.reshape(-1, 3), wo.reshape(-1, 3)], axis=1).tolist()
+        text = "\n".join([_COLUMNS, *(",".join(map(repr, row)) for row in rows), ""])
+        lines = _run(self.path, "--pairs", text=text).splitlines()[1:]
+        found = np.array([line.split(",") for line in lines], float).reshape(-1, 4)
+        return found.reshape(*wi.shape[:-1], 4)
+
+    def eval(self, wi, wo) -> Array:
+        """The BRDF in 1/sr, linear Rec.709, (..., 3), of unit vectors (..., 3)."""
+        return self._pairs(wi, wo)[..., :3]
+
+    def albedo(self, cos_theta_o) -> Array:
+        """The share of a white world's light that is reflected, (..., 3), over all azimuths."""
+        cosine = real("cos_theta_o", cos_theta_o, "numbers in (0, 1]")
+        if not ((cosine > 0.0018) & (cosine <= 1)).all():
+            raise ValueError("cos_theta_o: expected numbers from 0.0018 to 1")
+        at = ",".join(map(repr, np.degrees(np.arccos(cosine)).ravel().tolist()))
+        told = json.loads(_run(self.path, "--json", "--models", "none", "--at", at))
+        return np.array([view["rgb"] for view in told["albedo"]]).reshape(*cosine.shape, 3)
+
+    def fits(self, *models: str, matte: bool = True) -> list[Fit]:
+        """The models fitted to it, all if none is named, the nearest first. `matte`: light of a
+        Lambert surface may be added to those that have none."""
+        options = ["--models", ",".join(models) or "all", *([] if matte else ["--no-matte"])]
+        told = json.loads(_run(self.path, "--json", *options))
+
+        def plain(value):
+            return tuple(value) if isinstance(value, list) else value
+
+        return [
+            Fit(
+                f["model"],
+                {k: plain(v) for k, v in f["parameters"].items()},
+                plain(f["matte"]),
+                f["error"],
+            )
+            for f in told["fits"]
+        ]
+
+    def fit(self, model: str, *, matte: bool = True) -> Fit:
+        """One model fitted to it."""
+        return self.fits(model, matte=matte)[0]
+
+
+def measured(path: str | PathLike[str]) -> Measured:
+    """Reads a file. ValueError that says what is wrong with it; FileNotFoundError without the
+    program brdfc."""
+    told = json.loads(_run(os.fspath(path), "--json", "--models", "none"))
+    return Measured(
+        os.fspath(path),
+        told["format"],
+        told["description"],
+        told["isotropic"],
+        (*told["notes"], *told["lacks"]),
+    )

@@ -1,0 +1,477 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured BRDFs: files of every format, made from functions, are read as what they were made from;
+what is wrong in one is said in a line, and so is what data lack."""
+
+import json
+import re
+import struct
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from measured_files import (
+    GOLDEN,
+    KINDS,
+    golden_directions,
+    hemisphere,
+    merl,
+    merl_directions,
+    rgl_fields,
+    tensor,
+    unit,
+    utia,
+    utia_directions,
+)
+from support import ROOT, TOOL, run, scene
+
+COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
+
+
+def eval_pairs(arguments, wi, wo):
+    """What a command of the tool prints for pairs of directions."""
+    rows = "\n".join(",".join(f"{x:.17g}" for x in (*a, *b)) for a, b in zip(wi, wo, strict=True))
+    command = [TOOL, *arguments]
+    done = subprocess.run(command, input=f"{COLUMNS}\n{rows}\n", capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return np.array([line.split(",") for line in done.stdout.splitlines()[1:]], float)
+
+
+def pairs(file, wi, wo):
+    """f (N, 3) and pdf (N,) as the tool has them."""
+    found = eval_pairs(["measured", str(file), "--pairs"], wi, wo)
+    return found[:, :3], found[:, 3]
+
+
+def told(file):
+    done = run("measured", file, "--json", "--models", "none")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def above(wi, wo):
+    return ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
+
+
+def glossy(wi, wo, exponent=30):
+    """Blinn's lobe over a matte base, in three colours; reciprocal."""
+    h = unit(wi + wo)
+    lobe = np.clip(h[:, 2], 0, 1) ** exponent
+    return above(wi, wo) * (np.array([0.1, 0.05, 0.02]) + lobe[:, None] * np.array([0.5, 0.6, 0.7]))
+
+
+def brushed(wi, wo):
+    """Anisotropic, and not reciprocal."""
+    h = unit(wi + wo)
+    lobe = np.exp(-6 * h[:, 0] ** 2 - 2 * h[:, 1] ** 2) * (1 + 0.3 * wi[:, 0])
+    return above(wi, wo) * (0.05 + lobe[:, None] * np.array([0.2, 0.15, 0.1]))
+
+
+@pytest.fixture(scope="module")
+def merl_file(tmp_path_factory):
+    file = tmp_path_factory.mktemp("merl") / "glossy.binary"
+    file.write_bytes(merl(glossy(*merl_directions())))
+    return file
+
+
+def test_merl_is_what_it_was_made_from(merl_file):
+    """Between the entries by interpolation, whose error is an eighth of the lobe's curvature times
+    the squared distance of 2 degrees; for any azimuth, and with light and view swapped."""
+    wi, wo = hemisphere(2000, 1, 0.1), hemisphere(2000, 2, 0.1)
+    found, _ = pairs(merl_file, wi, wo)
+    np.testing.assert_allclose(found, glossy(wi, wo), rtol=5e-3)
+    np.testing.assert_allclose(pairs(merl_file, wo, wi)[0], found, rtol=1e-9)
+
+
+def test_merl_entries_are_in_their_places(merl_file):
+    """Each entry is a number of its own, which the tool gives back in the middle of its cell."""
+    wi, wo = merl_directions()
+    f = np.stack([1 + np.arange(len(wi)), 0.5 + np.arange(len(wi)), 0.25 * np.arange(len(wi))], -1)
+    file = merl_file.parent / "counted.binary"
+    file.write_bytes(merl(f))
+    some = np.random.default_rng(3).permutation(np.flatnonzero(above(wi, wo).ravel()))[:3000]
+    np.testing.assert_allclose(pairs(file, wi[some], wo[some])[0], f[some], rtol=1e-6)
+
+
+def test_merl_is_read_in_two_seconds(merl_file):
+    found = told(merl_file)
+    assert found["format"] == "MERL" and found["isotropic"] and found["seconds"] < 2
+    assert found["notes"] == [] and found["lacks"] == [] and found["non_reciprocal"] < 1e-6
+    # The base reflects pi times its value, and the lobe of Blinn more.
+    at_normal = found["albedo"][0]["rgb"]
+    assert np.pi * 0.1 < at_normal[0] < np.pi * 0.1 + 0.5 and found["albedo"][0]["degrees"] == 0
+
+
+@pytest.mark.slow
+def test_holes_are_filled_from_beside_them(merl_file):
+    wi, wo = merl_directions()
+    f = glossy(wi, wo)
+    holes = np.random.default_rng(4).uniform(size=len(f)) < 0.2
+    f[holes] = -1
+    dark = np.flatnonzero(~holes & above(wi, wo).ravel())[:50]
+    f[dark, 2] = -0.001
+    file = merl_file.parent / "holes.binary"
+    file.write_bytes(merl(f))
+    notes = told(file)["notes"]
+    share = holes[above(wi, wo).ravel()].mean()
+    assert len(notes) == 2 and f"{100 * share:.2g} %: not measured" in notes[0]
+    assert notes[1].startswith("50 entries are negative in one channel or two")
+    i, o = hemisphere(500, 5, 0.2), hemisphere(500, 6, 0.2)
+    found, _ = pairs(file, i, o)
+    # Where a cell and all beside it are missing there is nothing to tell: rare at a fifth.
+    near = np.isclose(found, glossy(i, o), rtol=0.05, atol=2e-3).all(-1)
+    assert near.mean() > 0.97 and (found >= 0).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rgl_files_are_what_mitsuba_makes_of_them(tmp_path, kind):
+    """measured_files.py wrote what Mitsuba's plug-in says: f times the cosine."""
+    file = tmp_path / "m.bsdf"
+    file.write_bytes(tensor(rgl_fields(kind)))
+    rows = [line.split(",") for line in GOLDEN.read_text(encoding="utf-8").splitlines()]
+    golden = np.array([row[1:] for row in rows if row[0] == kind], float)
+    light, view = golden_directions(kind)
+    np.testing.assert_allclose(golden[:, :6], np.hstack([light, view]), atol=1e-8)
+    expected = golden[:, 6:]
+    if kind == "spectral":
+        table = np.genfromtxt(ROOT / "data/color/observer.csv", delimiter=",", names=True)
+        weights = np.stack([table[c] * table["d65"] for c in "xyz"], -1)
+        white = weights.sum(0) / weights.sum(0)[1]
+        # IEC 61966-2-1, whose white is D65 with four digits.
+        to_rgb = np.linalg.inv(
+            [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+        )
+        xyz = expected @ (weights / weights.sum(0)) * white
+        expected = xyz @ to_rgb.T
+        tolerance = {"rtol": 2e-3}
+    else:
+        tolerance = {"rtol": 1e-4}
+    found, _ = pairs(file, light, view)
+    np.testing.assert_allclose(found * light[:, 2:], expected, atol=1e-7, **tolerance)
+    said = told(file)
+    assert said["isotropic"] == (kind in ("isotropic", "spectral"))
+    assert said["description"] == "Made up" and said["highest"] == pytest.approx(88)
+    assert any("nothing was measured beyond 88" in s for s in said["lacks"])
+
+
+def test_utia_is_what_it_was_made_from(tmp_path):
+    file = tmp_path / "m.bin"
+    wi, wo = utia_directions()
+    file.write_bytes(utia(brushed(wi, wo)))
+    some = np.random.default_rng(8).integers(0, len(wi), 500)
+    found, _ = pairs(file, wi[some], wo[some])
+    np.testing.assert_allclose(found, brushed(wi[some], wo[some]), rtol=1e-6)
+    i, o = hemisphere(500, 9, 0.3), hemisphere(500, 10, 0.3)
+    assert np.abs(pairs(file, i, o)[0] - brushed(i, o)).mean() < 0.02 * brushed(i, o).mean()
+    said = told(file)
+    assert not said["isotropic"] and said["highest"] == 75 and said["non_reciprocal"] > 0.02
+    assert any("not reciprocal" in s for s in said["lacks"])
+
+
+def angles(w):
+    return np.degrees(np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2])), np.degrees(
+        np.arctan2(w[:, 1], w[:, 0])
+    )
+
+
+def grid(*axes):
+    out = np.meshgrid(*map(np.asarray, axes), indexing="ij")
+    return [a.ravel().astype(float) for a in out]
+
+
+def vector(theta, phi):
+    theta, phi = np.radians(theta), np.radians(phi)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+
+def angle_table(*columns):
+    rows = "\n".join(",".join(f"{x:.9g}" for x in row) for row in zip(*columns, strict=True))
+    return "theta_i,phi_i,theta_o,phi_o,r,g,b\n" + rows + "\n"
+
+
+def test_a_table_is_what_it_was_made_from(tmp_path):
+    file = tmp_path / "m.csv"
+    ti, pi, to, po = grid(range(0, 86, 5), [0], range(0, 86, 5), range(0, 181, 10))
+    f = glossy(vector(ti, pi), vector(to, po), exponent=4)
+    file.write_text(angle_table(ti, pi, to, po, *f.T), encoding="utf-8")
+    said = told(file)
+    assert said["isotropic"] and said["format"] == "CSV" and "mirror image" in said["notes"][0]
+    i, o = hemisphere(500, 11, 0.1), hemisphere(500, 12, 0.1)
+    expected = glossy(i, o, exponent=4)
+    assert np.abs(pairs(file, i, o)[0] - expected).mean() < 0.01 * expected.mean()
+    at_nodes = slice(0, None, 7)
+    i, o = vector(ti, pi)[at_nodes], vector(to, po)[at_nodes]
+    np.testing.assert_allclose(pairs(file, i, o)[0], f[at_nodes], rtol=1e-6)
+    # Turned as a whole, and the mirror image.
+    turn = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+    for a, b in ((i @ turn, o @ turn), (i * [1, -1, 1], o * [1, -1, 1])):
+        np.testing.assert_allclose(pairs(file, a, b)[0], f[at_nodes], rtol=1e-5)
+    # Anisotropic, as vectors; the azimuth of a direction along the normal stands once.
+    ti, pi, to, po = grid(range(0, 81, 20), range(0, 360, 30), range(0, 81, 20), range(0, 360, 30))
+    once = ((ti > 0) | (pi == 0)) & ((to > 0) | (po == 0))
+    i, o = vector(ti, pi)[once], vector(to, po)[once]
+    text = COLUMNS + ",r,g,b\n"
+    for row in np.hstack([i, o, brushed(i, o)]):
+        text += ",".join(f"{x:.9g}" for x in row) + "\n"
+    file.write_text(text, encoding="utf-8")
+    assert not told(file)["isotropic"]
+    np.testing.assert_allclose(pairs(file, i, o)[0], brushed(i, o), rtol=1e-6)
+
+
+def test_more_light_than_comes_is_said(tmp_path):
+    file = tmp_path / "m.csv"
+    ti, pi, to, po = grid([0, 45, 90], [0], [0, 45, 90], [0, 90, 180])
+    file.write_text(angle_table(ti, pi, to, po, *(0 * ti + 0.5,) * 3), encoding="utf-8")
+    said = told(file)
+    for view in said["albedo"]:
+        assert view["rgb"] == pytest.approx([np.pi / 2] * 3, rel=0.01)
+    assert any(re.search(r"more light than it gets: 1\.5[678] times", s) for s in said["lacks"])
+
+
+def changed(**fields):
+    """A .bsdf file with other fields; None leaves one out."""
+    return tensor({k: v for k, v in (rgl_fields("isotropic") | fields).items() if v is not None})
+
+
+def with_nan(array):
+    array = array.copy()
+    array.ravel()[5] = np.nan
+    return array
+
+
+RGL = rgl_fields("isotropic")
+FLAT = np.zeros((90 * 90 * 180, 3))
+#: File name, content, and what is said of it.
+BAD = {
+    "empty.binary": (b"", "header: expected 3 numbers"),
+    "short.binary": (merl(FLAT + 1)[:-8], "expected 34992012 bytes"),
+    "long.binary": (merl(FLAT + 1) + b"\0", "expected 34992012 bytes"),
+    "size.binary": (struct.pack("<3i", 90, 90, 360), "expected 90 x 90 x 180 values"),
+    "nan.binary": (merl(np.where(np.arange(len(FLAT))[:, None] == 7, np.nan, 1) + FLAT), "entry 7"),
+    "holes.binary": (merl(FLAT - 1), "expected values above the horizon, found none"),
+    "short.bin": (bytes(1000), "expected 1990656 bytes"),
+    "nan.bin": (utia(np.full((288 * 288, 3), np.nan)), "red: expected finite numbers"),
+    "not.bsdf": (bytes(1000), "expected a tensor file"),
+    "short.bsdf": (changed()[:-1], "truncated?"),
+    "head.bsdf": (changed()[:40], "truncated?"),
+    "version.bsdf": (tensor(RGL, version=(2, 0)), "version: expected 1.0, got 2.0"),
+    "no_vndf.bsdf": (changed(vndf=None), "vndf: expected this field"),
+    "no_rgb.bsdf": (changed(rgb=None), "rgb: expected this field"),
+    "double.bsdf": (changed(ndf=RGL["ndf"].astype(float)), "ndf: expected numbers of type float32"),
+    "dims.bsdf": (changed(sigma=RGL["sigma"][0]), "sigma: expected 2 dimensions, got 1"),
+    "nan.bsdf": (changed(ndf=with_nan(RGL["ndf"])), "ndf: expected finite numbers, got nan at 5"),
+    "negative.bsdf": (changed(vndf=-RGL["vndf"]), "vndf: expected no number below 0"),
+    "empty.bsdf": (changed(vndf=0 * RGL["vndf"]), "vndf: expected a number above 0 in each slice"),
+    "slices.bsdf": (changed(theta_i=RGL["theta_i"][:-1]), "vndf: expected 6 slices"),
+    "order.bsdf": (changed(theta_i=RGL["theta_i"][::-1].copy()), "theta_i: expected increasing"),
+    "degrees.bsdf": (changed(theta_i=10 * RGL["theta_i"]), "theta_i: expected radians"),
+    "rgb.bsdf": (changed(rgb=RGL["rgb"][:, :, :2]), "rgb: expected 1 x 7 x 3 x n x n numbers"),
+    "infrared.bsdf": (
+        changed(spectra=RGL["rgb"], rgb=None, wavelengths=np.array([800, 900, 1000], np.float32)),
+        "wavelengths: expected 430 to 650 nm",
+    ),
+    "empty.csv": (b"", "expected a header with the columns theta_i"),
+    "columns.csv": (b"theta_i,phi_i\n0,0\n", "expected a header with the columns theta_i"),
+    "rows.csv": (b"theta_i,phi_i,theta_o,phi_o,r,g,b\n", "expected rows below the header"),
+    "angle.csv": (
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n95,0,0,0,1,1,1\n",
+        "line 2: theta_i: expected",
+    ),
+    "twice.csv": (
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,360,10,0,1,1,1\n",
+        "line 3: expected each combination of angles once",
+    ),
+    "gap.csv": (
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n20,0,20,0,1,1,1\n10,0,20,0,1,1,1\n",
+        "1 is missing, the first theta_i 20, phi_i 0, theta_o 10, phi_o 0",
+    ),
+    "text.csv": (b"theta_i,phi_i,theta_o,phi_o,r,g,b\n0,0,0,0,1,1,red\n", "b: expected a finite"),
+    "data.xyz": (b"", "expected a name that ends with one of .binary, .bsdf, .bin, .csv"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_wrong_in_a_file_is_said(tmp_path, name):
+    content, expected = BAD[name]
+    (tmp_path / name).write_bytes(content)
+    done = run("measured", tmp_path / name)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert name in done.stderr and expected in done.stderr, done.stderr
+    assert done.stdout == ""
+
+
+def test_fields_that_are_not_known_are_named(tmp_path):
+    file = tmp_path / "m.bsdf"
+    file.write_bytes(changed(valid=np.ones(3, np.float32)))
+    assert told(file)["notes"] == ["valid: this field is not known and was not read"]
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    done = run("measured", tmp_path / "none.binary")
+    assert done.returncode == 2 and "none.binary: expected a file, found none" in done.stderr
+
+
+def lobe_table(folder, matte=0.0):
+    """Blinn's model, as a table in steps of 5 degrees."""
+    file = folder / "lobe.csv"
+    ti, pi, to, po = grid(range(0, 90, 5), [0], range(0, 90, 5), range(0, 181, 5))
+    f = eval_pairs(["eval", "blinn", "ks=0.5,0.3,0.1", "e=10"], vector(ti, pi), vector(to, po))
+    f = f[:, :3] + np.asarray(matte)
+    file.write_text(angle_table(ti, pi, to, po, *f.T), encoding="utf-8")
+    return file
+
+
+@pytest.mark.slow
+def test_models_are_ranked(tmp_path):
+    """The model that the data were made from comes first, with what they were made from."""
+    file = lobe_table(tmp_path)
+    done = run("measured", file, "--json", "--models", "lambert,blinn,ward,phong")
+    assert done.returncode == 0, done.stderr
+    fits = json.loads(done.stdout)["fits"]
+    assert [f["model"] for f in fits][0] == "blinn" and len(fits) == 4
+    assert fits[0]["error"] < 0.01 and fits[1]["error"] > 2 * fits[0]["error"]
+    assert [f["error"] for f in fits] == sorted(f["error"] for f in fits)
+    of_model = json.loads(run("list", "--json").stdout)
+    assert fits[0]["parameters"].keys() == {
+        p["name"] for m in of_model if m["name"] == "blinn" for p in m["parameters"]
+    }
+    text = run("measured", file, "--models", "blinn").stdout
+    assert re.search(r"blinn +0\.\d+ % .*ks=.* e=", text)
+    for names, expected in (("blin", "'blin'"), ("fresnel_conductor", "is a mirror alone")):
+        done = run("measured", file, "--models", names)
+        assert done.returncode == 2 and expected in done.stderr
+
+
+def test_matte_light_is_added_unless_told_otherwise(tmp_path):
+    file = lobe_table(tmp_path, matte=[0.1, 0.05, 0.02])
+    with_matte, alone = (
+        json.loads(run("measured", file, "--json", "--models", "blinn", *more).stdout)["fits"][0]
+        for more in ((), ("--no-matte",))
+    )
+    assert with_matte["matte"] == pytest.approx([np.pi * c for c in (0.1, 0.05, 0.02)], rel=0.02)
+    assert alone["matte"] is None and alone["error"] > 5 * with_matte["error"]
+
+
+PLANE = {
+    "camera": {
+        "type": "orthographic",
+        "height": 1,
+        "position": [0, 0, 4],
+        "look_at": [0, 0, 0],
+        "up": [0, 1, 0],
+    },
+    "objects": [{"name": "o", "shape": {"type": "quad", "size": [4, 4]}, "material": "m"}],
+    "settings": {"width": 8, "height": 8, "spp": 1024, "seed": 1, "max_bounces": 0},
+}
+
+
+def rendered(folder, material, *options, **changes):
+    import OpenImageIO as oiio
+
+    content = scene(materials={"m": material}, **(PLANE | changes))
+    (folder / "s.json").write_text(json.dumps(content), encoding="utf-8")
+    done = run("render", folder / "s.json", "--out", folder / "s.exr", *options)
+    assert done.returncode == 0, done.stderr
+    return oiio.ImageBuf(str(folder / "s.exr")).get_pixels(oiio.FLOAT)[..., :3], done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("strategy", ["brdf", "mis"])
+def test_the_reference_renders_data_as_they_are(tmp_path, merl_file, strategy):
+    """A white world shows the albedo; under a lamp every way of sampling has one mean."""
+    material = {"measured": str(merl_file)}
+    pixels, _ = rendered(tmp_path, material, "--strategy", strategy)
+    expected = told(merl_file)["albedo"][0]["rgb"]
+    np.testing.assert_allclose(pixels.mean((0, 1)), expected, rtol=0.01)
+    lamp = {"type": "area", "position": [1, 0, 2], "direction": [-0.5, 0, -1], "size": [1, 1]}
+    lit = {"lights": [lamp | {"power": 100}], "environment": None}
+    by_lamp, _ = rendered(tmp_path, material, "--strategy", "light", **lit)
+    pixels, _ = rendered(tmp_path, material, "--strategy", strategy, **lit)
+    np.testing.assert_allclose(pixels.mean((0, 1)), by_lamp.mean((0, 1)), rtol=0.01)
+
+
+def test_data_have_one_colour_in_every_working_space(tmp_path, merl_file):
+    import PyOpenColorIO as ocio
+    from support import CONFIG
+
+    pixels, _ = rendered(tmp_path, {"measured": str(merl_file)}, working_space="ACEScg")
+    albedo = np.array([told(merl_file)["albedo"][0]["rgb"]], np.float32)
+    config = ocio.Config.CreateFromFile(str(CONFIG))
+    config.getProcessor("Linear Rec.709", "ACEScg").getDefaultCPUProcessor().applyRGB(albedo)
+    np.testing.assert_allclose(pixels.mean((0, 1)), albedo[0], rtol=0.01)
+    assert abs(albedo[0, 2] / albedo[0, 0] - 1) > 0.02
+
+
+@pytest.mark.slow
+def test_a_scene_has_the_model_that_is_fitted(tmp_path):
+    file = lobe_table(tmp_path)
+    material = {"measured": file.name, "as": "blinn"}
+    pixels, said = rendered(tmp_path, material)
+    raw, _ = rendered(tmp_path, {"measured": file.name})
+    np.testing.assert_allclose(pixels.mean((0, 1)), raw.mean((0, 1)), rtol=0.03)
+    assert re.search(r"lobe.csv: blinn misplaces 0\.\d+ % of the light: ks=", said)
+
+    def resolved(material):
+        content = scene(materials={"m": material}, **PLANE)
+        (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+        return run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+
+    assert resolved(material).returncode == 0
+    found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]["m"]
+    assert found["model"] == "blinn" and found["representation"] == "auto"
+    fit = json.loads(run("measured", file, "--json", "--models", "blinn", "--no-matte").stdout)
+    assert found["parameters"] == fit["fits"][0]["parameters"]
+    for bad, expected in (
+        ({"measured": file.name}, "material m: measured data are rendered by `brdfc render`"),
+        ({"measured": file.name, "as": "bling"}, "materials.m.as: expected"),
+        ({"measured": file.name, "model": "blinn"}, "materials.m.model"),
+        ({"measured": "none.csv"}, "materials.m.measured: "),
+        ({"model": "blinn", "as": "ward"}, "materials.m.as"),
+        ({"measured": file.name, "representation": "exact"}, 'expected "as" beside it'),
+    ):
+        done = resolved(bad)
+        assert done.returncode == 2 and expected in done.stderr, done.stderr
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    out = tmp_path_factory.mktemp("python")
+    done = run("python", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.mark.slow
+def test_the_package_says_what_the_tool_says(tmp_path, package):
+    """In a process of its own, without the package of other tests."""
+    file = lobe_table(tmp_path)
+    script = f"""
+import json
+import brdfc, numpy as np
+data = brdfc.measured({str(file)!r})
+wi, wo = np.load({str(tmp_path / "wi.npy")!r}), np.array([0.6, 0, 0.8])
+fit = data.fit("blinn", matte=False)
+f = brdfc.model("blinn").eval(wi, wo, **fit.parameters)
+try:
+    brdfc.measured("none.binary")
+except ValueError as error:
+    refused = str(error)
+print(json.dumps([data.format, data.isotropic, data.eval(wi, wo).tolist(), f.tolist(),
+    data.albedo(np.cos(np.radians([0, 45]))).tolist(), fit.error, refused]))
+"""
+    wi, wo = hemisphere(50, 20, 0.1), np.tile([0.6, 0, 0.8], (50, 1))
+    np.save(tmp_path / "wi.npy", wi)
+    environment = {"PYTHONPATH": str(package), "BRDFC_TOOL": TOOL, "PATH": ""}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    kind, isotropic, f, of_model, albedo, error, refused = json.loads(done.stdout)
+    assert kind == "CSV" and isotropic and error < 0.01
+    assert f == pairs(file, wi, wo)[0].tolist()
+    np.testing.assert_allclose(of_model, f, rtol=0.1, atol=0.01)
+    expected = [v["rgb"] for v in told(file)["albedo"]]
+    np.testing.assert_allclose(albedo, [expected[0], expected[3]], rtol=0.01)
+    assert refused == "none.binary: expected a file, found none"
+    del environment["BRDFC_TOOL"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert "FileNotFoundError: measured BRDFs are read by the program brdfc" in done.stderr
