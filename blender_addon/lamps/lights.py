@@ -103,7 +103,7 @@ def candidate_of(item, name, light, matrix):
         _irradiance(light, matrix),
         _looks(light, matrix),
         sizeless=is_sizeless(light),
-        hit_by_bsdf_sampling=has_importance(light) and not is_sizeless(light),
+        met=has_importance(light) and not is_sizeless(light),
         # A non-uniformly scaled spot has no circular cone, which shaders can't represent.
         uneven=not emission.is_even(light) or (light.type == "SPOT" and slots.is_stretched(matrix)),
     )

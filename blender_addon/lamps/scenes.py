@@ -159,10 +159,10 @@ def survey_lamps(scene, depsgraph, subject=None):
         if not math.isfinite(candidate.rank + angle):  # a mesh with invalid coordinates
             candidate.rank = angle = 0.0
         candidate.width = round(math.log2(max(angle, 1e-4)))
-        uneven, hit = candidate.uneven, candidate.hit_by_bsdf_sampling
-        if uneven and angle > _MAX_UNEVEN_SIZE and hit and not candidate.why:
+        uneven, met = candidate.uneven, candidate.met
+        if uneven and angle > _MAX_UNEVEN_SIZE and met and not candidate.why:
             candidate.why = say("its light is not the same all over it")
-        elif not hit and angle > _MAX_ANGULAR_SIZE:
+        elif not met and angle > _MAX_ANGULAR_SIZE:
             candidate.why = say("it looks too large for a closure")
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
     return survey

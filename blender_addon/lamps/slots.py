@@ -57,7 +57,7 @@ class Lamp:
     irradiance: float
     why: str = ""
     sizeless: bool = False
-    hit_by_bsdf_sampling: bool = True
+    met: bool = True
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Candidate:
     rank: float = 0.0
     width: int = 0  # doublings of its angular radius
     sizeless: bool = False
-    hit_by_bsdf_sampling: bool = True  # random rays hit it
+    met: bool = True  # random rays hit it
     uneven: bool = False  # its emission is not uniform
     #: For a mesh: judge(points) sets the values and `why`, given points (n, 3) of the subject.
     judge: object = None

@@ -164,7 +164,7 @@ def _not_aimed(node, count, scene):
     found = lamps.last_found(scene, group)
     left_out = [lamp for lamp in found if lamp.slot is None or lamp.slot > count]
     lost = [lamp for lamp in left_out if lamp.sizeless]
-    missed = [lamp for lamp in left_out if not lamp.hit_by_bsdf_sampling and not lamp.sizeless]
+    missed = [lamp for lamp in left_out if not lamp.met and not lamp.sizeless]
     total = sum(lamp.irradiance for lamp in found)
 
     def share(some):

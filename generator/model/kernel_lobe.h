@@ -142,7 +142,7 @@ template <class T, class Knots> struct KernelLobe {
   }
 
   /// n with a tiny lower limit, which prevents 0 / 0 and changes no digit of the result.
-  T gloss() const { return named("n_pos", maximum(n, T(1e-17))); }
+  T clamped_n() const { return named("n_pos", maximum(n, T(1e-17))); }
 
   T k(const T& u) const {
     if (kernel == Table) return drawn.k(u);
@@ -191,25 +191,26 @@ template <class T, class Knots> struct KernelLobe {
   /// A drawn kernel may increase, and takes more.
   T invert_marginal(const T& g, const T& p) const {
     const T target = named("target", T(2) * B(g) * p);
-    const std::array<T, 3> state = settle(kernel == Table ? Knots::kNewtonSteps : 8,
-                                          std::array<T, 3>{T(0), g / T(2), g * p}, [&](const std::array<T, 3>& s) {
-                                            const T v = s[2];
-                                            T F, dF;
-                                            if (kernel == Table) {
-                                              const std::array<T, 2> near = drawn.integrals(v);
-                                              const T far = A(g - v);
-                                              F = near[1] + v * far + drawn.moment(g - v, g);
-                                              dF = near[0] + far;
-                                            } else {
-                                              F = named("F", B(v) + drop(g, v));
-                                              dF = A(v) + A(g - v);
-                                            }
-                                            const auto below = F < target;
-                                            const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
-                                            const T newton = named("newton", v - (F - target) / maximum(dF, tiny<T>()));
-                                            const auto inside = newton >= lo && newton <= hi;
-                                            return std::array<T, 3>{lo, hi, select(inside, newton, (lo + hi) / T(2))};
-                                          });
+    const std::array<T, 3> state =
+        newton_iterate(kernel == Table ? Knots::kNewtonSteps : 8, std::array<T, 3>{T(0), g / T(2), g * p},
+                       [&](const std::array<T, 3>& s) {
+                         const T v = s[2];
+                         T F, dF;
+                         if (kernel == Table) {
+                           const std::array<T, 2> near = drawn.integrals(v);
+                           const T far = A(g - v);
+                           F = near[1] + v * far + drawn.moment(g - v, g);
+                           dF = near[0] + far;
+                         } else {
+                           F = named("F", B(v) + drop(g, v));
+                           dF = A(v) + A(g - v);
+                         }
+                         const auto below = F < target;
+                         const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
+                         const T newton = named("newton", v - (F - target) / maximum(dF, tiny<T>()));
+                         const auto inside = newton >= lo && newton <= hi;
+                         return std::array<T, 3>{lo, hi, select(inside, newton, (lo + hi) / T(2))};
+                       });
     return state[2];
   }
 
@@ -227,7 +228,7 @@ template <class T, class Knots> struct KernelLobe {
 
   /// f_theta / (2 pi).
   T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const T g = gloss();
+    const T g = clamped_n();
     const Place i = place(g, wi), o = place(g, wo);
     const T same = abs(i.v - o.v), across = maximum(g - i.v - o.v, T(0));
     const T near = select(i.low + o.low < T(1.5) && i.low + o.low > T(0.5), across, same);
@@ -248,7 +249,7 @@ template <class T, class Knots> struct KernelLobe {
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return select(above(wi, wo), lobe(wi, wo) * wi.z, T(0)); }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const T g = gloss();
+    const T g = clamped_n();
     const Place o = place(g, wo);
     // Along the axis, wo is at distance r from the nearer end and at distance g - r from the other.
     const T r = o.v, rest = g - r;

@@ -11,7 +11,8 @@ namespace brdfc::inline model {
 /// The same as iterate() for Newton's method on the last number of the state, but for numbers it stops when the result
 /// no longer changes. After a step of 1e-10 only rounding errors remain in double precision, and further steps would
 /// wander among them.
-template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int count, std::array<T, N> state, Step step) {
+template <Numeric T, std::size_t N, class Step>
+std::array<T, N> newton_iterate(int count, std::array<T, N> state, Step step) {
   for (int i = 0; i < count; ++i) {
     const std::array<T, N> last = std::exchange(state, step(state));
     if (std::same_as<T, double> ? abs(state[N - 1] - last[N - 1]) <= T(1e-10) * abs(state[N - 1]) : state == last)
@@ -21,7 +22,7 @@ template <Numeric T, std::size_t N, class Step> std::array<T, N> settle(int coun
 }
 /// Each lane stops by itself: its result does not depend on its neighbours.
 template <std::size_t N, class Step>
-std::array<Pack, N> settle(int count, const std::array<Pack, N>& begin, Step step) {
+std::array<Pack, N> newton_iterate(int count, const std::array<Pack, N>& begin, Step step) {
   std::array<Pack, N> state = begin;
   Mask settled(false);
   for (int i = 0; i < count && !settled.all(); ++i) {
@@ -33,7 +34,7 @@ std::array<Pack, N> settle(int count, const std::array<Pack, N>& begin, Step ste
   return state;
 }
 template <std::size_t N, class Step>
-std::array<Expr, N> settle(int count, const std::array<Expr, N>& state, Step step) {
+std::array<Expr, N> newton_iterate(int count, const std::array<Expr, N>& state, Step step) {
   return iterate(count, state, step);
 }
 

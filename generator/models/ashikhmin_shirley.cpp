@@ -47,7 +47,7 @@ const MeanTables& mean_tables();
 
 /// The specular lobe relative to the plane of incidence.
 template <class T> struct LobeAtView {
-  T sunk;             ///< 0 if no part of a narrow lobe is below the surface, 1 at the horizon
+  T below_horizon;    ///< 0 if no part of a narrow lobe is below the surface, 1 at the horizon
   T along2, across2;  ///< variances of its slopes along and across the plane
   T correlation2;     ///< squared correlation of the two slopes
   T cosTheta;
@@ -66,12 +66,12 @@ template <class T> struct LobeAtView {
     correlation2 = named("correlation2", covariance2 / (su2 * sv2 + covariance2));
     cosTheta = maximum(w.z, T(0));
     const T reach = named("reach", T(2) * sqrt(su2 * x2 + sv2 * y2));
-    sunk = named("sunk", reach / maximum(cosTheta + reach, tiny<T>()));
+    below_horizon = named("sunk", reach / maximum(cosTheta + reach, tiny<T>()));
   }
 
   /// 1 - A
   T loss() const {
-    return named("loss", lookup(lobe_tables().loss, std::array<T, 4>{sunk, along2, across2, correlation2}));
+    return named("loss", lookup(lobe_tables().loss, std::array<T, 4>{below_horizon, along2, across2, correlation2}));
   }
   /// 1 - B
   T matte() const {

@@ -111,12 +111,12 @@ template <class T> struct RadziszewskiAlda {
   }
 
   /// A direction on either side, mapped to the hemisphere in which the refraction lobe is evaluated.
-  struct Carried {
+  struct MappedDirection {
     Vec3<T> w;       ///< outside, or with stretched height beyond the critical angle
     Vec3<T> turned;  ///< for the azimuthal lobe: the original one where the height is stretched
     T beyond;        ///< (ior sin)^2 - 1 inside, -1 outside: positive beyond the critical angle
   };
-  Carried carry(const Vec3<T>& w) const {
+  MappedDirection map_outside(const Vec3<T>& w) const {
     const auto inside = w.z < T(0);
     const T scale = named("scale", select(inside, index, T(1)));
     const T x = scale * w.x, y = scale * w.y;
@@ -137,7 +137,7 @@ template <class T> struct RadziszewskiAlda {
 
   /// The factor of the lobe if light passes between the two directions, either through the surface or inside beyond the
   /// critical angle; otherwise 0.
-  T passage(const Vec3<T>& wi, const Carried& i, const Vec3<T>& wo, const Carried& o) const {
+  T transport_factor(const Vec3<T>& wi, const MappedDirection& i, const Vec3<T>& wo, const MappedDirection& o) const {
     const T through = select(wi.z < T(0), index * index, T(1));
     const T total = index * index / maximum((index - T(1)) * (index + T(1)), tiny<T>());
     const auto crosses = wi.z * wo.z < T(0) && i.beyond < T(0) && o.beyond < T(0);
@@ -161,8 +161,8 @@ template <class T> struct RadziszewskiAlda {
   /// Eq. 19 without tint; 0 where no light passes.
   T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
     if (around == Refraction) {
-      const Carried i = carry(wi), o = carry(wo);
-      return passage(wi, i, wo, o) * product(i.w, reflect(o.w), i.turned, reflect(o.turned));
+      const MappedDirection i = map_outside(wi), o = map_outside(wo);
+      return transport_factor(wi, i, wo, o) * product(i.w, reflect(o.w), i.turned, reflect(o.turned));
     }
     const Vec3<T> wr = centre(wo);
     return select(above(wi, wo), product(wi, wr, wi, wr), T(0));
@@ -215,7 +215,7 @@ template <class T> struct RadziszewskiAlda {
     // The lobe is even: solves for t in [0, pi] with the probability |2 u - 1|, then restores the sign.
     const T share = named("share", abs(T(2) * u - T(1)));
     const T target = named("target", share * c0 * pi<T>());
-    const std::array<T, 3> state = settle(
+    const std::array<T, 3> state = newton_iterate(
         newton_steps<T>(), std::array<T, 3>{T(0), pi<T>(), pi<T>() / T(2) * share}, [&](const std::array<T, 3>& s) {
           const T t = s[2];
           const T C = named("C", cos(t)), S = named("S", sin(t));
@@ -242,7 +242,7 @@ template <class T> struct RadziszewskiAlda {
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const bool refracts = around == Refraction;
-    const Carried o = refracts ? carry(wo) : Carried{wo, wo, T(-1)};
+    const MappedDirection o = refracts ? map_outside(wo) : MappedDirection{wo, wo, T(-1)};
     const Vec3<T> wr = refracts ? reflect(o.w) : centre(wo);
     const T sr2 = sin2_theta(wr);
     std::array<T, 2> x = {T(1) - u.y, u.y};
@@ -250,7 +250,7 @@ template <class T> struct RadziszewskiAlda {
     T cosTheta = named("cosTheta_i", sqrt(x[0])), sinTheta = named("sinTheta_i", sqrt(x[1]));
     T sr = sqrt(sr2), sine = sinTheta;  // sines for the azimuthal lobe
     if (refracts) {
-      // Inverts the mapping of carry().
+      // Inverts the mapping of map_outside().
       const auto total = o.beyond > T(0);
       const T room = named("room", (index - T(1)) * (index + T(1)));
       const T beyond_sin = named("beyond_sin", sqrt(x[1] * room + T(1)) / index);

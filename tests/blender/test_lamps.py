@@ -1322,7 +1322,7 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
     near = add_lamp(empty, "POINT", "Near", location=(0, 0, 2), shadow_soft_size=1.9)
     near.data.cycles.use_multiple_importance_sampling = False
     (lamp,) = extension.api.see_lamps(empty)
-    assert lamp.slot is None and not lamp.hit_by_bsdf_sampling and "too large" in lamp.why
+    assert lamp.slot is None and not lamp.met and "too large" in lamp.why
     (found,) = extension.api.warnings(material, empty)
     assert (found.code, found.severity) == ("multiple_importance", "ERROR")
     assert "Near" in found.message and lamp.why in found.message
