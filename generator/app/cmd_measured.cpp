@@ -122,8 +122,12 @@ void add_measured_command(CLI::App& app) {
            {"lacks", found.sentences},
            {"non_reciprocal", found.non_reciprocal}};
     for (const auto& view : found.views) j["albedo"].push_back({{"degrees", view.degrees}, {"rgb", rgb(view.albedo)}});
-    const auto fits = measured::fit_models(m, model, models_of(o->models),
-                                           o->no_matte ? measured::Matte::None : measured::Matte::Added);
+    const std::vector<const Model*> models = models_of(o->models);
+    const auto progress = [&](const Model& last, std::size_t done) {
+      fmt::print(stderr, "brdfc measured: {}/{} {}\n", done, models.size(), last.info().name);
+    };
+    const auto fits =
+        measured::fit_models(m, model, models, o->no_matte ? measured::Matte::None : measured::Matte::Added, progress);
     j["fits"] = Json::array();
     for (const measured::ModelFit& f : fits) j["fits"].push_back(describe(f));
     if (o->json) {

@@ -2,6 +2,7 @@
 #include "measured/fit_models.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -330,12 +331,15 @@ std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pair
 }  // namespace
 
 std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
-                                 const std::vector<const Model*>& models, Matte matte) {
+                                 const std::vector<const Model*>& models, Matte matte,
+                                 const std::function<void(const Model&, std::size_t done)>& progress) {
   const Pairs coarse = make_pairs(data, kCoarse, 1), fine = make_pairs(data, kFine, 2),
               last = make_pairs(data, kFinal, 3);
   std::vector<std::optional<ModelFit>> found(models.size());
+  std::atomic<std::size_t> done{0};
   for_all(models.size(), [&](std::size_t i) {
     if (models[i]->has_scatter()) found[i] = fit_model(*models[i], m.isotropic, coarse, fine, last, matte);
+    if (progress) progress(*models[i], ++done);
   });
   std::vector<ModelFit> out;
   for (auto& f : found)

@@ -6,6 +6,7 @@
 // squares with weights that approach this error; numbers are found by search, and choices by trying all.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "measured/measured_model.h"
@@ -24,6 +25,8 @@ struct ModelFit {
 /// Whether light of a Lambert surface may be added to the models.
 enum class Matte { None, Added };
 /// The models whose f is not 0, fitted, those with the least error first. Light that passes through is not considered.
-std::vector<ModelFit> fit_models(const Measurement&, const MeasuredModel&, const std::vector<const Model*>&, Matte);
+/// `progress`, if there is one, is called after each model, from any thread, with the number of models that are done.
+std::vector<ModelFit> fit_models(const Measurement&, const MeasuredModel&, const std::vector<const Model*>&, Matte,
+                                 const std::function<void(const Model&, std::size_t done)>& progress = {});
 
 }  // namespace brdfc::measured

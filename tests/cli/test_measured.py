@@ -328,6 +328,8 @@ def test_models_are_ranked(tmp_path):
     done = run("measured", file, "--json", "--models", "lambert,blinn,ward,phong")
     assert done.returncode == 0, done.stderr
     fits = json.loads(done.stdout)["fits"]
+    counted = re.findall(r"^brdfc measured: (\d)/4 \w+$", done.stderr, re.M)
+    assert sorted(counted) == ["1", "2", "3", "4"]
     assert [f["model"] for f in fits][0] == "blinn" and len(fits) == 4
     assert fits[0]["error"] < 0.01 and fits[1]["error"] > 2 * fits[0]["error"]
     assert [f["error"] for f in fits] == sorted(f["error"] for f in fits)
