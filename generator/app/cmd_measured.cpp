@@ -43,7 +43,8 @@ std::vector<const Model*> models_of(const std::vector<std::string>& names) {
 
 Json describe(const measured::ModelFit& f) {
   Json parameters = Json::object();
-  for (const auto& [name, value] : f.values) std::visit([&](const auto& v) { parameters[name] = v; }, value);
+  for (const auto& [name, value] : f.values)
+    parameters[name] = std::visit([](const auto& v) { return Json(v); }, value);
   return {{"model", f.model->info().name},
           {"parameters", parameters},
           {"matte", f.matte ? rgb(*f.matte) : Json()},

@@ -23,6 +23,8 @@ constexpr std::size_t kStarts = 4;  ///< searches begin at the best of them
 constexpr double kGood = 1e-3;
 /// Matte light is taken if it makes the error at least so many times smaller.
 constexpr double kWorthMatte = 0.95;
+/// Errors that differ by no more than this share, or by this part of the light, are alike.
+constexpr double kAlike = 0.05, kNegligible = 5e-4;
 /// Rounds of least squares. Deviations below a floor count as it; it begins at the mean of the data and falls.
 constexpr int kDeviationRounds = 24;
 constexpr double kFloorFalls = 0.6;
@@ -134,7 +136,7 @@ class Problem {
   bool through() const { return brdf_->scatters_through(); }
   const std::vector<const ParamInfo*>& searched() const { return searched_; }
   const ParamValues& values() const { return values_; }
-  bool has_colors() const { return !colors_.empty(); }
+  int free() const { return int(searched_.size() + colors_.size()); }
 
   void set_numbers(const std::vector<double>& t) {
     for (std::size_t i = 0; i < searched_.size(); ++i) set(*searched_[i], searched_[i]->slider().at(t[i]));
@@ -320,7 +322,7 @@ std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pair
       auto added = extra();
       const double error = problem.solve(last, added);
       if (!best || error < best->error * (matte && !best->matte ? kWorthMatte : 1 - 1e-3))
-        best = ModelFit{&model, problem.values(), added, error, 0};
+        best = ModelFit{&model, problem.values(), added, error, problem.free() + int(matte), 0};
     }
     if (!best) return std::nullopt;
   }
@@ -345,6 +347,14 @@ std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data
   for (auto& f : found)
     if (f) out.push_back(std::move(*f));
   std::ranges::stable_sort(out, {}, &ModelFit::error);
+  // A model that contains another one comes as close, whatever it is: the simpler one says more.
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const auto begin = out.begin() + long(i);
+    const auto end = std::find_if(
+        begin, out.end(), [&](const ModelFit& f) { return f.error > begin->error * (1 + kAlike) + kNegligible; });
+    const auto simplest = std::ranges::min_element(begin, end, {}, &ModelFit::found);
+    std::rotate(begin, simplest, simplest + 1);
+  }
   return out;
 }
 

@@ -19,13 +19,15 @@ struct ModelFit {
   /// Albedo of a Lambert surface that is added to the model; nullopt if the model does without.
   std::optional<Rgb<double>> matte;
   double error = 0;  ///< share of the light that is misplaced
+  int found = 0;     ///< number of parameters that were fitted
   double seconds = 0;
 };
 
 /// Whether light of a Lambert surface may be added to the models.
 enum class Matte { None, Added };
-/// The models whose f is not 0, fitted, those with the least error first. Light that passes through is not considered.
-/// `progress`, if there is one, is called after each model, from any thread, with the number of models that are done.
+/// The models whose f is not 0, fitted, those with the least error first; of models whose errors hardly differ, those
+/// with fewer parameters. Light that passes through is not considered. `progress`, if there is one, is called after each
+/// model, from any thread, with the number of models that are done.
 std::vector<ModelFit> fit_models(const Measurement&, const MeasuredModel&, const std::vector<const Model*>&, Matte,
                                  const std::function<void(const Model&, std::size_t done)>& progress = {});
 

@@ -302,6 +302,18 @@ TEST(FitModels, MatteLightIsAddedWhereAModelHasNone) {
   EXPECT_GT(alone.error, 0.1);
 }
 
+// Phong's material has a lobe like this among others.
+TEST(FitModels, OfModelsThatComeAsCloseTheSimplerIsFirst) {
+  const Model& simple = find_model("glossy_specular");
+  const Measurement m = as_measured(std::make_shared<OfModel>("glossy_specular", complete(simple.info(), {})));
+  const MeasuredModel data(m);
+  const auto fits = fit_models(m, data, {&find_model("phong_material"), &simple, &find_model("lambert")}, Matte::Added);
+  ASSERT_EQ(fits.size(), 3u);
+  EXPECT_LT(fits[1].error, 2e-3);
+  EXPECT_EQ(fits[0].model, &simple);
+  EXPECT_GT(fits[2].error, 0.1);
+}
+
 TEST(FitModels, TheErrorIsTheLightThatIsMisplaced) {
   // A black model misplaces all of it: glossy light from a mirror that is not there.
   const ParamValues black{{"rho", std::array<double, 3>{0, 0, 0}}};
