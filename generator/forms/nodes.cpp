@@ -14,6 +14,7 @@
 #include "forms/node_lamps.h"
 #include "measure/probes.h"
 #include "model/horizon.h"
+#include "model/under.h"
 #include "print/node_program.h"
 
 namespace brdfc::forms {
@@ -136,6 +137,10 @@ const char* kind_of(ClosureKind kind) {
   switch (kind) {
     case ClosureKind::Diffuse:
       return "diffuse";
+    case ClosureKind::DiffuseToon:
+      return "cone";
+    case ClosureKind::Ggx:
+      return "ggx";
     case ClosureKind::Reflection:
       return "mirror";
     default:
@@ -150,6 +155,33 @@ std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<E
   for (const Closure<Expr>& c : *sum)
     if (!is_native(c.kind) || c.turned) return std::nullopt;
   return sum;
+}
+
+/// Closures that are nowhere above the model; with choices bound. Their sockets are outputs of the program, which reads
+/// `stands`, 0 where normals are bent and Cycles would darken them, and `camera`, 1 for rays of that: Filter Glossy
+/// makes facets rougher for others. Returned as the other programs have them.
+ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const Brdf<Expr>& brdf, Program& program,
+                             Json& closures) {
+  const Under* of = under(model);
+  if (!of || measure::two_sided(model, brdf)) return {};
+  ClosureSum<Expr> sum = of->record(model.info(), fixed, input3("wo"));
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    Closure<Expr>& c = sum[i];
+    c.weight = c.weight * Expr::input("stands");
+    Json closure = {{"kind", kind_of(c.kind)}, {"weight", fmt::format("weight_{}", i)}};
+    if (has_facets(c.kind)) {
+      c.weight = c.weight * Expr::input("camera");
+      closure["roughness"] = fmt::format("roughness_{}", i);
+      program.output(closure["roughness"], sqrt(c.alpha));
+    }
+    if (has_cone(c.kind)) {
+      closure["size"] = fmt::format("size_{}", i);
+      closure["smooth"] = fmt::format("smooth_{}", i);
+    }
+    closures.push_back(closure);
+  }
+  output_closures(sum, program);
+  return input_closures(sum);
 }
 
 ParamValues default_choices(const ModelInfo& info) {
@@ -208,7 +240,7 @@ class Nodes final : public Form {
 Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_lamps) {
   Shader out;
   out.name = fmt::format("brdfc_{}_nodes", model.info().name);
-  Json parts = Json::object(), bounds = Json::object(), closures = Json::array();
+  Json parts = Json::object(), bounds = Json::object(), closures = Json::array(), under_closures = Json::array();
   const auto add = [&](const char* name, const NodeProgram& program) {
     parts[name] = json_of(program);
     out.operations += int(program.operations.size());
@@ -239,18 +271,25 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     } else {
       lamps = max_lamps > 0;
       const Vec3<Expr> wo = input3("wo"), wi = input3("wi");
+      Program of_base;
+      const ClosureSum<Expr> base = record_base(model, fixed, *brdf, of_base, under_closures);
+      if (!base.empty()) add("base", print::node_program(of_base, kVectors));
       {
         Program program;
-        program.output("value", brdf->eval(wi, wo) * abs(wi.z));
+        const Rgb<Expr> f = brdf->eval(wi, wo) * abs(wi.z);
+        program.output("value", base.empty() ? f : f - evaluate(base, wi, wo));
         const print::NodePrograms made = print::node_programs(program, {"wi_x", "wi_y", "wi_z"}, "kept_", kVectors);
         add("once", made.once);
         add("value", made.each);
       }
       {
         Program program;
-        const Sample<Expr> s = brdf->sample(wo, recorded_u());
+        const Under* of = base.empty() ? nullptr : under(model);
+        const Sample<Expr> s = of && of->sample
+                                   ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"))
+                                   : brdf->sample(wo, recorded_u());
         program.output("wi", s.wi);
-        program.output("weight", s.weight);
+        program.output("weight", base.empty() ? s.weight : s.weight - evaluate(base, s.wi, wo) / s.pdf);
         add("draw", print::node_program(program, kVectors));
       }
       if (model.has_mirror()) {
@@ -270,15 +309,16 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     add("lobe", record_lobe());
     out.lamps = max_lamps;
   }
-  out.closures = int(closures.size()) + int(parts.contains("draw")) + out.lamps;
+  out.closures = int(closures.size()) + int(under_closures.size()) + int(parts.contains("draw")) + out.lamps;
   // Of the lamps' the extension takes those off that no lamp fills, by what other forms take for one.
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
   out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
   out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
-  out.source = Json{{"format", 4},          {"isotropic", model.info().properties.isotropic},
+  out.source = Json{{"format", 5},          {"isotropic", model.info().properties.isotropic},
                     {"narrow", kNarrow},    {"widest", kWidestWidened},
                     {"lamps", out.lamps},   {"bounds", bounds},
-                    {"closures", closures}, {"parts", parts}}
+                    {"closures", closures}, {"base", under_closures},
+                    {"parts", parts}}
                    .dump() +
                "\n";
   return out;

@@ -23,6 +23,7 @@
 // Interpolation errs by at most 0.02 of the incident light, 0.003 on average; that is what R_d = 1 gains or loses.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
+#include "model/under.h"
 #include "tables/table.h"
 
 namespace brdfc {
@@ -266,6 +267,13 @@ template <class T> struct AshikhminShirley {
     }
     return {facets(ClosureKind::Beckmann, part == Diffuse ? none : glossy, sqrt(au2), sqrt(av2), rotation), matte};
   }
+
+  /// The diffuse term of eq. 14 by two cones, which have 96 % of it.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const bool none = part == Specular || diffuse == Tabulated;
+    const Rgb<T> all = none ? Rgb<T>(T(0)) : rd * (Rgb<T>(T(1)) - rs) * (T(28) / (T(23) * pi<T>()) * fade(wo.z));
+    return cones_under(all, {0.968, 0.7445}, {0.4033, 0.9222});
+  }
 };
 
 #if BRDFC_BASELINE  // tables are made once
@@ -376,5 +384,6 @@ const MeanTables& mean_tables() {
 #endif
 
 BRDFC_MODEL(AshikhminShirley)
+BRDFC_UNDER(AshikhminShirley)
 
 }  // namespace brdfc

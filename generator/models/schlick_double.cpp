@@ -9,6 +9,7 @@
 // Misprint: the fraction bar of the paper's equation divides the mirror term by pi, too.
 #include "model/base_terms.h"
 #include "model/sampling.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -58,8 +59,15 @@ template <class T> struct SchlickDouble {
 
   /// R_f(alpha) is R_0 but where both directions graze, apart.
   ClosureSum<T> base(const Vec3<T>&) const { return {Closure<T>(ClosureKind::Diffuse, rd * (T(1) - r0))}; }
+
+  /// Lambert's with the largest R_f for this view: alpha is at most half of a right angle more than theta_o.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const T cosAlpha = wo.z / sqrt(T(2) + T(2) * sqrt(sin2_theta(wo)));
+    return {Closure<T>(ClosureKind::Diffuse, rd * ((T(1) - r0) * one_minus_schlick_weight(cosAlpha)))};
+  }
 };
 
 BRDFC_MODEL(SchlickDouble)
+BRDFC_UNDER(SchlickDouble)
 
 }  // namespace brdfc
