@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Aimed forms under lamps: what they give there is the model; the slots are all they know of."""
 
+import itertools
 import math
 
 import bpy
@@ -59,7 +60,16 @@ def cases_of(extension, rng, form="aimed"):
         if name == "lossless":  # its heights are a kernel, of which not every one is admitted
             drawn = {}
         found += [(name, values) for values in ({}, *CASES.get(name, []), drawn)]
+        if form == "nodes":  # whose tree has all choices
+            found += [(name, values) for values in other_choices(extension, name, form)]
     return found
+
+
+def other_choices(extension, name, form):
+    """All combinations of a form's choices but the first, which is the default."""
+    options = extension.pack.form_choices(name, form)
+    combinations = itertools.product(*options.values())
+    return [dict(zip(options, chosen, strict=True)) for chosen in combinations][1:]
 
 
 def off_under_a_sun(extension, scene, tool, form, towards, samples, pictures=1):

@@ -26,7 +26,8 @@ def settings(extension, scene, samples, osl, size=64):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("towards", SUNS, ids=str)
 def test_a_sun_without_an_angle(extension, empty, tool, towards):
-    """Every model with defaults, stiff ends and random values: f cos to 1e-3 (relative L1)."""
+    """Every model with defaults, stiff ends, random values and each combination of choices: f cos
+    to 1e-3 (relative L1)."""
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     empty.cycles.shading_system = False
     found = off_under_a_sun(extension, empty, tool, "nodes", towards, 32, pictures=4)
@@ -216,10 +217,10 @@ def test_links_and_ranges(extension, empty, tool):
 
 
 def test_a_choice_without_nodes_is_a_sentence(extension, empty):
-    """Trees are made for the default choices."""
-    with pytest.raises(ValueError, match="Formula Nodes is only for Normalisation = Bounded"):
-        extension.api.new_material("ward", "nodes", normalisation="duer")
-    material = extension.api.new_material("ward", "aimed", normalisation="duer")
+    """Of tables of several numbers there are no nodes."""
+    with pytest.raises(ValueError, match="Formula Nodes is only for Diffuse Term = Paper"):
+        extension.api.new_material("ashikhmin_shirley", "nodes", diffuse="tabulated")
+    material = extension.api.new_material("ashikhmin_shirley", "aimed", diffuse="tabulated")
     with pytest.raises(ValueError, match="only for"):
         extension.api.switch_representation(material, "nodes")
     assert extension.nodes.identity(extension.nodes.group_nodes(material)[0])[1] == "aimed"
