@@ -14,7 +14,7 @@ namespace brdfc::forms {
 /// Each combination that agrees with `fixed`, in the order of choice_combinations(): `fixed` with all choices.
 std::vector<ParamValues> open_combinations(const ModelInfo&, const ParamValues& fixed);
 
-/// The programs of open_combinations(), all of the current recorder and with the same outputs, as one. It reads a
+/// The programs of open_combinations(), with the same outputs, as one of the operations that nodes have. It reads a
 /// number by the name of each choice that `fixed` lacks and that makes a difference.
 Program selected_by_choices(const ModelInfo&, const ParamValues& fixed, const std::vector<Program>& by_combination);
 
