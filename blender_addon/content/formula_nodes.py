@@ -219,8 +219,10 @@ class _Surface:
         self.place, self.view = geometry.outputs["Position"], geometry.outputs["Incoming"]
         self.true_normal = geometry.outputs["True Normal"]
         self.backfacing = geometry.outputs["Backfacing"]
+        self.interpolated = geometry.outputs["Normal"]
         self.strand = w.node("ShaderNodeHairInfo").outputs["Is Strand"]
-        self.path_length = w.node("ShaderNodeLightPath").outputs["Ray Length"]
+        path = w.node("ShaderNodeLightPath")
+        self.path_length, self.camera = path.outputs["Ray Length"], path.outputs["Is Camera Ray"]
         missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
         own = w.scaled(geometry.outputs["Normal"], missing)
         self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
@@ -472,6 +474,13 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
             colour = colours[closure["weight"]]
             total = colour if total is None else w.vector("ADD", total, colour)
         return {"BSDF": w.sum(shaders), "Albedo": total}
+    if parts.has("base"):
+        # Cycles darkens closures about normals of their own, by Bump Map Correction or, from
+        # Blender 5.0 on, below the interpolated normal.
+        bent = w.vector("DISTANCE", surface.normal, surface.interpolated, output="Value")
+        given |= {"stands": w.math("LESS_THAN", bent, 1e-4), "camera": surface.camera}
+        given |= parts.add("base", **given)
+        shaders += [_of_base(w, closure, given, surface.normal) for closure in data["base"]]
     lamps = []
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
@@ -491,6 +500,14 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
     for lamp in lamps:
         shaders.append(_instance(w, lit, given | lamp, "lamp")["BSDF"])
     return {"BSDF": w.sum(shaders)}
+
+
+def _of_base(w, closure, given, normal):
+    """A closure of the base."""
+    found = {name: given[of] for name, of in closure.items() if name != "kind"}
+    if closure["kind"] == "cone":
+        return w.toon(found["weight"], found["size"], normal, found["smooth"], "DIFFUSE")
+    return w.bsdf(closure["kind"], found["weight"], normal, found.get("roughness", 0.0))
 
 
 def _rest(w, parts, surface, given, lamps, narrow):

@@ -121,12 +121,13 @@ class Wiring:
         """The normalized half vector of two directions."""
         return self.vector("NORMALIZE", self.mix(0.5, a, b, True))
 
-    def toon(self, color, size, normal):
-        """A closure that is constant within a cone about the mirror direction."""
-        node = self.node("ShaderNodeBsdfToon", component="GLOSSY")
+    def toon(self, color, size, normal, smooth=0.0, component="GLOSSY"):
+        """A closure that is constant within a cone, and falls to 0 beside it: about the mirror
+        direction, or, if `component` is "DIFFUSE", the normal."""
+        node = self.node("ShaderNodeBsdfToon", component=component)
         self.give(node.inputs["Color"], color)
         self.give(node.inputs["Size"], size)
-        self.give(node.inputs["Smooth"], 0.0)
+        self.give(node.inputs["Smooth"], smooth)
         self.give(node.inputs["Normal"], normal)
         return node.outputs[0]
 

@@ -28,6 +28,7 @@
 // loses that much.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
+#include "model/under.h"
 #include "tables/table.h"
 
 namespace brdfc {
@@ -273,6 +274,13 @@ template <class T> struct AshikhminShirley {
     }
     return {facets(ClosureKind::Beckmann, part == Diffuse ? none : glossy, sqrt(au2), sqrt(av2), rotation), matte};
   }
+
+  /// The diffuse term of eq. 14 by two cones, which have 96 % of it.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const bool none = part == Specular || diffuse == Tabulated;
+    const Rgb<T> all = none ? Rgb<T>(T(0)) : rd * (Rgb<T>(T(1)) - rs) * (T(28) / (T(23) * pi<T>()) * fade(wo.z));
+    return cones_under(all, {0.968, 0.7445}, {0.4033, 0.9222});
+  }
 };
 
 #if BRDFC_BASELINE  // tables are made once
@@ -384,5 +392,6 @@ const MeanTables& mean_tables() {
 #endif
 
 BRDFC_MODEL(AshikhminShirley)
+BRDFC_UNDER(AshikhminShirley)
 
 }  // namespace brdfc

@@ -25,6 +25,7 @@
 #include <boost/math/quadrature/gauss.hpp>
 
 #include "model/sampling.h"
+#include "model/under.h"
 #include "tables/table.h"
 
 namespace brdfc {
@@ -198,10 +199,17 @@ template <class T> struct Coupled {
     return {ramp};
   }
 
+  /// With Schlick's coat the matte term by two cones, which have 94 % of it.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const Rgb<T> all = fresnel == Dielectric ? Rgb<T>(T(0)) : rm * (k() * f(wo.z));
+    return cones_under(all, {0.9995, 0.711}, {0.4951, 0.9583});
+  }
+
   /// Large enough that Cycles does not drop the closure (as it does at 1e-5), and small beside any relevant albedo.
   static constexpr double kRampWeight = 1e-3;
 };
 
 BRDFC_MODEL(Coupled)
+BRDFC_UNDER(Coupled)
 
 }  // namespace brdfc

@@ -20,6 +20,7 @@
 // sin alpha - (2 beta / pi)^3 is computed from 1 - 2 beta / pi and 1 - sin alpha.
 #include "model/base_terms.h"
 #include "model/sampling.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -109,8 +110,21 @@ template <class T> struct OrenNayar {
     const Rgb<T> again = rho * rho * (form == Full ? T(0.17) * share(0.13) : T(0));
     return {rough_facets(rho * C1(), ratio), Closure<T>(ClosureKind::Diffuse, again)};
   }
+
+  /// Lambert's part. In the full form the term with C2 takes light off where the light comes from the other side: the
+  /// most for light as high as the viewer, sin alpha being 1 at most, and beta the viewer's polar angle.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    if (form == Qualitative) return {Closure<T>(ClosureKind::Diffuse, rho * C1())};
+    const T so = named("so", sqrt(sin2_theta(wo))), co = maximum(wo.z, tiny<T>());
+    const T beta = T(4) / pi<T>() * atan(so / (T(1) + co)), rest = T(4) / pi<T>() * atan(co / (T(1) + so));
+    const T most = rest * (T(1) + beta + beta * beta) * (so / co);
+    const T direct = maximum(C1() - T(0.45) * share(0.09) * most, T(0));
+    const T again = T(0.17) * share(0.13) * (rest * (T(1) + beta));
+    return {Closure<T>(ClosureKind::Diffuse, rho * direct + rho * rho * again)};
+  }
 };
 
 BRDFC_MODEL(OrenNayar)
+BRDFC_UNDER(OrenNayar)
 
 }  // namespace brdfc

@@ -15,6 +15,7 @@
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -64,18 +65,19 @@ template <class T> struct PhongMaterial {
     return select(above(wi, wo), f, Rgb<T>(T(0)));
   }
 
-  /// The probabilities of the lobes, in proportion to the largest albedo of each.
+  /// The probabilities of the lobes, in proportion to the largest albedo of each; that of the diffuse term is `matte`.
   struct Shares {
     T specular, reflection;
   };
-  Shares shares() const {
+  Shares shares(const T& matte) const {
     const T s = ks * max_component(cs) * (T(2) * pi<T>() / (es + T(1))), r = kr * max_component(cr);
-    const T all = maximum(kd * max_component(cd) + s + r, tiny<T>());
+    const T all = maximum(matte + s + r, tiny<T>());
     return {named("specular_share", s / all), named("reflection_share", r / all)};
   }
+  Shares shares() const { return shares(kd * max_component(cd)); }
 
-  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const Shares p = shares();
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return pdf(wi, wo, shares()); }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo, const Shares& p) const {
     const T matte = maximum(T(1) - p.specular - p.reflection, T(0));
     return select(above(wi, wo),
                   matte * cosine_pdf(wi) + p.specular * power_lobe_pdf(es, reflect(wo), wi) +
@@ -83,14 +85,14 @@ template <class T> struct PhongMaterial {
                   T(0));
   }
 
-  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Shares p = shares();
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const { return sample(wo, u, shares()); }
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u, const Shares& p) const {
     const auto reflects = u.x < p.reflection;
     const Vec3<T> r = reflect(wo), s = sample_power_lobe(select(reflects, e, es), u.y, u.z);
     const Vec3<T> lobe = about_axis(r, s), turned = about_axis(r, {-s.x, -s.y, s.z});
     const Vec3<T> glossy = select(reflects && lobe.z <= T(0), turned, lobe);
     const Vec3<T> wi = select(u.x < p.reflection + p.specular, glossy, sample_cosine(u.y, u.z));
-    const T density = pdf(wi, wo);
+    const T density = pdf(wi, wo, p);
     return sample_if(density > T(0), wi, eval(wi, wo) * (wi.z / maximum(density, tiny<T>())), density);
   }
 
@@ -99,8 +101,16 @@ template <class T> struct PhongMaterial {
     return {Closure<T>(ClosureKind::Diffuse, cd * kd), power_closure(cs * (ks * T(2) * pi<T>() / (es + T(2))), es),
             power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(0.25) / (e + T(2))))), e)};
   }
+
+  /// The diffuse term, exactly.
+  ClosureSum<T> under(const Vec3<T>&) const { return {Closure<T>(ClosureKind::Diffuse, cd * kd)}; }
+  /// Where that is taken, the highlight and the reflection alone are drawn.
+  Sample<T> sample_beside_under(const Vec3<T>& wo, const Vec3<T>& u, const T& stands) const {
+    return sample(wo, u, shares(kd * max_component(cd) * (T(1) - stands)));
+  }
 };
 
 BRDFC_MODEL(PhongMaterial)
+BRDFC_UNDER(PhongMaterial)
 
 }  // namespace brdfc

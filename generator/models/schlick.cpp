@@ -22,6 +22,7 @@
 // stay below S.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -132,8 +133,21 @@ template <class T> struct Schlick {
     return {facets(ClosureKind::Ggx, F * (b() * thin * peak), wide * thin, wide / thin, T(0)),
             Closure<T>(ClosureKind::Diffuse, r * a())};
   }
+
+  /// S is at least r, and A sqrt(p) at least sqrt(p). The facets of base() are masked by 1 / (1 + Lambda(v') +
+  /// Lambda(v)), and v' G(v') (1 + Lambda(v')), from the horizon on, is at least the lesser of 1 - 0.47 s and of its
+  /// value there, 1 / (2 sqrt(s)), to half a percent.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const T wide = sqrt(rough);
+    const T masking = T(0.995) * minimum(T(1) - T(0.47) * rough, T(0.5) / maximum(wide, T(1e-8)));
+    Closure<T> glossy = facets(ClosureKind::Ggx, r * (b() * sqrt(p) * G(wo.z) * wo.z * masking), wide);
+    // Random directions meet what narrow lobes do, and Cycles takes the narrowest for mirrors.
+    glossy.weight = select(rough < T(1e-3), Rgb<T>(T(0)), glossy.weight);
+    return {glossy, Closure<T>(ClosureKind::Diffuse, r * a())};
+  }
 };
 
 BRDFC_MODEL(Schlick)
+BRDFC_UNDER(Schlick)
 
 }  // namespace brdfc

@@ -10,6 +10,7 @@
 // Erratum: the fraction bar in the paper's equation divides the mirror term by pi as well.
 #include "model/base_terms.h"
 #include "model/sampling.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -59,8 +60,15 @@ template <class T> struct SchlickDouble {
 
   /// R_f(alpha) is about R_0 except where both directions are at grazing angles and far apart.
   ClosureSum<T> base(const Vec3<T>&) const { return {Closure<T>(ClosureKind::Diffuse, rd * (T(1) - r0))}; }
+
+  /// Lambert's with the largest R_f for this view: alpha is at most half of a right angle more than theta_o.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const T cosAlpha = wo.z / sqrt(T(2) + T(2) * sqrt(sin2_theta(wo)));
+    return {Closure<T>(ClosureKind::Diffuse, rd * ((T(1) - r0) * one_minus_schlick_weight(cosAlpha)))};
+  }
 };
 
 BRDFC_MODEL(SchlickDouble)
+BRDFC_UNDER(SchlickDouble)
 
 }  // namespace brdfc

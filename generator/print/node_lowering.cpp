@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/series.h"
+#include "print/node_table.h"
 
 namespace brdfc::print {
 namespace {
@@ -145,6 +146,7 @@ class Lowering {
       case Op::MakeColor:
         return Rgb<Expr>(real(0), real(1), real(2));
       case Op::Lookup: {
+        if (const auto polynomial = polynomial_of(*n.table)) return polynomial_at(*polynomial, real(0));
         std::vector<Expr> at;
         for (std::size_t i = 0; i < n.args.size(); ++i) at.push_back(real(i));
         return record_lookup(n.table, at);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "print/node_lowering.h"
+#include "print/node_table.h"
 
 namespace brdfc::print {
 namespace {
@@ -445,6 +446,14 @@ class Writer {
 };
 
 }  // namespace
+
+bool has_nodes(const Program& program) {
+  for (int id = 0; id < program.size(); ++id)
+    if (program.reachable()[std::size_t(id)] && program.node(id).op == Op::Lookup &&
+        !polynomial_of(*program.node(id).table))
+      return false;
+  return true;
+}
 
 NodeProgram node_program(const Program& program, const std::set<std::string>& vectors) {
   const Program p = lowered_to_nodes(program);

@@ -50,6 +50,10 @@ struct NodeProgram {
 /// SVM's stack, in floats.
 inline constexpr int kSvmStack = 255;
 
+/// Whether nodes can be made of a program: a table of one axis becomes a polynomial, if it is smooth; of others they
+/// have none.
+bool has_nodes(const Program&);
+
 /// There has to be a recorder, whose precision constants are folded in. Inputs and outputs NAME_x, NAME_y and NAME_z,
 /// for a name among `vectors`, are one vector NAME: sums, products with numbers and dot products of vectors are one
 /// node each.

@@ -2,6 +2,7 @@
 """Aimed forms under lamps: they must match the model there, and know only the lamps in the
 slots."""
 
+import itertools
 import math
 
 import bpy
@@ -63,7 +64,16 @@ def cases_of(extension, rng, form, few_of):
             drawn = {}
         others = few_of([*CASES.get(name, []), drawn], 1)
         found += [(name, values) for values in ({}, *others)]
+        if form == "nodes":  # whose tree has all choices
+            found += [(name, values) for values in few_of(other_choices(extension, name, form), 2)]
     return found
+
+
+def other_choices(extension, name, form):
+    """All combinations of a form's choices but the first, which is the default."""
+    options = extension.pack.form_choices(name, form)
+    combinations = itertools.product(*options.values())
+    return [dict(zip(options, chosen, strict=True)) for chosen in combinations][1:]
 
 
 def off_under_a_sun(extension, scene, tool, form, towards, samples, few_of, pictures=1):

@@ -256,16 +256,16 @@ def test_a_choice_that_nodes_lack(extension, new_file):
     """While the choice is one that the nodes lack, the twin is shown with a warning; otherwise the
     formulas, in the same group."""
     few_samples(new_file, 64)
-    material = extension.api.new_material("glossy_specular", normalisation="conserving")
+    material = extension.api.new_material("ashikhmin_shirley", diffuse="tabulated")
     add_sphere(new_file, material)
     add_camera(new_file)
     add_world(new_file)
     (node,) = extension.nodes.group_nodes(material)
     group = node.node_tree
-    assert form_of(extension, material) == "exact"
+    assert form_of(extension, material) == "aimed"
     assert [f.code for f in extension.api.warnings(material, new_file)][0] == "osl_off"
     other = render(new_file)
-    extension.api.set_parameters(material, normalisation="book")
+    extension.api.set_parameters(material, diffuse="paper")
     assert node.node_tree == group
     assert form_of(extension, material) == "nodes"
     assert extension.api.warnings(material, new_file) == []

@@ -128,8 +128,10 @@ TEST(Plan, NodesComeBesideFormsThatAreLeftOpen) {
   const auto forms = [&](const std::vector<MaterialNeed>& needs) { return plan_scene(needs, budget)[0].forms; };
   EXPECT_THAT(forms({need("a", "phong", {"e=20"})}), ElementsAre(aimed, nodes));
   EXPECT_THAT(forms({need("a", "phong", {"e=20"}, "aimed")}), ElementsAre(aimed)) << "asked for by name";
-  EXPECT_THAT(forms({need("a", "ward", {"normalisation=duer"})}), ElementsAre(aimed)) << "another choice";
-  EXPECT_THAT(forms({need("a", "ward", {"normalisation=duer"}), need("b", "ward", {})}), ElementsAre(aimed, nodes));
+  EXPECT_THAT(forms({need("a", "ward", {"normalisation=duer"})}), ElementsAre(aimed, nodes)) << "any choice";
+  const MaterialNeed without = need("a", "ashikhmin_shirley", {"diffuse=tabulated"});
+  EXPECT_THAT(forms({without}), ElementsAre(aimed)) << "a choice that nodes lack";
+  EXPECT_THAT(forms({without, need("b", "ashikhmin_shirley", {})}), ElementsAre(aimed, nodes));
   EXPECT_THAT(plan_scene({need("a", "phong", {"e=20"})})[0].forms, ElementsAre(aimed)) << "not unasked";
 }
 

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "forms/node_parts.h"
+
+#include "forms/node_lamps.h"
+#include "model/horizon.h"
+#include "trace/program.h"
+
+namespace brdfc::forms {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using print::NodeOperand;
+using print::NodeProgram;
+
+Json operand_json(const NodeOperand& o) {
+  if (o.result >= 0) return "$" + std::to_string(o.result);
+  if (!o.input.empty()) return o.input;
+  if (!o.color) return float(o.value[0]);
+  return {float(o.value[0]), float(o.value[1]), float(o.value[2])};
+}
+
+/// Records a program by itself.
+template <class Outputs> NodeProgram recorded(const Outputs& outputs) {
+  Recorder recorder;
+  Program program;
+  outputs(program);
+  return print::node_program(program, node_vectors());
+}
+
+LampSlot<Expr> slot_input() { return {input3("place"), input3("turn"), input3("scale"), input3("shape")}; }
+LampAxes<Expr> axes_input() {
+  return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
+}
+
+}  // namespace
+
+const std::set<std::string>& node_vectors() {
+  static const std::set<std::string> names = {"across", "along",   "at",   "away", "normal", "place", "ray", "scale",
+                                              "shape",  "towards", "true", "turn", "view",   "wi",    "wo"};
+  return names;
+}
+
+Json json_of(const NodeProgram& program) {
+  Json inputs = Json::array(), operations = Json::array(), outputs = Json::array();
+  for (const auto& [name, color] : program.inputs) inputs.push_back({name, color ? "VECTOR" : "FLOAT"});
+  for (const print::NodeOperation& o : program.operations) {
+    Json line = {o.kind};
+    for (const NodeOperand& a : o.operands) line.push_back(operand_json(a));
+    operations.push_back(line);
+  }
+  for (const auto& [name, o] : program.outputs)
+    outputs.push_back({name, o.color ? "VECTOR" : "FLOAT", operand_json(o)});
+  return {{"inputs", inputs}, {"operations", operations}, {"outputs", outputs}, {"live", program.live}};
+}
+
+NodeProgram record_bend() {
+  return recorded([](Program& p) {
+    const Vec3<Expr> g = input3("true"), wo = input3("view"), n = input3("normal");
+    const Condition bends = mirror_rise(g, wo, n) < Expr(0.0) && Expr::input("strand") < Expr(0.5);
+    p.output("normal", select(bends, bent_normal(g, wo, n), n));
+  });
+}
+NodeProgram record_raise() {
+  return recorded([](Program& p) { p.output("wo", raise_to_horizon(input3("wo"))); });
+}
+NodeProgram record_axes() {
+  return recorded([](Program& p) {
+    const LampAxes<Expr> axes = lamp_axes(slot_input());
+    p.output("across", axes.across);
+    p.output("along", axes.along);
+    p.output("away", axes.away);
+    p.output("half_across", axes.half_across);
+    p.output("half_along", axes.half_along);
+  });
+}
+NodeProgram record_cone() {
+  return recorded([](Program& p) {
+    const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("normal"));
+    p.output("towards", cone.towards);
+    p.output("drop", cone.drop);
+    p.output("chord", cone.chord);
+    p.output("reach", cone.reach);
+    p.output("flat", cone.flat);
+    p.output("used", cone.used);
+    p.output("active", cone.active);
+    p.output("above", cone.above);
+    p.output("whole", cone.whole);
+  });
+}
+NodeProgram record_flat() {
+  return recorded([](Program& p) {
+    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), Expr::input("drop"),
+                                             Expr::input("u_0"), Expr::input("u_1"));
+    p.output("wi", point.wi);
+    p.output("emphasis", point.emphasis);
+  });
+}
+NodeProgram record_met() {
+  return recorded([](Program& p) {
+    LampCone<Expr> cone;
+    cone.towards = input3("towards");
+    cone.chord = Expr::input("chord");
+    p.output("met", meets(slot_input(), axes_input(), input3("at"), cone, input3("ray")));
+  });
+}
+NodeProgram record_lobe() {
+  return recorded([](Program& p) {
+    LampCone<Expr> cone;
+    cone.chord = Expr::input("chord");
+    cone.flat = Expr::input("flat");
+    const ToonLobe<Expr> lobe = toon_lobe(cone, Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
+    p.output("color", lobe.color);
+    p.output("size", lobe.size);
+  });
+}
+NodeProgram record_rest() {
+  return recorded([](Program& p) {
+    const Rgb<Expr> weight = Rgb<Expr>::input("weight");
+    const Expr factor = kept(max_component(weight), Expr::input("u"));
+    p.output("color", weight * (factor * (Expr(1.0) - Expr::input("lost"))));
+  });
+}
+
+}  // namespace brdfc::forms

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The parts of the form of nodes that are the same for all models, and the JSON of a part.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "print/node_program.h"
+
+namespace brdfc::forms {
+
+/// Which inputs and outputs of parts are vectors.
+const std::set<std::string>& node_vectors();
+nlohmann::ordered_json json_of(const print::NodeProgram&);
+
+print::NodeProgram record_bend();
+print::NodeProgram record_raise();
+print::NodeProgram record_axes();
+print::NodeProgram record_cone();
+print::NodeProgram record_flat();
+print::NodeProgram record_met();
+print::NodeProgram record_lobe();
+/// The drawn direction's weight; `lost`: 1 where it lies in the cone of a lamp or below the surface.
+print::NodeProgram record_rest();
+
+}  // namespace brdfc::forms

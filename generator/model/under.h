@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The base of the form of nodes: closures that are nowhere above a model. Without Open Shading Language Cycles drops
+// closures of negative weight, so what a base gives beyond the model could not be taken off again.
+//
+// A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
+// directions their sum is at most f cos(theta_i); weights are not negative. They are of kinds that Blender has a node
+// for: Diffuse, DiffuseToon, and Ggx with one roughness, all about the surface's normal, the same for all choices.
+#pragma once
+
+#include <array>
+
+#include "model/model.h"
+
+namespace brdfc::inline model {
+
+/// The base of a model.
+struct Under {
+  /// With the parameters as Model::record() has them. A Recorder must be active.
+  ClosureSum<Expr> (*record)(const ModelInfo&, const ParamValues& fixed, const Vec3<Expr>& wo);
+  ClosureSum<double> (*bound)(const ModelInfo&, const ParamValues&, const Vec3<double>& wo);
+  /// As Brdf::sample(), for what the base leaves of f; null where that serves well enough. The pdf is above 0 wherever
+  /// the base, times `stands`, is less than f cos(theta_i).
+  Sample<Expr> (*sample)(const ModelInfo&, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
+                         const Expr& stands);
+};
+/// That of the model, or a null pointer.
+const Under* under(const Model&);
+/// Called by BRDFC_UNDER before main().
+bool register_under(const std::string& name, const Under&);
+
+/// A term that depends on the polar angle of the light alone, from below: two cones about the normal. Their sum has
+/// `heights` at the normal and at the first of `angles`, is linear between, and 0 from the second on. Angles are in
+/// units of 90 degrees.
+template <class T> ClosureSum<T> cones_under(const Rgb<T>& weight, const std::array<double, 2>& heights,
+                                             const std::array<double, 2>& angles) {
+  ClosureSum<T> sum;
+  for (std::size_t i = 0; i < 2; ++i) {
+    // Over 2 pi (1 - cos) a cone's height is 1.
+    const double drop = 4 * kPi * std::pow(std::sin(angles[i] * kPi / 4), 2);
+    const double height = heights[i] - (i == 0 ? heights[1] : 0);
+    Closure<T>& c = sum.emplace_back(ClosureKind::DiffuseToon, weight * T(height * drop));
+    c.size = T(i == 0 ? 0 : angles[0]);
+    c.smooth = T(i == 0 ? angles[0] : angles[1] - angles[0]);
+  }
+  return sum;
+}
+
+namespace detail {
+
+template <class M>
+concept SamplesBesideUnder = requires(const M& m, const Vec3<double>& w) {
+  m.sample_beside_under(w, w, 1.0);
+};
+
+template <template <class> class M> Under under_of() {
+  static const auto recorded = [](const ModelInfo& info, const ParamValues& fixed) {
+    const ParamValues values = complete(info, fixed);
+    M<Expr> m;
+    m.parameters(RecordVisitor{values, fixed});
+    return m;
+  };
+  Under out{[](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo) {
+              return recorded(info, fixed).under(wo);
+            },
+            [](const ModelInfo& info, const ParamValues& given, const Vec3<double>& wo) {
+              const ParamValues values = complete(info, given);
+              M<double> m;
+              m.parameters(BindVisitor<double>{values});
+              return m.under(wo);
+            },
+            nullptr};
+  if constexpr (SamplesBesideUnder<M<double>>)
+    out.sample = [](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
+                    const Expr& stands) { return recorded(info, fixed).sample_beside_under(wo, u, stands); };
+  return out;
+}
+
+}  // namespace detail
+
+#if BRDFC_BASELINE
+#define BRDFC_UNDER(M)                       \
+  bool the_class_##M##_has_closures_under_ = \
+      ::brdfc::register_under(M<double>::info().name, ::brdfc::model::detail::under_of<M>());
+#else
+#define BRDFC_UNDER(M)
+#endif
+
+}  // namespace brdfc::inline model

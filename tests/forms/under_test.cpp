@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The base of the form of nodes, which lies under the model.
+#include "model/under.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "forms/recording.h"
+#include "measure/bound_model.h"
+#include "measure/probes.h"
+#include "model/choices.h"
+#include "support.h"
+
+namespace brdfc::forms {
+namespace {
+
+/// Random values over the sliders' ranges for all choices, and the ends of all ranges.
+std::vector<ParamValues> cases_of(const ModelInfo& info) {
+  std::vector<ParamValues> cases = measure::slider_cases(info, 40, 5);
+  for (const bool sliders : {true, false})
+    for (const ParamValues& values : measure::end_cases(info, sliders)) cases.push_back(values);
+  return cases;
+}
+
+TEST(Under, IsNowhereAboveTheModel) {
+  measure::Random random(11);
+  for (const auto& [name, m] : models()) {
+    const Under* of = under(*m);
+    if (!of) continue;
+    for (const ParamValues& values : cases_of(m->info())) {
+      const measure::BoundModel bound = measure::bind_model(*m, values);
+      for (const auto& [wi, any_wo] : measure::direction_pairs(*bound.brdf, 400, random)) {
+        // As views are before a form sees them.
+        const Vec3<double> wo = any_wo.z < 1e-4 ? direction(1e-4, 0.3) : any_wo;
+        if (wi.z <= 0) continue;
+        const ClosureSum<double> base = of->bound(m->info(), values, wo);
+        const Rgb<double> f = bound.brdf->eval(wi, wo) * wi.z, b = evaluate(base, wi, wo);
+        for (const Closure<double>& c : base)
+          measure::require_value(c.weight, "weight of the base", bound.label, c.normal, wo);
+        const auto above = [](double x, double y) { return y - x * (1 + 1e-7) - 1e-12; };
+        const double most = std::max({above(f.r, b.r), above(f.g, b.g), above(f.b, b.b)});
+        ASSERT_LE(most, 0) << bound.label << " wi " << wi.x << ' ' << wi.y << ' ' << wi.z << " wo " << wo.x << ' '
+                           << wo.y << ' ' << wo.z << " f " << f.g << " base " << b.g;
+      }
+    }
+  }
+}
+
+struct Row {
+  const char* model;
+  std::vector<std::string> values;
+  double share;  ///< of the model's light seen at 45 degrees, at least
+};
+const Row kRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
+                     {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
+                     {"coupled", {}, 0.94},
+                     {"oren_nayar", {}, 0.75},
+                     {"oren_nayar", {"form=qualitative"}, 0.9},
+                     {"phong_material", {"ks=0", "kr=0"}, 0.999},
+                     {"schlick", {}, 0.75},
+                     {"schlick", {"rough=0.9"}, 0.7},
+                     {"schlick_double", {}, 0.9}};
+
+TEST(Under, CarriesWhatWasMeasured) {
+  std::set<std::string> seen;
+  for (const Row& row : kRows) {
+    const Model& m = find_model(row.model);
+    seen.insert(row.model);
+    ASSERT_TRUE(under(m)) << row.model;
+    const ParamValues values = complete(m.info(), parse_values(m.info(), row.values));
+    const measure::BoundModel bound = measure::bind_model(m, values);
+    const Vec3<double> wo = direction(std::sqrt(0.5), 0.4);
+    const ClosureSum<double> base = under(m)->bound(m.info(), values, wo);
+    measure::Random random(12);
+    double of_model = 0, of_base = 0;
+    for (int i = 0; i < 1 << 14; ++i) {
+      const Vec3<double> wi = measure::uniform_direction(random);
+      of_model += bound.brdf->eval(wi, wo).g * wi.z;
+      of_base += evaluate(base, wi, wo).g;
+    }
+    EXPECT_GE(of_base / of_model, row.share) << bound.label;
+  }
+  for (const auto& [name, m] : models()) EXPECT_EQ(under(*m) != nullptr, seen.count(name) == 1) << name;
+}
+
+/// One tree of nodes serves all choices.
+TEST(Under, IsRecordedAlikeForAllChoices) {
+  for (const auto& [name, m] : models()) {
+    const Under* of = under(*m);
+    if (!of) continue;
+    std::vector<ClosureKind> kinds;
+    for (const Choices& choices : choice_combinations(m->info())) {
+      Recorder recorder;
+      std::vector<ClosureKind> here;
+      for (const Closure<Expr>& c : of->record(m->info(), with_choices(m->info(), choices), input3("wo"))) {
+        EXPECT_TRUE(c.kind == ClosureKind::Diffuse || c.kind == ClosureKind::DiffuseToon || c.kind == ClosureKind::Ggx)
+            << name;
+        EXPECT_FALSE(c.turned || c.stretched != Tangent::None) << name;
+        here.push_back(c.kind);
+      }
+      if (kinds.empty()) kinds = here;
+      EXPECT_EQ(here, kinds) << name;
+    }
+    EXPECT_FALSE(kinds.empty()) << name;
+  }
+}
+
+}  // namespace
+}  // namespace brdfc::forms
