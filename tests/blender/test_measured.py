@@ -59,7 +59,9 @@ def by_the_tool(program, monkeypatch):
 def test_what_a_file_holds(extension, empty, paint):
     found = extension.api.measured_fits(paint)
     assert found.isotropic and found.path == paint
-    assert [fit.error for fit in found.fits] == sorted(fit.error for fit in found.fits)
+    # Of models whose errors hardly differ, the simpler one comes first.
+    errors = [fit.error for fit in found.fits]
+    assert all(before < 1.06 * after for before, after in itertools.pairwise(errors))
     ward = found.fit("ward")
     assert ward.error < 0.02  # what straight lines between angles miss
     assert ward.parameters["ax"] == pytest.approx(0.25, rel=0.02)
