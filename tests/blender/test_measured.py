@@ -46,18 +46,24 @@ def write_table(extension, tmp_path_factory):
     return write
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def paint(write_table):
     return write_table("paint.csv", "ward", ks=(0.2, 0.1, 0.05), ax=0.25, ay=0.25)
 
 
-@pytest.fixture(autouse=True)
-def by_the_tool(program, monkeypatch):
-    monkeypatch.setenv("BRDFC_TOOL", str(program))
+@pytest.fixture(scope="module", autouse=True)
+def by_the_tool(program):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BRDFC_TOOL", str(program))
+        yield
 
 
-def test_what_a_file_holds(extension, empty, paint):
-    found = extension.api.measured_fits(paint)
+@pytest.fixture(scope="module")
+def found(extension, paint):
+    return extension.api.measured_fits(paint)
+
+
+def test_what_a_file_holds(paint, found):
     assert found.isotropic and found.path == paint
     # Of models whose errors hardly differ, the simpler one comes first.
     errors = [fit.error for fit in found.fits]
@@ -70,13 +76,14 @@ def test_what_a_file_holds(extension, empty, paint):
         found.fit("minnaert")
 
 
-def test_a_material_of_a_file(extension, empty, paint):
-    material = extension.api.new_measured_material(paint, "ward")
+def test_a_material_of_a_file(extension, empty, found):
+    material = extension.api.new_measured_material(found, "ward")
     assert material.name == "paint"
     (node,) = extension.nodes.group_nodes(material)
     assert extension.nodes.get_value(node, "ax") == pytest.approx(0.25, rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_matte_light_is_added(extension, empty, write_table):
     """In a white world the sum is brighter than the model by the Lambert surface's albedo."""
@@ -98,6 +105,7 @@ def test_matte_light_is_added(extension, empty, write_table):
     assert seen[0] - seen[1] == pytest.approx(0.4, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_operator_makes_the_closest(extension, empty, paint):
     ball = helpers.add_sphere(empty, None)
     bpy.context.view_layer.objects.active = ball
