@@ -443,6 +443,7 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
        "/camera",
        {{"type", "orthographic"}, {"position", {0, 0, 9}}, {"look_at", {0, 1, 0}}, {"height", 2}}},
       {"material", "/materials/red", nullptr},
+      {"measured_material", "/materials/red", {{"measured", "a.binary"}}},
       {"textured", "/materials/red/parameters/rho", {{"texture", checker}}},
       {"image_texture", "/materials/red/parameters/rho/texture", {{"image", "a.png"}}},
       {"checker_texture", "/materials/red/parameters/rho/texture", checker},
