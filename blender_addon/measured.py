@@ -10,6 +10,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import bpy
+
 from . import lean
 from .common.i18n import say
 from .common.jobs import ProgramJob
@@ -33,6 +35,8 @@ class Fit:
     matte: tuple | None
     #: The part of the light that goes in other directions than was measured.
     error: float
+    #: The share of a white world's light that the model's ideal mirror reflects: no data hold it.
+    mirror: float
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,9 @@ class Fitting(ProgramJob):
 
     def __init__(self, path):
         """Raises MeasuredError."""
-        self._path = Path(path)
+        if not path:
+            raise MeasuredError(say("Expected a file with a measured BRDF, got none"))
+        self._path = Path(bpy.path.abspath(str(path)))
         if not self._path.is_file():
             raise MeasuredError(say("There is no file {file}", file=path))
         try:
@@ -109,6 +115,7 @@ class Fitting(ProgramJob):
                 {k: tuple(v) if isinstance(v, list) else v for k, v in entry["parameters"].items()},
                 tuple(entry["matte"]) if entry["matte"] else None,
                 entry["error"],
+                entry["mirror"],
             )
             for entry in told["fits"]
             if entry["model"] in pack.model_names()

@@ -11,7 +11,7 @@ from ..common.i18n import say
 from ..packs import pack
 from . import compiler, formula_nodes, stand_in, twin
 from .compiler import CompileError
-from .group_sockets import VECTORS, Interface
+from .group_sockets import VECTORS, Interface, has_menus
 from .wiring import Wiring
 
 TAG = pack.TAG
@@ -156,7 +156,7 @@ def fill_with_nodes(group, model_name, representation, source, twin_group):
         instead = None
         if twin_group is not None:
             sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
-            instead = _instance(group, twin_group, sources)
+            instead, _ = _instance(group, twin_group, sources)
         elif stand_in.has_node(model_name) and "baked" not in group[TAG]:
             instead = stand_in.node_of(group, model_name, parameters, constants)
         if instead is not None:
@@ -191,9 +191,19 @@ def fill_with_form(group, model_name, native, with_osl, group_of):
     group_input, group_output = (group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output"))
     group_input.location, group_output.location = (-500, 0), (400, 0)
     interface = Interface(group, group_input, tag.get("sockets", {}))
-    sources = _relays(group, interface, pack.socket_parameters(model_name, with_osl))
+    parameters = pack.socket_parameters(model_name, with_osl)
+    # The form has its own sockets for choices. Where those are menus they take no number.
+    menus = {
+        name: parameters[name]
+        for name in form[TAG]["sockets"].keys() & parameters.keys()
+        if has_menus() and parameters[name]["kind"] == "choice"
+    }
+    others = {name: p for name, p in parameters.items() if name not in menus}
+    sources = _relays(group, interface, others)
     sources |= {name: interface.vector(name) for name in VECTORS}
-    made = _instance(group, form, sources)
+    made, sockets = _instance(group, form, sources)
+    for name, parameter in menus.items():
+        interface.menu(name, sockets[name], parameter)
     limits = {n: v for n, v in pack.form_values(model_name, native).items() if n in sources}
     if limits:
         made = _only_where(group, model_name, limits, sources, made, group_of)
@@ -207,9 +217,11 @@ def fill_with_form(group, model_name, native, with_osl, group_of):
 
 
 def _instance(group, inner, sources):
-    """Puts a group inside another; returns its outputs by name. `sources`: outputs by parameter."""
+    """Puts a group inside another; returns its outputs by name, and its inputs by parameter.
+    `sources`: outputs by parameter."""
     inputs = {i: sources.get(name) for name, i in inner[TAG]["sockets"].items()}
-    return stand_in.twin_of(group, inner, inputs)
+    outputs, sockets = stand_in.twin_of(group, inner, inputs)
+    return outputs, {name: sockets[i] for name, i in inner[TAG]["sockets"].items()}
 
 
 def _only_where(group, model_name, limits, sources, made, group_of):
@@ -221,7 +233,7 @@ def _only_where(group, model_name, limits, sources, made, group_of):
         chosen = same if chosen is None else w.math("MULTIPLY", chosen, same)
     if "twin" not in pack.model(model_name)["representations"]:
         return made | {"BSDF": w.shown(chosen, made["BSDF"])}
-    twin_ = _instance(group, group_of(model_name, "twin"), sources)
+    twin_, _ = _instance(group, group_of(model_name, "twin"), sources)
     return twin_ | made | stand_in.choose(group, chosen, twin_, made)
 
 
@@ -284,7 +296,7 @@ def fill_with_scripts(group, model_name, representation, texts, twin_group):
     sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
     instead = None
     if twin_group is not None:
-        instead = _instance(group, twin_group, sources)
+        instead, _ = _instance(group, twin_group, sources)
     elif stand_in.has_node(model_name) and "baked" not in tag:
         constants = pack.constants(model_name, representation)
         instead = stand_in.node_of(group, model_name, sources, constants)

@@ -136,6 +136,16 @@ class Interface:
         have = self.sockets.get(name)
         self.sockets[name] = add_parameter(self.group, self.group_input, target, parameter, have)
 
+    def menu(self, name, target, parameter):
+        """Links a choice to a menu socket inside the group, and takes the items of that: a menu
+        can't have those of two nodes."""
+        is_new = name not in self.sockets
+        if is_new:
+            self.sockets[name] = _choice_socket(self.group, parameter)
+        self.group.links.new(_output(self.group_input, self.sockets[name]), target)
+        if is_new:
+            self.sockets[name].default_value = choice_label(parameter["default"])
+
     def vector(self, name):
         """The output inside the group of one of the sockets in VECTORS."""
         if name not in self.sockets:

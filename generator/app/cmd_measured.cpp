@@ -49,6 +49,7 @@ Json describe(const measured::ModelFit& f) {
           {"parameters", parameters},
           {"matte", f.matte ? rgb(*f.matte) : Json()},
           {"error", f.error},
+          {"mirror", f.mirror},
           {"seconds", f.seconds}};
 }
 
@@ -145,9 +146,12 @@ void add_measured_command(CLI::App& app) {
       for (const std::string& sentence : *sentences) fmt::print("  {}\n", sentence);
     if (!fits.empty()) fmt::print("\n  {:<22}{:>10}  {:>6}  parameters\n", "model", "misplaced", "time");
     for (const measured::ModelFit& f : fits)
-      fmt::print("  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
-                 format_values(f.model->info(), rounded(f.values)),
-                 f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "");
+      fmt::print(
+          "  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
+          format_values(f.model->info(), rounded(f.values)),
+          (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
+              (f.mirror > 0 ? fmt::format("; its mirror, {:.2g} % of a white world, is not in the data", 100 * f.mirror)
+                            : ""));
   });
 }
 

@@ -24,6 +24,10 @@ std::vector<std::string> split_fields(const std::string& line) {
   }
 }
 
+std::string without_byte_order_mark(const std::string& line) {
+  return line.starts_with("\xEF\xBB\xBF") ? line.substr(3) : line;
+}
+
 CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::string> columns)
     : in_(in), source_(std::move(source)), columns_(std::move(columns)) {
   std::vector<std::string> header;
@@ -36,7 +40,8 @@ CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::stri
     std::size_t i = 0;
     while (i < header.size() && header[i] != c) ++i;
     if (i == header.size())
-      input_error("{}: expected a header with the columns {}; '{}' is missing", where(), fmt::join(columns_, ","), c);
+      input_error("{}: expected a header with the columns {}; '{}' is missing, got '{:.80}'", where(),
+                  fmt::join(columns_, ","), c, fmt::to_string(fmt::join(header, ",")));
     where_.push_back(i);
   }
 }
@@ -46,7 +51,7 @@ std::string CsvReader::where() const { return fmt::format("{} line {}", source_,
 bool CsvReader::read_line(std::vector<std::string>& fields) {
   std::string line;
   while (std::getline(in_, line)) {
-    ++line_;
+    if (++line_ == 1) line = without_byte_order_mark(line);
     if (trim(line).empty()) continue;
     fields = split_fields(line);
     return true;

@@ -21,6 +21,9 @@ std::vector<std::string> split_fields(const std::string& line);
 /// Reads numbers from named columns. The columns may come in any order, and other columns are ignored, so that the
 /// output of one command can be the input of the next. Every error is an InputError that names line, column and what
 /// was expected. Numbers must be finite.
+/// The first line of a file in UTF-8 without the mark with which some programs begin it.
+std::string without_byte_order_mark(const std::string& line);
+
 class CsvReader {
  public:
   /// Reads the header. For an input without any line empty() is true; only the caller can tell whether that is an

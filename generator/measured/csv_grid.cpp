@@ -40,7 +40,7 @@ bool has_vectors(const std::string& file) {
   std::string line;
   while (trim(line).empty() && std::getline(in, line)) {
   }
-  const auto fields = split_fields(line);
+  const auto fields = split_fields(without_byte_order_mark(line));
   return std::find(fields.begin(), fields.end(), "wi_x") != fields.end();
 }
 

@@ -121,10 +121,15 @@ class Problem {
       if (p.kind == ParamKind::Color) colors_.push_back(&p);
     if (brdf_->scatters_through()) return;
     std::vector<const ParamInfo*> numbers;
+    // Isotropic data say nothing of an angle about the normal, which isotropic models do not have.
+    const bool turns_nothing = isotropic && !info_.properties.isotropic;
     for (const ParamInfo& p : info_.params)
-      if (p.kind == ParamKind::Number && !(isotropic && p.unit == "rad")) numbers.push_back(&p);
+      if (p.kind == ParamKind::Number && !(turns_nothing && p.unit == "rad")) numbers.push_back(&p);
     for (const ParamInfo* p : numbers) {
-      if (!matters(*p, numbers, pairs)) continue;
+      if (!matters(*p, numbers, pairs)) {
+        without_mirror(*p);
+        continue;
+      }
       // A number that only scales what a colour scales as well is left to the colour.
       if (std::ranges::any_of(colors_, [&](const ParamInfo* c) { return p->max == 1 && same_at_zero(*p, *c, pairs); }))
         set(*p, 1);
@@ -206,7 +211,26 @@ class Problem {
     return std::isfinite(best) ? best : std::numeric_limits<double>::infinity();
   }
 
+  /// The share of a white world's light that goes by an ideal mirror, which a table of values does not hold.
+  double mirror() const {
+    constexpr int kViews = 16;
+    double light = 0;
+    for (int i = 0; i < kViews; ++i) {
+      const double z = (i + 0.5) / kViews;
+      const Rgb<double> m = brdf_->mirror({std::sqrt(1 - z * z), 0, z});
+      light += (m.r + m.g + m.b) / 3 * 2 * z / kViews;
+    }
+    return light;
+  }
+
  private:
+  /// A number that f does not depend on gets its least value if there is less of a mirror then.
+  void without_mirror(const ParamInfo& p) {
+    const double before = std::get<double>(values_.at(p.name)), had = mirror();
+    set(p, p.min);
+    if (!(mirror() < had)) set(p, before);
+  }
+
   void set(const ParamInfo& p, double value) {
     values_[p.name] = value;
     brdf_->assign(p.name, {value, value, value});
@@ -322,7 +346,7 @@ std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pair
       auto added = extra();
       const double error = problem.solve(last, added);
       if (!best || error < best->error * (matte && !best->matte ? kWorthMatte : 1 - 1e-3))
-        best = ModelFit{&model, problem.values(), added, error, problem.free() + int(matte), 0};
+        best = ModelFit{&model, problem.values(), added, error, problem.mirror(), problem.free() + int(matte), 0};
     }
     if (!best) return std::nullopt;
   }

@@ -2,8 +2,9 @@
 // Fits of models to a measured BRDF.
 //
 // The error is the light that a picture would misplace: the integral of |f - data| cos cos over both hemispheres,
-// divided by that of data cos cos. Colours, and matte light of which a model has none itself, are found by linear least
-// squares with weights that approach this error; numbers are found by search, and choices by trying all.
+// divided by that of data cos cos.
+// Colours, and matte light of which a model has none itself, are found by linear least squares with weights that
+// approach this error; numbers are found by search, and choices by trying all.
 #pragma once
 
 #include <functional>
@@ -19,7 +20,10 @@ struct ModelFit {
   /// Albedo of a Lambert surface that is added to the model; nullopt if the model does without.
   std::optional<Rgb<double>> matte;
   double error = 0;  ///< share of the light that is misplaced
-  int found = 0;     ///< number of parameters that were fitted
+  /// Share of a white world's light that the model's ideal mirror reflects, which data over a grid of angles do not
+  /// hold and the error does not count.
+  double mirror = 0;
+  int found = 0;  ///< number of parameters that were fitted
   double seconds = 0;
 };
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "measured/measurement.h"
 
+#include <algorithm>
+#include <cctype>
+
 #include "core/error.h"
 #include "measured/csv_grid.h"
 #include "measured/merl.h"
@@ -10,7 +13,8 @@
 namespace brdfc::measured {
 
 Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_rgb) {
-  const std::string extension = path.extension().string();
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   if (extension == ".binary") return read_merl(path);
   if (extension == ".bsdf") return read_rgl(path, to_rgb);
   if (extension == ".bin") return read_utia(path);

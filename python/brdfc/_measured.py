@@ -48,6 +48,8 @@ class Fit:
     matte: tuple[float, float, float] | None
     #: Share of the light that the model sends in other directions.
     error: float
+    #: Share of a white world's light that the model's ideal mirror reflects: no data hold it.
+    mirror: float
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,7 @@ class Measured:
                 {k: plain(v) for k, v in f["parameters"].items()},
                 plain(f["matte"]),
                 f["error"],
+                f["mirror"],
             )
             for f in told["fits"]
         ]

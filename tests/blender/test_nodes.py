@@ -307,3 +307,33 @@ def test_albedo_in_a_white_world(extension, empty, tool):
     add_world(empty)
     found = render(empty)[..., :3].mean((0, 1))
     np.testing.assert_allclose(found, albedo(tool, "cook_torrance", values, [1.0])[0], rtol=3e-3)
+
+
+def test_choices_of_automatic_materials(extension, empty):
+    """With OSL off they reach the form inside the group, also where they are menus (5.0 on)."""
+    empty.cycles.shading_system = False
+    for name, model in extension.api.models().items():
+        choices = [p for p in model["parameters"] if p["kind"] == "choice"]
+        if not choices or "nodes" not in model["representations"]:
+            continue
+        material = extension.api.new_material(name)
+        (node,) = extension.nodes.group_nodes(material)
+        for group in (node.node_tree, extension.nodes.content_group(node.node_tree)):
+            assert all(link.is_valid for link in group.links), name
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    settings(extension, bpy.context.scene, 64, osl=False, size=16)
+    material = extension.api.new_material("glossy_specular", normalisation="estimator")
+    sphere_scene(bpy.context.scene, material, samples=64)
+    seen = [render(bpy.context.scene)[6:10, 6:10, 1].mean()]
+    extension.api.switch_representation(material, "nodes")
+    seen.append(render(bpy.context.scene)[6:10, 6:10, 1].mean())
+    extension.api.switch_representation(material, "auto")
+    extension.api.set_parameters(material, normalisation="book")
+    seen.append(render(bpy.context.scene)[6:10, 6:10, 1].mean())
+    extension.api.set_parameters(material, normalisation="estimator")
+    for osl in (True, False):  # the choice stays when the group is made anew
+        bpy.context.scene.cycles.shading_system = osl
+        extension.api.follow_settings(bpy.context.scene)
+    seen.append(render(bpy.context.scene)[6:10, 6:10, 1].mean())
+    assert [seen[1], seen[3]] == pytest.approx([seen[0]] * 2, rel=0.02)
+    assert abs(seen[2] / seen[0] - 1) > 0.1

@@ -267,7 +267,10 @@ try:
     probe = False
 except PermissionError:
     probe = True
-from bl_ext.user_default.brdfc_shaders import api, nodes, pack, plots
+from bl_ext.user_default.brdfc_shaders import api
+from bl_ext.user_default.brdfc_shaders.groups import nodes
+from bl_ext.user_default.brdfc_shaders.packs import pack
+from bl_ext.user_default.brdfc_shaders.plotting import plots
 
 scene = bpy.context.scene
 api.enable_osl(scene)

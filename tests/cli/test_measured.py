@@ -196,6 +196,10 @@ def test_a_table_is_what_it_was_made_from(tmp_path):
     file.write_text(angle_table(ti, pi, to, po, *f.T), encoding="utf-8")
     said = told(file)
     assert said["isotropic"] and said["format"] == "CSV" and "mirror image" in said["notes"][0]
+    # As Windows names it, and its programs write it.
+    windows = tmp_path / "W.CSV"
+    windows.write_text(file.read_text(), encoding="utf-8-sig", newline="\r\n")
+    assert told(windows)["albedo"] == said["albedo"]
     i, o = hemisphere(500, 11, 0.1), hemisphere(500, 12, 0.1)
     expected = glossy(i, o, exponent=4)
     assert np.abs(pairs(file, i, o)[0] - expected).mean() < 0.01 * expected.mean()

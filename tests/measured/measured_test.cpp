@@ -218,22 +218,23 @@ struct Found {
   ParamValues values;              ///< those that differ from the defaults
   std::vector<const char*> names;  ///< numbers and colours that the data determine
 };
+/// Away from the defaults, at which the search begins.
 const Found kFound[] = {
     {"ashikhmin_shirley", {{"nu", 40.}, {"nv", 40.}}, {"rs", "rd", "nu"}},
-    {"blinn", {}, {"ks", "e"}},
-    {"cook_torrance", {}, {"f0", "m"}},
-    {"glossy_reflector", {}, {"e"}},
-    {"glossy_specular", {}, {"e"}},
+    {"blinn", {{"e", 35.}}, {"ks", "e"}},
+    {"cook_torrance", {{"m", 0.45}}, {"f0", "m"}},
+    {"glossy_reflector", {{"e", 30.}}, {"e"}},
+    {"glossy_specular", {{"e", 30.}}, {"e"}},
     {"lafortune", {}, {"ks", "e", "cxy", "cz"}},
     {"lambert", {}, {"rho"}},
-    {"lossless", {}, {"tint", "n"}},
-    {"max_phong", {}, {"ks", "e"}},
-    {"modified_phong", {}, {"ks", "e"}},
-    {"oren_nayar", {}, {"rho", "sigma"}},
-    {"phong", {}, {"ks", "e"}},
-    {"phong_material", {{"kr", 0.}}, {"es"}},
-    {"radziszewski_alda", {}, {"tint", "n"}},
-    {"schlick", {{"p", 0.6}}, {"r", "p", "rough"}},
+    {"lossless", {{"n", 7.}}, {"tint", "n"}},
+    {"max_phong", {{"e", 30.}}, {"ks", "e"}},
+    {"modified_phong", {{"e", 30.}}, {"ks", "e"}},
+    {"oren_nayar", {{"sigma", 0.6}}, {"rho", "sigma"}},
+    {"phong", {{"e", 30.}}, {"ks", "e"}},
+    {"phong_material", {{"kr", 0.}, {"es", 30.}}, {"es"}},
+    {"radziszewski_alda", {{"n", 7.}}, {"tint", "n"}},
+    {"schlick", {{"p", 0.6}, {"rough", 0.35}}, {"r", "p", "rough"}},
     {"ward", {{"ax", 0.1}, {"ay", 0.3}}, {"ks", "ax", "ay"}},
 };
 
