@@ -15,6 +15,13 @@
 namespace brdfc::forms {
 namespace {
 
+/// The combinations of choices that agree with `fixed`.
+std::vector<Choices> open_choices(const ModelInfo& info, const ParamValues& fixed) {
+  std::vector<Choices> out = choice_combinations(info);
+  std::erase_if(out, [&](const Choices& choices) { return !admits(info, choices, fixed); });
+  return out;
+}
+
 /// Goes through the programs of all combinations at once. Where they have the same operation it is there once, of what
 /// its arguments have in common; where they differ a choice selects. So combinations that differ in a parameter of a
 /// formula select that, and not one of several formulas.
@@ -28,11 +35,10 @@ class Merger {
   };
   using Places = std::vector<Place>;
 
-  Merger(const ModelInfo& info, const ParamValues& fixed, const std::vector<Program>& programs) : programs_(programs) {
+  Merger(const ModelInfo& info, const ParamValues& fixed, const std::vector<Program>& programs)
+      : programs_(programs), options_(open_choices(info, fixed)) {
     for (const ParamInfo& p : info.params)
       if (p.kind == ParamKind::Choice) names_.push_back(p.name);
-    for (const Choices& choices : choice_combinations(info))
-      if (admits(info, choices, fixed)) options_.push_back(choices);
   }
 
   /// The node of the current recorder that stands for all.
@@ -117,8 +123,8 @@ class Merger {
   }
 
   const std::vector<Program>& programs_;
-  std::vector<std::string> names_;  ///< of all choices
   std::vector<Choices> options_;    ///< by program
+  std::vector<std::string> names_;  ///< of all choices
   std::map<Places, int> known_;
 };
 
@@ -126,8 +132,7 @@ class Merger {
 
 std::vector<ParamValues> open_combinations(const ModelInfo& info, const ParamValues& fixed) {
   std::vector<ParamValues> out;
-  for (const Choices& choices : choice_combinations(info))
-    if (admits(info, choices, fixed)) out.push_back(with_choices(info, choices, fixed));
+  for (const Choices& choices : open_choices(info, fixed)) out.push_back(with_choices(info, choices, fixed));
   return out;
 }
 
