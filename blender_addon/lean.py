@@ -7,19 +7,15 @@ The program brdfc decides what can be left out. It is not part of the extension;
 import contextlib
 import json
 import math
-import os
-import re
-import shutil
-import sysconfig
 from numbers import Real
 from pathlib import Path
 
 import bpy
 
 from . import lamps
-from .common.extension import PACKAGE
 from .common.i18n import say
-from .common.jobs import Job, ProgramJob
+from .common.jobs import Job
+from .common.program import ToolJob, find
 from .groups import nodes, usage
 from .packs import pack
 from .warnings import lamp_checks
@@ -33,32 +29,8 @@ class PlanError(RuntimeError):
 
 
 def program():
-    """Path of the program brdfc. Looked for in the extension's preferences, the environment
-    variable BRDFC_TOOL, the PATH, and where pip installs programs for the running Python. Raises
-    PlanError."""
-    addon = bpy.context.preferences.addons.get(PACKAGE)
-    named = getattr(addon.preferences, "program", "") if addon and addon.preferences else ""
-    for what, path in (
-        (say("the extension's preferences name it"), bpy.path.abspath(named)),
-        (say("BRDFC_TOOL names it"), os.environ.get("BRDFC_TOOL", "")),
-    ):
-        if not path:
-            continue
-        # Searches a folder by name, so "brdfc" finds brdfc.exe on Windows in all versions of
-        # Python.
-        folder, name = os.path.split(path)
-        if found := shutil.which(name, path=folder or None):
-            return found
-        raise PlanError(say("{path} is not the program brdfc; {who}", path=path, who=what))
-    for folders in (None, sysconfig.get_path("scripts")):
-        if found := shutil.which("brdfc", path=folders):
-            return found
-    raise PlanError(
-        say(
-            "The program brdfc was not found: give its path in the extension's preferences, or put "
-            "it on the PATH"
-        )
-    )
+    """See find() of common/program.py. Raises PlanError."""
+    return find(PlanError)
 
 
 def budget(error, time):
@@ -94,10 +66,10 @@ def needs(materials):
     return found
 
 
-class Planning(ProgramJob):
+class Planning(ToolJob):
     """Runs the program brdfc to make a Plan, while Blender stays usable."""
 
-    failure = PlanError
+    failure, command = PlanError, "build"
 
     def __init__(self, used, error=None, time=None, fit=False):
         """`used`: {name: usage.Use}. With `error` or `time`, as for budget(), brdfc chooses the
@@ -110,19 +82,13 @@ class Planning(ProgramJob):
             materials = {name: _open(entry) for name, entry in materials.items()}
         # Lean groups have a single form, chosen for the settings of the file.
         options += ["--osl-only", *(["--fit"] if fit else [])]
-        self._program = program()
+        super().__init__()
         asked = needs(materials)
         self._used, self._materials, self._lamps = used, materials, asked.get("lamps")
         content = json.dumps(asked)
         folder = self._open_folder("brdfc-lean-", {"materials.json": content})
-        command = [self._program, "build", "--materials", folder / "materials.json", "--explain"]
-        command += [*options, "--out", folder]
-        self._said = folder / "said.json"
-        try:
-            self._start(command, self._said)
-        except OSError as failed:
-            more = f"{command[0]}: {failed}"
-            raise PlanError(say("The program brdfc does not start", more=more)) from failed
+        listed = folder / "materials.json"
+        self._run("--materials", listed, "--explain", *options, "--out", folder)
 
     def _ended(self, status):
         if status != 0:
@@ -133,11 +99,6 @@ class Planning(ProgramJob):
             more = f"{self._program}: expected an explanation: {bad}"
             raise PlanError(say("The program brdfc made no plan", more=more)) from bad
         return Plan(self._used, self._materials, self._lamps, explanation, self._folder)
-
-    def _share(self, log):
-        """The fraction of models that, by its log, the program has begun."""
-        counted = re.findall(r"^brdfc build: (\d+)/(\d+) ", log, re.M)
-        return int(counted[-1][0]) / max(int(counted[-1][1]), 1) if counted else 0.0
 
 
 def _open(entry):

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured BRDFs: the models that come close to a file of MERL, RGL or UTIA, or to a table.
 
-The program brdfc reads the file and fits the models; the extension does not contain it, see
-lean.program().
+The program brdfc reads the file and fits the models.
 """
 
 import json
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
-from . import lean
 from .common.i18n import say
-from .common.jobs import ProgramJob
+from .common.program import ToolJob
 from .packs import pack
 
 #: Endings of the files that the program reads: MERL, RGL, UTIA, and tables.
@@ -64,10 +61,10 @@ class Measured:
         )
 
 
-class Fitting(ProgramJob):
+class Fitting(ToolJob):
     """Runs the program brdfc to make a Measured of a file, while Blender stays usable."""
 
-    failure = MeasuredError
+    failure, command = MeasuredError, "measured"
 
     def __init__(self, path):
         """Raises MeasuredError."""
@@ -76,18 +73,9 @@ class Fitting(ProgramJob):
         self._path = Path(bpy.path.abspath(str(path)))
         if not self._path.is_file():
             raise MeasuredError(say("There is no file {file}", file=path))
-        try:
-            self._program = lean.program()
-        except lean.PlanError as error:
-            raise MeasuredError(*error.args) from error
-        folder = self._open_folder("brdfc-measured-")
-        self._said = folder / "said.json"
-        command = [self._program, "measured", self._path.resolve(), "--json"]
-        try:
-            self._start(command, self._said)
-        except OSError as failed:
-            more = f"{command[0]}: {failed}"
-            raise MeasuredError(say("The program brdfc does not start", more=more)) from failed
+        super().__init__()
+        self._open_folder("brdfc-measured-")
+        self._run(self._path.resolve(), "--json")
 
     def _ended(self, status):
         try:
@@ -130,11 +118,6 @@ class Fitting(ProgramJob):
             (*told["notes"], *told["lacks"]),
             fits,
         )
-
-    def _share(self, log):
-        """The fraction of models that, by its log, the program has fitted."""
-        counted = re.findall(r"^brdfc measured: (\d+)/(\d+) ", log, re.M)
-        return int(counted[-1][0]) / max(int(counted[-1][1]), 1) if counted else 0.0
 
 
 def add_matte(tree, node, albedo):

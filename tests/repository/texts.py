@@ -14,7 +14,9 @@ SHOWN = {"label": {"text"}, "operator": {"text"}, "menu": {"text"}}
 OF_PROPERTIES = {"name", "description"}
 OF_CLASSES = {"bl_label", "bl_description"}
 #: Calls that show the argument at this position to users: it must come from one of the above.
-MUST_BE_SAID = {"Finding": 2, "Refused": 0, "PlanError": 0, "CompileError": 0, "report": 1}
+MUST_BE_SAID = {"Finding": 2, "Refused": 0, "report": 1} | dict.fromkeys(
+    ("CompileError", "MeasuredError", "PlanError", "failure"), 0
+)
 #: Names, which are the same in all languages.
 NAMES = {"brdfc", "Text", ""}
 
