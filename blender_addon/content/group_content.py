@@ -9,6 +9,7 @@ import json
 from .. import lamps
 from ..common.i18n import say
 from ..packs import pack
+from ..packs.pack import choice_label
 from . import compiler, formula_nodes, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, Interface, has_menus
@@ -156,7 +157,7 @@ def fill_with_nodes(group, model_name, representation, source, twin_group):
         instead = None
         if twin_group is not None:
             sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
-            instead, _ = _instance(group, twin_group, sources)
+            instead = _instance(group, twin_group, sources)
         elif stand_in.has_node(model_name) and "baked" not in group[TAG]:
             instead = stand_in.node_of(group, model_name, parameters, constants)
         if instead is not None:
@@ -170,10 +171,14 @@ def fill_with_nodes(group, model_name, representation, source, twin_group):
     group[TAG]["sockets"] = interface.identifiers()
 
 
-def _relays(group, interface, parameters):
-    """An output inside the group for each of these parameters."""
+def _relays(group, interface, parameters, without=()):
+    """Makes the sockets of these parameters, in this order: one group's content may be replaced by
+    that of another form. Returns an output inside the group for each, except for `without`."""
     found = {}
     for name, parameter in parameters.items():
+        if name in without:
+            interface.require(name, parameter)
+            continue
         relay = group.nodes.new("NodeReroute")
         relay.location = (-100, -40 * len(found))
         interface.parameter(name, relay.inputs[0], parameter)
@@ -194,16 +199,16 @@ def fill_with_form(group, model_name, native, with_osl, group_of):
     parameters = pack.socket_parameters(model_name, with_osl)
     # The form has its own sockets for choices. Where those are menus they take no number.
     menus = {
-        name: parameters[name]
+        name
         for name in form[TAG]["sockets"].keys() & parameters.keys()
         if has_menus() and parameters[name]["kind"] == "choice"
     }
-    others = {name: p for name, p in parameters.items() if name not in menus}
-    sources = _relays(group, interface, others)
+    new_menus = menus - interface.sockets.keys()
+    sources = _relays(group, interface, parameters, without=menus)
     sources |= {name: interface.vector(name) for name in VECTORS}
-    made, sockets = _instance(group, form, sources)
-    for name, parameter in menus.items():
-        interface.menu(name, sockets[name], parameter)
+    made = _instance(group, form, sources | {name: interface.output(name) for name in menus})
+    for name in new_menus:  # a menu has its items, of which one is the default, from its link
+        interface.sockets[name].default_value = choice_label(parameters[name]["default"])
     limits = {n: v for n, v in pack.form_values(model_name, native).items() if n in sources}
     if limits:
         made = _only_where(group, model_name, limits, sources, made, group_of)
@@ -217,11 +222,9 @@ def fill_with_form(group, model_name, native, with_osl, group_of):
 
 
 def _instance(group, inner, sources):
-    """Puts a group inside another; returns its outputs by name, and its inputs by parameter.
-    `sources`: outputs by parameter."""
+    """Puts a group inside another; returns its outputs by name. `sources`: outputs by parameter."""
     inputs = {i: sources.get(name) for name, i in inner[TAG]["sockets"].items()}
-    outputs, sockets = stand_in.twin_of(group, inner, inputs)
-    return outputs, {name: sockets[i] for name, i in inner[TAG]["sockets"].items()}
+    return stand_in.twin_of(group, inner, inputs)
 
 
 def _only_where(group, model_name, limits, sources, made, group_of):
@@ -233,7 +236,7 @@ def _only_where(group, model_name, limits, sources, made, group_of):
         chosen = same if chosen is None else w.math("MULTIPLY", chosen, same)
     if "twin" not in pack.model(model_name)["representations"]:
         return made | {"BSDF": w.shown(chosen, made["BSDF"])}
-    twin_, _ = _instance(group, group_of(model_name, "twin"), sources)
+    twin_ = _instance(group, group_of(model_name, "twin"), sources)
     return twin_ | made | stand_in.choose(group, chosen, twin_, made)
 
 
@@ -296,7 +299,7 @@ def fill_with_scripts(group, model_name, representation, texts, twin_group):
     sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
     instead = None
     if twin_group is not None:
-        instead, _ = _instance(group, twin_group, sources)
+        instead = _instance(group, twin_group, sources)
     elif stand_in.has_node(model_name) and "baked" not in tag:
         constants = pack.constants(model_name, representation)
         instead = stand_in.node_of(group, model_name, sources, constants)

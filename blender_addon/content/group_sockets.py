@@ -92,12 +92,17 @@ def _number_socket(group, parameter):
     )
 
 
+def _parameter_socket(group, parameter):
+    make = _choice_socket if parameter["kind"] == "choice" else _number_socket
+    return make(group, parameter)
+
+
 def add_parameter(group, group_input, target, parameter, socket=None):
     """Links a parameter's socket, which is made if not given, to an input inside the group. Returns
     the socket."""
     is_choice, is_new = parameter["kind"] == "choice", socket is None
     if is_new:
-        socket = (_choice_socket if is_choice else _number_socket)(group, parameter)
+        socket = _parameter_socket(group, parameter)
     source = _output(group_input, socket)
     if not is_choice:
         group.links.new(source, target)
@@ -136,21 +141,20 @@ class Interface:
         have = self.sockets.get(name)
         self.sockets[name] = add_parameter(self.group, self.group_input, target, parameter, have)
 
-    def menu(self, name, target, parameter):
-        """Links a choice to a menu socket inside the group, and takes the items of that: a menu
-        can't have those of two nodes."""
-        is_new = name not in self.sockets
-        if is_new:
-            self.sockets[name] = _choice_socket(self.group, parameter)
-        self.group.links.new(_output(self.group_input, self.sockets[name]), target)
-        if is_new:
-            self.sockets[name].default_value = choice_label(parameter["default"])
+    def require(self, name, parameter):
+        """Makes a parameter's socket if the group has none, without a link."""
+        if name not in self.sockets:
+            self.sockets[name] = _parameter_socket(self.group, parameter)
+
+    def output(self, name):
+        """The output inside the group of a socket."""
+        return _output(self.group_input, self.sockets[name])
 
     def vector(self, name):
         """The output inside the group of one of the sockets in VECTORS."""
         if name not in self.sockets:
             self.sockets[name] = vector_socket(self.group, name, VECTORS[name])
-        return _output(self.group_input, self.sockets[name])
+        return self.output(name)
 
     def identifiers(self):
         return {name: socket.identifier for name, socket in self.sockets.items()}

@@ -102,15 +102,14 @@ def node_of(group, model_name, parameters, constants):
 
 
 def twin_of(group, twin, inputs):
-    """Puts a group into another. `inputs`: outputs for its sockets, by identifier. Returns its
-    outputs by name, and its inputs by identifier."""
+    """Puts a group into another; returns its outputs by name. `inputs`: outputs for its sockets, by
+    identifier."""
     node = group.nodes.new("ShaderNodeGroup")
     node.node_tree = twin
     for socket in node.inputs:
         if source := inputs.get(socket.identifier):
             group.links.new(source, socket)
-    outputs = {socket.name: socket for socket in node.outputs}
-    return outputs, {socket.identifier: socket for socket in node.inputs}
+    return {socket.name: socket for socket in node.outputs}
 
 
 def add(group, script, outputs, instead):

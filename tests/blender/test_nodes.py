@@ -337,3 +337,19 @@ def test_choices_of_automatic_materials(extension, empty):
     seen.append(render(bpy.context.scene)[6:10, 6:10, 1].mean())
     assert [seen[1], seen[3]] == pytest.approx([seen[0]] * 2, rel=0.02)
     assert abs(seen[2] / seen[0] - 1) > 0.1
+
+
+@pytest.mark.parametrize("model", ["ashikhmin_shirley", "glossy_specular", "ward"])
+def test_sockets_do_not_depend_on_how_a_group_began(extension, model):
+    """A group that was made with OSL off and then filled for OSL equals one made with OSL on: else
+    dragging a material of the library would bring a second group."""
+
+    def sockets(osl):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        bpy.context.scene.render.engine = "CYCLES"
+        bpy.context.scene.cycles.shading_system = osl
+        (node,) = extension.nodes.group_nodes(extension.api.new_material(model))
+        return [(s.name, s.identifier, s.type) for s in node.inputs]
+
+    with_osl, without = sockets(True), sockets(False)
+    assert without == with_osl
