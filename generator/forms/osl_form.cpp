@@ -60,8 +60,8 @@ print::OslText within_ranges(const ModelInfo& info, const ParamValues& fixed, co
 
 /// Statements that declare the frame.
 Statements frame_of(const Model& model, double lowest_view) {
-  Statements out = {
-      print::Declare{"vector", {{"shading_n", {call("normalize", {"Normal"})}}, {"frame_n", {"shading_n"}}}}};
+  Statements out = {print::Declare{
+      "vector", {{"shading_n", {call("brdfc_shading_normal", {"Normal"})}}, {"frame_n", {"shading_n"}}}}};
   if (const std::vector<Recording> bend = record_bending(model); !bend.empty()) {
     const auto run = [](const Recording& r) { return print::Run{r.program, r.taken}; };
     out.push_back(print::declare("float", "mirror_rise"));
@@ -325,7 +325,7 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     for (const char* what : {"Place", "Turn", "Scale", "Shape"})
       sockets += fmt::format("    vector Lamp{}{} = vector(0.0),\n", what, i);
   sockets +=
-      "    normal Normal = N,\n    vector Tangent = vector(0, 0, 0),\n"
+      "    vector Normal = vector(0, 0, 0),\n    vector Tangent = vector(0, 0, 0),\n"
       "    output closure color BSDF = 0";
   if (of_albedo.empty()) sockets += fmt::format(",\n{}", albedo_socket);
   print::OslText whole = text(shader.name, fmt::format("Form: {}", name()), sockets, body);
@@ -336,7 +336,7 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     apart.push_back(print::declare("float", "wo_z", call("dot", {"I", "frame_n"})));
     append(apart, std::move(of_albedo));
     shader.albedo = text(shader.name + "_albedo", fmt::format("Albedo of the form: {}", name()),
-                         fmt::format("    normal Normal = N,\n{}", albedo_socket), apart)
+                         fmt::format("    vector Normal = vector(0, 0, 0),\n{}", albedo_socket), apart)
                         .text;
   }
   return shader;

@@ -219,10 +219,6 @@ def test_links_and_ranges(extension, empty, tool):
     np.testing.assert_array_equal(render(empty), beyond)
 
 
-@pytest.mark.skipif(
-    bpy.app.version >= (5, 0, 0),
-    reason="the sampled form is brighter there from 5.0 on; formulas as nodes are as in 4.5",
-)
 def test_a_bent_normal_takes_the_base_away(extension):
     """Cycles would darken a base about it, and the random direction not make up for that."""
 
