@@ -2,6 +2,7 @@
 """An option of all tests, and their environment."""
 
 import os
+import zlib
 
 import pytest
 
@@ -35,6 +36,21 @@ def pytest_addoption(parser):
         metavar="N",
         help="of each test with more cases than N take N: the first, the last, and between them",
     )
+    parser.addoption(
+        "--third",
+        metavar="TEXT",
+        help="of the tests marked `long` run a third, which TEXT chooses, a commit for example",
+    )
+    parser.addoption(
+        "--third-of-files",
+        metavar="TEXT",
+        help="run a third of the files, which TEXT chooses",
+    )
+
+
+def third(things, text):
+    """Every third thing, beginning with one of the first three, which the text chooses."""
+    return things[zlib.crc32(text.encode()) % 3 :: 3]
 
 
 # After -m has deselected by marks, so that this many remain.
@@ -52,5 +68,11 @@ def pytest_collection_modifyitems(config, items):
         if not EVERY_CASE:
             limits += [mark.args[0] for mark in cases[0].iter_markers("sample")]
         kept |= set(evenly(cases, min(limits)))
+    if (text := config.getoption("third")) is not None:
+        long = [item for item in items if item in kept and item.get_closest_marker("long")]
+        kept -= set(long) - set(third(long, text))
+    if (text := config.getoption("third_of_files")) is not None:
+        files = sorted({item.path for item in items})
+        kept = {item for item in kept if item.path in set(third(files, text))}
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]

@@ -132,6 +132,7 @@ def test_a_sun_without_an_angle(extension, empty, tool, few_of, towards):
         assert off < max(1e-3, 8e-7 * exponent), f"{name} {values}: relative L1 {off:.3g}"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_lamp_that_is_not_in_the_list(extension, empty, tool):
     """It costs noise but no light: with and without slots, the picture has the same mean."""
@@ -294,6 +295,7 @@ BEYOND = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("model", "name", "value"), BEYOND)
 def test_a_link_beyond_the_range_is_its_end(extension, empty, model, name, value):
     """Sliders stop at the ends of a parameter's range, but links do not: a texture may be black."""

@@ -120,6 +120,7 @@ def judge(tmp_path):
     return run
 
 
+@pytest.mark.long
 @pytest.mark.full
 @pytest.mark.parametrize(
     "name",
@@ -158,6 +159,7 @@ def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_pa
     assert test["passed"], f"see {tmp_path}: spheres are {', '.join(materials)}, row by row"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_bias_of_one_percent_or_one_in_a_thousand_is_found(
     extension, extension_zip, tool, tmp_path, judge

@@ -141,6 +141,7 @@ def test_a_white_world(extension, model, values):
     assert noise < 1.7  # of about 50 blocks, with variances from ten pictures
 
 
+@pytest.mark.long
 @pytest.mark.full
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(

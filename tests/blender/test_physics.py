@@ -258,6 +258,7 @@ WORLDS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.sample(16)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), SAMPLED)
@@ -314,6 +315,7 @@ AIMED = with_every_model(
 )
 
 
+@pytest.mark.long
 @pytest.mark.sample(8)
 @pytest.mark.parametrize("world", WORLDS, ids=lambda w: w.__name__)
 @pytest.mark.parametrize(("model", "values"), AIMED)
@@ -321,6 +323,7 @@ def test_aimed_form_in_a_world(extension, empty, tool, batch, request, model, va
     check_in_a_world(extension, "aimed", tool, batch, request, model, values, world)
 
 
+@pytest.mark.long
 @pytest.mark.sample(6)
 @pytest.mark.full
 @pytest.mark.parametrize(("model", "values"), SAMPLED)

@@ -437,6 +437,7 @@ def off_the_tool(form_light, plots, extension, tool):
     return measured
 
 
+@pytest.mark.long
 def test_the_curve_of_a_fitted_form_is_that_of_the_tool(off_the_tool, extension, empty):
     """Its closures in double precision, from tables and numbers with six digits: for every fitted
     form of the extension, at two values of all that is a socket."""

@@ -51,6 +51,7 @@ def installed(extension, path):
         bpy.ops.preferences.addon_enable(module=extension.package)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", scenes())
 def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool, tmp_path, name):
     """As the driver does: installs, loads and renders, with every material of the scene."""
@@ -70,6 +71,7 @@ def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool,
     assert np.isfinite(picture).all() and picture.max() > 1e-3
 
 
+@pytest.mark.long
 def test_a_scene_renders_from_its_own_extension_without_osl(
     extension, empty, answers, tool, tmp_path
 ):
@@ -177,6 +179,7 @@ def stands_in(node):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.full
 @pytest.mark.parametrize("part", FOLDED)
 def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pack, few_of, part):

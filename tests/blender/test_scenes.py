@@ -538,6 +538,7 @@ def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_p
     assert np.corrcoef(one, two)[0, 1] < 0.4
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_scenes_working_space_is_that_of_its_pictures(extension_zip, empty, tool, tmp_path):
     """Gold, which is outside Rec.709, and a texture look as in the reference; then a scene that

@@ -103,6 +103,7 @@ def test_headers_have_no_closure(folder):
         assert not re.search(r"\bclosure\b|\bgetattribute\b", path.read_text())
 
 
+@pytest.mark.long
 @pytest.mark.full
 def test_shaders_reflect_the_albedo_of_their_models(folder, models, few_of, scene, tool, subtests):
     clear(scene)
@@ -213,6 +214,7 @@ def expected(tool, model, info, wi, wo, numbers):
     return out
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_headers_give_what_the_models_do(folder, models, few_of, scene, tool, subtests):
     clear(scene)

@@ -239,6 +239,7 @@ def test_a_twin_goes_with_its_shader(extension, empty):
     assert not bpy.data.node_groups and not bpy.data.texts
 
 
+@pytest.mark.long
 @pytest.mark.full
 def test_a_twin_in_eevee(extension, use_pack, tmp_path):
     """Two balls in the sun must look like the same nodes in Cycles: equally bright, to 5 %, with
@@ -287,6 +288,7 @@ def test_a_twin_in_eevee(extension, use_pack, tmp_path):
         assert np.abs(apart).max() < 1.5, name
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
     material = lean.api.new_material("phong", "twin")
