@@ -53,7 +53,7 @@ def random_values(schema, rng):
 
 
 def cases_of(extension, rng, form, few_of):
-    """[(model, values)]: the default values, extreme ones and random ones. script/test uses one case
+    """[(model, values)]: the defaults, extreme values and random ones. script/test uses one case
     per model besides the defaults."""
     found = []
     for name, model in extension.api.models().items():
