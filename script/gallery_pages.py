@@ -69,7 +69,7 @@ def measured(scene):
     names = sorted({m["representation"] for m in form["materials"]})
     cpu = sum(form["cpu_seconds"])
     return [
-        *heading("Blender", "Reference", "Pixel test", "relMSE", "of it noise", "bias"),
+        *heading("Blender", "Reference", "Pixel test", "relMSE", "from noise", "bias"),
         line(
             f"{' and '.join(names)}, {form['spp']} samples, {cpu:.1f} s CPU",
             f"{scene['reference']['spp']} samples, {scene['reference']['wall_seconds']:.1f} s",
