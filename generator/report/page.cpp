@@ -82,22 +82,23 @@ void put_verdict(std::string& out, const std::vector<SceneReport>& scenes) {
   }
   out += "<p class=\"verdict\">";
   if (judged > 0)
-    put(out, "In {} of {}, what materials get by default can't be told from the models themselves but by noise. ", same,
+    put(out, "In {} of {}, the default form of the materials differs from the models themselves only by noise. ", same,
         count(judged, "scene", "scenes"));
   if (!costs.empty()) {
     std::sort(costs.begin(), costs.end());
     put(out, "It takes {:.2f} times the CPU time of Blender's own Glossy node", costs[costs.size() / 2]);
     if (costs.size() > 1)
-      put(out, " in the middle of the scenes, {:.2f} to {:.2f} in all", costs.front(), costs.back());
+      put(out, " in the median over the scenes, and from {:.2f} to {:.2f} in single scenes", costs.front(),
+          costs.back());
     out += ". ";
   }
   if (worst)
-    put(out, "Of all forms, {} in <a href=\"#{}\">{}</a> is farthest off: all its light is {} of what it should be.",
+    put(out, "The largest bias is that of {} in <a href=\"#{}\">{}</a>: its total light is {} of the correct value.",
         escaped(label(*worst)), escaped(worst_scene->scene), escaped(worst_scene->scene),
         fmt::format("{:.2f} % \xc2\xb1 {:.2f}", 100 * (1 + worst->difference.bias),
                     100 * worst->difference.bias_error));
   else
-    out += "In no form and scene is the light as a whole off by more than noise explains.";
+    out += "In every scene and form, the total light is correct within the noise.";
   out += "</p>\n";
 }
 
