@@ -151,10 +151,11 @@ def fits_over(tool):
 
 
 VIEWS = """\
-A row says by the view how much of the light goes elsewhere, the integral of the difference of f cos
-over that of f cos: half of all views are below the first figure, 95 % below the second, none is
-above the third. Most models have their worst view within two degrees of the surface, where lobes
-are flat and wide and little of the light is."""
+A row lists the share of the light that goes in other directions than the model says: the integral
+of the absolute difference of f cos, divided by the integral of f cos. It depends on the view. Half
+of all views are below the first figure, 95 % below the second, and all are at or below the third.
+Most models have their worst view within two degrees of the surface, where lobes are flat and wide
+and reflect little light."""
 
 #: How each table is made, the title of its page, and the text above it.
 PAGES = {
@@ -162,26 +163,26 @@ PAGES = {
         forms,
         "What each form takes",
         """\
-Closures, error and cost with default parameters. Error: the part of the reflected light that goes
-in other directions than the model says, mean over all views; 0 where a form is right, or right on
-average. Cost: CPU time at equal samples in units of Blender's Glossy node, by
-`evidence/bench --forms`. `-`: there is none.
+Closures, error and cost with default parameters. The error is the part of the reflected light that
+goes in other directions than the model says, averaged over all views; it is 0 if a form is right,
+or right on average. The cost is CPU time at equal samples in units of Blender's Glossy node,
+measured by `evidence/bench --forms`. `-` means that there is none.
 
-Fitted forms are made for the default parameters here, as `brdfc build --error` makes them for those
-of a scene. The ones that the extension holds serve all values of a number and are further off:
-[errors along a number](fits-over.md).""",
+Fitted forms are made for the default parameters here, as `brdfc build --error` makes them for the
+parameters of a scene. Those that the extension contains cover all values of a number and have a
+larger error: see [errors along a number](fits-over.md).""",
     ),
     "fits": (
         fits,
         "Errors of fitted forms at default parameters",
-        f"Each row is one `build/brdfc fit MODEL [name=value ...]`.\n\n{VIEWS}",
+        f"Each row is the output of one `build/brdfc fit MODEL [name=value ...]`.\n\n{VIEWS}",
     ),
     "fits-any": (
         fits_any,
         "Errors of fitted forms, any shares and colours",
         f"""\
-Each row is one `build/brdfc fit MODEL --any NAME...`: for any value of these parameters, of which f
-is a polynomial, the worst of their mixtures.
+Each row is the output of one `build/brdfc fit MODEL --any NAME...`. f is a polynomial of the named
+parameters, which may have any value; the error is that of the worst mixture.
 
 {VIEWS}""",
     ),
@@ -189,16 +190,19 @@ is a polynomial, the worst of their mixtures.
         fits_over,
         "Errors of fitted forms along a number",
         f"""\
-Each row is one `build/brdfc fit MODEL --over NAME`: over all of the number's slider, half way
-between the knots of the tables, for any value of what multiplies or mixes. These fits are in the
-extension.
+Each row is the output of one `build/brdfc fit MODEL --over NAME`: the errors over the whole slider
+of the number, in the middle between the knots of the tables, for any value of factors and mixed
+parameters. The extension contains these fits.
 
 {VIEWS}""",
     ),
     "twins": (
         twins,
         "Errors of twins at default parameters",
-        f"Each row is one `build/brdfc fit MODEL --twin [name=value ...]`.\n\n{VIEWS}",
+        f"""\
+Each row is the output of one `build/brdfc fit MODEL --twin [name=value ...]`.
+
+{VIEWS}""",
     ),
 }
 

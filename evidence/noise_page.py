@@ -20,23 +20,25 @@ INTRODUCTION = """\
 
 Made by `evidence/noise` in Blender 4.5; the figures, with their errors, are in
 [noise.csv](noise.csv) and [noise-cost.csv](noise-cost.csv). A ball with the model lies on a grey
-floor under one kind of light and, where that is a lamp, the dim grey world of a new file.
+floor under one kind of light. If the light is a lamp, the world is the dim grey one of a new file.
 Settings are those of a new file (indirect light clamped at 10, Filter Glossy 1, light tree,
-caustics) with adaptive sampling and denoising off, so that samples are equal, OSL on, and one
-thread. Parameters have their defaults but for those named.
+caustics), except that adaptive sampling and denoising are off, so that all pictures have the same
+number of samples, that OSL is on, and that one thread is used. Parameters have their defaults,
+except for those that are named.
 
-**Noise** is the mean over the ball's pixels of the variance over the squared radiance + 0.01:
-relMSE, 64 samples a pixel unless said otherwise. The variance is that between pictures of {seeds}
-seeds (2 where there are 1,024 samples). The radiance is that of the form of the model with least
-noise; where that is the sampled form, its mean over squares of 7 x 7 pixels. *unmet*: the form
-shows less than 80 % of the light of that form, because what comes as rare, bright dots came in none
-of the pictures; medians take that for more than any number. Where noise is thousands a few dots
-make it: take it as rough. The unit is the noise of Blender's own Glossy node (GGX, colour 0.8,
-roughness 0.4) in the same scene. Grain, as the eye sees it, is the square root.
+**Noise** is relMSE: the variance divided by the squared radiance + 0.01, averaged over the ball's
+pixels, at 64 samples per pixel unless another number is given. The variance is measured between
+pictures with {seeds} seeds (2 for 1,024 samples). The radiance is taken from the form of the model
+with the least noise; if that is the sampled form, it is averaged over squares of 7 x 7 pixels.
+*unmet* means that the form shows less than 80 % of the light of that form, because the light would
+arrive as rare, bright dots and none of the pictures has them; medians count it as infinite. Noise
+in the thousands comes from a few dots, and is a rough figure. The unit is the noise of Blender's
+own Glossy node (GGX, colour 0.8, roughness 0.4) in the same scene. Visible grain is the square
+root of the noise.
 
-**Cost** is CPU time a sample in units of that node, forms and node taking turns in one process;
-compiling is left out. **Noise x cost** is how much longer than with the Glossy node a picture of
-the same noise takes.
+**Cost** is CPU time per sample in units of that node, without compilation; forms and node take
+turns in one process. **Noise x cost** is the factor on the Glossy node's time for a picture with
+the same noise.
 """
 
 
@@ -150,7 +152,7 @@ class Page:
         lines = [
             "## Blender's own nodes",
             "",
-            "Noise as it is, of which the first row is the unit.",
+            "Noise in absolute numbers; the Glossy node is the unit of all other tables.",
         ]
         lines += ["", *heading("Node", *(self.title(p) for p in self.common()))]
         for case, found in self.noise.get(NODE, {}).items():
@@ -162,7 +164,7 @@ class Page:
         timed = [c for c in self.conditions if any(k[3] == c for k in self.costs)]
         if not timed:
             return []
-        lines = ["## Cost", "", "CPU time a sample in units of the Glossy node."]
+        lines = ["## Cost", "", "CPU time per sample in units of the Glossy node."]
         titles = [self.conditions[c]["title"] for c in timed]
         lines += ["", *heading("Model", "form", *titles)]
         for model, form in dict.fromkeys((k[0], k[2]) for k in self.costs):
@@ -195,12 +197,12 @@ class Page:
     def means(self):
         lines = ["## Means", ""]
         lines += [
-            "Mean radiance of the ball against that of the exact form, or of the sampled form",
-            "where there is no exact one: difference and its standard error in percent. Of the",
-            "other form the most samples count that were measured. Bold is what exceeds 1 % and 5",
-            "standard errors. The error comes from the spread of a few pictures: where light is",
-            "met as rare dots alone, it is larger than it says; nothing stands where the form to",
-            "compare with has not met the lamp.",
+            "Difference of the ball's mean radiance from that of the exact form (of the sampled",
+            "form if there is no exact one), and its standard error, in percent. The form compared",
+            "with has the largest number of samples that was measured. Differences above 1 % and 5",
+            "standard errors are bold. The standard error is estimated from a few pictures, and is",
+            "too small where light arrives only as rare dots. A cell is empty if the form compared",
+            "with has not met the lamp.",
             "",
         ]
         for form in self.forms:
@@ -233,11 +235,11 @@ class Page:
         return [
             "## In a penumbra",
             "",
-            "A floor that has the model where the edge of a ball's shadow crosses it, under a 1 m",
-            "area lamp, seen from the mirror direction; only pixels that see part of the lamp",
-            "count. Difference of the mean from that of the exact or sampled form, and relative L1",
-            f"of squares of {BLOCK} x {BLOCK} pixels beside what noise alone makes of it; all in",
-            "percent.",
+            "The edge of a ball's shadow crosses a floor with the model, under a 1 m area lamp,",
+            "seen from the mirror direction. Only pixels that see a part of the lamp count. The",
+            "table lists the difference of the mean from that of the exact or sampled form, and",
+            f"the relative L1 difference of squares of {BLOCK} x {BLOCK} pixels beside the value",
+            "that noise alone would give, all in percent.",
             "",
             *heading("Model", "form", "samples", "mean", "squares", "by noise"),
             *rows,

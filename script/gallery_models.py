@@ -152,15 +152,15 @@ def claims(model):
     """The claims of the schema about the model, as a sentence."""
     q = model["properties"]
     parts = [
-        "light and view may be exchanged" if q["reciprocal"] else "it is not reciprocal",
-        "no light is lost"
+        "it is reciprocal" if q["reciprocal"] else "it is not reciprocal",
+        "it loses no light"
         if q["lossless"]
-        else "no light is gained"
+        else "it gains no light"
         if q["conserving"]
-        else "some parameters and views gain light",
+        else "it gains light for some parameters and views",
     ]
     if not q["isotropic"]:
-        parts.append("highlights may be stretched along the tangent")
+        parts.append("its highlights may be stretched along the tangent")
     text = ", ".join(parts[:-1]) + (", and " if len(parts) > 2 else " and ") + parts[-1]
     return text[0].upper() + text[1:] + "."
 
@@ -359,31 +359,33 @@ def page(model, scene, folder, pages):
         "",
         *measured(scene),
         "",
-        "## Where the light goes",
+        "## Lobes",
         "",
         f"![Lobes of {model['label']}]({name}-lobes.png)",
         "",
     ]
     if model["scatter"]:
         lines += [
-            "Above, the plane of incidence, seen from the left at four angles: the radius is",
-            "the square root of f cos, in 1/sr. Below, the half sphere from above, equal areas for",
-            "equal solid angles: × is the view, + the mirror direction.",
+            "Top: the plane of incidence, for four view angles; the radius is the square root of",
+            "f cos, in 1/sr. Bottom: the hemisphere seen from above, where equal areas are equal",
+            "solid angles; × is the view, + the mirror direction.",
         ]
         if model["mirror"]:
-            lines += ["Dotted is ideal reflection: the square root of its weight, 1 at the rim."]
+            lines += [
+                "Dotted lines: ideal reflection, as the square root of its weight; 1 at the rim."
+            ]
     else:
         lines += [
             "All of it is ideal reflection (lines) and refraction (dashes), in red, green and blue."
         ]
     lines += [
         "",
-        "## How much comes back",
+        "## Albedo",
         "",
         f"![Albedo of {model['label']}]({name}-albedo.png)",
         "",
-        "The share of the light that a surface gives back when it is lit from everywhere, mean of",
-        "the three colours; what a boundary lets through is counted.",
+        "The fraction of light that a surface reflects under uniform illumination, averaged over",
+        "the three colours; transmitted light is included.",
         "",
         "## The same by hand",
         "",
@@ -404,11 +406,11 @@ def page(model, scene, folder, pages):
 
 def overview(models, pages):
     lines = [
-        "# A page a model",
+        "# A page for each model",
         "",
-        "Each model as three balls under one lamp, in Blender, by the reference renderer, and the",
-        "difference; its lobes; and how much of the light comes back. `script/gallery models`",
-        "makes these pages from the models' schemas.",
+        "For each model: three balls under one lamp, in Blender and by the reference renderer,",
+        "and the difference; its lobes; and its albedo. `script/gallery models` makes these pages",
+        "from the models' schemas.",
         "",
     ]
     for model in models:

@@ -69,7 +69,7 @@ def measured(scene):
     names = sorted({m["representation"] for m in form["materials"]})
     cpu = sum(form["cpu_seconds"])
     return [
-        *heading("Blender", "Reference", "Pixel test", "relMSE", "of it noise", "bias"),
+        *heading("Blender", "Reference", "Pixel test", "relMSE", "from noise", "bias"),
         line(
             f"{' and '.join(names)}, {form['spp']} samples, {cpu:.1f} s CPU",
             f"{scene['reference']['spp']} samples, {scene['reference']['wall_seconds']:.1f} s",
@@ -115,12 +115,12 @@ def main():
     pages.mkdir(parents=True, exist_ok=True)
     index = ["# Gallery", ""]
     index += [
-        "Scenes of the papers, and a few of ours: on the left in Blender, in the form that *auto*",
-        "takes, then by the reference renderer, which evaluates the models themselves, and the",
-        "difference, red where Blender is brighter and blue where it is darker. Pictures with",
-        "other seeds tell error from noise: the pixel test is Welch's, at 0.01 for the whole",
-        "picture, and wants 99.75 % of the pixels and all tiles of 16 x 16.",
-        f"`{command}` makes these pages and their pictures.",
+        "Scenes of the papers, and a few of ours. Left: Blender, with the form that *auto*",
+        "selects. Middle: the reference renderer, which evaluates the models themselves. Right:",
+        "the difference, red where Blender is brighter and blue where it is darker. Several",
+        "pictures with different seeds distinguish error from noise: the pixel test is Welch's,",
+        "at 0.01 for the whole picture, and requires 99.75 % of the pixels and all tiles of 16 x",
+        f"16 pixels to agree. `{command}` makes these pages and their pictures.",
         "",
         *heading("Page", "Scenes", "same within noise"),
     ]

@@ -112,9 +112,9 @@ def page(rooms, below, addon, addon_below):
     lines = [
         "# Rooms of the code, drawn",
         "",
-        "Made by `script/rooms` of `generator/CMakeLists.txt`, `pyproject.toml`, and of what files",
-        "include or import. An arrow leads to a room that builds on the other; what a longer way",
-        "says has none.",
+        "Made by `script/rooms` from `generator/CMakeLists.txt`, `pyproject.toml`, and the",
+        "files' includes and imports. An arrow leads from a room to one that builds on it;",
+        "arrows that follow from others are omitted.",
         "",
         "## The generator",
         "",

@@ -30,17 +30,17 @@ void add_albedo_command(CLI::App& app) {
       "albedo",
       "Directional albedo by quadrature: integral of f cos over the light directions plus the weights of ideal\n"
       "reflection and refraction.\n"
-      "stdin:  CSV with header cos_theta_o (0 < cos <= 1, and negative inside of what lets light through);\n"
+      "stdin:  CSV with header cos_theta_o (0 < cos <= 1; negative inside a transmissive model);\n"
       "        without input, 64 cosines from 0.01 to 1\n"
       "stdout: CSV with header cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate\n"
-      "        (the albedo includes the mirror and what is refracted)");
+      "        (the albedo includes ideal reflection and refraction)");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  add_number(*cmd, "--count", o->count, {2, 1 << 20}, "So many cosines from 0.01 to 1; stdin is not read");
+  add_number(*cmd, "--count", o->count, {2, 1 << 20}, "Number of cosines, from 0.01 to 1; stdin is not read");
   add_number(*cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
   cmd->add_flag("--store", o->store,
-                "Instead makes the table of all parameters anew that packs are built of, and keeps it in\n"
-                "data/albedos, in place of what is kept of the model")
+                "Instead makes the table over all parameters that packs use, and replaces the stored one in\n"
+                "data/albedos")
       ->excludes("values", "--count", "--phi");
   cmd->callback([o] {
     const Model& model = find_model(o->model);

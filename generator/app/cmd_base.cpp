@@ -19,13 +19,14 @@ void add_base_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "base",
-      "How much of f cos the closures of a model's base carry by view angle, and the variance of one drawn direction,\n"
-      "in squares of the albedo: of all of f cos drawn from the model, and of the rest after the base, drawn as the\n"
-      "aimed form draws it; in a white world and under a smooth sky.\n"
+      "The share of f cos that the closures of a model's base carry, by view angle; and the variance of one drawn\n"
+      "direction, divided by the squared albedo, in a white world and under a smooth sky: if the model draws all of\n"
+      "f cos, and if the aimed form draws only the rest beside the base.\n"
       "stdout: CSV with header "
       "theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest:\n"
-      "        the integral of |f cos - base| and that of the base over the albedo, the factor of the base that would\n"
-      "        leave the least variance, the variances, and the most that one direction of the rest brings");
+      "        the integrals of |f cos - base| and of the base, divided by the albedo; the factor for the base with "
+      "the\n"
+      "        least variance; the variances; and the largest contribution of one direction of the rest");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
   add_numbers(*cmd, "--angles", o->angles, {0, 89.999}, "Angles of the view to the normal in degrees");

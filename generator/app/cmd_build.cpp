@@ -260,37 +260,38 @@ void add_build_command(CLI::App& app) {
                 "view angles")
       ->group(what);
   c->add_option("--materials", options->materials,
-                "The same for a file that the extension wrote in Blender (Write Materials): what its .blend uses")
+                "Only what a .blend uses, given in a file that the extension wrote (Write Materials)")
       ->group(what);
   add_number(*c, "--error", options->error,
              {.low = 0, .high = 100, .unit = '%', .in_words = "percent from 0 to 100, as 5 or 5%"},
-             "Percent of the light (relative L1 of f cos), as 5%, that a fitted form may be off, where a material\n"
-             "of a scene leaves its form open, or beside the sampled form of a .blend; without, no form is fitted\n"
-             "unasked")
+             "Largest error of a fitted form in percent of the light (relative L1 of f cos), for example 5%. Applies\n"
+             "to materials of a scene that leave their form open, and to .blend materials with a sampled form, which\n"
+             "get a fitted form as well. By default, forms are fitted only on request")
       ->group(forms);
   add_number(*c, "--time", options->time,
              {.low = 0, .above_low = true, .unit = 'x', .in_words = "a positive number, as 1.2 or 1.2x"},
-             "What a form may cost, as 1.2x, in CPU time of Blender's Glossy node at equal samples, where a\n"
-             "material leaves its form open; --explain prints what forms cost")
+             "Largest cost of a form for materials that leave their form open: CPU time at equal samples, in units\n"
+             "of Blender's Glossy node, for example 1.2x; --explain prints the costs of forms")
       ->group(forms);
   c->add_flag("--fit", options->fit_bases,
-              "Closures are fitted to the materials that can have it, as the base of their aimed forms, which are\n"
-              "then less noisy under skies and images; seconds to minutes a material")
+              "Fits closures to the materials where possible, as the base of their aimed forms, which reduces noise\n"
+              "under skies and images; takes seconds to minutes for each material")
       ->group(forms);
   c->add_flag("--twin", options->twin,
-              "Also twins, Blender's own nodes for where Open Shading Language does not run, of every material whose\n"
-              "parameters are constant")
+              "Adds a twin for every material with constant parameters: Blender's own nodes, for devices without\n"
+              "Open Shading Language")
       ->group(forms);
   c->add_flag("--osl-only", options->osl_only,
-              "Only for renders with Open Shading Language: without Blender's own nodes, which materials that leave\n"
-              "their form open are where it is off")
+              "Only for renders with Open Shading Language: leaves out the formula nodes that materials with an open\n"
+              "form use where it is off")
       ->group(forms);
-  c->add_flag("--explain", options->json, "What forms there are, what is left out, why and what that saves, as JSON")
+  c->add_flag("--explain", options->json,
+              "Prints as JSON which forms exist, what is left out and why, and what that saves")
       ->group(forms);
   c->add_option("--out", options->out, "Folder for the extension and its zip")->group(where);
   c->add_option("--osl", options->osl,
-                "Instead of an extension: every model, or those of --model, as a shader for Blender's Script node,\n"
-                "and its formulas as OSL without closures, into this folder")
+                "Writes to this folder, instead of an extension, every model (or those of --model) as a shader for\n"
+                "Blender's Script node, and its formulas as OSL without closures")
       ->group(where);
   c->add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`")
       ->group(where);

@@ -19,17 +19,18 @@ void add_check_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "check",
-      "Tries to prove what the models declare (energy, reciprocity, isotropy, positive values, smoothness, limits; a\n"
-      "declared failure must show) and what all must keep (sampling against density, exact closures, rounding in "
-      "float\n"
-      "and double), over defaults, random and extreme parameters. Of all models it then prints the table of "
-      "properties.\n"
-      "A check that does not apply to a model is skipped, with the reason. Exit status 1 if one fails.");
-  CLI::Option* model = cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
-  cmd->add_flag("--all", o->all, "All models, the same as without a model")->excludes(model);
+      "Tests the properties that models declare (energy, reciprocity, isotropy, positive values, smoothness, limits; "
+      "a\n"
+      "declared failure must be visible), and those that every model must have (sampling according to the pdf, exact\n"
+      "closures, small rounding errors in float and double), at default, random and extreme parameters. For all "
+      "models\n"
+      "it then prints a table of properties. A check that does not apply to a model is skipped, with the reason. Exit\n"
+      "status 1 if a check fails.");
+  CLI::Option* model = cmd->add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
+  cmd->add_flag("--all", o->all, "All models, as if no model is given")->excludes(model);
   CLI::Option* json = cmd->add_flag(
-      "--json", o->json, "As JSON: an array of objects, one a row; passed is null where a check was skipped");
-  cmd->add_flag("--markdown", o->markdown, "Only the table of properties of all models, for a Markdown page")
+      "--json", o->json, "Print JSON: an array with one object per row; passed is null if the check was skipped");
+  cmd->add_flag("--markdown", o->markdown, "Print only the table of properties of all models, as Markdown")
       ->excludes(model)
       ->excludes(json);
   add_number(*cmd, "--effort", o->check.effort, {0.01, 1000}, "Scales the numbers of cases, directions and samples");

@@ -76,7 +76,7 @@ void add_closure_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "closure",
-      "f cos(theta_i) of a Cycles closure as the forms rely on it, for direction pairs.\n"
+      "f cos(theta_i) of a Cycles closure, as the forms assume it, for pairs of directions.\n"
       "Kinds: diffuse, burley, oren_nayar, velvet, diffuse_ramp, phong_ramp, reflection, ggx, beckmann,\n"
       "ashikhmin_shirley, diffuse_toon, glossy_toon. Values: weight, normal, tangent, exponent, alpha_x, alpha_y,\n"
       "roughness, albedo, size, smooth, ramp_0 ... ramp_7.\n"

@@ -42,7 +42,7 @@ void add_compare_command(CLI::App& app) {
       "compare",
       "Error of picture A against the reference picture B. With several A, rendered from different seeds, their mean\n"
       "is judged, and --test tells error from noise.");
-  command->add_option("A... B", options->files, "EXR to judge, one or more; then the EXR taken as truth")
+  command->add_option("A... B", options->files, "One or more EXR files to judge, then the reference EXR")
       ->required()
       ->expected(2, 1 << 16);
   command->add_flag("--json", options->json, "Print JSON instead of a table");
@@ -55,10 +55,12 @@ void add_compare_command(CLI::App& app) {
       "--test", options->test,
       "Welch's t-test per pixel and per tile of 16 x 16, Sidak-corrected at 0.01; exit status 1 unless 99.75 % of the\n"
       "pixels and all tiles are accepted. Needs two A or more, and a B with a variance layer");
-  command->add_option("--keep", options->keep, "Where the test fails: folder for both pictures, difference, p-values")
+  command
+      ->add_option("--keep", options->keep,
+                   "If the test fails, write both pictures, their difference and the p-values to this folder")
       ->needs(test);
   add_number(*command, "--inject", options->inject, {-1, 1},
-             "Brighten A by this fraction first, to see whether the test notices")
+             "First brighten A by this fraction, to see whether the test detects it")
       ->needs(test);
   command->callback([options] {
     const std::string name_a = options->files.front(), name_b = options->files.back();

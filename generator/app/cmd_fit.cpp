@@ -48,32 +48,33 @@ void add_fit_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "fit",
-      "Error of the fitted form by view angle: closures of Cycles whose sum comes close to a model at these "
+      "Error of the fitted form by view angle: Cycles closures whose sum approximates a model with these "
       "parameters.\n"
-      "stdout: CSV with header cos_theta_o,relative_l1,relative_l2,albedo,negative: the integral of the difference of\n"
-      "f cos over the albedo, the same by squares, the albedo's difference, and what is negative of f cos.\n"
-      "stderr: the middle, the 95th percentile and the largest of relative_l1");
+      "stdout: CSV with header cos_theta_o,relative_l1,relative_l2,albedo,negative: the integral of the\n"
+      "absolute difference of f cos divided by the albedo, the same in the L2 norm, the difference of the albedo, and\n"
+      "the negative part of f cos.\n"
+      "stderr: the median, the 95th percentile and the maximum of relative_l1");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "name=value; a colour is three numbers or one");
   cmd->add_option("--over", o->over,
-                  "A number that the fit runs over, from one end of its slider to the other, instead of its value:\n"
-                  "another column, of its values at both ends and half way between any two knots of the tables");
+                  "Fit along this Number parameter, over the whole range of its slider, instead of a value. Adds a\n"
+                  "column with its value: both ends, and the middle between any two knots of the tables");
   cmd->add_option("--any", o->any,
-                  "Parameters that f is a polynomial of (a colour of second degree, a number of first), whatever they\n"
-                  "are: closures are fitted to f at a few values of them, and the worst of these is printed");
-  cmd->add_flag("--twin", o->twin, "Of the twin instead: Blender's own nodes with weights, roughness and tilt by view");
+                  "Parameters of which f is a polynomial (degree up to 2 for a colour, 1 for a number), for any of\n"
+                  "their values: closures are fitted to f at a few values, and the worst error is printed");
+  cmd->add_flag("--twin", o->twin,
+                "Error of the twin instead: Blender's own nodes, whose weights, roughness and tilt depend on the view");
   cmd->add_flag("--pairs", o->pairs,
-                "f cos(theta_i) of the closures instead, for direction pairs.\n"
+                "f cos(theta_i) of the closures instead, for pairs of directions.\n"
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
                 "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
   cmd->add_flag("--store", o->store,
-                "With --over: makes the fit anew and keeps it in data/fits, in place of what is kept of the model.\n"
-                "With --twin: the same in data/twins, of the twin that the extension has")
+                "With --over: makes the fit again and replaces the stored one in data/fits.\n"
+                "With --twin: does the same for the extension's twin, in data/twins")
       ->excludes("--pairs");
-  cmd->add_option(
-         "--exr", o->exr,
-         "Also writes the tables that the closures are looked up in as a float EXR, a row a table; what each is\n"
-         "stands in the attribute brdfc:table")
+  cmd->add_option("--exr", o->exr,
+                  "Also writes the tables of the closures as a float EXR, with one row per table; the attribute\n"
+                  "brdfc:table describes them")
       ->excludes("--twin");
   cmd->callback([o] {
     const Model& model = find_model(o->model);

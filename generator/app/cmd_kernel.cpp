@@ -39,9 +39,9 @@ void add_kernel_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "kernel",
-      "Parameters of the model lossless for a drawn kernel k(u), u = n |x' - y'|: of four heights and a glossiness,\n"
-      "those with the least error.\n"
-      "FILE:   CSV with header u,k: distances >= 0, increasing, and heights > 0, two points at least; the kernel is\n"
+      "Parameters of the model lossless for a drawn kernel k(u), u = n |x' - y'|: the four heights and the glossiness\n"
+      "with the smallest error.\n"
+      "FILE:   CSV with header u,k: distances >= 0, increasing, and heights > 0, at least two points; the kernel is\n"
       "        linear between them and constant outside\n"
       "stdout: n=... kernel=table h0=... h1=... h2=... h3=..., as other commands take them\n"
       "stderr: largest relative difference of the kernel, and relative L1 of f cos");

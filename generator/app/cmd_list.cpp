@@ -98,7 +98,7 @@ void print_text(const Model& m) {
 void add_list_command(CLI::App& app) {
   auto json = std::make_shared<bool>(false);
   CLI::App* cmd = app.add_subcommand("list", "The models, their parameters and forms.");
-  cmd->add_flag("--json", *json, "As JSON: an array of objects");
+  cmd->add_flag("--json", *json, "Print JSON: an array of objects");
   cmd->callback([json] {
     if (*json) {
       Json all = Json::array();

@@ -76,15 +76,16 @@ void add_optical_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "optical",
-      "What metals, glass and liquids of measured refractive index n + i k are in the working space:\n"
-      "reflectance seen from above, n and k by channel; of what lets light through n_d and Abbe's number, and what\n"
-      "k leaves of light after a thickness.\n"
-      "The working space is the role scene_linear of the configuration that OCIO names, else Rec.709.");
-  cmd->add_option("name", o->name, "One of them, or a file NAME.csv as refractiveindex.info exports it; without: all");
+      "Converts metals, glass and liquids with a measured refractive index n + i k to the working space: reflectance\n"
+      "at normal incidence, and n and k by channel; for transparent substances also n_d, the Abbe number, and the\n"
+      "transmittance for a thickness.\n"
+      "The working space is the role scene_linear of the configuration that OCIO names, otherwise Rec.709.");
+  cmd->add_option("name", o->name,
+                  "Substance, or a file NAME.csv as exported by refractiveindex.info; all substances if omitted");
   add_number(*cmd, "--thickness", o->thickness, {kThinnest, kThickest},
-             "Metres after which the absorption of a glass is exact; how far it is off over others is said")
+             "Distance in metres for which the absorption of a glass is exact; prints the error at others")
       ->capture_default_str();
-  cmd->add_flag("--json", o->json, "JSON, also with X, Y, Z over a perfect reflector's under D65");
+  cmd->add_flag("--json", o->json, "Print JSON, with X, Y, Z under D65 relative to a perfect reflector as well");
   cmd->callback([o] {
     Json all = Json::array();
     if (o->name.empty())

@@ -64,15 +64,16 @@ void add_probe_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "probe",
-      "Prints an OSL shader that shows f, pdf and samples of a model as its recorded formulas give them; or with\n"
-      "--run executes the same here: in double, in float, recorded, and recorded with OSL's arithmetic.\n"
+      "Prints an OSL shader that shows f, pdf and samples of a model, computed by its recorded formulas. With --run "
+      "it\n"
+      "computes them itself: in double, in float, as recorded, and as recorded with OSL's arithmetic.\n"
       "stdin of --run:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,u1,u2,u3 and the parameters (colours as\n"
       "                 name_r,name_g,name_b)\n"
       "stdout of --run: CSV of f_r,f_g,f_b,pdf,wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,sample_pdf for each;\n"
-      "                 -31337 is what is not finite");
+      "                 -31337 stands for values that are not finite");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("choices", o->choices, "name=value of its choices");
-  cmd->add_flag("--run", o->run, "Execute the points of stdin");
+  cmd->add_option("choices", o->choices, "Choices as name=value");
+  cmd->add_flag("--run", o->run, "Compute the points from stdin");
   cmd->callback([o] {
     const Model& model = find_model(o->model);
     ParamValues choices = parse_values(model.info(), o->choices);

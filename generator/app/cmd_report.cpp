@@ -11,10 +11,10 @@ namespace brdfc::app {
 void add_report_command(CLI::App& app) {
   auto* command = app.add_subcommand(
       "report",
-      "Write index.html, report.json and report.csv about the scenes rendered in the folders of DIR, with the\n"
-      "tables of conformance/ beside DIR, which the tests of closures write");
+      "Write index.html, report.json and report.csv about the scenes rendered in the folders of DIR. Includes the\n"
+      "tables that the closure tests write to conformance/ beside DIR");
   const auto folder = std::make_shared<std::string>();
-  command->add_option("DIR", *folder, "A folder with one folder a scene, each holding runs.json")->required();
+  command->add_option("DIR", *folder, "A folder with one folder per scene, each with a runs.json")->required();
   command->callback([folder] {
     const std::vector<report::SceneReport> scenes = report::write_report(*folder);
     fmt::print(stdout, "{}", report::report_csv(scenes));

@@ -36,17 +36,17 @@ void add_sample_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd =
       app.add_subcommand("sample",
-                         "Directions drawn from the model, with their weight f cos / pdf and density per solid angle.\n"
+                         "Directions sampled from the model, with their weights f cos / pdf and pdfs per solid angle.\n"
                          "A sample with pdf 0 is lost (below the horizon); its weight is 0.\n"
                          "stdin:  CSV with header wo_x,wo_y,wo_z,u1,u2,u3 (0 <= u < 1), unless --count is given\n"
                          "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
   CLI::Option* count =
-      add_number(*cmd, "--count", o->count, {.low = 1}, "Draw so many samples from own random numbers");
+      add_number(*cmd, "--count", o->count, {.low = 1}, "Number of samples to draw with built-in random numbers");
   add_number(*cmd, "--seed", o->seed, {}, "Seed of the random numbers")->needs(count);
   cmd->add_option("--pattern", o->pattern,
-                  "How they are placed, as those of a pixel are by the reference renderer: random, regular, jittered,\n"
+                  "Sampling pattern, as for the pixels of the reference renderer: random, regular, jittered,\n"
                   "multi_jittered or hammersley")
       ->check(CLI::IsMember(reference::pattern_names()))
       ->needs(count);

@@ -21,13 +21,16 @@ void add_stability_command(CLI::App& app) {
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
       "stability",
-      "Rounding of double precision against 113 bits over everything a model accepts, float and recorded program\n"
-      "against double, bad values (NaN, infinite, negative). Exit status 1 if one fails.");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`; all of them without");
-  add_number(*cmd, "--points", o->hunt.points, {.low = 1}, "Places a model at which double is compared with 113 bits");
-  add_number(*cmd, "--calls", o->calls, {.low = 0}, "Evaluations and samples over all models that look for bad values");
-  add_number(*cmd, "--limit", o->limit, {.low = 0}, "Units of epsilon that a formula may add to its inputs' rounding");
-  cmd->add_option("--page", o->page, "Folder for a page of maps of the errors");
+      "Compares, over all parameters that models accept, double precision with 113 bits, and float and recorded\n"
+      "programs with double; looks for invalid values (NaN, infinite, negative). Exit status 1 if a test fails.");
+  cmd->add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
+  add_number(*cmd, "--points", o->hunt.points, {.low = 1},
+             "Points per model at which double is compared with 113 bits");
+  add_number(*cmd, "--calls", o->calls, {.low = 0},
+             "Evaluations and samples, over all models, to search for invalid values");
+  add_number(*cmd, "--limit", o->limit, {.low = 0},
+             "Rounding that a formula may add to that of its inputs, in units of epsilon");
+  cmd->add_option("--page", o->page, "Folder for a page with maps of the errors");
   add_number(*cmd, "--seed", o->hunt.seed, {}, "Seed of parameters and directions");
   cmd->callback([o] {
     const std::vector<const Model*> chosen = models_named(o->model);

@@ -9,9 +9,9 @@ namespace brdfc::app {
 
 void add_where_command(CLI::App& app) {
   app.add_subcommand("where",
-                     "Prints the folder that stored fits and albedos and the extension's Python are taken from: what\n"
-                     "the environment variable BRDFC_DATA names, or share/brdfc beside the program's folder, or the\n"
-                     "nearest folder above it that has them, as are the sources that it is built in.")
+                     "Prints the folder with the stored fits and albedos and the extension's Python: the one that the\n"
+                     "environment variable BRDFC_DATA names, otherwise share/brdfc beside the program's folder,\n"
+                     "otherwise the nearest folder above it that has them, for example the source tree.")
       ->callback([] { fmt::print("{}\n", data_dir().string()); });
 }
 

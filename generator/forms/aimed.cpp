@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The aimed form (aimed.h): closures aimed at lamps that carry the model there, over a base, and one drawn direction
-// for the rest.
+// Writes the shader of the aimed form (aimed.h): a base, closures aimed at lamps, and one drawn direction for the rest.
 #include "forms/aimed.h"
 
 #include <fmt/format.h>
@@ -41,9 +40,9 @@ using print::Statements;
 using print::Value;
 using print::Variable;
 
-/// The statements of the form that depend on the model, for one combination of choices.
+/// The parts of the form that depend on the model, recorded for one combination of choices.
 struct AimedRecording {
-  Recording base;   ///< assigns what its closures take, as an exact form's
+  Recording base;   ///< assigns the inputs of the base's closures, as for an exact form
   Recording draw;   ///< reads u_0, u_1, u_2; assigns drawn_x, drawn_y, drawn_z
   Recording value;  ///< reads wi_x, wi_y, wi_z and the base's closures; assigns excess and drawn_density
 };
@@ -56,7 +55,7 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, AimedB
   AimedRecording out;
   std::optional<fit::Fit> fit;
   if (from == AimedBase::Fitted) fit = fit::fit_of(model, fixed, views);
-  // None for what lies on both sides of the surface.
+  // There is no base for models that scatter on both sides of the surface.
   const ClosureSum<Expr> base = fit                                ? recorded_fit(model, *fit, fixed, wo)
                                 : measure::two_sided(model, *brdf) ? ClosureSum<Expr>()
                                                                    : brdf->base(wo);
@@ -85,15 +84,16 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, AimedB
 /// name_x, name_y and name_z.
 std::vector<std::string> components(const std::string& name) { return {name + "_x", name + "_y", name + "_z"}; }
 Value vector_of(const std::string& name) { return call("vector", {name + "_x", name + "_y", name + "_z"}); }
-/// Of arrays of lamps or lobes: the lamp that the loop has come to, the lobe that is being aimed, an earlier one.
+/// An element of an array of lamps or lobes: at the lamp of the current iteration, the lobe being aimed, or an earlier
+/// lobe.
 Value of_lamp(const char* array) { return element(array, "lamp"); }
 Value of_new(const char* array) { return element(array, "lobes"); }
 Value of_earlier(const char* array) { return element(array, "earlier"); }
-/// Into the shader's frame.
+/// Transforms a direction of the scene into the shader's frame.
 Value in_frame(Value direction) { return call("brdfc_local", {std::move(direction), "frame_t", "frame_b", "frame_n"}); }
 
-/// The lamps and the rest of an aimed form: a loop over the lamps, whose last turn is the drawn direction's, so that
-/// the model is evaluated in one place.
+/// Statements for the lamps and the rest of an aimed form. They are one loop over the lamps with one more iteration for
+/// the drawn direction, so that the model is evaluated at a single place in the text.
 class AimedLamps {
  public:
   /// `through`: whether the model may scatter through the surface.
@@ -109,7 +109,7 @@ class AimedLamps {
   int operations() const {
     if (lamps_ == 0) return operations_ + steps_.alone.operations();
     int all = operations_ + steps_.rest.operations();
-    // Without those of cones and of horizons, which few lamps are cut off by.
+    // Programs for light cones and horizons are not counted, because few lamps need them.
     for (const Recording* r : {&steps_.above, &steps_.room, &steps_.aim, &steps_.low, &steps_.less, &steps_.send,
                                &steps_.toss, &steps_.under, &steps_.meet})
       all += r->operations();
@@ -145,14 +145,14 @@ class AimedLamps {
 
  private:
   static Run run(const Recording& r) { return {r.program, r.taken}; }
-  /// Whether a turn of the loop is a lamp's, and not that of the drawn direction.
+  /// True in the iterations for lamps, false in the one for the drawn direction.
   static Value is_lamp() { return operation("lamp", "<", "lamps"); }
 
   static Statement declare_drawn_as_wi() {
     return Declare{"float", {{"drawn_density"}, {"wi_x", {"drawn_x"}}, {"wi_y", {"drawn_y"}}, {"wi_z", {"drawn_z"}}}};
   }
 
-  /// What the sockets hold, as an array.
+  /// An array with the values of the lamps' sockets.
   Statement slots_array(const std::string& what) const {
     Variable array{"lamp_" + what, {}, lamps_};
     array.name[5] = char(std::tolower(what[0]));
@@ -160,7 +160,7 @@ class AimedLamps {
     return Declare{"vector", {array}};
   }
 
-  /// Declares what is known of lamps and lobes, and counts the sockets up to the last that is in use.
+  /// Declares the variables for lamps and lobes, and counts the sockets up to the last one in use.
   Statements state() const {
     const auto arrays = [&](const char* type, const std::vector<std::string>& names) {
       Declare all{type, {}};
@@ -182,7 +182,7 @@ class AimedLamps {
     };
   }
 
-  /// Aims a lobe at the lamp, or goes on with the next one.
+  /// Aims a lobe at the lamp, or continues with the next lamp.
   Statements aim() const {
     Statements out = {
         declare_all("vector", {"centre_here", "across_here", "along_here", "beam_here"}),
@@ -208,8 +208,8 @@ class AimedLamps {
     };
     for (const std::string what : {"centre", "across", "along", "disk"})
       lit.push_back(assign(element("lamp_" + what, "lobes"), "lit_" + what));
-    // Bump Map Correction bends the normals of lobes towards what is lower, and from Blender 5.0 on Cycles evaluates no
-    // lobe towards what is below the interpolated normal.
+    // Bump Map Correction bends the normals of lobes downwards. From Blender 5.0 on, Cycles evaluates no lobe in
+    // directions below the interpolated normal.
     append(out, {
                     If{operation("beam_edge", ">", 0.0), lit},
                     declare("vector", "to_centre", call("normalize", {of_new("lamp_centre")})),
@@ -243,7 +243,7 @@ class AimedLamps {
     return out;
   }
 
-  /// Draws a direction, and adds up what lamps make of it.
+  /// Draws a direction, and sums up what the lamps mean for it.
   Statements draw() const {
     Statements out = {
         declare("float", "tossed"),
@@ -254,28 +254,28 @@ class AimedLamps {
     };
     for (const char* axis : {"_x", "_y", "_z"})
       out.push_back(assign(std::string("ray") + axis, std::string("drawn") + axis));
-    // Neither lamp nor seam reaches out from under its lobe.
+    // A lamp and its seam always lie within the lamp's lobe.
     out.push_back(earlier_lobes({If{under_lobe("drawn"), {run(steps_.meet)}}}));
     for (const char* axis : {"_x", "_y", "_z"})
       out.push_back(assign(std::string("wi") + axis, std::string("drawn") + axis));
     return out;
   }
 
-  /// Gives the lobe that was aimed its value.
+  /// Assigns the value of the lobe that was aimed.
   Statements send() const {
     return {earlier_lobes({If{under_lobe("wi"), {run(steps_.less)}}}), run(steps_.send), print::Increment{"lobes"}};
   }
 
-  /// Done with every lobe so far, in the loop over the lamps.
+  /// A loop over all lobes so far, inside the loop over the lamps.
   static Statement earlier_lobes(Statements body) { return Loop{"earlier", "lobes", std::move(body)}; }
   static Value under_lobe(const std::string& direction) {
     return operation(call("dot", {of_earlier("lobe_towards"), vector_of(direction)}), ">", of_earlier("lobe_end"));
   }
-  /// From the shader's frame.
+  /// Transforms a direction of the shader's frame into the scene.
   static Value in_scene_of(const char* v) { return in_scene(element(v, 0), element(v, 1), element(v, 2)); }
 
-  /// The closures of all lobes. Each joins the sum from the left: Cycles walks it without a stack. The weight is a
-  /// colour: see kPoolNode.
+  /// The closures of all lobes. Each is added at the left of the sum, which Cycles traverses without a stack. The
+  /// weight is a colour: see kPoolNode.
   static Statements closures() {
     constexpr int kSize = int(kRampSize);
     Variable level{"lobe_level", {}, kSize};
@@ -307,7 +307,7 @@ class Aimed final : public OslForm {
  public:
   Aimed() : OslForm("aimed") {}
 
-  /// One that is preferred to it and exists for all values leaves nothing to aim.
+  /// Not needed if a preferred form exists for all values of the parameters.
   bool in_whole_pack(const Model& model) const override {
     if (!model.has_scatter()) return false;
     const auto own = std::ranges::find(forms(), static_cast<const Form*>(this));
@@ -319,9 +319,9 @@ class Aimed final : public OslForm {
   bool aims() const override { return true; }
   std::string under_sizeless_lamps(int lamps, int slots) const override;
 
-  /// What it aims is the model's own value.
+  /// The aimed value is the model's own, so the error is that of the model's samples.
   FormError error(const Model& model, const Setting&) const override { return error_of_samples(model); }
-  /// Costs were measured with the base that a model declares.
+  /// Costs were measured with the declared base.
   bool cost_is_measured(const Setting& setting) const override { return setting.base == AimedBase::Declared; }
   const fit::Fit* fit(const Model& model, const Setting& setting) const override {
     return setting.base == AimedBase::Fitted ? &fit::fit_of(model, setting.fixed) : nullptr;
@@ -329,11 +329,13 @@ class Aimed final : public OslForm {
 
   std::vector<std::string> warnings(const Model& model, const Shader& shader) const override {
     const bool mirror = model.has_mirror();
-    // Path Guiding and the passes know nothing of closures that take light away: pictures get 2 % too bright, the
-    // albedo too high by what base and rest cancel. Normals are those of the drawn lobes where no base outweighs them.
+    // Path Guiding and the render passes do not support closures that subtract light. Pictures become 2 % too bright,
+    // and the albedo pass too high by the light that base and rest cancel. The normal pass shows the normals of the
+    // drawn lobes unless a base outweighs them.
     std::vector<std::string> codes = {"path_guiding", "orthographic_far", "albedo_passes"};
     if (shader.leaning) codes.push_back("bump_correction");
-    // Of lamps without it aimed closures carry all; the panel says which have none.
+    // For lamps without multiple importance sampling, the aimed closures carry all of the light; the panel names such
+    // lamps.
     if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
     if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
     if (mirror) codes.push_back("filter_glossy");
@@ -352,20 +354,20 @@ class Aimed final : public OslForm {
   void make_closures(ShaderBody&) const override;
 };
 
-/// Closures that Cycles would evaluate as others than the rest takes off are left out of the base.
+/// Removes closures from the base where Cycles would evaluate them differently from what the rest subtracts.
 void leave_out_of_base(ShaderBody& body, const std::vector<RecordedClosure>& base) {
   for (std::size_t c = 0; c < base.size(); ++c) {
     if (body.model.info().look == Look::Matte && !base[c].turned) continue;
-    // About a bent normal: by Bump Map Correction Cycles darkens matte ones, and from Blender 5.0 on it evaluates none
-    // towards what is below the interpolated normal.
+    // True where the normal is bent: with Bump Map Correction, Cycles darkens Diffuse closures, and from Blender 5.0 on
+    // it evaluates no closure in directions below the interpolated normal.
     std::vector<Value> out = {operation("frame_n", "!=", "shading_n")};
-    // Bump Map Correction would bend it.
+    // Bump Map Correction would bend this normal.
     if (base[c].turned)
       out.push_back(
           call("brdfc_is_below", {call("reflect", {-Value("I"), in_scene(fmt::format("normal_{}", c))}), kMirrorRise}));
     body.add(If{print::any_of(out), {assign(fmt::format("weight_{}", c), 0.0)}});
   }
-  // But for matte ones about normals of their own, which it darkens anywhere.
+  // Except for Diffuse closures with their own normal, which it darkens everywhere.
   body.shader.leaning = std::any_of(base.begin(), base.end(), [](const RecordedClosure& c) {
     return c.turned && c.kind == ClosureKind::DiffuseRamp;
   });
@@ -391,13 +393,14 @@ void Aimed::make_closures(ShaderBody& body) const {
     return r.base;
   });
   body.declare(base);
-  shader.facets = false;  // none that is seen by more than the camera
+  shader.facets = false;  // only camera rays see them
   body.add(print::scope(by_choice.statements()));
   body.scale(base, setting.base == AimedBase::Fitted ? fit::roles_of(model, setting.fixed).with(fit::Role::Factor)
                                                      : std::set<std::string>());
   const auto weight = [](std::size_t c) { return fmt::format("weight_{}", c); };
-  // Filter Glossy makes facets rougher behind a rough surface, and without caustics Cycles drops them there: then the
-  // rest, which takes off what they were to give, would be wrong. Light that has come so far is noisy anyway.
+  // After a rough surface, Filter Glossy increases the roughness of microfacet closures, and without caustics Cycles
+  // drops them. The rest, which subtracts their values, would then be wrong. Such light is noisy anyway, so these
+  // closures are kept only for camera rays.
   for (std::size_t c = 0; c < base.size(); ++c)
     if (has_facets(base[c].kind))
       body.add(If{operation(call("raytype", {print::quotation("camera")}), "==", 0), {assign(weight(c), 0.0)}});

@@ -10,7 +10,7 @@
 namespace brdfc::forms {
 namespace {
 
-/// An OSL vector.
+/// An OSL vector as three inputs.
 Vec3<Expr> input_vector(const std::string& name) {
   return {Expr::input(name + "[0]"), Expr::input(name + "[1]"), Expr::input(name + "[2]")};
 }
@@ -116,7 +116,7 @@ AimedSteps record_steps() {
   steps.meet = record_step([&](Program& p) {
     const Met<Expr> met = meet(before, kept_patch("earlier"), earlier, Expr::input("lamp_solid_angle[earlier]"),
                                Rgb<Expr>::input("lobe_value[earlier]"), input3("drawn"));
-    p.output("covered_before", met.before);  // from what was covered before this one is added
+    p.output("covered_before", met.before);  // the sum before the current lobe is added
     p.output("covered", met.covered);
     p.output("lamp_met", met.solid_angle);
     p.output("density_under", met.density);

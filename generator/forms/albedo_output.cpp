@@ -48,7 +48,7 @@ class AlbedoOutput {
     return out;
   }
 
-  /// A parameter's name, or its value where it is fixed.
+  /// The parameter's name, or its value if it is fixed.
   Value operand(const std::string& name) const {
     const auto it = fixed_.find(name);
     if (it == fixed_.end()) return Value(name == "cos_theta_o" ? "wo_z" : name);

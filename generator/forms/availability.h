@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which models and materials have a form.
+// Decides which models and materials a form exists for.
 #pragma once
 
 #include <optional>
@@ -12,26 +12,27 @@ namespace brdfc::forms {
 
 class Availability {
  public:
-  /// When a form is taken for a material that leaves its form open.
+  /// When a form is chosen for a material that does not name one.
   enum class When {
-    Always,        ///< wherever the model has it, unless a form that comes before it in forms() is taken
-    WithinBudget,  ///< where a budget names an error and off_by() keeps it, or a time
-    Asked          ///< never
+    Always,        ///< whenever it exists, unless an earlier form in forms() was chosen
+    WithinBudget,  ///< if a budget limits the time, or limits the error and off_by() is within the limit
+    Asked          ///< never: only on request
   };
   virtual ~Availability() = default;
 
   virtual When when() const { return When::Always; }
-  /// Whether a pack of everything has it of this model.
+  /// True if a pack of all models contains this form of the model.
   virtual bool in_whole_pack(const Model&) const = 0;
-  /// Whether it is made for given values, all but those of parameters whose role it serves.
+  /// True if the form is made of a fit. It then exists only for given values of all parameters, except those whose role
+  /// it serves().
   virtual bool made_of_fit() const { return false; }
-  /// Whether its closures may be the base of a form that aims at lamps: AimedBase::Fitted.
+  /// True if its closures may be the base of an aimed form (AimedBase::Fitted).
   virtual bool gives_base() const { return false; }
-  /// Whether parameters of this role may be anything.
+  /// True if parameters of this role need no fixed value.
   virtual bool serves(fit::Role) const { return true; }
-  /// The values that it is confined to, beside those that are fixed.
+  /// Values that the form requires in addition to the fixed ones.
   virtual ParamValues values(const Model&, const ParamValues& /*fixed*/) const { return {}; }
-  /// Why a model with these values does not have it, as the rest of a sentence; nothing if it has.
+  /// The reason, as a clause, why the form does not exist for a model with these values; nullopt if it exists.
   virtual std::optional<std::string> why_not(const Model&, const ParamValues& /*fixed*/) const { return {}; }
 };
 

@@ -18,7 +18,7 @@ double sky(const Vec3<double>& w) {
   return 1 + 0.9 * dot(brightest, w);
 }
 
-/// Mean and variance of one channel's average.
+/// Mean and variance of one channel.
 struct Moments1 {
   Rgb<double> sum{0, 0, 0}, sum2{0, 0, 0};
   void add(const Rgb<double>& v) {

@@ -12,7 +12,7 @@ namespace {
 using print::Statements;
 using print::Value;
 
-/// Whether every value of choice k stands in the combinations with the others as in c.
+/// True if `combinations` contains c with every value of choice k.
 bool covers(const std::vector<Choices>& combinations, Choices c, std::size_t k, int size) {
   for (int i = 0; i < size; ++i) {
     c[k] = i;
@@ -41,7 +41,7 @@ Statements ChoiceSwitch::statements() const {
 }
 
 Value ChoiceSwitch::condition(const std::vector<Choices>& combinations) const {
-  // Only the choices that tell these combinations from the others need a test.
+  // Test only the choices that distinguish these combinations from the others.
   std::set<std::vector<std::pair<std::string, int>>> alternatives;
   for (const Choices& c : combinations) {
     std::vector<std::pair<std::string, int>> tested;

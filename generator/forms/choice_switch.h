@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements for all combinations of a model's choices.
+// Statements that cover all combinations of a model's choices.
 #pragma once
 
 #include <map>
@@ -14,14 +14,14 @@
 
 namespace brdfc::forms {
 
-/// Statements that differ by combination of choices: equal ones are there once.
+/// Selects statements by the combination of choices. Equal statements are written once.
 class ChoiceSwitch {
  public:
-  /// Both must outlive it. Choices among `fixed` are tested nowhere.
+  /// Both must outlive it. Choices in `fixed` are not tested.
   ChoiceSwitch(const ModelInfo& info, const ParamValues& fixed) : info_(info), fixed_(fixed) {}
 
   void add(const Choices&, print::Statements);
-  /// Cases by the parameters, or the statements alone where all are equal.
+  /// The statements as cases of the choices, or without cases if all are equal.
   print::Statements statements() const;
 
  private:
@@ -31,10 +31,10 @@ class ChoiceSwitch {
   std::vector<std::pair<print::Statements, std::vector<Choices>>> cases_;
 };
 
-/// The arrays of all recordings of a shader, each once: combinations of choices share their tables.
+/// The arrays of all recordings of a shader, without repetition: combinations of choices share their tables.
 class SharedArrays {
  public:
-  /// Statements of a recording, before which stand the arrays whose names other ones have taken.
+  /// The statements of a recording, after the declarations of its arrays that are not declared yet.
   print::Statements run(const Recording&);
   print::Statements declarations() const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a pack holds of a form.
+// Writes the shader or node tree of a form for a pack.
 #pragma once
 
 #include <string>
@@ -17,17 +17,18 @@ class Emission {
  public:
   virtual ~Emission() = default;
 
-  /// `table` gives the Albedo output, in a shader of its own where its text is longer than kMaxAlbedoText. Throws
-  /// InputError if the closures would exceed what Cycles keeps or the table what an array holds, and for fixed values
-  /// that differ from Availability::values().
+  /// `table` is for the Albedo output, which gets a shader of its own if its text is longer than kMaxAlbedoText. Throws
+  /// InputError if the closures exceed Cycles' limit, if the table exceeds that of an array, or if fixed values
+  /// contradict Availability::values().
   virtual Shader write(const Model&, const measure::AlbedoTable& table, const Setting& = {}) const = 0;
-  /// What is recorded of a model for one combination of choices, which `values` have; nothing for nodes.
+  /// The programs recorded from a model for one combination of choices, given in `values`; empty for forms made of
+  /// nodes.
   virtual std::vector<Recording> recordings(const Model&, const ParamValues& /*values*/, const Setting& = {}) const {
     return {};
   }
-  /// What a user must know of it; the add-on turns each into words where it applies.
+  /// Codes of what a user must know about the form. The add-on turns those that apply into sentences.
   virtual std::vector<std::string> warnings(const Model&, const Shader&) const = 0;
-  /// Whether a clamp on light shows in it by how bright its highlight is.
+  /// True if clamping of light becomes visible depending on the brightness of the form's highlight.
   virtual bool highlights(const Model&, const Shader&) const { return false; }
 };
 

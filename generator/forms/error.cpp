@@ -36,7 +36,7 @@ void require_finite(const Model& model, const ParamValues& values, const Vec3<do
                                    format_values(model.info(), values), wo.x, wo.y, wo.z));
 }
 
-/// A view of a model with random parameters, and what was recorded of it.
+/// A model with random parameters, a view, and what was recorded for it.
 struct Case {
   const Model& model;
   const ParamValues& values;
@@ -44,7 +44,7 @@ struct Case {
   const Program& program;
   Inputs<float> inputs;
   Vec3<double> wo;
-  double distance;  ///< in the medium
+  double distance;  ///< length of the path in the medium
 
   std::map<std::string, std::array<float, 3>> run() const { return program.run<float>(inputs); }
   Rgb<double> checked(const std::map<std::string, std::array<float, 3>>& out, const std::string& name,
@@ -55,7 +55,7 @@ struct Case {
   }
 };
 
-/// The largest magnitude of what `difference` returns, by channel.
+/// The largest absolute value that `difference` returns, over all cases and channels.
 double largest_difference(const Model& model, const ParamValues& confined,
                           const std::function<void(const Brdf<Expr>&, Program&)>& record,
                           const std::function<Rgb<double>(Case&, Sequence3& points)>& difference) {
@@ -139,7 +139,7 @@ FormError error_of_samples(const Model& model) {
   const double albedo = largest_difference(model, {}, record, [&](Case& at, Sequence3& points) {
     Rgb<double> difference(0.0);
     for (int i = 0; i < kPoints; ++i) {
-      // The same numbers drive both, so that what differs is the arithmetic and not the noise.
+      // Both use the same random numbers, so that they differ by arithmetic only and not by noise.
       const Vec3<float> v = Vec3<float>::from(points.next());
       set_input(at.inputs, "u_0", v.x);
       set_input(at.inputs, "u_1", v.y);

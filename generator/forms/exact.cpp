@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The exact form: closures of Cycles that equal the model, as it declares them.
+// The exact form: Cycles closures that equal the model, as the model declares them.
 #include <set>
 
 #include "forms/error.h"
@@ -13,7 +13,7 @@ class Exact final : public OslForm {
   Exact() : OslForm("exact") {}
 
   bool in_whole_pack(const Model& model) const override { return model.has_exact(); }
-  /// Choices, where closures are known for some alone.
+  /// Choices, if closures are declared only for some of them.
   ParamValues values(const Model& model, const ParamValues& fixed) const override;
 
   FormError error(const Model& model, const Setting&) const override {
@@ -24,7 +24,7 @@ class Exact final : public OslForm {
 
   std::vector<std::string> warnings(const Model& model, const Shader& shader) const override {
     std::vector<std::string> codes = warnings_of_closures(model, shader);
-    // Ramps here are signed: what they take away the passes do not see.
+    // These ramps may have negative entries. The passes ignore what they subtract.
     if (has_ramps(shader)) codes.push_back("albedo_passes");
     return codes;
   }
@@ -37,7 +37,7 @@ class Exact final : public OslForm {
   }
 
  private:
-  /// As the shader has to weigh them.
+  /// The closures with the weights that the shader has to use.
   static ClosureSum<Expr> closures(const Model& model, const Brdf<Expr>& brdf) {
     std::optional<ClosureSum<Expr>> sum = brdf.exact(recorded_wo(model, brdf));
     if (!sum) input_error("{}: has no exact form", model.info().name);
@@ -45,7 +45,7 @@ class Exact final : public OslForm {
       const Rgb<Expr> left = named("medium", medium(brdf, Expr::input("side"), Expr::input("path_length")));
       for (Closure<Expr>& c : *sum) c.weight = c.weight * left;
     }
-    // Without dispersion one refraction bends all channels, and the others have no weight, whatever the view.
+    // Without dispersion, one refraction serves all channels. The others have weight 0 in every view.
     std::erase_if(*sum, [](const Closure<Expr>& c) {
       std::array<double, 3> weight;
       return c.kind == ClosureKind::Refraction && c.weight.is_constant(&weight) && weight == std::array{0.0, 0.0, 0.0};

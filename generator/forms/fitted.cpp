@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The fitted form: closures that come close to the model, for one set of parameters or along a number (fit/fit.h).
+// The fitted form: closures that approximate the model for one set of parameters, or along one parameter (fit/fit.h).
 #include "fit/roles.h"
 #include "forms/made_of_fit.h"
 #include "forms/osl_form.h"
@@ -47,7 +47,7 @@ class Fitted final : public OslForm {
     return !model.has_mirror() && has_ramps(shader);
   }
 
-  /// They read the axis and what is mixed, not the factors.
+  /// They read the axis and the mixed parameters, but not the factors.
   std::vector<Recording> recordings(const Model& model, const ParamValues& values,
                                     const Setting& setting) const override {
     const fit::Fit fit = fit::fit_of(model, values, setting.views);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A form is a way to bring a model to Cycles: a shader, or a tree of Blender's nodes. Each is a file of this folder
-// that implements Form, and a line in registry.cpp. What else there is, the plan, the pack, the command line, asks
-// forms here and knows none by name: the plan which materials have one (Availability) and how far it is off
-// (Measurement), the pack what it holds of it (Emission).
+// A form is a way to represent a model in Cycles: as a shader, or as a tree of Blender's nodes. Each form is a file in
+// this folder that implements Form, and a line in registry.cpp. The rest of the program knows no form by name and asks
+// this interface: the plan asks which materials a form exists for (Availability) and how large its error is
+// (Measurement), the pack asks for its shader or nodes (Emission).
 #pragma once
 
 #include <optional>
@@ -22,13 +22,13 @@ class Form : public Availability, public Measurement, public Emission {
   Form(const Form&) = delete;
   Form& operator=(const Form&) = delete;
 
-  /// In files, tables and the manifest, and for a material's `representation`.
+  /// The name in files, tables, the manifest, and a material's `representation`.
   const std::string& name() const { return name_; }
-  /// Whether it sends rays in directions that it draws.
+  /// True if it samples random directions itself.
   virtual bool draws() const { return false; }
-  /// Whether it aims at lamps: then it has slots for them, and a base.
+  /// True if it aims closures at lamps. It then has lamp slots and a base.
   virtual bool aims() const { return false; }
-  /// Whether it is Blender's own nodes, a JSON file, and no shader.
+  /// True if it consists of Blender's own nodes, described by a JSON file, without a shader.
   virtual bool native() const { return false; }
 
   std::optional<fit::FitAxis> axis(const Model& model, const Setting& setting) const override {
@@ -42,9 +42,9 @@ class Form : public Availability, public Measurement, public Emission {
 
 /// All forms, preferred first.
 const std::vector<const Form*>& forms();
-/// Throws InputError that lists the known names.
+/// The form with this name. Throws InputError, which lists the known names, if there is none.
 const Form* form(const std::string& name);
-/// Those that a pack of everything has of a model, preferred first.
+/// The forms that a pack of all models contains for this one, preferred first.
 std::vector<const Form*> forms_of(const Model&);
 
 }  // namespace brdfc::forms

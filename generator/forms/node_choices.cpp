@@ -22,12 +22,12 @@ std::vector<Choices> open_choices(const ModelInfo& info, const ParamValues& fixe
   return out;
 }
 
-/// Goes through the programs of all combinations at once. Where they have the same operation it is there once, of what
-/// its arguments have in common; where they differ a choice selects. So combinations that differ in a parameter of a
-/// formula select that, and not one of several formulas.
+/// Merges the programs of all combinations of choices, operation by operation. Where all programs have the same
+/// operation it is written once, with merged arguments; where they differ, the choice selects. So combinations that
+/// differ only in a parameter of a formula select that parameter, not one of several formulas.
 class Merger {
  public:
-  /// A node of each of some programs.
+  /// A node of one of the programs.
   struct Place {
     std::size_t program;
     int node;
@@ -41,7 +41,7 @@ class Merger {
       if (p.kind == ParamKind::Choice) names_.push_back(p.name);
   }
 
-  /// The node of the current recorder that stands for all.
+  /// The node of the current recorder that represents all these nodes.
   int merged(const Places& places) {
     if (const auto it = known_.find(places); it != known_.end()) return it->second;
     const int made = alike(places) ? together(places) : selected(places);
@@ -69,14 +69,14 @@ class Merger {
     return Recorder::current().add(std::move(n));
   }
 
-  /// By the option of a choice.
+  /// Groups the places by the option of one choice.
   std::map<int, Places> split(const Places& places, std::size_t choice) const {
     std::map<int, Places> out;
     for (const Place& p : places) out[options_[p.program][choice]].push_back(p);
     return out;
   }
 
-  /// By the choice that makes them differ, if it is one alone.
+  /// Selects by a choice: by the one that alone explains the differences, if there is one.
   int selected(const Places& places) {
     std::optional<std::size_t> by;
     for (std::size_t choice = 0; choice < names_.size(); ++choice) {
@@ -86,9 +86,9 @@ class Merger {
       if (!by || settles) by = choice;
       if (settles) break;
     }
-    // Options that have the same operation go on together.
+    // Options with the same operation are merged.
     std::vector<Places> together;
-    std::vector<std::pair<int, std::size_t>> taken;  // options, and which of these they are
+    std::vector<std::pair<int, std::size_t>> taken;  // options, and the index in `together` of each
     for (const auto& [option, group] : split(places, by.value())) {
       std::size_t at = 0;
       for (; at < together.size(); ++at) {
@@ -123,7 +123,7 @@ class Merger {
   }
 
   const std::vector<Program>& programs_;
-  std::vector<Choices> options_;    ///< by program
+  std::vector<Choices> options_;    ///< of each program
   std::vector<std::string> names_;  ///< of all choices
   std::map<Places, int> known_;
 };
@@ -138,7 +138,7 @@ std::vector<ParamValues> open_combinations(const ModelInfo& info, const ParamVal
 
 Program selected_by_choices(const ModelInfo& info, const ParamValues& fixed,
                             const std::vector<Program>& by_combination) {
-  // Loops are unrolled first: their bodies can't be shared.
+  // Unroll loops first, because loop bodies can't be shared.
   std::vector<Program> lowered;
   for (const Program& p : by_combination) lowered.push_back(print::lowered_to_nodes(p));
   Merger merger(info, fixed, lowered);

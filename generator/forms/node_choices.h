@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One program of the form of nodes for all combinations of a model's choices. What they share is there once; outputs
-// are selected by the numbers of the choices. Cycles knows those before it renders, and leaves out what is not
-// selected.
+// Merges the programs for all combinations of a model's choices into one program for the form made of nodes. Shared
+// parts are written once, and the numbers of the choices select outputs. Cycles knows these numbers before rendering,
+// and removes what is not selected.
 #pragma once
 
 #include <vector>
@@ -11,11 +11,13 @@
 
 namespace brdfc::forms {
 
-/// Each combination that agrees with `fixed`, in the order of choice_combinations(): `fixed` with all choices.
+/// All combinations of choices that agree with `fixed`, in the order of choice_combinations(). Each is `fixed` with all
+/// choices added.
 std::vector<ParamValues> open_combinations(const ModelInfo&, const ParamValues& fixed);
 
-/// The programs of open_combinations(), with the same outputs, as one of the operations that nodes have. It reads a
-/// number by the name of each choice that `fixed` lacks and that makes a difference.
+/// Merges the programs of open_combinations(), which must have the same outputs, into one program that uses only
+/// operations available as nodes. It has an input named after each choice that is not in `fixed` and that makes a
+/// difference.
 Program selected_by_choices(const ModelInfo&, const ParamValues& fixed, const std::vector<Program>& by_combination);
 
 }  // namespace brdfc::forms

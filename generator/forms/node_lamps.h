@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the form of nodes makes of lamps (nodes.cpp): cones of directions. Without Open Shading Language Cycles drops
-// closures that take light away, so what a closure carries of a lamp has to be left out elsewhere and can't be taken
-// off.
+// How the form made of nodes (nodes.cpp) handles lamps: as cones of directions. Without Open Shading Language, Cycles
+// drops closures that subtract light. So the light that a closure carries for a lamp can't be subtracted elsewhere and
+// has to be left out there.
 //
-// Lamps: one Toon closure each, level over the cone that the lamp fills, with the model's f cos at a random point of
-// it. Rest: a direction drawn from the model, which carries nothing where it lies in such a cone.
+// Lamps: one Toon closure each, constant over the lamp's cone, with the model's f cos at a random point of the lamp.
+// Rest: a direction drawn from the model, which carries nothing if it lies in one of these cones.
 //
-// A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the widest that fits into it, and
-// carries what all of the lamp gives. A closure of small weight is lost, so the cone of a small lamp is
-// widened until it carries kWidened of the light: that much of what shines beside the lamp counts twice. Of two cones
-// that overlap the earlier one, which the list has the wider lamps in, is left to drawn directions: both would count
-// twice there.
+// A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the largest that fits into it, and
+// carries the light of the whole lamp. Cycles drops closures with a small weight, so the cone of a small lamp is
+// widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If two
+// cones overlap, the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn
+// directions. Otherwise light in the overlap would count twice.
 //
-// These formulas run as nodes alone (print/node_program.h), whose division by 0 and whose root of less than 0 are 0.
+// The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
+// give 0.
 #pragma once
 
 #include "core/vec.h"
@@ -20,13 +21,14 @@
 
 namespace brdfc::forms {
 
-/// What a slot of a lamp holds: see brdfc_lamp() in osl/brdfc.osl.in, and blender_addon/lamps/slots.py.
+/// The contents of a lamp slot: see brdfc_lamp() in osl/brdfc.osl.in and blender_addon/lamps/slots.py.
 template <class T> struct LampSlot { Vec3<T> place, turn, scale, shape; };
 
-/// What a slot says of how a lamp lies. It does not depend on the shading point, so Cycles computes it once.
+/// The orientation and size of a lamp, from its slot. It does not depend on the shading point, so Cycles computes it
+/// once.
 template <class T> struct LampAxes {
-  Vec3<T> across, along, away;  ///< unit; `away` from the side that shines
-  T half_across, half_along;    ///< of a rectangle or an ellipse: half its axes
+  Vec3<T> across, along, away;  ///< unit vectors; `away` points away from the shining side
+  T half_across, half_along;    ///< half axes of a rectangle or an ellipse
 };
 template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   const Vec3<T>& q = slot.turn;
@@ -40,31 +42,33 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   return axes;
 }
 
-/// What a shading point sees of a lamp. Radii are chords, how far apart the tips of unit vectors are: that takes fewer
-/// nodes than angles do.
+/// A lamp as seen from a shading point. Radii are given as chords (the distance between the tips of two unit vectors),
+/// which take fewer nodes than angles.
 template <class T> struct LampCone {
-  Vec3<T> towards;  ///< its axis, unit
-  T drop;           ///< 1 - cos of the radius of the cone that lies within the lamp
-  T chord;          ///< of its closure's radius: that of a ball or a sun has a seam
-  T reach;          ///< of a cone about the lamp
-  T flat;           ///< 1: a rectangle or an ellipse, else 0
-  T used;           ///< 0: the slot is empty, else 1
-  T active;         ///< 0: the lamp is left to drawn directions, or the slot is empty, else 1
-  T above;          ///< 1 where a part of it is above the horizon, else 0
-  T whole;          ///< all of the cone over its part above the horizon
+  Vec3<T> towards;  ///< unit vector along the axis
+  T drop;           ///< 1 - cos of the radius of the largest cone within the lamp
+  T chord;          ///< radius of the closure; for a ball or a sun it includes a seam
+  T reach;          ///< radius of a cone around the whole lamp
+  T flat;           ///< 1 for a rectangle or an ellipse, otherwise 0
+  T used;           ///< 0 for an empty slot, otherwise 1
+  T active;         ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
+  T above;          ///< 1 if a part of the lamp is above the horizon, otherwise 0
+  T whole;          ///< the whole cone divided by its part above the horizon
 };
 
-/// Half the width of the lobe of a drawn direction. It keeps off lamps by that.
+/// Half the width of the lobe of a drawn direction, which is also its minimum distance from lamps.
 inline constexpr double kNarrow = 1e-3;
 
-/// At the point `at` for the viewer's direction wo and the normal of the horizon, all in the world's axes. What depends
-/// on the slot alone Cycles folds, so that a ball, a sun and a rectangle take the nodes of their kind.
+/// The cone of a lamp at the point `at`, for the viewer's direction wo and the normal of the horizon, all in world
+/// coordinates. Cycles folds what depends only on the slot, so that a ball, a sun and a rectangle each take only the
+/// nodes for their kind.
 template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                        const Vec3<T>& wo, const Vec3<T>& normal) {
-  /// Of the sine of the radius, squared: from where on drawn directions meet a lamp well (tangent 1.5), and that of
-  /// what has no size. What is left of a cone's normal's height over its rim, at least.
+  /// Squared sines of radii: kWidest is where drawn directions hit a lamp often enough (tangent 1.5), kPoint is the
+  /// size given to lamps without size. kLeastRise is the minimum height of the cone's rim over the horizon of the
+  /// closure's normal.
   constexpr double kWidest = 2.25 / 3.25, kPoint = 1e-8, kLeastRise = 0.01;
-  /// Of a cone that is above the horizon to a smaller part, light is lost rather than made of few samples.
+  /// If a smaller part of a cone is above the horizon, light is lost; otherwise few samples would have to carry it.
   constexpr double kLeastPart = 0.05;
   const T kind = slot.shape.x;
   const auto ball = kind < T(1.5);
@@ -77,23 +81,23 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   const T distance2 = dot(centre, centre), nearness = T(1) / sqrt(distance2);
   LampCone<T> cone;
   cone.towards = centre * nearness;
-  // Squared sines of radii.
+  // Squared sines of the radii.
   const T of_ball = sqr(slot.shape.y) / distance2;
   const T of_sun = sqr(sin(minimum(abs(slot.shape.y) / T(2), T(1.5))));
-  // The widest cone about the centre within a disk: its rim touches that where the plane recedes.
+  // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes.
   const T facing = dot(lamp.away, cone.towards), slant = sqrt(T(1) - facing * facing);
   const T within = minimum(lamp.half_across, lamp.half_along) * nearness;
   const T tangent = within * facing / (T(1) + within * slant), tangent2 = tangent * tangent;
   const T sine2 = maximum(select(ball, of_ball, select(flat, tangent2 / (T(1) + tangent2), of_sun)), T(kPoint));
   const T sine = sqrt(sine2);
   cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
-  // All of a rectangle's light is made up for by what its cone has of it, which so must not be wider.
+  // The cone of a rectangle carries all of the rectangle's light, so it must not be widened.
   cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
   const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
   cone.reach = select(flat, diagonal * nearness + T(2 * kNarrow), cone.chord);
   cone.flat = select(flat, T(1), T(0));
-  // Twice the cosine between the closure's normal and its axis, squared; all of the cone has to be above that normal's
-  // horizon.
+  // Twice the squared cosine between the closure's normal and the cone's axis. The whole cone has to be above the
+  // horizon of that normal.
   const T rise2 = T(2) * dot(cone.towards, wo) + T(2), least = T(2) * sine + T(2 * kLeastRise);
   const auto used = kind > T(0.5);
   const auto usable = used && sine2 < T(kWidest) && rise2 > least * least;
@@ -102,17 +106,17 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   cone.active = select(usable && shines_here, T(1), T(0));
   const T height = dot(cone.towards, normal);
   cone.above = select(T(0) < height + cone.reach, T(1), T(0));
-  // f is averaged over all of the lamp, with zeros below the horizon, and the surface hides that part of the cone. The
-  // part of a disk above a line, to 0.02.
+  // f is averaged over the whole lamp, with zeros below the horizon, and the surface hides that part of the cone. This
+  // approximates the part of a disk above a line, to 0.02.
   const T x = maximum(minimum(height / sine, T(1)), T(-1));
   cone.whole = T(1) / maximum(x * (T(0.75) - T(0.25) * (x * x)) + T(0.5), T(kLeastPart));
   return cone;
 }
 
-/// A point of a rectangle or an ellipse, by two numbers in [0, 1).
+/// A point of a rectangle or an ellipse, chosen by two numbers in [0, 1).
 template <class T> struct FlatPoint {
-  Vec3<T> wi;  ///< towards it, unit
-  T emphasis;  ///< what it stands for, as a solid angle, over that of the cone within the lamp
+  Vec3<T> wi;  ///< unit vector to the point
+  T emphasis;  ///< solid angle that the point stands for, divided by that of the cone within the lamp
 };
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                            const T& drop, const T& u, const T& v) {
@@ -129,7 +133,7 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   return out;
 }
 
-/// Whether a drawn direction meets a lamp, or passes it so near that its lobe would: 1, else 0.
+/// 1 if a drawn direction hits a lamp, or passes so close that its lobe would; otherwise 0.
 template <class T> T meets(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at, const LampCone<T>& cone,
                            const Vec3<T>& ray) {
   const auto flat = slot.shape.x > T(2.5) && slot.shape.x<T(4.5), round = slot.shape.x> T(3.5);
@@ -144,19 +148,21 @@ template <class T> T meets(const LampSlot<T>& slot, const LampAxes<T>& lamp, con
   return select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
 }
 
-/// A closure of small weight, which Cycles would drop: kept by chance, and as much brighter then. `u` from 0 to 1.
+/// Russian roulette for a closure with a small weight, which Cycles would drop: it is kept at random, with a weight
+/// increased accordingly. `u` is from 0 to 1.
 template <class T> T kept(const T& weight, const T& u) {
   constexpr double kLeast = 1e-4;
   const T chance = weight * T(1 / kLeast);
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// What a Toon closure takes that carries `value`, f cos, over the cone. That of a ball or a sun may be wider.
+/// The inputs of a Toon closure that carries `value`, as f cos, over the cone. For a ball or a sun it may be wider than
+/// the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
-  T size;  ///< in units of 90 degrees, as the node has it
+  T size;  ///< in units of 90 degrees, as in the node
 };
-/// `room`: how wide it may be made without covering another lamp.
+/// `room`: the radius that it may have without covering another lamp.
 template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& room, const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
   const T largest = max_component(value);
@@ -164,14 +170,14 @@ template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& room,
   const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
   const T extent = chord2 * T(kPi);
   ToonLobe<T> out;
-  // The angle 2 asin(chord / 2), to 1e-4 of itself.
+  // The angle 2 asin(chord / 2), with a relative error of 1e-4.
   out.size = chord * (T(2 / kPi) +
                       chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
   out.color = value * (extent * kept(largest * extent, u));
   return out;
 }
 
-/// As wide as a cone is made that may be wider than its lamp.
+/// The largest radius of a cone that is widened beyond its lamp.
 inline constexpr double kWidestWidened = 0.3;
 
 }  // namespace brdfc::forms

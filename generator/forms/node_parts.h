@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of the form of nodes that are the same for all models, and the JSON of a part.
+// The parts of the form made of nodes that are the same for all models, and the JSON of a part.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,7 +10,7 @@
 
 namespace brdfc::forms {
 
-/// Which inputs and outputs of parts are vectors.
+/// Names of the inputs and outputs of parts that are vectors.
 const std::set<std::string>& node_vectors();
 nlohmann::ordered_json json_of(const print::NodeProgram&);
 
@@ -21,7 +21,7 @@ print::NodeProgram record_cone();
 print::NodeProgram record_flat();
 print::NodeProgram record_met();
 print::NodeProgram record_lobe();
-/// The drawn direction's weight; `lost`: 1 where it lies in the cone of a lamp or below the surface.
+/// The weight of the drawn direction. `lost` is 1 if it lies in the cone of a lamp or below the surface.
 print::NodeProgram record_rest();
 
 }  // namespace brdfc::forms

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The form of nodes: a model's formulas as trees of Blender's own Math nodes, around its Toon, Glossy and Diffuse
-// nodes. Runs wherever Cycles does, with Open Shading Language and without. How its parts are wired is in the
-// extension's formula_nodes.py; what they are made of is here: recordings as JSON.
+// The form made of nodes: a model's formulas as trees of Blender's Math nodes, which feed its Toon, Glossy and Diffuse
+// nodes. It works wherever Cycles does, with and without Open Shading Language. This file writes the parts as JSON,
+// from recordings; the extension's formula_nodes.py connects them.
 
 #include <fmt/format.h>
 
@@ -44,7 +44,7 @@ const char* kind_of(ClosureKind kind) {
   }
 }
 
-/// The closures that equal the model, where nodes make all of them; with choices bound.
+/// The closures that equal the model, if all of them exist as nodes. Choices must be bound.
 std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<Expr>& brdf) {
   std::optional<ClosureSum<Expr>> sum = brdf.exact(recorded_wo(model, brdf));
   if (!sum) return std::nullopt;
@@ -53,9 +53,10 @@ std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<E
   return sum;
 }
 
-/// Closures that are nowhere above the model; with choices bound. Their sockets are outputs of the program, which reads
-/// `stands`, 0 where normals are bent and Cycles would darken them, and `camera`, 1 for rays of that: Filter Glossy
-/// makes facets rougher for others. Returned as the other programs have them.
+/// Closures that are nowhere brighter than the model. Choices must be bound. The sockets of the closures are outputs of
+/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken the closures, and
+/// `camera`, which is 1 for camera rays: for other rays, Filter Glossy increases the roughness of microfacets. The
+/// returned closures have these outputs as inputs, for use in other programs.
 ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const Brdf<Expr>& brdf, Program& program,
                              Json& closures) {
   const Under* of = under(model);
@@ -87,16 +88,16 @@ ParamValues default_choices(const ModelInfo& info) {
   return out;
 }
 
-/// What the formulas of a model give to its parts, for one combination of choices.
+/// The programs that a model contributes to the parts, for one combination of choices.
 struct NodeRecording {
-  bool native = false;     ///< closures of Blender's are all of the model
-  Json closures, of_base;  ///< kinds, and names of what they take
-  Program give;            ///< what `closures` take
-  Program base;            ///< what `of_base` takes
-  Program value, draw;     ///< f cos - base; a random direction and its weight
+  bool native = false;     ///< Blender's closures equal the whole model
+  Json closures, of_base;  ///< kinds of closures, and the names of their inputs
+  Program give;            ///< computes the inputs of `closures`
+  Program base;            ///< computes the inputs of `of_base`
+  Program value, draw;     ///< f cos - base; a drawn direction and its weight
 };
 
-/// With the current recorder; `fixed` has every choice.
+/// Uses the current recorder; `fixed` must contain every choice.
 NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   NodeRecording out{.native = false,
                     .closures = Json::array(),
@@ -138,7 +139,7 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   return out;
 }
 
-/// Why nodes can't be made of a model with these choices, as the rest of a sentence.
+/// The reason, as a clause, why this form does not exist for a model with these choices.
 std::optional<std::string> obstacle(const Model& model, const ParamValues& fixed) {
   Recorder recorder;
   const NodeRecording r = record_nodes(model, fixed);
@@ -150,7 +151,7 @@ std::optional<std::string> obstacle(const Model& model, const ParamValues& fixed
   return std::nullopt;
 }
 
-/// The programs of all combinations of choices that `fixed` leaves open, by the names of parts.
+/// The programs for all combinations of choices that `fixed` leaves open, by name of the part.
 std::vector<std::pair<const char*, NodeProgram>> record_parts(const Model& model, const ParamValues& fixed,
                                                               const std::vector<NodeRecording>& recorded) {
   std::vector<std::pair<const char*, NodeProgram>> out;
@@ -179,10 +180,10 @@ std::vector<NodeRecording> record_combinations(const Model& model, const ParamVa
   return out;
 }
 
-/// More than these Blender takes long to make, and Cycles to read.
+/// With more operations, Blender takes long to create the nodes and Cycles to compile them.
 constexpr int kMostOperations = 6000;
 
-/// See Nodes::values(); `fixed` has choices alone.
+/// See Nodes::values(); `fixed` has only choices.
 ParamValues confined(const Model& model, const ParamValues& fixed) {
   const ParamValues defaults = default_choices(model.info());
   ParamValues chosen = fixed, out, all;
@@ -214,12 +215,12 @@ class Nodes final : public Form {
   bool in_whole_pack(const Model& model) const override { return !why_not(model, default_choices(model.info())); }
   bool draws() const override { return true; }
   bool native() const override { return true; }
-  /// Choices of which nodes know the default alone.
+  /// Fixes choices for which nodes support only the default.
   ParamValues values(const Model& model, const ParamValues& fixed) const override {
     ParamValues choices;
     for (const ParamInfo& p : model.info().params)
       if (const auto it = fixed.find(p.name); p.kind == ParamKind::Choice && it != fixed.end()) choices.insert(*it);
-    // Formulas are recorded for it, and plans ask often.
+    // Cached, because it requires recordings and plans ask often.
     static std::mutex lock;
     static std::map<std::pair<std::string, ParamValues>, ParamValues> known;
     const std::lock_guard guard(lock);
@@ -277,7 +278,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     out.lamps = max_lamps;
   }
   out.closures = int(first.closures.size() + first.of_base.size()) + int(parts.contains("draw")) + out.lamps;
-  // Of the lamps' the extension takes those off that no lamp fills, by what other forms take for one.
+  // The extension subtracts the slots of lamps that are not in use, with the count per lamp that other forms have.
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
   out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
   out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;

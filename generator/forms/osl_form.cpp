@@ -40,14 +40,14 @@ std::string parameter(const ParamInfo& p) {
   }
 }
 
-/// Prints a shader's statements, with numbers that are sockets kept within their ranges: sliders keep those, but links
-/// do not, and a texture may be black. The count leaves out the statements that do this.
+/// Prints a shader's statements, with the numbers that are sockets clamped to their ranges: sliders stay within them,
+/// but linked values may not, for example a black texture. The count does not include the statements that clamp.
 print::OslText within_ranges(const ModelInfo& info, const ParamValues& fixed, const Statements& statements) {
   const std::set<std::string> read = print::names_in(statements);
   Statements bounds, bounded;
   for (const ParamInfo& p : info.params) {
     if (p.kind != ParamKind::Number || fixed.count(p.name) || !read.count(p.name)) continue;
-    // A parameter cannot be assigned to, but hidden by a variable of its name.
+    // A parameter cannot be assigned to, but a variable of the same name can hide it.
     bounds.push_back(print::declare("float", "bounded_" + p.name, call("clamp", {p.name, p.min, p.max})));
     bounded.push_back(print::declare("float", p.name, "bounded_" + p.name));
   }
@@ -79,8 +79,8 @@ Value closure_of(const RecordedClosure& closure, std::size_t i, const std::strin
   const std::string n = closure.turned ? numbered("normal", i) : "frame_n";
   const auto of = [&](const char* name) { return Value(numbered(name, i)); };
   const auto microfacet = [&](const char* distribution) {
-    // The viewer's direction lies in the plane of incidence. Along the normal, where it is no tangent, facets are not
-    // stretched by it, and Cycles takes none.
+    // The viewer's direction lies in the plane of incidence. If it is parallel to the normal it is no valid tangent,
+    // but then facets are not stretched by it, and Cycles uses no tangent.
     const Value tangent = closure.stretched == Tangent::View      ? Value("I")
                           : closure.stretched == Tangent::Surface ? of("tangent")
                                                                   : call("vector", {0.0});
@@ -184,7 +184,7 @@ void ShaderBody::declare(const std::vector<RecordedClosure>& closures, const std
       const std::string of = numbered(name, c);
       add(print::declare_all("float", {of + "_x", of + "_y", of + "_z"}));
     };
-    // 0 for choices without closures.
+    // Weight 0 for choices without closures.
     add(print::declare("color", numbered("weight", c), 0.0));
     if (has_ramp(kind)) add(print::Declare{"color", {{numbered("ramp", c), {}, kRampSize}}});
     if (kind == ClosureKind::PhongRamp) variable("float", "exponent");
@@ -232,10 +232,10 @@ void OslForm::make_closures(ShaderBody& body) const {
   const auto closures = body.record(by_choice, [&](const Choices&, const ParamValues& values) {
     return recordings(body.model, values, body.setting).at(0);
   });
-  // As Blender's nodes do, where closures are not parts of a sum that holds for one frame alone.
+  // Blender's nodes use the shading normal. Closures of a fit are parts of a sum that is right in one frame only.
   body.declare(closures, made_of_fit() ? "frame_n" : "shading_n");
   body.add(by_choice.statements());
-  // Closures of a fit are made without them.
+  // The closures of a fit do not contain the factors.
   body.scale(closures, made_of_fit() ? fit::roles_of(body.model, body.setting.fixed).with(fit::Role::Factor)
                                      : std::set<std::string>());
   body.turn(closures);
@@ -296,7 +296,7 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     of_albedo = albedo_output(info, table, fixed);
     if (print::osl_statements(of_albedo, 1).text.size() <= kMaxAlbedoText) append(body, std::exchange(of_albedo, {}));
   } else {
-    // Delta terms alone: all of their closures are terms.
+    // The model has only delta terms, so its albedo is the sum of their weights.
     Value sum = numbered("weight", 0);
     for (std::size_t c = 1; c < made.terms.size(); ++c) sum = sum + numbered("weight", c);
     add(assign("Albedo", sum));

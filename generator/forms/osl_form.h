@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What all forms that are shaders share: the shader around what one of them makes of the model.
+// Base class of all forms that are shaders: it writes the shader around the closures of the form.
 #pragma once
 
 #include <functional>
@@ -14,25 +14,26 @@
 
 namespace brdfc::forms {
 
-/// A shader as it is being made.
+/// A shader under construction.
 struct ShaderBody {
   const Model& model;
-  const Setting& setting;  ///< with the form's own values among what is fixed
+  const Setting& setting;  ///< the fixed values include those that the form requires
   Shader shader = {};
   SharedArrays arrays = {};
-  print::Statements statements = {};     ///< after the frame is known, before BSDF is assigned
-  std::vector<print::Value> terms = {};  ///< closures, the sum of which is BSDF
+  print::Statements statements = {};     ///< between the frame's declarations and the assignment of BSDF
+  std::vector<print::Value> terms = {};  ///< the closures whose sum is BSDF
 
-  /// Records once for each combination of choices that what is fixed admits, together with what is fixed. Returns the
-  /// closures, which are the same for all that have any, and counts the operations of the longest.
+  /// Records once for each combination of choices that the fixed values allow; the callback gets the combination
+  /// together with the fixed values. Returns the closures, which must be the same for all combinations that have any,
+  /// and counts the operations of the longest one.
   std::vector<RecordedClosure> record(ChoiceSwitch&,
                                       const std::function<Recording(const Choices&, const ParamValues&)>& recording);
-  /// Declares what recorded statements assign of the closures, makes them terms and counts what they take. `diffuse_n`:
-  /// the variable that Diffuse closures have for their normal.
+  /// Declares the variables that recorded statements assign for the closures, adds the closures to `terms` and counts
+  /// their memory. `diffuse_n`: the variable with the normal of Diffuse closures.
   void declare(const std::vector<RecordedClosure>&, const std::string& diffuse_n = "frame_n");
-  /// Divides colours of ramps as they ask for; then weights are multiplied by the `factors`, that of a mirror is not.
+  /// Divides the colours of ramps as their Division says, and multiplies all weights except a mirror's by `factors`.
   void scale(const std::vector<RecordedClosure>&, const std::set<std::string>& factors);
-  /// Brings normals and tangents of their own from the model's frame into the shader's.
+  /// Transforms the closures' own normals and tangents from the model's frame into the scene.
   void turn(const std::vector<RecordedClosure>&);
 
   void add(print::Statement statement) { statements.push_back(std::move(statement)); }
@@ -45,37 +46,37 @@ class OslForm : public Form {
   Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const final;
 
  protected:
-  /// Makes statements and terms of all but the mirror of a form that draws(). Here of the closures that recordings()
-  /// assign, its first.
+  /// Adds the statements and terms of the form, without the mirror of a form that draws(). By default these are the
+  /// closures assigned by the first of recordings().
   virtual void make_closures(ShaderBody&) const;
-  /// The lowest view, as a cosine, that its closures are for: of a lower one the normal is turned; 0: any.
+  /// The lowest cosine of the view that its closures support; for lower views the normal is turned. 0: any view.
   virtual double lowest_view() const { return 0; }
 };
 
-/// Only ramps take more slots than closures.
+/// Only ramps take more slots than there are closures.
 inline bool has_ramps(const Shader& shader) { return shader.slots > shader.closures; }
 
-/// Codes of what changes the light of Cycles' own closures and of a mirror beside them.
+/// Codes of the settings that change the light of Cycles' closures, and of a mirror beside them.
 std::vector<std::string> warnings_of_closures(const Model&, const Shader&);
 
-/// Declares u_0, u_1, u_2: three numbers in [0, 1) that draw a direction.
+/// Declares u_0, u_1, u_2: three random numbers in [0, 1) for drawing a direction.
 print::Statements declare_draws();
 
-/// A direction of the frame in the coordinates of the scene.
+/// Transforms a direction of the shader's frame into the coordinates of the scene.
 print::Value in_scene(print::Value x, print::Value y, print::Value z);
-/// The same of name_x, name_y and name_z.
+/// The same for name_x, name_y and name_z.
 print::Value in_scene(const std::string& name);
 
-/// Sets a weight to 0 where the vector `wi` of this name leaves on the viewer's side of the shading normal but goes
-/// below the true surface. Cycles ends such a path; with Bump Map Correction it would send it along the surface.
+/// Sets `weight` to 0 if the vector `wi` lies on the viewer's side of the shading normal but below the true surface.
+/// Cycles ends such a path; with Bump Map Correction it would continue it along the surface.
 print::Statement lost_below(const Model&, const std::string& wi, const std::string& weight);
 
-/// How the shading normal is bent (model/horizon.h): whether it has to be, and to what. None for a matte model, which
-/// has no mirror direction; Blender's Diffuse node leaves its normal as it is, too.
+/// Computes whether the shading normal has to be bent, and the bent normal (model/horizon.h). Empty for a matte model,
+/// which has no mirror direction; Blender's Diffuse node leaves its normal unchanged, too.
 std::vector<Recording> record_bending(const Model&);
 
-/// What a drawn direction, which is a lobe, takes of a GPU's pool. Where it may be another closure, OSL makes a product
-/// of that and its weight.
+/// Memory that the lobe of a drawn direction takes in a GPU's closure pool. If it may be another closure instead, OSL
+/// also stores a product of that closure and its weight.
 int ray_bytes(const Model&);
 
 }  // namespace brdfc::forms

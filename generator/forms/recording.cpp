@@ -12,14 +12,14 @@
 namespace brdfc::forms {
 namespace {
 
-/// What a shader has for parameters: statements may not declare them, not even those that they do not read.
+/// The parameters of the shader. Its statements may not declare these names, even if they do not read them.
 std::vector<std::string> parameter_names(const Model& model) {
   std::vector<std::string> names;
   for (const ParamInfo& p : model.info().params) names.push_back(p.name);
   return names;
 }
 
-/// What the closures of a fit vary by: inputs, but for what is fixed.
+/// The numbers that a fit's closures depend on: inputs, or constants if they are fixed.
 fit::Varied<Expr> recorded_varied(const Model& model, const fit::Fit& fit, const ParamValues& fixed) {
   fit::Varied<Expr> out;
   if (fit.axis()) out.number = Expr::input(fit.axis()->parameter);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The sampled form: the shader draws a direction from the model itself, one narrow lobe per sample.
+// The sampled form: the shader draws one direction from the model per sample, and emits it as a narrow lobe.
 #include "closures/closure_pool.h"
 #include "forms/error.h"
 #include "forms/osl_form.h"
@@ -18,8 +18,8 @@ class Sampled final : public OslForm {
   FormError error(const Model& model, const Setting&) const override { return error_of_samples(model); }
 
   std::vector<std::string> warnings(const Model& model, const Shader&) const override {
-    // A clamp or a lamp of no size meets the lobe differently from Blender's own closures, and its normal is not the
-    // surface's.
+    // Clamping and lamps without size affect the lobe differently from Blender's own closures, and the lobe's normal is
+    // not the normal of the surface.
     std::vector<std::string> codes = {"multiple_importance", "clamp_indirect",   "clamp_direct",
                                       "zero_size_lights",    "orthographic_far", "normal_pass"};
     if (model.has_mirror()) codes.insert(codes.end(), {"filter_glossy", "albedo_passes_mirror"});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a form is made for.
+// The options that a form is made with.
 #pragma once
 
 #include "core/cosines.h"
@@ -7,16 +7,16 @@
 
 namespace brdfc::forms {
 
-/// Lamp slots that a shader of the extension has. Each that is in use costs an evaluation of the model per sample;
-/// empty ones cost nothing.
+/// Number of lamp slots in the extension's shaders. Each slot in use costs one evaluation of the model per sample;
+/// empty slots cost nothing.
 inline constexpr int kMaxLamps = 8;
 
-/// Where the base of a form that aims at lamps comes from: the model declares it, or closures are fitted to the model.
+/// The source of an aimed form's base: the closures that the model declares, or closures fitted to the model.
 enum class AimedBase { Declared, Fitted };
 
 struct Setting {
-  ParamValues fixed = {};  ///< folded into the text: no parameters of the shader
-  Cosines views = {};      ///< of the viewer, that it is right for
+  ParamValues fixed = {};  ///< constants in the shader instead of parameters
+  Cosines views = {};      ///< the range of views that it must be right for
   int max_lamps = kMaxLamps;
   AimedBase base = AimedBase::Declared;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a form is written as, and what it takes of Cycles.
+// The shader or node tree that a form is written as, and the resources that it needs in Cycles.
 #pragma once
 
 #include <cstddef>
@@ -8,21 +8,22 @@
 namespace brdfc::forms {
 
 struct Shader {
-  std::string name;       ///< of the shader and, with .osl, of its file; of a form of nodes with .json
-  std::string source;     ///< stands alone
-  std::string albedo;     ///< a shader of its own for the Albedo output; "" where `source` has it
-  int closures = 0;       ///< most that one shading point adds
-  int slots = 0;          ///< what they take of Cycles' kMaxClosures
-  int operations = 0;     ///< most that one combination of choices executes, a loop's body counted once
-  int statements = 0;     ///< of the shader for all combinations of choices, without the library it calls
-  bool facets = false;    ///< has closures of facets
-  bool leaning = false;   ///< has closures about normals of their own that Bump Map Correction changes
-  int lamps = 0;          ///< slots of lamps that it aims at
-  int closure_bytes = 0;  ///< most that they take of a GPU's kPoolBytes where no lamp is aimed at
-  int lamp_bytes = 0;     ///< that each lamp adds
+  std::string name;       ///< name of the shader; its file adds .osl, or .json for a form made of nodes
+  std::string source;     ///< complete source text
+  std::string albedo;     ///< source of a separate shader for the Albedo output; empty if `source` contains it
+  int closures = 0;       ///< maximum number of closures that one shading point adds
+  int slots = 0;          ///< slots that they take, of Cycles' kMaxClosures
+  int operations = 0;     ///< maximum over the combinations of choices; the body of a loop counts once
+  int statements = 0;     ///< for all combinations of choices, without the library functions
+  bool facets = false;    ///< uses microfacet closures
+  bool leaning = false;   ///< uses closures with their own normals, which Bump Map Correction changes
+  int lamps = 0;          ///< number of lamp slots
+  int closure_bytes = 0;  ///< maximum that the closures take of a GPU's kPoolBytes without any lamp
+  int lamp_bytes = 0;     ///< additional bytes for each lamp
 };
 
-/// Characters of tables that a shader holds for an output that most materials leave unlinked.
+/// If the table for the Albedo output is longer than this, it gets a separate shader, because most materials leave that
+/// output unlinked.
 inline constexpr std::size_t kMaxAlbedoText = 4096;
 
 }  // namespace brdfc::forms

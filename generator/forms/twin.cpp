@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The twin: no shader but Blender's own nodes, close to the model along one number (fit/twin.h).
+// The twin: a material of Blender's own nodes, without a shader, that approximates the model along one parameter
+// (fit/twin.h).
 #include "fit/twin.h"
 
 #include <fmt/format.h>
@@ -31,7 +32,7 @@ const char* node_of(ClosureKind kind) {
   }
 }
 
-/// Nodes are in single precision. A row a place of the axis, one without.
+/// The table in single precision, as nodes compute. One row per place of the axis; a single row without an axis.
 Json rows_of(const fit::TablePtr& table) {
   const std::size_t width = std::size_t(fit::kTwinKnots), rows = table->values.size() / width;
   Json out = Json::array();
@@ -52,7 +53,7 @@ Json by_term(const std::vector<fit::Channels>& terms) {
   return out;
 }
 
-/// Of what it never gives more than a millionth of the light there is no node.
+/// A closure that never gives more than a millionth of the light gets no node.
 bool black(const fit::TwinClosure& part) {
   for (const fit::Channels& channels : part.weight)
     for (const fit::TablePtr& table : channels)
@@ -60,7 +61,7 @@ bool black(const fit::TwinClosure& part) {
   return true;
 }
 
-/// Of each term [times, powers of the parameters], to be added up.
+/// For each term a list of [factor, powers of the parameters], to be summed.
 Json polynomials(const fit::Terms& terms) {
   Json out = Json::array();
   for (const fit::Terms::Term& term : terms.terms) {
@@ -99,18 +100,18 @@ class Twin final : public Form {
 
   Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const override;
   std::vector<std::string> warnings(const Model& model, const Shader&) const override {
-    // A matte node, glossy ones whose facets lean, and a mirror.
+    // It consists of a Diffuse node, Glossy nodes with tilted normals, and a mirror.
     if (!model.has_mirror()) return {"leaning_facets", "caustics", "filter_glossy"};
     return {"multiple_importance", "leaning_facets", "caustics", "filter_glossy", "clamp_mirror"};
   }
   bool highlights(const Model& model, const Shader&) const override { return !model.has_mirror(); }
 };
 
-/// `source` is JSON: what the nodes make of closures. Tables are over the cosine of the view, evenly spaced from 0 to 1
-/// (fit/twin.h says what they are), a row for each even place of `axis`, which is null where there is one row.
-/// `closures`: kind, and tables; `weight` and `albedo` by term and channel, one where `tint` multiplies them. `terms`
-/// says how weights of terms come of the `mixed` parameters, `mirror_terms` the same for a mirror. Factors multiply all
-/// but a mirror's weight.
+/// `source` is JSON that describes the nodes' inputs. Tables (fit/twin.h) run over the cosine of the view, evenly
+/// spaced from 0 to 1, with one row for each evenly spaced place of `axis`; `axis` is null if there is only one row.
+/// `closures` has the kind and the tables of each closure: `weight` and `albedo` by term and channel, with a single
+/// channel if `tint` multiplies it. `terms` says how the `mixed` parameters give the weights of the terms,
+/// `mirror_terms` the same for a mirror. Factors multiply all weights except a mirror's.
 Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Setting& setting) const {
   const fit::Twin& twin = fit::twin_of(model, setting.fixed);
   Shader out;
@@ -127,7 +128,8 @@ Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Settin
     closures.push_back(j);
     const int nodes = has_facets(part.kind) ? 2 : 1;
     out.closures += nodes;
-    // In Open Shading Language Blender's nodes are these closures; a mirror of theirs is facets without roughness.
+    // With Open Shading Language, Blender's nodes use the same closures; its mirror is a microfacet closure without
+    // roughness.
     const bool glossy = part.kind != ClosureKind::Diffuse;
     out.closure_bytes += nodes * pool_bytes(glossy ? ClosureKind::Ggx : ClosureKind::Diffuse);
   }

@@ -12,7 +12,7 @@
 namespace brdfc::print {
 namespace {
 
-/// A value of the program as it is recorded anew.
+/// A value of the lowered program.
 struct NodeValue {
   ExprType type = ExprType::Real;
   Expr real{};
@@ -20,16 +20,16 @@ struct NodeValue {
   Condition flag{false};
 
   NodeValue() = default;
-  NodeValue(const Expr& x) : real(x) {}                               // NOLINT: one of three
+  NodeValue(const Expr& x) : real(x) {}                               // NOLINT: one of three types
   NodeValue(const Rgb<Expr>& c) : type(ExprType::Color), color(c) {}  // NOLINT
   NodeValue(const Condition& c) : type(ExprType::Bool), flag(c) {}    // NOLINT
   Rgb<Expr> as_color() const { return type == ExprType::Color ? color : Rgb<Expr>(real); }
 };
 
-/// Records a program anew with the operations alone that nodes have.
+/// Records a program again with only the operations that nodes have.
 class Lowering {
  public:
-  /// With the current recorder.
+  /// Uses the current recorder.
   explicit Lowering(const Program& program) : p_(program), values_(std::size_t(program.size())) {
     for (int id = 0; id < p_.size(); ++id)
       if (p_.reachable()[std::size_t(id)] && p_.node(id).scope < 0) step(id);
@@ -156,7 +156,8 @@ class Lowering {
     }
   }
 
-  /// Whether a value is made of random numbers alone: it has the digits of those, so that a series would win none.
+  /// True if a value is made only of random numbers. It has only the precision of these, so a series would gain
+  /// nothing.
   bool is_random(int id) const {
     const ExprNode& n = p_.node(id);
     if (n.op == Op::Input) return n.name == "u_0" || n.name == "u_1" || n.name == "u_2";

@@ -5,8 +5,8 @@
 
 namespace brdfc::print {
 
-/// The program with the operations alone that nodes have: loops unrolled, series for what SVM lacks. There has to be a
-/// recorder, whose precision it takes.
+/// Rewrites the program so that it contains only operations that nodes have: loops are unrolled, and functions that SVM
+/// lacks become series. Requires a current recorder, and uses its precision.
 Program lowered_to_nodes(const Program&);
 
 }  // namespace brdfc::print

@@ -13,10 +13,10 @@
 namespace brdfc::print {
 namespace {
 
-/// Writes what lowered_to_nodes() left, depth first, so that few values live at once.
+/// Writes the result of lowered_to_nodes(), depth first, so that few values are alive at once.
 class Writer {
  public:
-  /// `cuts`: values that come from elsewhere, by node; `vectors`: see node_program().
+  /// `cuts`: values that are inputs with these names, by node. `vectors`: see node_program().
   Writer(const Program& program, std::map<int, std::string> cuts, const std::set<std::string>& vectors)
       : p_(program),
         cuts_(std::move(cuts)),
@@ -26,7 +26,7 @@ class Writer {
 
   NodeProgram write(const std::vector<std::pair<std::string, int>>& outputs) {
     for (const auto& [name, id] : outputs) count_uses(id);
-    // A vector that is put together for an output serves other nodes as well.
+    // A vector that is built for an output is available to other nodes as well.
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       if (base_of(outputs[i].first, 'x').empty()) continue;
       const Triple triple = {outputs[i].second, outputs.at(i + 1).second, outputs.at(i + 2).second};
@@ -51,7 +51,7 @@ class Writer {
   }
 
  private:
-  /// A truth value that a node gives, or its opposite.
+  /// A truth value: the result of a node, or its negation.
   struct Truth {
     NodeOperand value;
     bool inverted;
@@ -59,14 +59,14 @@ class Writer {
 
   /// x, y and z of a vector.
   using Triple = std::array<int, 3>;
-  /// How the operands of a triple of equal operations go together: those of one vector, or a number for all three.
+  /// The operands of three equal operations, grouped into vectors, or into numbers that all three share.
   struct Joined {
     std::vector<Triple> operands;
   };
 
   bool is_color(int id) const { return p_.node(id).type == ExprType::Color; }
 
-  /// The vector that NAME_x (or _y or _z) is a part of, or "".
+  /// NAME if `name` is NAME_x (or _y or _z, according to `axis`) for a vector NAME; otherwise empty.
   std::string base_of(const std::string& name, char axis) const {
     if (name.size() < 3 || name[name.size() - 2] != '_' || name.back() != axis) return "";
     const std::string base = name.substr(0, name.size() - 2);
@@ -87,7 +87,7 @@ class Writer {
   }
   static bool same(const Triple& t) { return t[0] == t[1] && t[1] == t[2]; }
 
-  /// Whether three numbers are a vector of which nodes compute all at once.
+  /// True if the three numbers form a vector that nodes can compute in one operation.
   bool plan(const Triple& t) {
     if (same(t)) return false;
     if (all(t, Op::Const) || !input_of(t).empty()) return true;
@@ -115,7 +115,7 @@ class Writer {
         return std::nullopt;
       case Op::Add:
       case Op::Mul:
-        // Either way round in each.
+        // Try both orders of the operands in each of the three.
         for (unsigned turned = 0; turned < 8; ++turned) {
           const auto at = [&](std::size_t c, std::size_t i) { return argument(c, (turned >> c & 1) ? 1 - i : i); };
           const Triple first = {at(0, 0), at(1, 0), at(2, 0)}, second = {at(0, 1), at(1, 1), at(2, 1)};
@@ -133,7 +133,7 @@ class Writer {
     return add("COMBINE", parts, true);
   }
 
-  /// What plan() allows.
+  /// The vector for a triple that plan() accepts.
   NodeOperand vector(const Triple& t) {
     if (const std::string base = input_of(t); !base.empty()) return input(base, true);
     if (all(t, Op::Const))
@@ -166,7 +166,7 @@ class Writer {
     }
   }
 
-  /// Takes note of a sum of three products of the parts of two vectors.
+  /// Records a sum of three products as a dot product, if its factors are the components of two vectors.
   void find_dot(int id) {
     const auto product = [&](int a) {
       return p_.node(a).op == Op::Mul && p_.node(a).type == ExprType::Real && !cuts_.count(a);
@@ -191,7 +191,7 @@ class Writer {
       }
     }
   }
-  /// Parts of a vector that is computed are taken from it.
+  /// Takes the components of a vector from its node.
   void take_parts(const Triple& t) {
     if (all(t, Op::Const) || !input_of(t).empty() || combined_.count(t) || !taken_.insert(t).second) return;
     for (std::size_t c = 0; c < 3; ++c)
@@ -205,8 +205,8 @@ class Writer {
     for (int a : p_.node(id).args) count_uses(a);
   }
 
-  /// Registers that a value takes, were it a tree (R. Sethi, J. Ullman: The Generation of Optimal Code for Arithmetic
-  /// Expressions, 1970).
+  /// Number of registers that the value would need if it were a tree (R. Sethi, J. Ullman: The Generation of Optimal
+  /// Code for Arithmetic Expressions, 1970).
   int need(int id) {
     int& known = need_[std::size_t(id)];
     if (known >= 0) return known;
@@ -245,7 +245,7 @@ class Writer {
     return {int(out_.operations.size()) - 1, "", {}, color};
   }
 
-  /// Whether nothing else takes the value, which so can be a part of another node.
+  /// True if the value has no other use, so that it can become part of another node.
   bool own(int id) const {
     return uses_[std::size_t(id)] == 1 && !cuts_.count(id) && !known_.count(id) && !part_of_.count(id) &&
            !dots_.count(id);
@@ -266,7 +266,7 @@ class Writer {
         return minus_product(p.args, other);
       }
       if (n.op == Op::Sub && !constant) continue;
-      // What takes more registers first.
+      // Operands that need more registers come first.
       std::vector<int> order = {p.args[0], p.args[1], other};
       std::ranges::stable_sort(order, [&](int a, int b) { return need(a) > need(b); });
       for (int a : order) operand(a);
@@ -278,7 +278,7 @@ class Writer {
     return std::nullopt;
   }
 
-  /// c - a b as c + (-a) b, in which -a often serves several times: polynomials are written that way.
+  /// Writes c - a b as c + (-a) b. The value -a is often needed several times, because polynomials have this form.
   NodeOperand minus_product(const std::vector<int>& factors, int from) {
     int turned = factors[0], other = factors[1];
     if (p_.node(other).op == Op::Const || uses_[std::size_t(other)] > uses_[std::size_t(turned)])

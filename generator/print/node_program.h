@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recorded program as a list of Blender's Math, Vector Math and Mix nodes, which Cycles' SVM runs on every device.
+// A recorded program as a list of Blender's Math, Vector Math and Mix nodes, which run in Cycles' SVM on every device.
 //
-// A real is a float, a colour a vector, a truth value 0 or 1. SVM has no loops, so they are unrolled; no expm1 and
-// log1p, so those are series (core/series.h). Its division is 0 where the divisor is 0, its square root 0 and its
-// logarithm 0 where they are not defined, a power of a negative base 0 unless the exponent is whole: formulas guard
-// their arguments, so none of this shows. An arm of a selection that is not taken is multiplied by 0, so it has to be
-// finite.
+// A real is a float, a colour a vector, a truth value 0 or 1. SVM has no loops, so they are unrolled, and no expm1 and
+// log1p, so they become series (core/series.h). Where a division, square root or logarithm is undefined, SVM gives 0,
+// and so it does for a negative base with an exponent that is not an integer; formulas guard their arguments, so this
+// does not matter. The branch of a selection that is not taken is multiplied by 0, so it has to be finite.
 #pragma once
 
 #include <array>
@@ -19,52 +18,54 @@
 
 namespace brdfc::print {
 
-/// What a node takes: a constant, an input or the result of an earlier node.
+/// An operand of a node: a constant, an input of the program, or the result of an earlier node.
 struct NodeOperand {
-  int result = -1;                ///< number of that node
-  std::string input;              ///< "": none
-  std::array<double, 3> value{};  ///< of a constant
-  bool color = false;             ///< whether it is a vector
+  int result = -1;                ///< index of the earlier node
+  std::string input;              ///< name of the input; empty if it is none
+  std::array<double, 3> value{};  ///< of the constant
+  bool color = false;             ///< true for a vector
 
   bool is_constant() const { return result < 0 && input.empty(); }
   bool operator==(const NodeOperand&) const = default;
 };
 
 struct NodeOperation {
-  /// The operation of a Math node, as Blender calls it; with V_ before it that of a Vector Math node; MIX and V_MIX, of
-  /// a factor and the values at 0 and 1; COMBINE, of x, y, z; X, Y, Z, of a vector; LOOKUP, of coordinates from 0 to 1.
+  /// The name of the operation: that of Blender's Math node; with the prefix V_, that of a Vector Math node; MIX and
+  /// V_MIX of a factor and the values at 0 and 1; COMBINE of x, y, z; X, Y, Z of a vector; LOOKUP of coordinates from 0
+  /// to 1.
   std::string kind;
   std::vector<NodeOperand> operands;
-  bool color = false;                    ///< whether the result is a vector
-  std::shared_ptr<const Table> table{};  ///< of a LOOKUP
+  bool color = false;                    ///< true if the result is a vector
+  std::shared_ptr<const Table> table{};  ///< for a LOOKUP
 };
 
 struct NodeProgram {
-  std::vector<std::pair<std::string, bool>> inputs;  ///< names, and which are vectors
-  std::vector<NodeOperation> operations;             ///< each after those whose results it takes
+  std::vector<std::pair<std::string, bool>> inputs;  ///< names, and true for vectors
+  std::vector<NodeOperation> operations;             ///< each one after those whose results it uses
   std::vector<std::pair<std::string, NodeOperand>> outputs;
-  /// Floats of results that are alive at once, at most, if nodes run in this order: SVM's stack has 255.
+  /// Maximum number of floats that are alive at once if nodes run in this order. SVM's stack has 255.
   int live = 0;
 };
 
-/// SVM's stack, in floats.
+/// Size of SVM's stack, in floats.
 inline constexpr int kSvmStack = 255;
 
-/// Whether nodes can be made of a program: a table of one axis becomes a polynomial, if it is smooth; of others they
-/// have none.
+/// True if the program can be made of nodes. Its tables must have one axis and be smooth, because nodes have no tables
+/// and use polynomials instead.
 bool has_nodes(const Program&);
 
-/// There has to be a recorder, whose precision constants are folded in. Inputs and outputs NAME_x, NAME_y and NAME_z,
-/// for a name among `vectors`, are one vector NAME: sums, products with numbers and dot products of vectors are one
-/// node each.
+/// Requires a current recorder, in whose precision constants are folded. For a name in `vectors`, the inputs or outputs
+/// NAME_x, NAME_y and NAME_z become one vector NAME. Sums, dot products and products of vectors with numbers then take
+/// one node each.
 NodeProgram node_program(const Program&, const std::set<std::string>& vectors = {});
 
-/// The same in two steps, where a program runs several times with the same values of all inputs but some.
+/// The program split into two, for programs that run several times while only some of the inputs change.
 struct NodePrograms {
-  NodeProgram once;  ///< what does not depend on the varying inputs; outputs that are inputs of `each`
+  NodeProgram
+      once;  ///< everything that does not depend on the varying inputs; some of its outputs are inputs of `each`
   NodeProgram each;
 };
-/// `prefix`: names of what goes from one to the other begin with it.
+/// `prefix`: the names of values passed from one to the other begin with it.
 NodePrograms node_programs(const Program&, const std::set<std::string>& varying, const std::string& prefix,
                            const std::set<std::string>& vectors = {});
 

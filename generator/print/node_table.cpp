@@ -8,7 +8,7 @@
 namespace brdfc::print {
 namespace {
 
-/// Beyond it single precision loses what the polynomial gains.
+/// At a higher degree, rounding in single precision exceeds the gain.
 constexpr int kDegree = 20;
 constexpr double kOff = 2e-4;
 
@@ -23,8 +23,7 @@ double horner(const std::vector<double>& c, double t) {
 std::optional<std::vector<double>> polynomial_of(const Table& table) {
   if (table.axes.size() != 1 || table.channels != 1) return std::nullopt;
   const auto value = [&](double x) { return interpolate(table, {x}).r; };
-  // Interpolation at the zeros of a Chebyshev polynomial, as a sum of those, and that by powers: T_k+1 = 2 t T_k -
-  // T_k-1.
+  // Interpolates at Chebyshev nodes with Chebyshev polynomials, then converts to powers with T_k+1 = 2 t T_k - T_k-1.
   constexpr int kCount = kDegree + 1;
   std::vector<double> out(kCount), before(kCount), now(kCount);
   before[0] = 1;

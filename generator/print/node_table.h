@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables for Blender's nodes, which have none: one of a single axis becomes a polynomial.
+// Tables for Blender's nodes, which have none: a table with one axis becomes a polynomial.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace brdfc::print {
 
-/// Coefficients of the powers of 2 x - 1, the constant first, for x from 0 to 1; nullopt for a table of several axes,
-/// or where values are more than 2e-4 of themselves off.
+/// Coefficients of the powers of 2 x - 1, constant term first, for x from 0 to 1. Returns nullopt for a table with
+/// several axes, and if the relative error of a value exceeds 2e-4.
 std::optional<std::vector<double>> polynomial_of(const Table&);
 
-/// Its value at x, which is clamped to [0, 1].
+/// The value of the polynomial at x, which is clamped to [0, 1].
 Expr polynomial_at(const std::vector<double>& coefficients, const Expr& x);
 
 }  // namespace brdfc::print

@@ -106,7 +106,7 @@ class NumpyPrinter : public ProgramPrinter {
         return infix("<", n, 3);
       case Op::LessEqual:
         return infix("<=", n, 3);
-      // These bind tighter than comparisons in Python: what they join stands in brackets, and so do they.
+      // In Python these bind more tightly than comparisons, so both they and their operands get parentheses.
       case Op::And:
         return {use(n.args[0], 6) + " & " + use(n.args[1], 6), 0};
       case Op::Or:
@@ -135,7 +135,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-/// Between words, where a line would be longer than 100 characters.
+/// Wraps between words if a line would be longer than 100 characters.
 std::string wrapped(const std::string& text, int indent) {
   std::string out;
   std::size_t width = std::size_t(indent), start = 0;

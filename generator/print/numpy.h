@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A recorded program as Python on NumPy arrays, in double precision.
 //
-// A real is an array (N,), a colour (3, N), what is constant (), (1,) or (3, 1): shapes that NumPy broadcasts by
-// itself.
+// A real is an array of shape (N,), a colour (3, N). Constants are (), (1,) or (3, 1); NumPy broadcasts these shapes.
 #pragma once
 
 #include <map>
@@ -14,29 +13,31 @@
 
 namespace brdfc::print {
 
-/// Tables by name, which the functions of a module read.
+/// The tables that the functions of a module read, by name.
 using NumpyTables = std::map<std::string, std::shared_ptr<const Table>>;
 
-/// Whether a function of Python uses that name itself: a keyword, a module or a function that formulas call, a table.
+/// True if Python functions use the name themselves: for a keyword, a module or function that formulas call, or a
+/// table.
 bool is_python_word(const std::string& name);
 
-/// Text of a function of these arguments that returns the outputs in their order, a single one by itself. It calls np,
-/// rgb(r, g, b) and lookup(table, coordinates...), and names its tables table_NAME, which are added to `tables`.
-/// Throws ExprError for an argument that Python can't have, and if two tables have one name.
+/// The source of a function with these arguments that returns the outputs in order; a single output is returned without
+/// a tuple. It calls np, rgb(r, g, b) and lookup(table, coordinates...), and refers to its tables as table_NAME. These
+/// tables are added to `tables`. Throws ExprError for an argument that is no valid name in Python, and if two tables
+/// have the same name.
 std::string numpy_function(const Program&, const std::string& name, const std::vector<std::string>& arguments,
                            NumpyTables& tables);
 
-/// The statement that makes table_NAME, of table(sizes, text).
+/// The statement that creates table_NAME with a call of table(sizes, text).
 std::string numpy_table(const Table&);
 
-/// A double with as few digits as tell it from all others. Throws ExprError unless it is finite.
+/// The shortest text that reads back as the same double. Throws ExprError unless the number is finite.
 std::string python_number(double);
 
 /// A string literal in double quotes.
 std::string python_string(const std::string&);
 
-/// Text between three double quotes, in lines of at most 100 characters where there are spaces to break at; `indent`
-/// goes before all lines but the first.
+/// Text in triple double quotes, wrapped at spaces to at most 100 characters per line. All lines but the first are
+/// indented by `indent`.
 std::string python_docstring(const std::vector<std::string>& paragraphs, int indent);
 
 }  // namespace brdfc::print

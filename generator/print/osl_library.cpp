@@ -12,14 +12,14 @@ namespace brdfc::print {
 namespace {
 
 struct Function {
-  std::string name, text;  // with the comment above it
+  std::string name, text;  // the text includes the comment above the function
 };
 
-/// Paragraphs of the library: each function with the comment before it ends in a line "}".
+/// Splits the library into its functions, each with the comment in front of it. A function ends with a line "}".
 std::vector<Function> parse_library() {
   std::vector<Function> functions;
   const std::string library = kOslLibrary;
-  std::size_t start = library.find("\n\n") + 2;  // after the heading
+  std::size_t start = library.find("\n\n") + 2;  // after the file's header
   while (start < library.size()) {
     const std::size_t end = library.find("\n}\n", start);
     if (end == std::string::npos) break;

@@ -6,8 +6,8 @@
 
 namespace brdfc::print {
 
-/// Those of these functions that are osl/brdfc.osl.in's, which begin with brdfc_, and those they call, in the order of
-/// the file. One that the library does not have is a std::logic_error.
+/// The source of these functions of osl/brdfc.osl.in (names that begin with brdfc_ only) and of the functions that they
+/// call, in the order of the file. Throws std::logic_error for a function that the library does not have.
 std::string library_for(const std::set<std::string>& functions);
 
 }  // namespace brdfc::print

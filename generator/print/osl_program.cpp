@@ -13,16 +13,16 @@
 namespace brdfc::print {
 namespace {
 
-/// Operations that OSL has no function for, but the library has.
+/// Operations that are functions of the library, because OSL lacks them.
 bool is_of_library(Op op) { return op == Op::Log1p || op == Op::Expm1 || op == Op::MaxComponent; }
 std::string library_name(Op op) { return std::string("brdfc_") + name_of(op); }
 
-/// Where OSL's spelling lives: text of a subexpression and how tightly it binds.
+/// Prints values in OSL's syntax, each with its precedence.
 class OslPrinter : public ProgramPrinter {
  public:
   using ProgramPrinter::ProgramPrinter;
 
-  /// The arrays that look-ups read; to be called before statements are printed.
+  /// The arrays that look-ups read; must be called before the statements are printed.
   std::vector<ProgramArray> arrays() {
     std::vector<ProgramArray> all;
     for (std::size_t i = 0; i < reachable_.size(); ++i) {

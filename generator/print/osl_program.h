@@ -12,12 +12,12 @@
 
 namespace brdfc::print {
 
-/// Statements that assign every output (to variables declared by the caller), indented, after the arrays that look-ups
-/// read. The text declares no name of `taken`, as it declares no osl_words(), inputs and outputs. Throws ExprError for
-/// what OSL has no words for.
+/// Statements that assign every output, indented, after the arrays that its look-ups read. The caller declares the
+/// outputs. The statements declare no name in `taken`, no osl_words(), and no name of an input or output. Throws
+/// ExprError for operations that OSL does not have.
 std::string osl_program(const Program&, int indent, const std::vector<std::string>& taken);
 
-/// The same without the arrays, which have to be declared before.
+/// The same without the arrays, which must be declared before.
 OslText osl_assignments(const Program&, int indent, const std::vector<std::string>& taken);
 struct ProgramArray {
   std::string name;
@@ -25,7 +25,7 @@ struct ProgramArray {
 };
 std::vector<ProgramArray> osl_arrays(const Program&, const std::vector<std::string>& taken);
 
-/// The functions of the library (print/osl_library.h) that the statements call.
+/// The library functions (print/osl_library.h) that the statements call.
 std::set<std::string> library_calls(const Program&);
 
 }  // namespace brdfc::print

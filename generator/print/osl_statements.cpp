@@ -14,7 +14,7 @@
 namespace brdfc::print {
 namespace {
 
-/// How tightly a value binds.
+/// Precedence of the kinds of values, lowest first.
 enum Precedence : int { kChoice, kOr, kAnd, kComparison, kSum, kProduct, kUnary, kAtom };
 
 int precedence_of_sign(std::string_view sign) {
@@ -47,7 +47,7 @@ std::string list(const std::vector<Value>& values) {
   return out;
 }
 
-/// As an operand of something that binds so tightly.
+/// The value as an operand of an operator with this precedence.
 std::string operand(const Value& v, int precedence) {
   return precedence_of(v) < precedence ? "(" + osl_value(v) + ")" : osl_value(v);
 }
@@ -73,7 +73,7 @@ class Printer {
     print(body);
     --level_;
   }
-  /// Whether a head may have it on the next line, without braces.
+  /// True if the body can follow its head without braces.
   static bool is_single(const Statements& body) {
     if (body.size() != 1) return false;
     const auto& only = body[0].node().is;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements as OSL.
+// Prints statements as OSL.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace brdfc::print {
 
-/// Lines of a block so many levels deep.
+/// The lines of a block, indented by `level` levels.
 OslText osl_statements(const Statements&, int level);
 std::string osl_value(const Value&);
 

@@ -15,7 +15,7 @@ std::string position_name(const std::string& suffix, std::size_t axis) {
   return fmt::format("position_{}_{}", suffix, axis);
 }
 
-/// A coordinate on the axis' scale, as its array of knots is.
+/// The coordinate on the scale of the axis, as in its array of knots.
 Value scaled(const TableAxis& axis, const Value& coordinate) {
   switch (axis.scale) {
     case AxisScale::Log:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables as OSL: arrays of numbers, and look-ups in them.
+// Tables in OSL: arrays of numbers, and look-ups in them.
 #pragma once
 
 #include <string>
@@ -10,24 +10,24 @@
 
 namespace brdfc::print {
 
-/// Numbers in one OSL array; more compile slowly.
+/// Maximum number of values in one OSL array; larger ones compile slowly.
 inline constexpr std::size_t kMaxArray = 32768;
 
-/// The declaration of an array, short: tables are most of a long shader's text.
+/// The declaration of an array, without superfluous spaces: tables make up most of the text of a long shader.
 std::string compact_array(const std::string& name, const std::vector<double>& values, int indent);
 
-/// Arrays of a table that positions() and look_up() read: of the knots of each axis on its scale, and of each channel.
-/// Their names end in _`suffix`.
+/// The arrays of a table that positions() and look_up() read: the knots of each axis, on the scale of the axis, and the
+/// values of each channel. Their names end in _`suffix`.
 Statements table_arrays(const Table&, const std::string& suffix);
 
-/// Declares where coordinates, values in units of the axes, lie among the knots of each axis, for look_up(). Nothing
-/// for a constant.
+/// Declares the positions of the coordinates among the knots of each axis, for look_up(). Coordinates are in units of
+/// the axes. Empty for a constant table.
 Statements positions(const Table&, const std::vector<Value>& coordinates, const std::string& suffix);
 
-/// The interpolated value: a float, or a color of three channels. Throws std::logic_error for more than four axes.
+/// The interpolated value: a float, or a color for three channels. Throws std::logic_error for more than four axes.
 Value look_up(const Table&, const std::string& suffix);
 
-/// The function of the library that looks a channel up: of its array, the size of each axis, and at positions among
-/// the knots, from 0 to size - 1.
+/// The library function that looks up one channel. Its arguments are the array, the size of each axis, and the
+/// positions among the knots, from 0 to size - 1.
 std::string table_function(const Table&);
 }  // namespace brdfc::print

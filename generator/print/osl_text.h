@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pieces of OSL text.
+// Helpers for OSL source text.
 #pragma once
 
 #include <array>
@@ -8,26 +8,27 @@
 
 namespace brdfc::print {
 
-/// Text of statements, and how many of them end in a semicolon.
+/// The text of statements, and the number of those that end in a semicolon.
 struct OslText {
   std::string text;
   int statements = 0;
 };
 
-/// Of a float, with as few digits as tell it from all others. Throws ExprError for what no float is.
+/// The shortest text that reads back as the same float. Throws ExprError for a number that no float represents.
 std::string number(double);
 std::string color(const std::array<double, 3>&);
 
 /// A string literal.
 std::string quoted(const std::string&);
 
-/// Lines of comment, broken between words.
+/// Comment lines, wrapped between words.
 std::string comment(const std::string&);
 
-/// Every line of the text but empty ones, `levels` steps further in.
+/// Indents every line that is not empty by `levels` more levels.
 std::string indented(const std::string& text, std::size_t levels = 1);
 
-/// Every line with half its indent: a .blend keeps the text of each shader, and deep blocks are many.
+/// Halves the indentation of every line: a .blend stores the text of each shader, and there are many deeply nested
+/// blocks.
 std::string narrow(const std::string& text);
 
 /// The declaration of an array.

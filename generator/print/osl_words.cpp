@@ -38,7 +38,7 @@ constexpr const char* kWords = R"(
   to_centre to_half_y to_half_z to_lamp_x to_lamp_y to_lamp_z tossed v_all
 )";
 
-/// What a shader numbers.
+/// Prefixes of numbered names.
 constexpr const char* kNumbered =
     "albedo alpha alpha_across exponent ior knots normal position ramp roughness size smooth table table_b table_g "
     "table_r tangent u v weight";
@@ -48,7 +48,7 @@ std::set<std::string> split(const char* text) {
   return {std::istream_iterator<std::string>(in), {}};
 }
 
-/// As weight_0, normal_0_x or knots_0_1.
+/// True for names such as weight_0, normal_0_x or knots_0_1.
 bool is_numbered(const std::string& name) {
   for (std::size_t at = name.find('_'); at != std::string::npos; at = name.find('_', at + 1))
     if (at + 1 < name.size() && std::isdigit(static_cast<unsigned char>(name[at + 1])))
@@ -56,7 +56,7 @@ bool is_numbered(const std::string& name) {
   return false;
 }
 
-/// Functions of the library, constants that OSL defines, slots of lamps, and parameters within their ranges.
+/// True for library functions, OSL's constants, lamp slots, and clamped parameters.
 bool is_prefixed(const std::string& name) {
   for (const char* prefix : {"bounded_", "brdfc_", "M_", "LampPlace", "LampTurn", "LampScale", "LampShape"})
     if (name.starts_with(prefix)) return true;

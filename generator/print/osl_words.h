@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one list of names that the text of a shader uses itself: of OSL, and of what the generator writes around a
-// model's statements. A test compares it with the text of every form, and names what is missing here.
+// The names that shaders use themselves: those of OSL, and those that the generator writes around a model's statements.
+// A test compares this list with the shaders of all forms, and reports missing names.
 #pragma once
 
 #include <set>
@@ -8,16 +8,16 @@
 
 namespace brdfc::print {
 
-/// Words of OSL that a parameter or a statement may not have for a name, functions and globals that shaders use, and
-/// the names of their own statements.
+/// Names that a parameter or a statement must not use: keywords of OSL, functions and globals that shaders use, and
+/// variables that the generator declares.
 const std::set<std::string>& osl_words();
-/// Beginnings of names that a shader numbers, as in weight_0, normal_0_x or knots_0_1.
+/// Prefixes of the names that a shader numbers, for example weight_0, normal_0_x or knots_0_1.
 const std::set<std::string>& numbered_osl_words();
 
-/// Whether a shader has that name for something else, so that neither a parameter nor a model's statement may have it.
+/// True if shaders use the name themselves, so that neither a parameter nor a model's statements may use it.
 bool is_osl_word(const std::string& name);
 
-/// The name, or another if no number after it could make it one that is free.
+/// A base for numbered names: `name`, or another name if every `name` with a number would be an OSL word.
 std::string unnumbered(const std::string& name);
 
 }  // namespace brdfc::print

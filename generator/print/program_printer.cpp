@@ -89,7 +89,7 @@ void ProgramPrinter::loop(int id, int indent, std::string& out) {
       names_[v] = vars[std::size_t(program_.node(v).index)];
   line(indent, loop_head(fresh("i"), n.index));
   statements(serial, id, indent + 4, out);
-  // All of the next state before any of it is assigned: one element may use another's old value.
+  // Compute the whole next state before assigning any of it, because one element may use the old value of another.
   std::vector<std::string> next;
   for (std::size_t k = 0; k < size; ++k) {
     next.push_back(fresh(fmt::format("next{}", k)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What printing a recorded program takes in any language: which values get names, and in what order they stand.
+// Prints a recorded program in any language: decides which values become variables, and in which order they stand.
 #pragma once
 
 #include <map>
@@ -11,18 +11,18 @@
 
 namespace brdfc::print {
 
-/// A language derives from this and spells what is virtual.
+/// Base class of the printers. Each language implements the virtual functions.
 class ProgramPrinter {
  public:
-  /// No statement declares a name of `taken`, of an input or of an output. The program must outlive it.
+  /// Statements declare no name in `taken`, and no name of an input or output. The program must outlive this object.
   ProgramPrinter(const Program&, const std::vector<std::string>& taken);
   virtual ~ProgramPrinter() = default;
 
-  /// The statements that the outputs need.
+  /// The statements that compute and assign the outputs.
   std::string statements(int indent);
-  /// How many those are, without the heads of loops.
+  /// The number of these statements, without the heads of loops.
   int count() const { return count_; }
-  /// A value as an operand of something that binds as tightly as that.
+  /// The text of a value as an operand of an operator with this precedence, with parentheses where necessary.
   std::string use(int id, int precedence) const;
 
  protected:
@@ -32,14 +32,14 @@ class ProgramPrinter {
   };
 
   virtual Text text(int id) const = 0;
-  /// Whether the language has the name for something else.
+  /// True if the language reserves the name.
   virtual bool is_word(const std::string& name) const = 0;
-  /// The name, or another if no number after it could make it one that is free.
+  /// A base for numbered names: `name`, or another name if every `name` with a number would be reserved.
   virtual std::string free_base(const std::string& name) const { return name; }
   virtual std::string declaration(ExprType, const std::string& name, const std::string& value) const = 0;
   virtual std::string assignment(const std::string& name, const std::string& value) const = 0;
   virtual std::string loop_head(const std::string& counter, int count) const = 0;
-  /// What closes a loop, "" for nothing.
+  /// The line that closes a loop; empty if the language has none.
   virtual std::string loop_end() const = 0;
 
   std::string fresh(const std::string& base);

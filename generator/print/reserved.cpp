@@ -25,7 +25,7 @@ std::optional<std::string> reserved_for_parameters(const std::string& name) {
 }
 
 std::optional<std::string> reserved_for_models(const std::string& name) {
-  // The class of a model is called as the model, with capitals: None, True and False are words of Python.
+  // The class of a model has its name in CamelCase, and None, True and False are keywords of Python.
   if (is_python_word(name) || name == "none" || name == "true" || name == "false") return "Python";
   return std::nullopt;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Names that models and their parameters may not have, since what is made of a model uses them itself.
+// Names that models and parameters must not have, because the generated code uses them itself.
 #pragma once
 
 #include <optional>
@@ -8,13 +8,13 @@
 
 namespace brdfc::print {
 
-/// Names of the arguments and local variables of a model's formulas as functions of OSL (pack/standalone.h).
+/// Names of the arguments and local variables of a model's formulas, as OSL functions (pack/standalone.h).
 const std::set<std::string>& osl_function_words();
-/// Names of the arguments that functions in Python have beside a model's parameters, which they take by name: those of
-/// the Python package and of the extension's api. A test compares them with both.
+/// Names of arguments that Python functions have besides a model's parameters, which are keyword arguments: in the
+/// Python package and in the extension's API. A test compares them with both.
 const std::set<std::string>& python_arguments();
 
-/// Who has that name already, where a parameter may not have it: "OSL or the generator", "Python" or the like.
+/// Who reserves the name of a parameter, for example "OSL or the generator" or "Python"; nullopt if it is free.
 std::optional<std::string> reserved_for_parameters(const std::string& name);
 /// The same for the name of a model.
 std::optional<std::string> reserved_for_models(const std::string& name);

@@ -8,7 +8,7 @@
 namespace brdfc::print {
 namespace {
 
-/// How a tree is walked: by its values and the programs that it runs.
+/// Walks a tree and visits its values and the programs that it runs.
 struct Visitor {
   std::function<void(const Value&)> value;
   std::function<void(const Program&)> program;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Statements of a shader as data. A form makes a tree of them, osl_statements.h prints it; what a shader reads, calls
-// and takes is counted on the tree.
+// Statements of a shader as data. Forms build trees of statements, and osl_statements.h prints them. The names that a
+// shader reads, the functions that it calls and its closures are found by walking the tree.
 #pragma once
 
 #include <concepts>
@@ -15,19 +15,19 @@
 
 namespace brdfc::print {
 
-/// A value in a statement: a tree of names, literals, operations and calls. Text that becomes one is a name.
+/// A value in a statement: a tree of names, literals, operations and calls. A string that is converted becomes a name.
 struct Value {
   enum class Kind {
     Name,
     Number,
     Integer,
     Text,       ///< a string literal
-    Call,       ///< of the function `word`
-    Element,    ///< of the first argument, an array or a vector, by the second
-    Unary,      ///< `word` is the operator before its argument
-    Operation,  ///< `word` is the operator between its arguments
-    Choice,     ///< condition, and the values where it is true and false
-    Group       ///< its argument in brackets that it does not need
+    Call,       ///< a call of the function `word`
+    Element,    ///< an element of an array or vector; arguments: the array, the index
+    Unary,      ///< `word` is the operator in front of the argument
+    Operation,  ///< `word` is the operator between the arguments
+    Choice,     ///< the ternary operator; arguments: the condition, the values if true and if false
+    Group       ///< redundant parentheses around the argument
   };
 
   Value(const char* name) : word(name) {}             // NOLINT: a name
@@ -48,18 +48,18 @@ Value call(std::string function, std::vector<Value> arguments = {});
 Value quotation(std::string text);
 Value element(Value of, Value index);
 Value choice(Value condition, Value yes, Value no);
-/// a < b and the like: any operator between two values.
+/// The operation a `sign` b, for any binary operator.
 Value operation(Value a, const char* sign, Value b);
 Value all_of(const std::vector<Value>& conditions);
 Value any_of(const std::vector<Value>& conditions);
-/// a + b + ... as a balanced tree: Cycles walks a sum with a stack of 16, so that a chain loses terms.
+/// The sum of the terms as a balanced tree. Cycles walks sums with a stack of 16, so a long chain would lose terms.
 Value balanced_sum(const std::vector<Value>& terms);
 inline Value operator+(Value a, Value b) { return operation(std::move(a), "+", std::move(b)); }
 inline Value operator*(Value a, Value b) { return operation(std::move(a), "*", std::move(b)); }
 inline Value operator-(Value a) { return {Value::Kind::Unary, "-", {std::move(a)}}; }
 inline Value operator!(Value a) { return {Value::Kind::Unary, "!", {std::move(a)}}; }
 
-/// One of the kinds below. Copies share what they hold, which does not change.
+/// One of the kinds below. Copies share their contents, which are immutable.
 class Statement {
  public:
   template <class S>
@@ -75,7 +75,7 @@ class Statement {
 };
 using Statements = std::vector<Statement>;
 
-/// A variable with or without a value, or an array of `size` with or without its elements.
+/// Declares a variable, with or without a value, or an array with `size` elements, with or without their values.
 struct Variable {
   std::string name;
   std::vector<Value> values = {};
@@ -87,9 +87,9 @@ struct Declare {
   std::vector<Variable> variables;
   bool operator==(const Declare&) const = default;
 };
-/// An array of numbers.
+/// Declares an array of numbers.
 struct Array {
-  /// How it is written: as short as can be, or to be read.
+  /// Dense: as short as possible; Aligned: readable.
   enum class Layout { Dense, Aligned };
   std::string name;
   std::vector<double> values;
@@ -101,17 +101,17 @@ struct Assign {
   std::string sign = "=";  ///< =, +=, *= or /=
   bool operator==(const Assign&) const = default;
 };
-/// A call for what it does.
+/// A call for its side effects.
 struct Perform {
   Value call;
   bool operator==(const Perform&) const = default;
 };
-/// Adds 1.
+/// Increments a variable.
 struct Increment {
   std::string name;
   bool operator==(const Increment&) const = default;
 };
-/// With the next turn of the loop.
+/// Continues with the next iteration of the loop.
 struct Continue {
   bool operator==(const Continue&) const = default;
 };
@@ -121,12 +121,12 @@ struct If {
   Statements otherwise = {};
   bool operator==(const If&) const = default;
 };
-/// Exclusive cases, the last of which needs no condition.
+/// Exclusive cases, like if, else if, else. The last one needs no condition.
 struct Cases {
   std::vector<std::pair<Value, Statements>> cases;
   bool operator==(const Cases&) const = default;
 };
-/// With a counter from 0 to less than `end`, or to `end` itself.
+/// A loop with a counter from 0 up to `end`, exclusive or inclusive.
 struct Loop {
   std::string counter;
   Value end;
@@ -134,13 +134,13 @@ struct Loop {
   bool inclusive = false;
   bool operator==(const Loop&) const = default;
 };
-/// A scope of its own, so that what is declared in it stands in no other's way.
+/// A scope of its own for declarations.
 struct Block {
   Statements body;
   bool operator==(const Block&) const = default;
 };
-/// The assignments of a recorded program, which declare no name of `taken`; arrays that it looks up stand before them
-/// (print/osl_program.h).
+/// The assignments of a recorded program, which declare no name in `taken`. The arrays that it looks up must be
+/// declared before (print/osl_program.h).
 struct Run {
   std::shared_ptr<const Program> program;
   std::vector<std::string> taken;
@@ -166,13 +166,13 @@ Statement declare_all(std::string type, const std::vector<std::string>& names);
 Statement assign(Value target, Value value);
 /// A block of the statements, or nothing if there are none.
 Statements scope(Statements);
-/// The arrays that a program looks up, and its run.
+/// Declares the arrays that a program looks up, and runs it.
 Statements run_with_arrays(const std::shared_ptr<const Program>&, const std::vector<std::string>& taken);
 void append(Statements& to, Statements more);
 
-/// All variables and parameters that values name or recorded programs take as inputs.
+/// All variables and parameters that are named in values or are inputs of recorded programs.
 std::set<std::string> names_in(const Statements&);
-/// All functions that values call, and those of the library that recorded programs call.
+/// All functions that are called in values, and the library functions that recorded programs call.
 std::set<std::string> functions_in(const Statements&);
 
 }  // namespace brdfc::print

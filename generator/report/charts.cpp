@@ -71,7 +71,7 @@ void put_overview(std::string& out, const std::vector<SceneReport>& scenes) {
         if (f.form == forms[i] && f.cost && f.difference.rel_mse > 0)
           put(out,
               "<a href=\"#{}\" {}><circle style=\"fill:{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"><title>{}, {}: relMSE "
-              "{:.2g}, of it noise {:.2g}; CPU {:.2f} of the Glossy node</title></circle></a>\n",
+              "{:.2g}, from noise {:.2g}; CPU {:.2f} of the Glossy node</title></circle></a>\n",
               escaped(s.scene), marked(s), color, x(*f.cost), y(f.difference.rel_mse), escaped(s.scene),
               escaped(label(f)), f.difference.rel_mse, f.difference.noise, *f.cost);
   }
@@ -123,7 +123,7 @@ void put_chart(std::string& out, const SceneReport& s) {
       name.base = other->base - kLine;
     names.push_back(name);
     put(out,
-        "<circle{} cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"><title>relMSE {:.2g}, of it noise {:.2g}; CPU {:.2f} of the "
+        "<circle{} cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"><title>relMSE {:.2g}, from noise {:.2g}; CPU {:.2f} of the "
         "Glossy "
         "node</title></circle><text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
         on_front(s, *f) ? "" : " class=\"behind\"", at_x, at_y, f->difference.rel_mse, f->difference.noise, *f->cost,

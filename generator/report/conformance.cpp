@@ -40,9 +40,9 @@ std::vector<ConformanceTable> load_conformance(const fs::path& folder) {
 void put_conformance(std::string& out, const std::vector<ConformanceTable>& tables) {
   if (tables.empty()) return;
   out +=
-      "<section id=\"closures\"><h2>Closures of Cycles</h2>\n<p>Whether each closure does what its definition says, in "
-      "every version of Blender that was tested: how far its evaluation is from our definition (relative L1), and "
-      "whether the light found by its own sampling is what its evaluation gives. A form uses no closure that is "
+      "<section id=\"closures\"><h2>Closures of Cycles</h2>\n<p>Behaviour of each closure in "
+      "every tested version of Blender: the error of its evaluation relative to our definition (relative L1), and the "
+      "difference between the light found by its own sampling and by its evaluation. Forms use no closure that is "
       "marked.</p>\n<div class=\"wide\"><table><thead><tr><th class=\"left\">Closure</th>";
   for (const ConformanceTable& t : tables)
     put(out, "<th>{}<br>evaluation</th><th>sampling<br>(resolution)</th>", escaped(t.blender));

@@ -82,22 +82,23 @@ void put_verdict(std::string& out, const std::vector<SceneReport>& scenes) {
   }
   out += "<p class=\"verdict\">";
   if (judged > 0)
-    put(out, "In {} of {}, what materials get by default can't be told from the models themselves but by noise. ", same,
+    put(out, "In {} of {}, the default form of the materials differs from the models themselves only by noise. ", same,
         count(judged, "scene", "scenes"));
   if (!costs.empty()) {
     std::sort(costs.begin(), costs.end());
     put(out, "It takes {:.2f} times the CPU time of Blender's own Glossy node", costs[costs.size() / 2]);
     if (costs.size() > 1)
-      put(out, " in the middle of the scenes, {:.2f} to {:.2f} in all", costs.front(), costs.back());
+      put(out, " in the median over the scenes, and from {:.2f} to {:.2f} in single scenes", costs.front(),
+          costs.back());
     out += ". ";
   }
   if (worst)
-    put(out, "Of all forms, {} in <a href=\"#{}\">{}</a> is farthest off: all its light is {} of what it should be.",
+    put(out, "The largest bias is that of {} in <a href=\"#{}\">{}</a>: its total light is {} of the correct value.",
         escaped(label(*worst)), escaped(worst_scene->scene), escaped(worst_scene->scene),
         fmt::format("{:.2f} % \xc2\xb1 {:.2f}", 100 * (1 + worst->difference.bias),
                     100 * worst->difference.bias_error));
   else
-    out += "In no form and scene is the light as a whole off by more than noise explains.";
+    out += "In every scene and form, the total light is correct within the noise.";
   out += "</p>\n";
 }
 
@@ -132,14 +133,14 @@ void put_summary(std::string& out, const std::vector<SceneReport>& scenes) {
   out +=
       "</tbody></table>\n<p class=\"soft\">In each cell: relMSE, whether it is more than noise, and CPU time in units "
       "of "
-      "the Glossy node; \xe2\x97\x86 no form of the scene has less error for less time.</p>\n";
+      "the Glossy node; \xe2\x97\x86 no other form of the scene has both a smaller error and a shorter time.</p>\n";
 }
 
 /// All figures of one scene.
 void put_figures(std::string& out, const SceneReport& s) {
   out += R"(<details><summary>All figures</summary><div class="wide"><table>
 <thead><tr><th class="left">Form</th><th>relMSE</th><th>noise<br>in it</th><th>Mean, against<br>the reference</th>
-<th>Pixels<br>accepted</th><th>FLIP</th><th>CPU time /<br>Glossy</th><th>Samples<br>a pixel</th><th>Closures</th>
+<th>Pixels<br>accepted</th><th>FLIP</th><th>CPU time /<br>Glossy</th><th>Samples<br>per pixel</th><th>Closures</th>
 <th>Form's own<br>error (L1)</th><th>CPU time to<br>equal error</th></tr></thead><tbody>
 )";
   for (const FormReport& f : s.forms) {
@@ -227,35 +228,36 @@ void put_method(std::string& out) {
   put(out, R"(<section><h2>How to read this</h2><dl>
 <dt>relMSE</dt><dd>Mean over pixels and channels of (picture {minus} reference)<sup>2</sup> /
 (reference<sup>2</sup> + {epsilon:g}).</dd>
-<dt>Of which noise</dt><dd>The relMSE that two pictures with equal expectation would have: the reference's variance layer plus,
-where a form was rendered with several seeds, the variance of their mean. A relMSE close to it means that no difference
-but noise was found.</dd>
-<dt>Mean, against the reference</dt><dd>Relative difference of the sums over all pixels, with one standard deviation; marked
-when it is more than three.</dd>
-<dt>Pixels accepted</dt><dd>Welch's t-test of each pixel's luminance against the reference, at 0.01 after Sidak's correction
-for their number; the same for the means of tiles of {tile} {times} {tile} pixels. Marked where fewer than {least:g} % of the
-pixels, or not all tiles, are accepted. The map of the p-values of each form is linked below its pictures: even grey noise
-is agreement, dark patches are not.</dd>
-<dt>FLIP</dt><dd>Mean of HDR-FLIP, the difference that people would see between picture and reference, noise included.</dd>
-<dt>CPU time / Glossy node</dt><dd>A diamond marks the forms that no other beats in both error and time. Median over the seeds of the CPU time of rendering, divided by that of the same scene with
-Blender's own Glossy node on every material, rendered in turns in the same process: of the smaller pictures with the most
-samples where they took longer, as they do in the whole report. {dash}: the Glossy node took less than {shortest} s, of
-which chance is a good part.</dd>
-<dt>Closures</dt><dd>The most closures a point of any material gives to Cycles.</dd>
-<dt>In the Glossy node's time</dt><dd>The mean of as many of the form's pictures as fit into the CPU time of all pictures
-of the Glossy node: what one gets for the same wait.</dd>
-<dt>CPU time to equal error</dt><dd>Until the form's noise is as small as that of Blender's Glossy node with 16, 256 or 1024
-samples a pixel, in units of the time which that takes.</dd>
-<dt>Form's own error</dt><dd>How far the form is from the model, as measured when it was compiled. Aimed and sampled forms are exact
-in expectation: their error is noise.</dd>
-<dt>auto</dt><dd>What materials have by default, where that is not one form for all: the exact form where there is one, else
-the aimed one.</dd>
-<dt>planned, twin</dt><dd>Of a pack cut to the scene by <code>brdfc build --scene</code>: what it chooses where forms may be
-off a little (closures fitted to the model, which lamps can be sampled for); and Blender's own nodes steered by the view
-angle, for where Open Shading Language does not run, where every material can have them.</dd>
-<dt>Blender's Glossy node</dt><dd>The unit of cost, and what a scene looks like without these models.</dd>
-<dt>Blender's nodes, fitted</dt><dd>What one would take instead: parameters that come nearest to the model, by least squares of
-f cos over directions. Their own error is what is left then.</dd>
+<dt>Noise in it</dt><dd>The relMSE of two pictures with the same expectation: the reference's variance layer plus, if a
+form was rendered with several seeds, the variance of the mean of its pictures. A relMSE close to this value shows no
+difference other than noise.</dd>
+<dt>Mean, against the reference</dt><dd>Relative difference of the sums over all pixels, with one standard deviation. It
+is marked if it exceeds three standard deviations.</dd>
+<dt>Pixels accepted</dt><dd>Welch's t-test of each pixel's luminance against the reference, at 0.01 with Sidak's
+correction for the number of pixels; and the same for the means of tiles of {tile} {times} {tile} pixels. It is marked
+if fewer than {least:g} % of the pixels, or not all tiles, are accepted. A map of each form's p-values is linked below
+its pictures: uniform grey noise means agreement, dark patches mean differences.</dd>
+<dt>FLIP</dt><dd>Mean of HDR-FLIP, the visible difference between picture and reference, including noise.</dd>
+<dt>CPU time / Glossy node</dt><dd>CPU time of rendering, divided by that of the same scene with Blender's own Glossy
+node on every material; both take turns in the same process. The value is the median over the seeds. If the smaller
+pictures with the largest number of samples took longer, as in the whole report, their times are used. {dash} means that
+the Glossy node took less than {shortest} s, which is too short for a reliable ratio. A diamond marks forms for which no
+other form has both a smaller error and a shorter time.</dd>
+<dt>Closures</dt><dd>The largest number of closures that a point of any material passes to Cycles.</dd>
+<dt>In the Glossy node's time</dt><dd>The mean of as many pictures of the form as fit into the CPU time of all pictures
+of the Glossy node.</dd>
+<dt>CPU time to equal error</dt><dd>CPU time until the form has as little noise as Blender's Glossy node with 16, 256 or
+1024 samples per pixel, in units of the node's time.</dd>
+<dt>Form's own error</dt><dd>The error of the form against the model, measured when the form was compiled. Aimed and
+sampled forms are exact in expectation: their error is noise.</dd>
+<dt>auto</dt><dd>The default of the materials, if it is not the same form for all: the exact form if there is one,
+otherwise the aimed form.</dd>
+<dt>planned, twin</dt><dd>Forms of a pack cut to the scene by <code>brdfc build --scene</code>. Planned: its choice if
+forms may have a small error, that is closures fitted to the model, with light sampling. Twin: Blender's own nodes,
+controlled by the view angle, for devices without Open Shading Language; only if every material can have them.</dd>
+<dt>Blender's Glossy node</dt><dd>The unit of cost, and the look of the scene without these models.</dd>
+<dt>Blender's nodes, fitted</dt><dd>What users would choose without this extension: nodes with the parameters nearest to
+the model, by least squares of f cos over directions. Their own error is the remaining difference.</dd>
 </dl></section>
 )",
       fmt::arg("minus", kMinus), fmt::arg("epsilon", kRelMseEpsilon), fmt::arg("tile", kTestTile),
@@ -327,7 +329,7 @@ std::string report_html(const std::vector<SceneReport>& scenes, const std::vecto
   put(out,
       "<p>Every form of every model, rendered in Blender's Cycles and compared "
       "with an independent path tracer that evaluates the model itself in double precision. {}, {}. "
-      "<span class=\"soft\">What the figures mean is <a href=\"#method\">explained below</a>.</span></p>\n",
+      "<span class=\"soft\">The meaning of the figures is <a href=\"#method\">explained below</a>.</span></p>\n",
       count(scenes.size(), "scene", "scenes"), count(forms, "picture", "pictures"));
   put_filter(out, scenes);
   put_summary(out, scenes);

@@ -53,8 +53,8 @@ def random_values(schema, rng):
 
 
 def cases_of(extension, rng, form, few_of):
-    """[(model, values)]: the defaults, values that are stiff, and random ones; of the latter two
-    script/test takes one a model."""
+    """[(model, values)]: the defaults, extreme values and random ones. script/test uses one case
+    per model besides the defaults."""
     found = []
     for name, model in extension.api.models().items():
         if form not in model["representations"] or not model["scatter"]:
@@ -64,13 +64,13 @@ def cases_of(extension, rng, form, few_of):
             drawn = {}
         others = few_of([*CASES.get(name, []), drawn], 1)
         found += [(name, values) for values in ({}, *others)]
-        if form == "nodes":  # whose tree has all choices
+        if form == "nodes":  # its trees contain all choices
             found += [(name, values) for values in few_of(other_choices(extension, name, form), 2)]
     return found
 
 
 def other_choices(extension, name, form):
-    """All combinations of a form's choices but the first, which is the default."""
+    """All combinations of a form's choices except the first, which has the defaults."""
     options = extension.pack.form_choices(name, form)
     combinations = itertools.product(*options.values())
     return [dict(zip(options, chosen, strict=True)) for chosen in combinations][1:]

@@ -221,7 +221,7 @@ def test_links_and_ranges(extension, empty, tool):
 
 
 def test_a_bent_normal_takes_the_base_away(extension):
-    """Cycles would darken a base about it, and the random direction not make up for that."""
+    """Cycles would darken a base about it, and the random direction would not compensate."""
 
     def bent(form):
         found = []
@@ -247,7 +247,7 @@ def test_a_bent_normal_takes_the_base_away(extension):
 
 
 def test_a_choice_without_nodes_is_a_sentence(extension, empty):
-    """Of tables of several numbers there are no nodes."""
+    """Tables with several axes can't be made of nodes."""
     with pytest.raises(ValueError, match="Formula Nodes is only for Diffuse Term = Paper"):
         extension.api.new_material("ashikhmin_shirley", "nodes", diffuse="tabulated")
     material = extension.api.new_material("ashikhmin_shirley", "aimed", diffuse="tabulated")
@@ -307,7 +307,7 @@ def test_albedo_in_a_white_world(extension, empty, tool):
 
 
 def test_choices_of_automatic_materials(extension, empty):
-    """With OSL off they reach the form inside the group, also where they are menus (5.0 on)."""
+    """With OSL off they reach the form inside the group, also as menus (from Blender 5.0 on)."""
     empty.cycles.shading_system = False
     for name, model in extension.api.models().items():
         choices = [p for p in model["parameters"] if p["kind"] == "choice"]
@@ -338,8 +338,8 @@ def test_choices_of_automatic_materials(extension, empty):
 
 @pytest.mark.parametrize("model", ["ashikhmin_shirley", "glossy_specular", "ward"])
 def test_sockets_do_not_depend_on_how_a_group_began(extension, model):
-    """A group that was made with OSL off and then filled for OSL equals one made with OSL on: else
-    dragging a material of the library would bring a second group."""
+    """A group that was made with OSL off and then filled for OSL equals one made with OSL on;
+    otherwise dragging a material of the library would add a second group."""
 
     def sockets(osl):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One program of nodes for all combinations of choices.
+// Merging the programs for all combinations of choices into one program for nodes.
 #include "forms/node_choices.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace brdfc::forms {
 namespace {
 
-/// The programs of f by combination, as one.
+/// The programs of f for all combinations, merged into one.
 Program recorded_value(const Model& m, const ParamValues& fixed) {
   std::vector<Program> by_combination;
   for (const ParamValues& values : open_combinations(m.info(), fixed))
@@ -24,7 +24,7 @@ Program recorded_value(const Model& m, const ParamValues& fixed) {
 TEST(NodeChoices, SelectTheValueOfTheirCombination) {
   for (const char* name : {"ward", "coupled", "oren_nayar", "ashikhmin_shirley", "radziszewski_alda"}) {
     const Model& m = find_model(name);
-    ParamValues fixed;  // what nodes lack
+    ParamValues fixed;  // choices of which nodes support only one option
     if (m.info().param("diffuse")) fixed["diffuse"] = std::string("paper");
     if (m.info().param("around")) fixed["around"] = std::string("reflection");
     Recorder recorder;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The base of the form of nodes, which lies under the model.
+// The base of the form made of nodes, which is nowhere brighter than the model.
 #include "model/under.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ TEST(Under, IsNowhereAboveTheModel) {
     for (const ParamValues& values : cases_of(m->info())) {
       const measure::BoundModel bound = measure::bind_model(*m, values);
       for (const auto& [wi, any_wo] : measure::direction_pairs(*bound.brdf, 400, random)) {
-        // As views are before a form sees them.
+        // As forms receive views.
         const Vec3<double> wo = any_wo.z < 1e-4 ? direction(1e-4, 0.3) : any_wo;
         if (wi.z <= 0) continue;
         const ClosureSum<double> base = of->bound(m->info(), values, wo);
@@ -52,7 +52,7 @@ TEST(Under, IsNowhereAboveTheModel) {
 struct Row {
   const char* model;
   std::vector<std::string> values;
-  double share;  ///< of the model's light seen at 45 degrees, at least
+  double share;  ///< the base's minimum share of the model's light, seen at 45 degrees
 };
 const Row kRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                      {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
@@ -86,7 +86,7 @@ TEST(Under, CarriesWhatWasMeasured) {
   for (const auto& [name, m] : models()) EXPECT_EQ(under(*m) != nullptr, seen.count(name) == 1) << name;
 }
 
-/// One tree of nodes serves all choices.
+/// One node tree serves all choices.
 TEST(Under, IsRecordedAlikeForAllChoices) {
   for (const auto& [name, m] : models()) {
     const Under* of = under(*m);

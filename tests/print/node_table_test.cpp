@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of one axis as polynomials.
+// Tables with one axis as polynomials.
 #include "print/node_table.h"
 
 #include <gtest/gtest.h>

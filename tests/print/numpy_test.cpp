@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recorded program as Python: digits, grouping, loops, tables, and what Python can't have.
+// A recorded program as Python: digits, grouping, loops, tables, and errors for names that Python can't have.
 #include "print/numpy.h"
 
 #include <gmock/gmock.h>

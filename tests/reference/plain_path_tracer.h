@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The path tracer as a textbook writes it (Pharr, Jakob, Humphreys, Physically Based Rendering, 4th edition, 14.2): one
-// path at a time, in scalar double precision, with the same random numbers as reference/path_tracer.h. That one
-// advances many paths together and evaluates eight at once; what a path carries must be the same to rounding.
+// The path tracer as textbooks write it (Pharr, Jakob, Humphreys, Physically Based Rendering, 4th edition, 14.2): one
+// path at a time, in scalar double precision, with the same random numbers as reference/path_tracer.h. The latter
+// advances many paths together and evaluates eight at once; the light of each path must be the same up to rounding.
 #pragma once
 
 #include <cmath>
@@ -42,7 +42,7 @@ class PlainPathTracer {
     camera_ray(scene_.camera, settings_.width, settings_.height, x + dx, y + dy, ray.origin, ray.direction);
 
     Color light{0, 0, 0}, throughput{1, 1, 1};
-    std::optional<Scattered> last;  // nothing: light sampling could not have found this ray's direction
+    std::optional<Scattered> last;  // empty if light sampling could not have found this ray's direction
     for (int bounce = 0;; ++bounce) {
       Hit hit;
       const bool on_surface = tracer_.intersect(ray, bounce == 0, hit);
@@ -66,7 +66,7 @@ class PlainPathTracer {
       const double delta_chance =
           surface.has_mirror() || surface.has_transmit() ? surface.delta_chance(mirror + transmit, wo.z) : 0;
 
-      // Light sampling on the viewer's side, and on the other one if f reaches there.
+      // Light sampling on the viewer's side, and on the other side if f is not 0 there.
       const int dimension = 1 + 10 * bounce;
       std::array<std::vector<double>, 2> chances;
       for (const bool far : {false, true}) {
@@ -84,7 +84,7 @@ class PlainPathTracer {
           light += throughput * crossing * f_cos * lit->radiance * (weight / lit->pdf);
       }
 
-      // The direction in which the path goes on: by a delta term, or by the model's sampling.
+      // The direction in which the path continues: by a delta term, or by the model's sampling.
       Vector wi;
       double index = brdf.ior();
       last.reset();
@@ -125,19 +125,19 @@ class PlainPathTracer {
   }
 
  private:
-  /// What MIS needs of the last scattering event: the pdf of its direction, the normal on that side, and the
-  /// probabilities with which light sampling chose lights there.
+  /// What MIS needs to know about the last scattering event: the pdf of the sampled direction, the normal on its side,
+  /// and the probabilities with which light sampling would have chosen each light there.
   struct Scattered {
     double pdf;
     Vector normal;
     std::vector<double> chances;
   };
-  /// Light that a ray meets; light_pdf is 0 where light sampling could not have found it.
+  /// Light that a ray meets. light_pdf is 0 if light sampling could not have found it.
   struct Met {
     Color radiance;
     double light_pdf;
   };
-  /// A sampled direction to a light.
+  /// A direction sampled towards a light.
   struct Lit {
     Vector wi;
     double distance, pdf;
@@ -146,7 +146,7 @@ class PlainPathTracer {
   };
 
   /// The shading frame at a point. Normals that are seen from below, or whose mirror direction is below the surface,
-  /// are mended as model/horizon.h says. For a model that lets light through, z points outside.
+  /// are corrected as in model/horizon.h. For a transmissive model, z points outwards.
   struct Frame {
     Vector tangent, bitangent, normal, wo;
     double side;
@@ -173,7 +173,7 @@ class PlainPathTracer {
     return !settings_.scale_radiance ? 1 : wo.z > 0 ? 1 / sqr(index) : sqr(index);
   }
 
-  // Lights are sampled and met in blocks; here in blocks of one.
+  // reference/lights.h samples and intersects lights in blocks; here each block has a single ray or point.
   std::vector<Met> meet(const Ray& ray, double distance, const std::optional<Scattered>& last, bool from_camera) const {
     Rays rays{};
     rays.origin.set(0, ray.origin);
@@ -188,8 +188,8 @@ class PlainPathTracer {
     });
     return found;
   }
-  /// A light chosen for a point, and a direction to it. `chances` become those of all lights; they stay empty, and
-  /// nothing is returned, where no light can contribute.
+  /// A light chosen for a point, and a direction to it. Sets `chances` to the probabilities of all lights. If no light
+  /// can contribute, returns nothing and leaves `chances` empty.
   std::optional<Lit> sample_light(const Vector& p, const Vector& facing, const PathSampler& random, int dimension,
                                   std::vector<double>& chances) const {
     Vectors points{}, normals{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The path tracer of many paths at once carries the light of the plain one, path by path.
+// Compares the path tracer that traces many paths together with the plain one, path by path.
 #include "plain_path_tracer.h"
 
 #include <gtest/gtest.h>
@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 constexpr int kWidth = 24, kSamples = 4;
 
 struct Difference {
-  double light = 0, off = 0;  // sums over paths: of the light, and of the differences of those that agree
-  int paths = 0, apart = 0;   // `apart`: paths that take another turn, because rounding decided a choice or a hit
+  double light = 0, off = 0;  // sums over paths: the light, and the difference for paths that agree
+  int paths = 0, apart = 0;   // `apart`: paths that continue differently because rounding decided a choice or a hit
 };
 
 Difference compare(const Scene& scene, const RenderSettings& settings) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What rays hit if objects share meshes, and the memory that takes.
+// Rays hit the same points if objects share meshes; and the memory that meshes take.
 #include "reference/tracer.h"
 
 #include <gmock/gmock.h>

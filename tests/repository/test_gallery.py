@@ -128,7 +128,7 @@ def test_a_ball_a_value_of_the_schema():
 
 def test_a_model_s_page_says_what_its_schema_claims():
     assert gallery_models.claims(MODEL) == (
-        "Light and view may be exchanged and some parameters and views gain light."
+        "It is reciprocal and it gains light for some parameters and views."
     )
 
 
