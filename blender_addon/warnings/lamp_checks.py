@@ -13,6 +13,9 @@ SMALL_SUN = 0.02
 #: Up to this size, an ideal mirror shows lamps as dots. A new lamp in Blender is larger (0.1): with
 #: its 4,096 samples, blocks of 8 x 8 pixels differ by less than 1 %.
 SMALL_IN_MIRROR = 0.05
+#: From this angle on (radians), a sun that random rays do not meet is noisy in sharp highlights: its
+#: light is that of one closure, with f towards one random point of the sun.
+WIDE_SUN = 0.5
 #: Sizes are stored in single precision.
 _SLACK = 1e-6
 #: Fraction of the scene's light below which the noise of a lamp is invisible among the others.
@@ -241,6 +244,27 @@ def _without_shadow(form, scene):
         )
 
 
+def _wide_suns(scene):
+    """Warns of wide suns without Multiple Importance, for forms that aim at lamps."""
+    found = [
+        item
+        for item in lamps.lamps_of(scene)
+        if item.data.type == "SUN"
+        and item.data.angle > WIDE_SUN
+        and not lamps.has_importance(item.data)
+    ]
+    if found:
+        yield (
+            "multiple_importance",
+            "WARNING",
+            say(
+                "Multiple Importance is off for wide suns ({lamps}): light that other surfaces "
+                "reflect becomes rare bright dots",
+                lamps=_names(found),
+            ),
+        )
+
+
 def of_node(node, form, scene):
     """(code, severity, sentence) of what is wrong with a scene's lamps for the form of a group
     node."""
@@ -248,6 +272,7 @@ def of_node(node, form, scene):
         return
     if form.get("lamps"):
         yield from _not_aimed(node, form["lamps"], scene)
+        yield from _wide_suns(scene)
     if "clamp_mirror" in form.get("warnings", []):
         yield from _in_mirror(scene)
     yield from _without_shadow(form, scene)

@@ -1318,6 +1318,10 @@ def test_lamps_that_drawn_directions_do_not_meet(extension, ball, empty):
         assert (found.code, found.severity) == ("cast_shadow", "WARNING") and kind in found.message
         item.data.cycles.use_multiple_importance_sampling = False
         assert extension.api.warnings(material, empty) == []
+        if kind == "SUN":
+            item.data.angle = 0.6
+            (found,) = extension.api.warnings(material, empty)
+            assert (found.code, found.severity) == ("multiple_importance", "WARNING")
         bpy.data.objects.remove(item)
     near = add_lamp(empty, "POINT", "Near", location=(0, 0, 2), shadow_soft_size=1.9)
     near.data.cycles.use_multiple_importance_sampling = False
