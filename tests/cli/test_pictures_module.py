@@ -14,7 +14,12 @@ from support import ROOT, TOOL, run, scene
 MODULE = Path(TOOL).with_name("brdfc_pictures.so")
 LIBRARY = re.compile(rb"libOpenImageIO\.so\.(\d)")
 
-pytestmark = pytest.mark.skipif(not MODULE.exists(), reason="built without the module")
+CACHE = Path(TOOL).with_name("CMakeCache.txt")
+
+pytestmark = pytest.mark.skipif(
+    CACHE.exists() and re.search(r"^BRDFC_PICTURES_MODULE:\w+=OFF$", CACHE.read_text(), re.M),
+    reason="built without the module",
+)
 
 
 @pytest.fixture
