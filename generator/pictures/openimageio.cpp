@@ -26,8 +26,7 @@ Header header_of(const OIIO::ImageSpec& spec) {
       header.attributes.push_back({name, a.get_float()});
     } else {
       std::vector<float> numbers(type.numelements() * type.aggregate);
-      if (OIIO::convert_type(type, a.data(), OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, int(numbers.size())),
-                             numbers.data()))
+      if (spec.getattribute(name, OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, int(numbers.size())), numbers.data()))
         header.attributes.push_back({name, std::move(numbers)});
     }
   }
