@@ -10,6 +10,7 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "core/process.h"
+#include "pictures/pictures.h"
 #include "reference/color.h"
 #include "reference/image.h"
 #include "reference/render.h"
@@ -148,6 +149,7 @@ void add_render_command(CLI::App& app) {
         input_error("--from {}: expected the strategy mis, not {}", options->from,
                     reference::strategy_names()[std::size_t(r.settings.strategy)]);
     }
+    pictures::require();
     ProgressLine line(scene.name);
     r.progress = [&](const reference::Progress& p) { line.show(p); };
     reference::RenderResult result;

@@ -10,10 +10,13 @@
 #include <sstream>
 #include <string>
 
+#include "core/error.h"
+
 #ifdef _WIN32
 #include <io.h>
 #include <process.h>
 #else
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
@@ -51,6 +54,17 @@ QuietErrors::~QuietErrors() {
   fflush(stderr);
   dup2(kept_, STDERR_FILENO);
   close(kept_);
+}
+
+void* load_symbol(const fs::path& library, const char* symbol) {
+  // Functions of the libraries behind it are looked up when they are called, as at the start of a program.
+  void* const loaded = dlopen(library.c_str(), RTLD_LAZY | RTLD_LOCAL);
+  void* const address = loaded ? dlsym(loaded, symbol) : nullptr;
+  if (!address) {
+    const char* const reason = dlerror();
+    input_error("{} can't be loaded: {}", library.string(), reason ? reason : "an empty symbol");
+  }
+  return address;
 }
 #endif
 

@@ -35,6 +35,10 @@ class QuietErrors {
   int kept_ = -1;
 };
 
+/// The address of a symbol of a shared library, which stays loaded until the program ends. Throws InputError that names
+/// the library and gives the loader's reason. Not on Windows.
+void* load_symbol(const std::filesystem::path& library, const char* symbol);
+
 /// Exchanges two file names atomically. Returns false, and changes nothing, if the file system or the operating system
 /// can't do that.
 bool exchange(const std::filesystem::path&, const std::filesystem::path&);

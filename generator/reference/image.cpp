@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reference/image.h"
 
-#include <OpenImageIO/imagebuf.h>
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -13,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/process.h"
+#include "pictures/pictures.h"
 #include "reference/color.h"
 
 namespace brdfc::reference {
@@ -23,43 +21,41 @@ namespace {
 
 constexpr int kMaxSide = 65536;
 constexpr std::size_t kMaxPixels = std::size_t(1) << 30;
-constexpr OIIO::TypeDesc kChromaticities(OIIO::TypeDesc::FLOAT, 8);
 
 struct Channels {
   int r = -1, g = -1, b = -1;
 };
 
-int channel_index(const OIIO::ImageSpec& spec, const std::string& name) {
-  for (int i = 0; i < spec.nchannels; ++i)
-    if (spec.channelnames[i] == name) return i;
-  return -1;
+int channel_index(const pictures::Header& header, const std::string& name) {
+  const auto found = std::ranges::find(header.channels, name);
+  return found == header.channels.end() ? -1 : int(found - header.channels.begin());
 }
 
 /// Selects the channels: R, G, B without a layer name; else those of the first layer that has all three; else the first
 /// channel as grey.
-Channels find_channels(const OIIO::ImageSpec& spec) {
-  Channels c{channel_index(spec, "R"), channel_index(spec, "G"), channel_index(spec, "B")};
+Channels find_channels(const pictures::Header& header) {
+  Channels c{channel_index(header, "R"), channel_index(header, "G"), channel_index(header, "B")};
   if (c.r >= 0 && c.g >= 0 && c.b >= 0) return c;
-  for (const std::string& name : spec.channelnames) {
+  for (const std::string& name : header.channels) {
     if (name.size() < 2 || name.substr(name.size() - 2) != ".R") continue;
     const std::string layer = name.substr(0, name.size() - 1);
     if (layer == "variance.") continue;
-    c = {channel_index(spec, layer + "R"), channel_index(spec, layer + "G"), channel_index(spec, layer + "B")};
+    c = {channel_index(header, layer + "R"), channel_index(header, layer + "G"), channel_index(header, layer + "B")};
     if (c.r >= 0 && c.g >= 0 && c.b >= 0) return c;
   }
-  if (spec.nchannels <= 2) return {0, 0, 0};
+  if (header.channels.size() <= 2) return {0, 0, 0};
   return {};
 }
 
 struct File {
-  OIIO::ImageSpec spec;
-  std::vector<float> data;  // interleaved, spec.nchannels values per pixel
+  pictures::Header header;
+  std::vector<float> data;  // interleaved channels
 
   Image extract(const Channels& c) const {
-    Image image(spec.width, spec.height);
-    const std::size_t pixels = std::size_t(spec.width) * spec.height;
+    Image image(header.width, header.height);
+    const std::size_t pixels = std::size_t(header.width) * header.height;
     for (std::size_t i = 0; i < pixels; ++i) {
-      const float* from = &data[i * spec.nchannels];
+      const float* from = &data[i * header.channels.size()];
       image.rgb[3 * i] = from[c.r];
       image.rgb[3 * i + 1] = from[c.g];
       image.rgb[3 * i + 2] = from[c.b];
@@ -97,7 +93,7 @@ const Format* format_of_content(const fs::path& path) {
 }
 
 /// OpenImageIO's message on one line.
-std::string reason(std::string text) {
+std::string on_one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
 }
@@ -134,39 +130,40 @@ File read_file(const fs::path& path) {
                 format->name, content ? fmt::format(", but {}", content->name) : "");
   if (type == ".exr") check_exr_header(path);
   // Uses only the reader for that file extension. Otherwise about thirty readers would try to open a damaged file.
-  const auto in = OIIO::ImageInput::create(type.substr(1));
-  File file;
+  std::string reason;
   const QuietErrors quiet;  // libpng and libtiff also print the error themselves
-  if (!in || !in->open(path.string(), file.spec))
-    input_error("{}: damaged {} file: its header can't be read", path.string(), format->name);
-  const auto& s = file.spec;
-  if (s.width < 1 || s.height < 1 || s.width > kMaxSide || s.height > kMaxSide || s.depth > 1 || s.nchannels < 1 ||
-      s.nchannels > 1024 || std::size_t(s.width) * s.height * s.nchannels > kMaxPixels)
+  const auto in = pictures::open(path, reason, type.substr(1));
+  if (!in) input_error("{}: damaged {} file: its header can't be read", path.string(), format->name);
+  File file{in->header(), {}};
+  const pictures::Header& h = file.header;
+  const std::size_t channels = h.channels.size();
+  if (h.width < 1 || h.height < 1 || h.width > kMaxSide || h.height > kMaxSide || h.depth > 1 || channels < 1 ||
+      channels > 1024 || std::size_t(h.width) * h.height * channels > kMaxPixels)
     input_error("{}: {} x {} pixels with {} channels: expected a flat image with sides of at most {}", path.string(),
-                s.width, s.height, s.nchannels, kMaxSide);
+                h.width, h.height, channels, kMaxSide);
   // A few bytes may declare an image of gigabytes. None of the formats that are read here compresses a value to less
   // than a thousandth of its size; the densest codec, deflate, reaches at most 1 : 1032.
-  const std::size_t values = std::size_t(s.width) * s.height * s.nchannels;
+  const std::size_t values = std::size_t(h.width) * h.height * channels;
   if (values > (std::size_t(1) << 20) + 1032 * fs::file_size(path))
-    input_error("{}: damaged image: {} x {} pixels with {} channels do not fit into {} bytes", path.string(), s.width,
-                s.height, s.nchannels, fs::file_size(path));
+    input_error("{}: damaged image: {} x {} pixels with {} channels do not fit into {} bytes", path.string(), h.width,
+                h.height, channels, fs::file_size(path));
   file.data.resize(values);
-  if (!in->read_image(0, 0, 0, s.nchannels, OIIO::TypeDesc::FLOAT, file.data.data()))
+  if (in->read(file.data.data()))
     input_error("{}: damaged {} file: its pixels can't be read to the end", path.string(), format->name);
   return file;
 }
 
-void write_file(const fs::path& path, const OIIO::ImageSpec& spec, const std::vector<float>& data) {
+void write_file(const fs::path& path, const pictures::Header& header, const std::vector<float>& data) {
   write_beside(path, [&](const fs::path& temporary) {
-    const auto out = OIIO::ImageOutput::create(temporary.string());
-    if (!out) input_error("{}: can't write this image format ({})", path.string(), reason(OIIO::geterror()));
-    if (!out->open(temporary.string(), spec) || !out->write_image(OIIO::TypeDesc::FLOAT, data.data()) || !out->close())
-      input_error("{}: can't write ({})", path.string(), reason(out->geterror()));
+    if (const auto failed = pictures::write(temporary, header, data))
+      input_error("{}: can't write{} ({})", path.string(), failed->unknown_format ? " this image format" : "",
+                  on_one_line(failed->reason));
     // When OpenEXR closes a small file, it passes the last bytes to the operating system, and does not report if that
     // fails. So the file is read back.
-    const auto back = OIIO::ImageInput::open(temporary.string());
+    std::string reason;
+    const auto back = pictures::open(temporary, reason);
     std::vector<float> same(data.size());
-    if (!back || !back->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, same.data()))
+    if (!back || back->read(same.data()))
       input_error("{}: can't write (what was written can't be read: is the disk full?)", path.string());
   });
 }
@@ -175,31 +172,29 @@ void expect_exr(const fs::path& path) {
   if (path.extension() != ".exr") input_error("{}: expected a file name that ends in .exr", path.string());
 }
 
-OIIO::ImageSpec exr_spec(int width, int height, std::vector<std::string> names) {
-  OIIO::ImageSpec spec(width, height, int(names.size()), OIIO::TypeDesc::FLOAT);
-  spec.channelnames = std::move(names);
-  spec.attribute("compression", "zip");
+pictures::Header exr_header(int width, int height, std::vector<std::string> names) {
+  pictures::Header header{width, height};
+  header.channels = std::move(names);
   // OpenImageIO writes the present time unless one is set; with a fixed time equal pixels give equal files.
-  spec.attribute("DateTime", "1980:01:01 00:00:00");
-  return spec;
+  header.attributes = {{"compression", "zip"}, {"DateTime", "1980:01:01 00:00:00"}};
+  return header;
 }
 
 /// The working space that a file states for its colours; empty if it states none.
-std::string stated_working_space(const OIIO::ImageSpec& spec, const fs::path& path) {
-  Chromaticities chromaticities;
-  const bool known = spec.getattribute("chromaticities", kChromaticities, chromaticities.data());
-  const std::string id = spec.get_string_attribute("colorInteropID");
-  if (id.empty() && !known) return "";
+std::string stated_working_space(const pictures::Header& header, const fs::path& path) {
+  const auto chromaticities = header.numbers("chromaticities", 8);
+  const std::string id = header.text("colorInteropID");
+  if (id.empty() && !chromaticities) return "";
   const auto same = [](float a, float b) { return std::abs(a - b) < 1e-4f; };
   std::vector<std::string> names;
   for (const WorkingSpace& s : working_spaces()) {
-    if (id.empty() ? std::ranges::equal(chromaticities, s.chromaticities, same) : id == s.interop_id) return s.name;
+    if (id.empty() ? std::ranges::equal(*chromaticities, s.chromaticities, same) : id == s.interop_id) return s.name;
     names.push_back(s.name);
   }
   if (!id.empty())
     input_error("{}: its colours are in '{}', expected one of {}", path.string(), id, fmt::join(names, ", "));
   input_error("{}: its colours have the chromaticities {}, expected those of one of {}", path.string(),
-              fmt::join(chromaticities, " "), fmt::join(names, ", "));
+              fmt::join(*chromaticities, " "), fmt::join(names, ", "));
 }
 
 /// The current configuration with the working space of a rendering.
@@ -210,8 +205,8 @@ ColorConfig config_of(const Rendering& r) {
 
 /// The primaries and white point that a file states for its colours; nullopt if it states none, or states that they are
 /// not colours but data.
-std::optional<Chromaticities> stated_primaries(const OIIO::ImageSpec& spec, const fs::path& path) {
-  const std::string id = spec.get_string_attribute("colorInteropID");
+std::optional<Chromaticities> stated_primaries(const pictures::Header& header, const fs::path& path) {
+  const std::string id = header.text("colorInteropID");
   if (id == "data" || id == "unknown") return std::nullopt;
   if (!id.empty()) {
     std::vector<std::string> known;
@@ -223,7 +218,9 @@ std::optional<Chromaticities> stated_primaries(const OIIO::ImageSpec& spec, cons
                 path.string(), id, fmt::join(known, ", "));
   }
   Chromaticities stated;
-  if (!spec.getattribute("chromaticities", kChromaticities, stated.data())) return std::nullopt;
+  const auto numbers = header.numbers("chromaticities", stated.size());
+  if (!numbers) return std::nullopt;
+  std::ranges::copy(*numbers, stated.begin());
   // The chromaticities must span a triangle with an area, and the white must have a luminance.
   const double area =
       double(stated[2] - stated[0]) * (stated[5] - stated[1]) - double(stated[4] - stated[0]) * (stated[3] - stated[1]);
@@ -287,26 +284,25 @@ void write_beside(const fs::path& path, const std::function<void(const fs::path&
 
 Rendering read_rendering(const fs::path& path) {
   const File file = read_file(path);
-  const Channels color = find_channels(file.spec);
+  const Channels color = find_channels(file.header);
   if (color.r < 0)
-    input_error("{}: expected channels R, G, B, found {}", path.string(), fmt::join(file.spec.channelnames, ", "));
+    input_error("{}: expected channels R, G, B, found {}", path.string(), fmt::join(file.header.channels, ", "));
   Rendering rendering;
   rendering.mean = file.extract(color);
-  const Channels variance{channel_index(file.spec, "variance.R"), channel_index(file.spec, "variance.G"),
-                          channel_index(file.spec, "variance.B")};
+  const Channels variance{channel_index(file.header, "variance.R"), channel_index(file.header, "variance.G"),
+                          channel_index(file.header, "variance.B")};
   if (variance.r >= 0 && variance.g >= 0 && variance.b >= 0) rendering.variance = file.extract(variance);
-  rendering.working_space = stated_working_space(file.spec, path);
+  rendering.working_space = stated_working_space(file.header, path);
   const std::string prefix = "brdfc:";
-  for (const auto& attribute : file.spec.extra_attribs) {
-    const std::string name = attribute.name().string();
-    if (name.compare(0, prefix.size(), prefix) != 0) continue;
-    const std::string key = name.substr(prefix.size());
-    if (attribute.type() == OIIO::TypeDesc::STRING)
-      rendering.metadata[key] = attribute.get_string();
-    else if (attribute.type() == OIIO::TypeDesc::INT)
-      rendering.metadata[key] = attribute.get_int();
-    else if (attribute.type() == OIIO::TypeDesc::FLOAT)
-      rendering.metadata[key] = attribute.get_float();
+  for (const pictures::Attribute& attribute : file.header.attributes) {
+    if (!attribute.name.starts_with(prefix)) continue;
+    const std::string key = attribute.name.substr(prefix.size());
+    if (const auto* text = std::get_if<std::string>(&attribute.value))
+      rendering.metadata[key] = *text;
+    else if (const auto* integer = std::get_if<int>(&attribute.value))
+      rendering.metadata[key] = *integer;
+    else if (const auto* number = std::get_if<float>(&attribute.value))
+      rendering.metadata[key] = *number;
   }
   return rendering;
 }
@@ -316,20 +312,21 @@ void write_rendering(const fs::path& path, const Rendering& rendering) {
   std::vector<std::string> names{"R", "G", "B"};
   if (rendering.variance) names.insert(names.end(), {"variance.R", "variance.G", "variance.B"});
   const Image& mean = rendering.mean;
-  OIIO::ImageSpec spec = exr_spec(mean.width, mean.height, names);
+  pictures::Header header = exr_header(mean.width, mean.height, names);
   for (const WorkingSpace& s : working_spaces())
     if (s.name == rendering.working_space) {
-      spec.attribute("colorInteropID", s.interop_id);
-      spec.attribute("chromaticities", kChromaticities, s.chromaticities.data());
+      header.attributes.push_back({"colorInteropID", s.interop_id});
+      header.attributes.push_back(
+          {"chromaticities", std::vector<float>(s.chromaticities.begin(), s.chromaticities.end())});
     }
   for (const auto& [key, value] : rendering.metadata.items()) {
     const std::string name = "brdfc:" + key;
     if (value.is_string())
-      spec.attribute(name, value.get<std::string>());
+      header.attributes.push_back({name, value.get<std::string>()});
     else if (value.is_number_integer())
-      spec.attribute(name, value.get<int>());
+      header.attributes.push_back({name, value.get<int>()});
     else if (value.is_number())
-      spec.attribute(name, value.get<float>());
+      header.attributes.push_back({name, value.get<float>()});
     else
       throw std::logic_error("metadata '" + key + "' must be a string or a number");
   }
@@ -341,7 +338,7 @@ void write_rendering(const fs::path& path, const Rendering& rendering) {
     if (rendering.variance)
       data.insert(data.end(), &rendering.variance->rgb[3 * i], &rendering.variance->rgb[3 * i] + 3);
   }
-  write_file(path, spec, data);
+  write_file(path, header, data);
 }
 
 void to_working_space_of(Rendering& rendering, const Rendering& other) {
@@ -358,16 +355,16 @@ void to_working_space_of(Rendering& rendering, const Rendering& other) {
 Image read_image(const fs::path& path, const ColorConfig& colors, const std::string& space,
                  std::vector<std::string>* notes) {
   const File file = read_file(path);
-  const Channels channels = find_channels(file.spec);
+  const Channels channels = find_channels(file.header);
   if (channels.r < 0)
     input_error("{}: expected channels R, G, B or one grey channel, found {}", path.string(),
-                fmt::join(file.spec.channelnames, ", "));
+                fmt::join(file.header.channels, ", "));
   Image image = file.extract(channels);
   blacken_what_is_not_finite(image, path.string(), notes);
-  if (space == "srgb" || (space == "auto" && !file.spec.format.is_floating_point())) {
+  if (space == "srgb" || (space == "auto" && !file.header.floating)) {
     colors.srgb_to_scene_linear(image);
   } else if (space == "auto") {
-    if (const auto primaries = stated_primaries(file.spec, path)) colors.to_scene_linear(image, *primaries);
+    if (const auto primaries = stated_primaries(file.header, path)) colors.to_scene_linear(image, *primaries);
   } else if (space != "linear") {
     colors.to_scene_linear(image, space);
   }
@@ -376,7 +373,7 @@ Image read_image(const fs::path& path, const ColorConfig& colors, const std::str
 
 void write_image(const fs::path& path, const Image& image) {
   expect_exr(path);
-  write_file(path, exr_spec(image.width, image.height, {"R", "G", "B"}), image.rgb);
+  write_file(path, exr_header(image.width, image.height, {"R", "G", "B"}), image.rgb);
 }
 
 Comparison compare(const Rendering& a, const Rendering& b, const std::string& name_a, const std::string& name_b) {
@@ -442,9 +439,11 @@ Image difference_image(const Image& a, const Image& b, double scale) {
 
 void write_display(const fs::path& path, const Image& display) {
   if (path.extension() != ".png") input_error("{}: expected a file name that ends in .png", path.string());
-  OIIO::ImageSpec spec(display.width, display.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  write_file(path, spec, display.rgb);
+  pictures::Header header{display.width, display.height};
+  header.channels = {"R", "G", "B"};
+  header.floating = false;
+  header.attributes = {{"oiio:ColorSpace", "sRGB"}};
+  write_file(path, header, display.rgb);
 }
 
 void write_preview(const fs::path& path, const Rendering& rendering, double exposure, const std::string& view) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "report/stability_page.h"
 
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include "core/parallel.h"
 #include "measure/probes.h"
 #include "model/model.h"
+#include "pictures/pictures.h"
 
 namespace brdfc::report {
 namespace {
@@ -47,9 +47,10 @@ void write_map(const std::string& path, const Map& map) {
       }
     }
   });
-  const auto out = OIIO::ImageOutput::create(path);
-  const OIIO::ImageSpec spec(kWidth * kScale, kHeight * kScale, 3, OIIO::TypeDesc::UINT8);
-  if (!out || !out->open(path, spec) || !out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) || !out->close())
+  pictures::Header header{kWidth * kScale, kHeight * kScale};
+  header.channels = {"R", "G", "B"};
+  header.floating = false;
+  if (pictures::write(path, header, pixels))
     throw InputError(fmt::format("{}: expected a place that can be written", path));
 }
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tables/table_file.h"
 
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 
 #include "core/error.h"
+#include "pictures/pictures.h"
 
 namespace brdfc::inline tables {
 namespace {
@@ -46,19 +45,15 @@ std::optional<std::vector<double>> values_in(const TableImage& image, std::size_
 }
 
 void write_table_image(const TableImage& image, const std::filesystem::path& path) {
-  OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::FLOAT);
-  spec.attribute(kMeta, image.meta);
-  spec.attribute("compression", "zip");
+  pictures::Header header{image.width, image.height};
+  header.channels.resize(std::size_t(image.channels));
   // OpenImageIO writes the present time unless one is set.
-  spec.attribute("DateTime", "1980:01:01 00:00:00");
+  header.attributes = {{kMeta, image.meta}, {"compression", "zip"}, {"DateTime", "1980:01:01 00:00:00"}};
   const std::string beside = path.string() + ".part.exr";
-  const auto out = OIIO::ImageOutput::create(beside);
-  if (!out) input_error("{}: cannot be written: {}", path.string(), OIIO::geterror());
-  if (!out->open(beside, spec) || !out->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !out->close()) {
-    const std::string reason = out->geterror();
+  if (const auto failed = pictures::write(beside, header, image.pixels)) {
     std::error_code ignored;
     std::filesystem::remove(beside, ignored);
-    input_error("{}: cannot be written: {}", path.string(), reason);
+    input_error("{}: cannot be written: {}", path.string(), failed->reason);
   }
   std::error_code error;
   std::filesystem::rename(beside, path, error);
@@ -66,14 +61,14 @@ void write_table_image(const TableImage& image, const std::filesystem::path& pat
 }
 
 TableImage read_table_image(const std::filesystem::path& path) {
-  const auto in = OIIO::ImageInput::open(path.string());
-  if (!in) input_error("{}: cannot be read: {}", path.string(), OIIO::geterror());
-  const OIIO::ImageSpec& spec = in->spec();
-  TableImage image{spec.width, spec.height, spec.nchannels, {}, std::string(spec.get_string_attribute(kMeta))};
+  std::string reason;
+  const auto in = pictures::open(path, reason);
+  if (!in) input_error("{}: cannot be read: {}", path.string(), reason);
+  const pictures::Header& header = in->header();
+  TableImage image{header.width, header.height, int(header.channels.size()), {}, header.text(kMeta)};
   if (image.meta.empty()) input_error("{}: expected tables, with the attribute {}", path.string(), kMeta);
   image.pixels.resize(std::size_t(image.width) * std::size_t(image.height) * std::size_t(image.channels));
-  if (!in->read_image(0, 0, 0, image.channels, OIIO::TypeDesc::FLOAT, image.pixels.data()))
-    input_error("{}: cannot be read: {}", path.string(), in->geterror());
+  if (const auto failed = in->read(image.pixels.data())) input_error("{}: cannot be read: {}", path.string(), *failed);
   return image;
 }
 

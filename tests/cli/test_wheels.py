@@ -85,7 +85,14 @@ def test_that_of_the_tool_is_what_is_built_and_its_data(wheels):
     assert wheels["brdfc_tool"].name == f"brdfc_tool-{VERSION}-py3-none-{platform}.whl"
     with zipfile.ZipFile(wheels["brdfc_tool"]) as archive:
         names = set(archive.namelist())
-        assert archive.read("brdfc_tool/tree/bin/brdfc") == Path(ROOT / "build/brdfc").read_bytes()
+        built = {
+            "bin/brdfc": "brdfc",
+            "lib/brdfc/brdfc_pictures.so": "brdfc_pictures.so",
+        }
+        for file, name in built.items():
+            assert (
+                archive.read(f"brdfc_tool/tree/{file}") == Path(ROOT / "build", name).read_bytes()
+            )
         assert archive.getinfo("brdfc_tool/tree/bin/brdfc").external_attr >> 16 & 0o111 == 0o111
     share = {"data", "blender_addon", "scenes"}
     kept = succeeded(["git", "ls-files", "-z", *share], cwd=ROOT).split("\0")[:-1]
@@ -154,8 +161,10 @@ def test_what_is_missing_is_said(environment, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(not shutil.which("dpkg-query"), reason="packages are those of Debian")
 def test_the_packages_that_are_named_hold_the_libraries():
-    """All libraries that the program is linked to, except the C library, which every system has."""
-    linked = re.findall(r"NEEDED.*\[(.*)\]", succeeded(["readelf", "--dynamic", "--wide", TOOL]))
+    """All libraries that the program and its module are linked to, except the C library, which
+    every system has."""
+    read = ["readelf", "--dynamic", "--wide", TOOL, Path(TOOL).with_name("brdfc_pictures.so")]
+    linked = re.findall(r"NEEDED.*\[(.*)\]", succeeded(read))
     everywhere = {"libc.so.6", "libm.so.6", "libmvec.so.1", "libgcc_s.so.1"}
     assert set(linked) - everywhere == set(brdfc_tool.PACKAGES)
     files = [f"*/{library}*" for library in brdfc_tool.PACKAGES]

@@ -2,7 +2,6 @@
 // Quadrature compared with closed forms, and tables compared with quadrature.
 #include "measure/albedo.h"
 
-#include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -20,6 +19,7 @@
 #include "measure/probes.h"
 #include "measure/tabulate_albedo.h"
 #include "model/sampling.h"
+#include "pictures/pictures.h"
 #include "rough_dielectric.h"
 #include "support.h"
 
@@ -308,15 +308,15 @@ TEST(AlbedoTableFile, HoldsTheNumbersAndTheirMeaning) {
   const AlbedoTable t = tabulate_albedo(m);
   const auto path = std::filesystem::temp_directory_path() / fmt::format("brdfc_albedo_{}.exr", ::getpid());
   write_albedo_exr(t, path.string());
-  const auto in = OIIO::ImageInput::open(path.string());
-  ASSERT_TRUE(in) << OIIO::geterror();
-  const OIIO::ImageSpec& spec = in->spec();
-  EXPECT_EQ(spec.format, OIIO::TypeDesc::FLOAT);
-  ASSERT_EQ(spec.height, int(t.grids.size()));
-  std::vector<float> pixels(std::size_t(spec.width) * std::size_t(spec.height) * std::size_t(spec.nchannels));
-  ASSERT_TRUE(in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, pixels.data()));
-  const auto meta = nlohmann::json::parse(spec.get_string_attribute("brdfc:table"));
-  in->close();
+  std::string reason;
+  const auto in = pictures::open(path, reason);
+  ASSERT_TRUE(in) << reason;
+  const pictures::Header& header = in->header();
+  EXPECT_TRUE(header.floating);
+  ASSERT_EQ(header.height, int(t.grids.size()));
+  std::vector<float> pixels(std::size_t(header.width) * std::size_t(header.height) * header.channels.size());
+  ASSERT_EQ(in->read(pixels.data()), std::nullopt);
+  const auto meta = nlohmann::json::parse(header.text("brdfc:table"));
   std::filesystem::remove(path);
   EXPECT_EQ(meta["model"], "coupled");
   EXPECT_EQ(meta["error"].get<double>(), t.error);
@@ -324,7 +324,7 @@ TEST(AlbedoTableFile, HoldsTheNumbersAndTheirMeaning) {
     EXPECT_EQ(meta["grids"][g]["axes"][0]["name"], t.grids[g].axes[0].name);
     EXPECT_EQ(meta["grids"][g]["axes"][0]["values"].get<std::vector<double>>(), t.grids[g].axes[0].values);
     for (std::size_t i = 0; i < t.grids[g].values.size(); ++i)
-      EXPECT_EQ(pixels[(g * std::size_t(spec.width) + i) * std::size_t(spec.nchannels)], t.grids[g].values[i]);
+      EXPECT_EQ(pixels[(g * std::size_t(header.width) + i) * header.channels.size()], t.grids[g].values[i]);
   }
   EXPECT_THROW(write_albedo_exr(t, "/nowhere/at/all.exr"), InputError);
 }

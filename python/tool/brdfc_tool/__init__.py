@@ -7,7 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-#: Debian 12's packages of the shared libraries that the program is linked to. They bring others.
+#: Debian 12's packages of the shared libraries that the program and its module for picture files
+#: are linked to. They bring others.
 PACKAGES = {
     "libOpenColorIO.so.2.1": "libopencolorio2.1",
     "libOpenImageIO.so.2.4": "libopenimageio2.4",
@@ -35,7 +36,7 @@ def why_it_cannot_start(path) -> str:
     """What Linux's loader misses for the program, and what helps, on a line; empty where all is
     there."""
     try:
-        # What ldd does: libraries are searched, and nothing is run. A thirtieth of a second.
+        # What ldd does: libraries are searched, and nothing is run. A few milliseconds.
         done = subprocess.run(
             [path],
             env=os.environ | {"LD_TRACE_LOADED_OBJECTS": "1"},
