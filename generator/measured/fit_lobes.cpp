@@ -143,7 +143,7 @@ class Fitter {
   std::vector<Place> extended(const std::vector<Place>& places) const {
     std::vector<Place> out = searched(with_best(places));
     // Lobes that came first may have stood for several.
-    for (std::size_t i = 0; i + 1 < out.size(); ++i) {
+    for (std::size_t i = 0; out.size() > 1 && i < out.size(); ++i) {
       std::vector<Place> rest = out;
       rest.erase(rest.begin() + long(i));
       std::vector<Place> other = searched(with_best(rest));
