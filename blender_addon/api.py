@@ -59,6 +59,7 @@ __all__ = [
     "models",
     "new_material",
     "new_measured_material",
+    "new_sum",
     "plan",
     "plan_conversion",
     "prepare_material",
@@ -157,17 +158,47 @@ def measured_fits(path):
 def new_measured_material(found, model=None, representation="auto"):
     """Makes a material that comes close to a measured BRDF.
 
-    `found`: a file, or what measured_fits() returned of it. `model`: one of the models; without it
-    the closest. Where the fit has a matte part, the light of a Diffuse node is added to the
-    model's. Raises ValueError, and what measured_fits() and new_material() raise.
+    `found`: a file, or what measured_fits() returned of it. `model`: one of the models, or "lobes"
+    for the sum of several; without it the model that comes closest. Where the fit has a matte part,
+    the light of a Diffuse node is added to the model's. Raises ValueError, and what measured_fits()
+    and new_material() raise.
     """
     if not isinstance(found, Measured):
         found = measured_fits(found)
+    if model == "lobes":
+        lobes = [(lobe.model, lobe.parameters) for lobe in found.lobe_sum().lobes]
+        return new_sum(lobes, representation, found.path.stem)
     fit = found.fit(model)
     material = new_material(fit.model, representation, **fit.parameters)
     material.name = found.path.stem
     if fit.matte:
         measured.add_matte(material.node_tree, _the_node(material), fit.matte)
+    return material
+
+
+def new_sum(lobes, representation="auto", name="Sum"):
+    """Makes a material whose light is the sum of that of several models, by Add Shader nodes.
+
+    `lobes`: pairs of a model and a dictionary of its parameters. Raises what new_material() raises;
+    after an error nothing is left in the file.
+    """
+    (first, values), *others = lobes
+    checked = [(model, *_checked(model, representation, given)) for model, given in others]
+    material = new_material(first, representation, **values)
+    try:
+        tree, node = material.node_tree, _the_node(material)
+        added = []
+        for model, form, values in checked:
+            form = "auto" if representation == "auto" else form
+            added.append(nodes.add_group_node(tree, model, form, values))
+            for parameter, value in values.items():
+                nodes.set_value(added[-1], parameter, value)
+        measured.add_shaders(tree, node, added)
+        prepare_material(material)
+    except BaseException:
+        bpy.data.materials.remove(material)
+        raise
+    material.name = name
     return material
 
 

@@ -14,6 +14,9 @@ from .common.i18n import say
 from .common.program import ToolJob
 from .packs import pack
 
+#: The largest number of lobes in a sum: with more, renders take longer, and errors hardly fall.
+LOBES = 4
+
 #: Endings of the files that the program reads: MERL, RGL, UTIA, and tables.
 ENDINGS = (".binary", ".bsdf", ".bin", ".csv")
 
@@ -37,6 +40,26 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class Lobe:
+    """One of the models whose sum is fitted to a measured BRDF."""
+
+    model: str
+    parameters: dict
+    #: The part of the sum's light that is its.
+    share: float
+
+
+@dataclass(frozen=True)
+class LobeSum:
+    """A sum of models fitted to a measured BRDF."""
+
+    #: Of Lobe, those that reflect most first.
+    lobes: tuple
+    #: The part of the light that goes in other directions than was measured.
+    error: float
+
+
+@dataclass(frozen=True)
 class Measured:
     """A file with a measured BRDF."""
 
@@ -49,6 +72,14 @@ class Measured:
     notes: tuple
     #: The models of this extension, the one that comes closest first; never empty.
     fits: tuple
+    #: Sums of 1, 2, ... lobes, each with a smaller error than the one before; empty for black data.
+    sums: tuple = ()
+
+    def lobe_sum(self):
+        """The sum that comes closest. Raises ValueError if there is none."""
+        if not self.sums:
+            raise ValueError(say("The data are black, so no lobes were found"))
+        return self.sums[-1]
 
     def fit(self, model=None):
         """The fit of a model, or the closest one. Raises ValueError."""
@@ -75,7 +106,7 @@ class Fitting(ToolJob):
             raise MeasuredError(say("There is no file {file}", file=path))
         super().__init__()
         self._open_folder("brdfc-measured-")
-        self._run(self._path.resolve(), "--json")
+        self._run(self._path.resolve(), "--json", "--models", "all", "--lobes", str(LOBES))
 
     def _ended(self, status):
         try:
@@ -100,7 +131,7 @@ class Fitting(ToolJob):
         fits = tuple(
             Fit(
                 entry["model"],
-                {k: tuple(v) if isinstance(v, list) else v for k, v in entry["parameters"].items()},
+                _values(entry),
                 tuple(entry["matte"]) if entry["matte"] else None,
                 entry["error"],
                 entry["mirror"],
@@ -117,20 +148,43 @@ class Fitting(ToolJob):
             told["isotropic"],
             (*told["notes"], *told["lacks"]),
             fits,
+            tuple(
+                LobeSum(
+                    tuple(Lobe(e["model"], _values(e), e["share"]) for e in entry["lobes"]),
+                    entry["error"],
+                )
+                for entry in told["sums"]
+                if all(lobe["model"] in pack.model_names() for lobe in entry["lobes"])
+            ),
         )
+
+
+def _values(entry):
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in entry["parameters"].items()}
 
 
 def add_matte(tree, node, albedo):
     """Adds the light of a Lambert surface to that of a model's node: Blender's Diffuse node with a
-    roughness of 0. Links of the node's BSDF lead to the sum afterwards."""
-    targets = [link.to_socket for link in node.outputs["BSDF"].links]
+    roughness of 0."""
     diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.location = (node.location.x, node.location.y + 200)
     diffuse.inputs["Color"].default_value = (*albedo, 1.0)
     diffuse.inputs["Roughness"].default_value = 0.0
-    both = tree.nodes.new("ShaderNodeAddShader")
-    both.location = (node.location.x + 200, node.location.y + 100)
-    tree.links.new(diffuse.outputs[0], both.inputs[0])
-    tree.links.new(node.outputs["BSDF"], both.inputs[1])
+    add_shaders(tree, node, [diffuse])
+
+
+def add_shaders(tree, node, others):
+    """Adds the light of other nodes to that of a model's node by Add Shader nodes. Links of the
+    node's BSDF lead to the sum afterwards."""
+    sum_so_far = node.outputs["BSDF"]
+    targets = [link.to_socket for link in sum_so_far.links]
+    x, y = node.location
+    for index, other in enumerate(others):
+        other.location = (x, y + 300 * (index + 1))
+        both = tree.nodes.new("ShaderNodeAddShader")
+        both.location = (x + 250 + 180 * index, y + 150 * (index + 1))
+        tree.links.new(other.outputs[0], both.inputs[0])
+        tree.links.new(sum_so_far, both.inputs[1])
+        sum_so_far = both.outputs[0]
     for target in targets:
-        tree.links.new(both.outputs[0], target)
+        target.node.location.x += 180 * len(others) + 100
+        tree.links.new(sum_so_far, target)

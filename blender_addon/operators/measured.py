@@ -18,6 +18,8 @@ from .common import ERRORS, ModalJob, refused, report_osl
 
 #: Models that the dialog offers, the closest first.
 OFFERED = 8
+#: What stands for the sum of lobes among them.
+LOBES = "lobes"
 
 
 def _assign(operator, context, material):
@@ -99,7 +101,19 @@ def _fits_as_items(_operator, _context):
         )
         for fit in fits[:OFFERED]
     ]
+    if fits and BRDFC_OT_choose_measured.found.sums:
+        _listed.append(_sum_as_item(BRDFC_OT_choose_measured.found.lobe_sum()))
     return _listed
+
+
+def _sum_as_item(found):
+    said = say(
+        "Sum of {count} lobes: {percent} % of the light in other directions",
+        count=len(found.lobes),
+        percent=f"{100 * found.error:.2g}",
+    )
+    names = " + ".join(pack.model(lobe.model)["label"] for lobe in found.lobes)
+    return (LOBES, iface(said), names)
 
 
 class BRDFC_OT_choose_measured(Operator):
@@ -132,6 +146,18 @@ class BRDFC_OT_choose_measured(Operator):
             wrapped(column, line, pixels=480)
         self.layout.separator()
         self.layout.column().prop(self, "model", expand=True)
+        if self.model == LOBES:
+            parts = (
+                say(
+                    "{model}: {percent} %",
+                    model=pack.model(lobe.model)["label"],
+                    percent=f"{100 * lobe.share:.2g}",
+                )
+                for lobe in self.found.lobe_sum().lobes
+            )
+            for part in parts:
+                wrapped(self.layout.column(align=True), part, pixels=480)
+            return
         fit = self.found.fit(self.model)
         if fit.matte:
             grey = sum(fit.matte) / 3

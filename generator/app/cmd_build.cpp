@@ -44,12 +44,18 @@ void print_table(const pack::Result& result) {
                l.table_floats, l.table_error, l.bytes, l.albedo_bytes);
 }
 
-/// How the materials of a scene use their models.
-std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>& materials) {
+/// How the materials of a scene use their models; `views` has the angles from which each material is seen, if known.
+std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>& materials,
+                                         const std::vector<Cosines>& views = {}) {
   reference::require_models(materials);
   std::vector<plan::MaterialNeed> needs;
-  for (const reference::Material& m : materials) {
-    plan::MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation};
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    const reference::Material& m = materials[i];
+    const Cosines seen = views.empty() ? Cosines{} : views[i];
+    for (const measured::Lobe& lobe : m.sum)
+      needs.push_back({m.id, lobe.model, lobe.values, {}, m.representation, seen});
+    if (!m.sum.empty()) continue;
+    plan::MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation, seen};
     for (const auto& [name, image] : m.textures) need.textured.insert(name);
     needs.push_back(std::move(need));
   }
@@ -218,10 +224,7 @@ void run(const Options& options) {
         budget.sizeless.push_back(l.key);
     // The extension also finds bright spots in an image, and aims at them if there is room.
     budget.lamps = int(scene.lights.size()) + (scene.environment.image ? forms::kMaxLamps : 0);
-    std::vector<plan::MaterialNeed> needs = needs_of(scene.materials);
-    const std::vector<Cosines> views = reference::seen_cosines(scene);
-    for (std::size_t i = 0; i < needs.size(); ++i) needs[i].views = views[i];
-    plan = plan::plan_scene(needs, budget);
+    plan = plan::plan_scene(needs_of(scene.materials, reference::seen_cosines(scene)), budget);
   } else if (!options.materials.empty()) {
     const reference::UsedMaterials used = reference::load_materials(options.materials);
     budget.sizeless = used.sizeless_lamps;

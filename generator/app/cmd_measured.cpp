@@ -9,6 +9,7 @@
 #include "app/numbers.h"
 #include "core/csv.h"
 #include "measured/findings.h"
+#include "measured/fit_lobes.h"
 #include "measured/fit_models.h"
 #include "reference/color.h"
 
@@ -41,16 +42,56 @@ std::vector<const Model*> models_of(const std::vector<std::string>& names) {
   return out;
 }
 
+Json parameters_of(const ParamValues& values) {
+  Json out = Json::object();
+  for (const auto& [name, value] : values) out[name] = std::visit([](const auto& v) { return Json(v); }, value);
+  return out;
+}
+
 Json describe(const measured::ModelFit& f) {
-  Json parameters = Json::object();
-  for (const auto& [name, value] : f.values)
-    parameters[name] = std::visit([](const auto& v) { return Json(v); }, value);
   return {{"model", f.model->info().name},
-          {"parameters", parameters},
+          {"parameters", parameters_of(f.values)},
           {"matte", f.matte ? rgb(*f.matte) : Json()},
           {"error", f.error},
           {"mirror", f.mirror},
           {"seconds", f.seconds}};
+}
+
+Json describe(const measured::LobeSum& sum) {
+  Json lobes = Json::array();
+  for (std::size_t i = 0; i < sum.lobes.size(); ++i)
+    lobes.push_back({{"model", sum.lobes[i].model->info().name},
+                     {"parameters", parameters_of(sum.lobes[i].values)},
+                     {"share", sum.share[i]}});
+  return {{"error", sum.error},
+          {"lobes", lobes},
+          {"brightest", {{"albedo", sum.brightest}, {"degrees", sum.brightest_at}}},
+          {"seconds", sum.seconds}};
+}
+
+void print_sums(const std::vector<measured::LobeSum>& sums, int asked) {
+  if (sums.empty()) {
+    fmt::print("\n  black: there is nothing of which lobes could be a sum\n");
+    return;
+  }
+  fmt::print("\n  {:>5}{:>12}  {:>6}  lobes\n", "lobes", "misplaced", "time");
+  for (const measured::LobeSum& sum : sums) {
+    std::vector<std::string> names;
+    for (const measured::Lobe& lobe : sum.lobes) names.push_back(lobe.model->info().name);
+    fmt::print("  {:>5}{:>10.2f} %  {:>4.1f} s  {}\n", sum.lobes.size(), 100 * sum.error, sum.seconds,
+               fmt::join(names, " + "));
+  }
+  const measured::LobeSum& last = sums.back();
+  if (last.lobes.size() < std::size_t(asked)) fmt::print("  another lobe hardly makes the error smaller\n");
+  fmt::print("\n  {:>8}  lobe\n", "of light");
+  for (std::size_t i = 0; i < last.lobes.size(); ++i) {
+    const ModelInfo& info = last.lobes[i].model->info();
+    fmt::print("  {:>6.2f} %  {} {}\n", 100 * last.share[i], info.name,
+               format_values(info, rounded(last.lobes[i].values)));
+  }
+  if (last.brightest > 1.005)
+    fmt::print("  the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees\n", last.brightest,
+               last.brightest_at);
 }
 
 /// f and pdf for pairs of directions from stdin.
@@ -76,6 +117,8 @@ void add_measured_command(CLI::App& app) {
     std::vector<std::string> models{"all"};
     std::vector<double> at{0, 15, 30, 45, 60, 75, 89};
     bool no_matte = false;
+    int lobes = 0;
+    std::vector<std::string> from;
   };
   auto o = std::make_shared<Options>();
   CLI::App* cmd = app.add_subcommand(
@@ -91,6 +134,15 @@ void add_measured_command(CLI::App& app) {
   cmd->add_option("--models", o->models, "Names of the models to fit, separated by commas; all, or none")
       ->delimiter(',')
       ->capture_default_str();
+  CLI::Option* lobes =
+      cmd->add_option("--lobes", o->lobes,
+                      "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
+                      "--models names them then")
+          ->check(CLI::Range(1, measured::kMostLobes));
+  cmd->add_option("--from", o->from,
+                  "Names of the models whose lobes may be in a sum, separated by commas; all that have")
+      ->delimiter(',')
+      ->needs(lobes);
   cmd->add_flag("--no-matte", o->no_matte,
                 "Fits are of the models alone, without light of a Lambert surface beside them");
   add_numbers(*cmd, "--at", o->at, {0, 90, false, 0, "degrees from 0 to 89.9"},
@@ -100,7 +152,8 @@ void add_measured_command(CLI::App& app) {
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
                 "stdout: CSV with header f_r,f_g,f_b,pdf")
       ->excludes("--json");
-  cmd->callback([o] {
+  cmd->callback([o, cmd] {
+    if (o->lobes > 0 && cmd->count("--models") == 0) o->models = {"none"};
     const auto start = std::chrono::steady_clock::now();
     const measured::Measurement m = measured::read_measurement(o->file, reference::ColorConfig::current().to_rec709());
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
@@ -125,13 +178,25 @@ void add_measured_command(CLI::App& app) {
            {"non_reciprocal", found.non_reciprocal}};
     for (const auto& view : found.views) j["albedo"].push_back({{"degrees", view.degrees}, {"rgb", rgb(view.albedo)}});
     const std::vector<const Model*> models = models_of(o->models);
+    const std::vector<measured::LobeKind> kinds =
+        o->lobes > 0 ? measured::lobe_kinds(o->from, m.isotropic) : std::vector<measured::LobeKind>{};
+    const std::size_t steps = models.size() + std::size_t(o->lobes);
     const auto progress = [&](const Model& last, std::size_t done) {
-      fmt::print(stderr, "brdfc measured: {}/{} {}\n", done, models.size(), last.info().name);
+      fmt::print(stderr, "brdfc measured: {}/{} {}\n", done, steps, last.info().name);
     };
     const auto fits =
         measured::fit_models(m, model, models, o->no_matte ? measured::Matte::None : measured::Matte::Added, progress);
     j["fits"] = Json::array();
     for (const measured::ModelFit& f : fits) j["fits"].push_back(describe(f));
+    std::vector<measured::LobeSum> sums;
+    if (o->lobes > 0) {
+      sums = measured::fit_lobes(m, model, kinds, std::size_t(o->lobes), [&](const measured::LobeSum& sum) {
+        fmt::print(stderr, "brdfc measured: {}/{} {}\n", models.size() + sum.lobes.size(), steps,
+                   measured::counted(sum.lobes.size(), "lobe", "lobes"));
+      });
+      j["sums"] = Json::array();
+      for (const measured::LobeSum& sum : sums) j["sums"].push_back(describe(sum));
+    }
     if (o->json) {
       fmt::print("{}\n", j.dump(1));
       return;
@@ -152,6 +217,7 @@ void add_measured_command(CLI::App& app) {
           (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
               (f.mirror > 0 ? fmt::format("; its mirror, {:.2g} % of a white world, is not in the data", 100 * f.mirror)
                             : ""));
+    if (o->lobes > 0) print_sums(sums, o->lobes);
   });
 }
 

@@ -10,8 +10,9 @@
 #include "core/parallel.h"
 #include "core/sequence.h"
 #include "fit/view.h"
+#include "measured/least_deviations.h"
+#include "measured/pairs.h"
 #include "model/choices.h"
-#include "model/sampling.h"
 
 namespace brdfc::measured {
 namespace {
@@ -25,93 +26,6 @@ constexpr double kGood = 1e-3;
 constexpr double kWorthMatte = 0.95;
 /// Errors that differ by no more than this share, or by this part of the light, are alike.
 constexpr double kAlike = 0.05, kNegligible = 5e-4;
-/// Rounds of least squares. Deviations below a floor count as it; it begins at the mean of the data and falls.
-constexpr int kDeviationRounds = 24;
-constexpr double kFloorFalls = 0.6;
-
-using Colors = std::vector<Rgb<double>>;
-
-/// Pairs of directions, and the data there; `weight` makes a sum an integral over both hemispheres of f cos cos.
-struct Pairs {
-  std::vector<Vec3<double>> wi, wo;
-  std::vector<double> weight;
-  Colors data;
-  double light = 0;  ///< the sum of weight * data
-};
-
-Pairs make_pairs(const MeasuredModel& data, std::size_t count, std::uint64_t seed) {
-  const auto brdf = data.make_double({});
-  Sequence3 lights(seed);
-  Sequence2 views(seed + 1);
-  Pairs out;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Point2 v = views.next();
-    const Vec3<double> wo = sample_cosine(v.x, v.y);
-    const Sample<double> s = brdf->sample(wo, lights.next());
-    if (!(s.pdf > 0) || !(wo.z > 1e-3)) continue;
-    out.wi.push_back(s.wi);
-    out.wo.push_back(wo);
-    out.weight.push_back(s.wi.z / s.pdf / double(count));
-    out.data.push_back(brdf->eval(s.wi, wo));
-    const Rgb<double>& d = out.data.back();
-    out.light += out.weight.back() * (d.r + d.g + d.b);
-  }
-  return out;
-}
-
-double error_of(const Pairs& p, const Colors& f) {
-  double off = 0;
-  for (std::size_t k = 0; k < f.size(); ++k) {
-    const Rgb<double> d = magnitude(f[k] - p.data[k]);
-    off += p.weight[k] * (d.r + d.g + d.b);
-  }
-  return p.light > 0 ? off / p.light : 0;
-}
-
-double channel(const Rgb<double>& c, std::size_t i) { return i == 0 ? c.r : i == 1 ? c.g : c.b; }
-void set_channel(Rgb<double>& c, std::size_t i, double v) { (i == 0 ? c.r : i == 1 ? c.g : c.b) = v; }
-
-/// The x in [0, high] that minimise the sum of weight (target - sum x_j column_j)^2, by descent along one after
-/// another.
-std::vector<double> least_squares(const std::vector<std::vector<double>>& columns, const std::vector<double>& target,
-                                  const std::vector<double>& weight, const std::vector<double>& start,
-                                  const std::vector<double>& high) {
-  const std::size_t n = columns.size();
-  std::vector<double> normal(n * n), right(n), x = start;
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j <= i; ++j)
-      for (std::size_t k = 0; k < target.size(); ++k) normal[i * n + j] += weight[k] * columns[i][k] * columns[j][k];
-    for (std::size_t k = 0; k < target.size(); ++k) right[i] += weight[k] * columns[i][k] * target[k];
-    for (std::size_t j = 0; j < i; ++j) normal[j * n + i] = normal[i * n + j];
-  }
-  for (int sweep = 0; sweep < (n > 1 ? 200 : 1); ++sweep)
-    for (std::size_t i = 0; i < n; ++i) {
-      if (!(normal[i * n + i] > 0)) continue;
-      double rest = right[i];
-      for (std::size_t j = 0; j < n; ++j)
-        if (j != i) rest -= normal[i * n + j] * x[j];
-      x[i] = std::clamp(rest / normal[i * n + i], 0., high[i]);
-    }
-  return x;
-}
-
-/// The same for the sum of weight |target - sum x_j column_j|: least squares with weights that follow the deviations.
-/// `scale` is the mean of the data.
-std::vector<double> least_deviations(const std::vector<std::vector<double>>& columns, const std::vector<double>& target,
-                                     const std::vector<double>& weight, double scale, const std::vector<double>& high) {
-  std::vector<double> x(columns.size()), by_deviation(target.size());
-  double floor = scale;
-  for (int round = 0; round < kDeviationRounds; ++round, floor *= kFloorFalls) {
-    for (std::size_t k = 0; k < target.size(); ++k) {
-      double rest = target[k];
-      for (std::size_t j = 0; j < x.size(); ++j) rest -= x[j] * columns[j][k];
-      by_deviation[k] = weight[k] / (std::abs(rest) + floor + 1e-30);
-    }
-    x = least_squares(columns, target, by_deviation, x, high);
-  }
-  return x;
-}
-
 /// A model with its choices made, and what is searched for.
 class Problem {
  public:
@@ -182,20 +96,22 @@ class Problem {
         set(*colors_[j], base[j]);
       }
       for (std::size_t c = 0; c < 3; ++c) {
-        std::vector<std::vector<double>> columns(all, std::vector<double>(count));
-        std::vector<double> target(count);
-        const std::vector<double> high(all, 1.);
+        Eigen::MatrixXd columns(count, all);
+        Eigen::VectorXd target(count);
         for (std::size_t k = 0; k < count; ++k) {
-          target[k] = channel(p.data[k], c) - channel(at_base[k], c);
+          const auto row = Eigen::Index(k);
+          target[row] = channel(p.data[k], c) - channel(at_base[k], c);
           for (std::size_t j = 0; j < n; ++j) {
-            columns[j][k] = (channel(slopes[j][k], c) - channel(at_base[k], c)) / channel(steps[j], c);
-            target[k] += columns[j][k] * channel(base[j], c);
+            double& slope = columns(row, Eigen::Index(j));
+            slope = (channel(slopes[j][k], c) - channel(at_base[k], c)) / channel(steps[j], c);
+            target[row] += slope * channel(base[j], c);
           }
-          if (matte) columns[n][k] = 1 / kPi;
+          if (matte) columns(row, Eigen::Index(n)) = 1 / kPi;
         }
-        const std::vector<double> x = least_deviations(columns, target, p.weight, mean, high);
-        for (std::size_t j = 0; j < n; ++j) set_channel(found[j], c, x[j]);
-        if (matte) set_channel(added, c, x[n]);
+        const Eigen::VectorXd x =
+            least_deviations(columns, target, p.weight, mean, Eigen::VectorXd::Ones(Eigen::Index(all)));
+        for (std::size_t j = 0; j < n; ++j) set_channel(found[j], c, x[Eigen::Index(j)]);
+        if (matte) set_channel(added, c, x[Eigen::Index(n)]);
       }
       for (std::size_t j = 0; j < n; ++j) set(*colors_[j], found[j]);
       f = eval(p);

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "measured/sum_model.h"
 #include "model/model.h"
 #include "reference/image.h"
 #include "reference/mesh.h"
@@ -63,7 +64,10 @@ struct Material {
   std::map<std::string, std::shared_ptr<const Image>> textures;
   std::set<std::string> varying;  ///< parameters whose values vary and are not known here; only from load_materials()
   std::string representation = "auto";
-  std::shared_ptr<const Model> table;  ///< owns `model` if that looks measured data up instead of computing
+  /// Owns `model` if that is not a registered one: it looks measured data up, or adds `sum` up.
+  std::shared_ptr<const Model> own;
+  /// The lobes of a sum, whose colours and numbers are constant; empty for other materials.
+  std::vector<measured::Lobe> sum;
 };
 
 /// Throws InputError naming the first material that is measured data as such, which no other renderer has.

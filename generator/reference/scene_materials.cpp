@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/hash.h"
+#include "measured/fit_lobes.h"
 #include "measured/fit_models.h"
 #include "model/optical.h"
 #include "reference/procedural.h"
@@ -59,6 +60,11 @@ class MaterialReader {
         scene_.materials.push_back(std::move(material));
         continue;
       }
+      if (m.has("sum")) {
+        read_sum(m, material, out[id]);
+        scene_.materials.push_back(std::move(material));
+        continue;
+      }
       m.only({"model", "optical", "thickness", "parameters", "representation"});
       std::vector<std::string> names;
       for (const auto& [name, model] : models()) names.push_back(name);
@@ -69,20 +75,14 @@ class MaterialReader {
         std::optional<double> thickness;
         if (const auto t = m.find("thickness")) thickness = t->number(kThinnest, kThickest);
         material.values = optical_parameters(*optical, info, thickness);
-        for (const auto& [name, value] : material.values)
-          resolved["parameters"][name] = std::visit([](const auto& v) { return json(v); }, value);
+        resolved["parameters"] = to_json(material.values);
       } else if (const auto thickness = m.find("thickness")) {
         thickness->error("expected \"optical\" beside it, which says what absorbs");
       }
       const ParamValues of_substance = material.values;
       if (const auto parameters = m.find("parameters"))
         for (const auto& [name, value] : parameters->members()) {
-          const ParamInfo* p = info.param(name);
-          if (!p) {
-            std::vector<std::string> known;
-            for (const ParamInfo& each : info.params) known.push_back(each.name);
-            value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
-          }
+          const ParamInfo* const p = &parameter_named(name, value, info);
           if (of_substance.count(name)) value.error("\"optical\" says what it is, expected one of the two");
           if (alone_ && value.json().is_object()) {
             value.only({"varies"});
@@ -112,47 +112,137 @@ class MaterialReader {
   }
 
  private:
-  /// Measured data as such, or as a model that is fitted to them.
+  /// Models that are added up, with constant parameters.
+  void read_sum(const JsonView& m, Material& material, json& resolved) {
+    m.only({"sum", "representation"});
+    if (alone_) m.at("sum").error("expected \"model\" in a file of materials alone");
+    if (const auto v = m.find("representation")) material.representation = v->text();
+    std::vector<std::string> names;
+    for (const auto& [name, model] : models())
+      if (!model->two_sided()) names.push_back(name);
+    std::vector<measured::Lobe> lobes;
+    const JsonView list = m.at("sum");
+    if (!list.json().is_array() || list.json().empty() || list.json().size() > measured::kMostLobes)
+      list.fail(fmt::format("1 to {} lobes", measured::kMostLobes));
+    for (const JsonView& each : list.elements()) {
+      each.only({"model", "parameters"});
+      measured::Lobe lobe{&find_model(each.at("model").choice(names)), {}};
+      const ModelInfo& info = lobe.model->info();
+      if (const auto parameters = each.find("parameters"))
+        for (const auto& [name, value] : parameters->members()) {
+          if (value.json().is_object()) value.error("expected a constant: textures are not for the lobes of a sum");
+          lobe.values[name] = read_value(value, parameter_named(name, value, info));
+        }
+      lobe.values = complete(info, lobe.values);
+      if (lobe.model->make_double(lobe.values)->scatters_through())
+        each.error("lets light through: expected lobes that reflect");
+      lobes.push_back(std::move(lobe));
+    }
+    set_sum(std::move(lobes), material, resolved);
+  }
+
+  static void set_sum(std::vector<measured::Lobe> lobes, Material& material, json& resolved) {
+    resolved = {{"sum", json::array()}, {"representation", material.representation}};
+    for (const measured::Lobe& lobe : lobes)
+      resolved["sum"].push_back({{"model", lobe.model->info().name}, {"parameters", to_json(lobe.values)}});
+    material.sum = lobes;
+    material.own = std::make_shared<measured::SumModel>(std::move(lobes));
+    material.model = material.own.get();
+  }
+
+  static json to_json(const ParamValues& values) {
+    json out = json::object();
+    for (const auto& [name, value] : values) out[name] = std::visit([](const auto& v) { return json(v); }, value);
+    return out;
+  }
+
+  static const ParamInfo& parameter_named(const std::string& name, const JsonView& value, const ModelInfo& info) {
+    if (const ParamInfo* p = info.param(name)) return *p;
+    std::vector<std::string> known;
+    for (const ParamInfo& each : info.params) known.push_back(each.name);
+    value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
+  }
+
+  /// For people: a measurement has no more digits.
+  static std::string described(const ModelInfo& info, ParamValues values) {
+    const auto digits = [](double& v) { v = std::stod(fmt::format("{:.4g}", v)); };
+    for (auto& [name, value] : values) {
+      if (auto* number = std::get_if<double>(&value)) digits(*number);
+      if (auto* color = std::get_if<std::array<double, 3>>(&value)) std::ranges::for_each(*color, digits);
+    }
+    return format_values(info, values);
+  }
+
+  /// Measured data as such, or as models that are fitted to them.
   void read_measured(const JsonView& m, Material& material, json& resolved) {
-    m.only({"measured", "as", "representation"});
+    m.only({"measured", "as", "lobes", "representation"});
     if (alone_) m.at("measured").error("expected \"model\" in a file of materials alone");
     const JsonView file = m.at("measured");
-    const auto measurement = files_.read_file(file, [&](const fs::path& path) {
-      return in_working_space(measured::read_measurement(path, files_.colors().to_rec709()), files_.colors());
-    });
-    for (const std::string& text : measurement.notes) files_.note(measurement.file + ": " + text);
-    auto table = std::make_shared<measured::MeasuredModel>(measurement);
     const auto as = m.find("as");
     if (const auto v = m.find("representation")) {
       if (!as) v->error("expected \"as\" beside it: measured data themselves have no form in Blender");
       material.representation = v->text();
     }
+    std::vector<std::string> names{"best", "lobes"};
+    std::vector<const Model*> tried;
+    for (const auto& [name, model] : models())
+      if (model->has_scatter()) names.push_back(name), tried.push_back(model.get());
+    const std::string name = as ? as->choice(names) : "";
+    if (const auto lobes = m.find("lobes"); lobes && name != "lobes")
+      lobes->error("expected \"as\": \"lobes\" beside it");
+    const auto measurement = files_.read_file(file, [&](const fs::path& path) {
+      return in_working_space(measured::read_measurement(path, files_.colors().to_rec709()), files_.colors());
+    });
+    for (const std::string& text : measurement.notes) files_.note(measurement.file + ": " + text);
+    auto table = std::make_shared<measured::MeasuredModel>(measurement);
     if (!as) {
       material.model = table.get();
       material.values = {};
-      material.table = std::move(table);
+      material.own = std::move(table);
       std::ifstream in(files_.beside(file.text()), std::ios::binary);
       std::ostringstream content;
       content << in.rdbuf();
       resolved = {{"measured", sha256(content.str())}};
       return;
     }
-    std::vector<std::string> names{"best"};
-    std::vector<const Model*> tried;
-    for (const auto& [name, model] : models())
-      if (model->has_scatter()) names.push_back(name), tried.push_back(model.get());
-    if (const std::string name = as->choice(names); name != "best") tried = {&find_model(name)};
-    const auto fits = measured::fit_models(measurement, *table, tried, measured::Matte::None);
+    const auto misplaces = [&](const std::string& what, double error, const std::string& values) {
+      files_.note(
+          fmt::format("{}: {} misplaces {:.2g} % of the light: {}", measurement.file, what, 100 * error, values));
+    };
+    if (name == "lobes") {
+      const auto most = m.find("lobes");
+      const auto sums = measured::fit_lobes(measurement, *table, measured::lobe_kinds({}, measurement.isotropic),
+                                            most ? std::size_t(most->integer(1, measured::kMostLobes)) : 4);
+      if (sums.empty()) as->error("is a sum of nothing: the data are black");
+      const measured::LobeSum& sum = sums.back();
+      std::vector<std::string> each;
+      for (const measured::Lobe& lobe : sum.lobes)
+        each.push_back(lobe.model->info().name + " " + described(lobe.model->info(), lobe.values));
+      misplaces("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
+                fmt::format("{}", fmt::join(each, " + ")));
+      if (sum.brightest > 1.005)
+        files_.note(fmt::format("{}: the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees",
+                                measurement.file, sum.brightest, sum.brightest_at));
+      set_sum(sum.lobes, material, resolved);
+      return;
+    }
+    if (name != "best") tried = {&find_model(name)};
+    const auto fits = measured::fit_models(measurement, *table, tried, measured::Matte::Added);
     if (fits.empty()) as->error("lets light through, which no measured BRDF shows: expected another model");
     const measured::ModelFit& fit = fits.front();
+    const ModelInfo& info = fit.model->info();
+    if (fit.matte) {
+      const Model& lambert = find_model("lambert");
+      const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};
+      misplaces(info.name + " with lambert", fit.error,
+                described(info, fit.values) + " + " + described(lambert.info(), rho));
+      set_sum({{fit.model, fit.values}, {&lambert, rho}}, material, resolved);
+      return;
+    }
+    misplaces(info.name, fit.error, described(info, fit.values));
     material.model = fit.model;
     material.values = fit.values;
-    const ModelInfo& info = fit.model->info();
-    files_.note(fmt::format("{}: {} misplaces {:.2g} % of the light: {}", measurement.file, info.name, 100 * fit.error,
-                            format_values(info, fit.values)));
-    resolved = {{"model", info.name}, {"parameters", json::object()}, {"representation", material.representation}};
-    for (const auto& [name, value] : fit.values)
-      resolved["parameters"][name] = std::visit([](const auto& v) { return json(v); }, value);
+    resolved = {{"model", info.name}, {"parameters", to_json(fit.values)}, {"representation", material.representation}};
   }
 
   static std::size_t channels_of(const ParamInfo& info) { return info.kind == ParamKind::Number ? 1 : 3; }
@@ -246,7 +336,7 @@ void read_materials(const JsonView& j, SceneFiles& files, bool alone) { Material
 
 void require_models(const std::vector<Material>& materials) {
   for (const Material& m : materials)
-    if (m.table)
+    if (m.own && m.sum.empty())
       input_error(
           "material {}: measured data are rendered by `brdfc render` alone: expected \"as\" with a model beside "
           "\"measured\"",

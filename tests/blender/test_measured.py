@@ -2,8 +2,10 @@
 """Materials of measured BRDFs: files made here from formulas, and what is found in them."""
 
 import itertools
+import json
 import math
 import os
+import subprocess
 from importlib import import_module
 
 import bpy
@@ -103,6 +105,89 @@ def test_matte_light_is_added(extension, empty, write_table):
         helpers.sphere_scene(scene, material, size=8, samples=256)
         seen.append(helpers.render(scene)[3:5, 3:5, 1].mean())
     assert seen[0] - seen[1] == pytest.approx(0.4, rel=0.05)
+
+
+def test_the_sum_of_lobes_is_added_up(extension, empty, found):
+    """A node a lobe, whose sum leads to the output; nothing is left after an error."""
+    best = found.lobe_sum()
+    assert [len(each.lobes) for each in found.sums] == list(range(1, len(found.sums) + 1))
+    errors = [each.error for each in found.sums]
+    assert errors == sorted(errors, reverse=True) and sum(
+        lobe.share for lobe in best.lobes
+    ) == pytest.approx(1)
+    assert best.error <= found.fits[0].error
+    material = extension.api.new_measured_material(found, "lobes")
+    assert material.name == "paint"
+    nodes = {extension.nodes.identity(n)[0]: n for n in extension.nodes.group_nodes(material)}
+    assert nodes.keys() == {lobe.model for lobe in best.lobes}
+    for lobe in best.lobes:
+        for name, value in lobe.parameters.items():
+            if not isinstance(value, str):
+                got = extension.nodes.get_value(nodes[lobe.model], name)
+                assert got == pytest.approx(value, rel=1e-5, abs=1e-6), name
+    tree = material.node_tree
+    added = [n for n in tree.nodes if n.type == "ADD_SHADER"]
+    assert len(added) == len(best.lobes) - 1
+    materials = len(bpy.data.materials)
+    with pytest.raises(ValueError, match="ax"):
+        extension.api.new_sum([("ward", {}), ("ward", {"ax": 5})])
+    assert len(bpy.data.materials) == materials
+
+
+SUM = {
+    "sum": [
+        {"model": "lambert", "parameters": {"rho": [0.3, 0.2, 0.1]}},
+        {"model": "cook_torrance", "parameters": {"m": 0.25, "f0": [0.1, 0.2, 0.3]}},
+        {
+            "model": "lafortune",
+            "parameters": {"cxy": 1, "cz": 0.9, "e": 8, "ks": [0.2, 0.1, 0.1]},
+        },
+    ]
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("osl", [True, False])
+def test_blender_and_the_reference_have_one_sum(extension, empty, program, tmp_path, osl):
+    """A ball under a lamp and a grey sky: blocks of the pictures differ by noise, and a lobe that
+    is left out is seen."""
+    scene = {
+        "name": "sum",
+        "settings": {"width": 48, "height": 48, "spp": 512, "seed": 1, "max_bounces": 0},
+        "camera": {
+            "type": "orthographic",
+            "height": 2.2,
+            "position": [0, -5, 0],
+            "look_at": [0, 0, 0],
+            "up": [0, 0, 1],
+        },
+        "materials": {"m": SUM},
+        "objects": [{"name": "o", "shape": {"type": "sphere", "radius": 1}, "material": "m"}],
+        "lights": [{"type": "point", "position": [2, -4, 3], "radius": 0.5, "power": 300}],
+        "environment": {"color": [0.3, 0.3, 0.3]},
+    }
+
+    def reference(name, material):
+        file = tmp_path / f"{name}.json"
+        file.write_text(json.dumps(scene | {"materials": {"m": material}}))
+        out = tmp_path / f"{name}.exr"
+        subprocess.run([program, "render", file, "--out", out], check=True, capture_output=True)
+        subprocess.run([program, "scene", file, "--out", tmp_path / name], check=True)
+        pixels = helpers.open_image_io().ImageBuf(str(out)).get_pixels()
+        return blocks(pixels[::-1])  # row 0 at the bottom, as in helpers.render()
+
+    def blocks(picture):
+        return picture[..., :3].reshape(6, 8, 6, 8, 3).mean((1, 3))
+
+    expected = reference("whole", SUM)
+    loaded = extension.scene_loader.load_scene(tmp_path / "whole" / "scene.json", osl=osl)
+    got = blocks(helpers.render(loaded))
+    lit = expected[1:5, 1:5]
+    worst = np.abs(got[1:5, 1:5] / lit - 1).max()
+    without = reference("part", {"sum": SUM["sum"][:2]})[1:5, 1:5]
+    assert worst < 0.03
+    assert np.abs(without / lit - 1).max() > 0.15
+    np.testing.assert_allclose(got.mean((0, 1)), expected.mean((0, 1)), rtol=0.01)
 
 
 @pytest.mark.slow

@@ -440,6 +440,78 @@ def test_a_scene_has_the_model_that_is_fitted(tmp_path):
         assert done.returncode == 2 and expected in done.stderr, done.stderr
 
 
+@pytest.mark.slow
+def test_sums_of_lobes_are_told(tmp_path):
+    """Of a table of two lobes, two lobes leave next to nothing; without their kind more is left."""
+    file = lobe_table(tmp_path, matte=[0.1, 0.05, 0.02])
+    done = run("measured", file, "--json", "--lobes", "2")
+    assert done.returncode == 0, done.stderr
+    assert re.findall(r"^brdfc measured: (\d)/2 ", done.stderr, re.M) == ["1", "2"]
+    said = json.loads(done.stdout)
+    one, two = said["sums"]
+    assert said["fits"] == [] and two["error"] < 0.01 < 0.1 < one["error"]
+    assert {lobe["model"] for lobe in two["lobes"]} == {"lambert", "blinn"}
+    assert sum(lobe["share"] for lobe in two["lobes"]) == pytest.approx(1)
+    rho = next(lobe for lobe in two["lobes"] if lobe["model"] == "lambert")["parameters"]["rho"]
+    assert rho == pytest.approx([np.pi * c for c in (0.1, 0.05, 0.02)], rel=0.05)
+    without = run("measured", file, "--json", "--lobes", "2", "--from", "lambert,phong,ward")
+    assert json.loads(without.stdout)["sums"][-1]["error"] > 2 * two["error"]
+    text = run("measured", file, "--lobes", "2").stdout
+    assert re.search(r"^ +2 +0\.\d+ % .* blinn", text, re.M), text
+    assert re.search(r"% +lambert rho=", text) and "misplaced" in text
+    for options, expected in (
+        (("--lobes", "13"), "--lobes"),
+        (("--lobes", "2", "--from", "wart"), "wart"),
+        (("--lobes", "2", "--from", "coupled"), "coupled has no lobe for a sum"),
+        (("--from", "ward"), "--lobes"),
+    ):
+        done = run("measured", file, *options)
+        assert done.returncode == 2 and expected in done.stderr, done.stderr
+
+
+@pytest.mark.slow
+def test_a_scene_has_the_sum_that_is_fitted(tmp_path):
+    """In the reference the sum is nearly the data, by every way of sampling, and the resolved scene
+    is one that renders the same."""
+    file = lobe_table(tmp_path, matte=[0.1, 0.05, 0.02])
+    lamp = {"type": "area", "position": [1, 0, 2], "direction": [-0.5, 0, -1], "size": [1, 1]}
+    lit = {"lights": [lamp | {"power": 100}], "environment": None}
+    raw, _ = rendered(tmp_path, {"measured": file.name}, **lit)
+    for material, lobes in (
+        ({"measured": file.name, "as": "lobes", "lobes": 2}, 2),
+        ({"measured": file.name, "as": "blinn"}, 2),
+    ):
+        for strategy in ("mis", "brdf", "light"):
+            pixels, said = rendered(tmp_path, material, "--strategy", strategy, **lit)
+            np.testing.assert_allclose(pixels.mean((0, 1)), raw.mean((0, 1)), rtol=0.02)
+        assert re.search(r"lobe.csv: .* misplaces 0\.\d+ % of the light", said)
+        assert not re.search(r"[1-9]\d*\.\d{5}|\.0*[1-9]\d{4}", said), said  # four digits
+        done = run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+        assert done.returncode == 0, done.stderr
+        found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]["m"]
+        assert {lobe["model"] for lobe in found["sum"]} == {"lambert", "blinn"}
+        assert len(found["sum"]) == lobes and found["representation"] == "auto"
+        again, _ = rendered(tmp_path, found, **lit)
+        np.testing.assert_allclose(again.mean((0, 1)), pixels.mean((0, 1)), rtol=0.01)
+
+
+def test_what_is_wrong_in_a_sum_is_said(tmp_path):
+    lobe_table(tmp_path)
+    for bad, expected in (
+        ({"sum": []}, "materials.m.sum: expected 1 to 12 lobes"),
+        ({"sum": [{"model": "glass"}]}, "materials.m.sum[0].model: expected one of"),
+        ({"sum": [{"model": "ward", "parameters": {"e": 2}}]}, "ward has no such parameter"),
+        ({"sum": [{"model": "ward", "parameters": {"ks": {"texture": "x.png"}}}]}, "a constant"),
+        ({"sum": [{"model": "ward"}], "model": "ward"}, "materials.m.model"),
+        ({"measured": "lobe.csv", "as": "blinn", "lobes": 2}, '"as": "lobes" beside it'),
+        ({"measured": "lobe.csv", "as": "lobes", "lobes": 13}, "materials.m.lobes"),
+    ):
+        content = scene(materials={"m": bad}, **PLANE)
+        (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+        done = run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+        assert done.returncode == 2 and expected in done.stderr, done.stderr
+
+
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
     out = tmp_path_factory.mktemp("python")

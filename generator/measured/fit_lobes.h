@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fits of sums of lobes to a measured BRDF. M. Radziszewski and W. Alda offer their models as a basis for that.
+//
+// One lobe after another is added, the one of all kinds with which the sum comes closest when all colours are found
+// anew: orthogonal matching pursuit. Y. Pati, R. Rezaiifar, P. Krishnaprasad: Orthogonal Matching Pursuit, Asilomar
+// 1993. Then the numbers of all lobes are searched together, and each lobe is exchanged where another one does better.
+// The error is that of fit_models.h.
+#pragma once
+
+#include <functional>
+
+#include "measured/lobe_kinds.h"
+#include "measured/measured_model.h"
+#include "measured/sum_model.h"
+
+namespace brdfc::measured {
+
+struct LobeSum {
+  std::vector<Lobe> lobes;    ///< those that reflect most light first
+  std::vector<double> share;  ///< of the light of the sum, by lobe
+  double error = 0;           ///< share of the light that is misplaced
+  /// The largest albedo of all views that were tried, and where, in degrees to the normal.
+  double brightest = 0, brightest_at = 0;
+  double seconds = 0;  ///< since the fit of sums began
+};
+
+/// The best sums that were found of 1, 2, ... `most` lobes; each has a smaller error than the one before. There are
+/// fewer where another lobe no longer helps, and none for black data. Where the data reflect no more light than comes,
+/// neither does a sum, unless that would cost much: `brightest` says. `progress`, if there is one, is called after
+/// each.
+std::vector<LobeSum> fit_lobes(const Measurement&, const MeasuredModel&, const std::vector<LobeKind>&, std::size_t most,
+                               const std::function<void(const LobeSum&)>& progress = {});
+
+/// The largest number of lobes that can be asked for.
+inline constexpr int kMostLobes = 12;
+
+}  // namespace brdfc::measured

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/sum_model.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "core/sequence.h"
+#include "model/sampling.h"
+
+namespace brdfc::measured {
+namespace {
+
+constexpr int kShareRows = 32, kShareSamples = 256;
+/// A lobe that reflects anything at all is sampled at least so often, because its albedo is known for a few views only.
+constexpr double kLeast = 0.02;
+
+using Shares = SumModel::Shares;
+template <class Term> using Terms = std::vector<std::unique_ptr<Term>>;
+
+/// The lobe that a random number chooses; `u` becomes a random number for that lobe.
+std::size_t choose(const std::vector<double>& shares, double& u) {
+  double before = 0;
+  std::size_t last = 0;
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    if (!(shares[k] > 0)) continue;
+    last = k;
+    if (u < before + shares[k]) break;
+    before += shares[k];
+  }
+  // Rounding may leave `u` at the end of the last lobe.
+  u = std::clamp((u - before) / shares[last], 0., 1 - 1e-16);
+  return last;
+}
+
+class SumBrdf final : public Brdf<double> {
+ public:
+  SumBrdf(Terms<Brdf<double>> terms, std::shared_ptr<const Shares> shares)
+      : terms_(std::move(terms)), shares_(std::move(shares)) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    Rgb<double> f(0);
+    for (const auto& term : terms_) f += term->eval(wi, wo);
+    return f;
+  }
+  double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    const std::vector<double>& shares = shares_->at(wo.z);
+    double p = 0;
+    for (std::size_t k = 0; k < terms_.size(); ++k)
+      if (shares[k] > 0) p += shares[k] * terms_[k]->pdf(wi, wo);
+    return p;
+  }
+  Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const override {
+    double first = u.x;
+    const std::size_t k = choose(shares_->at(wo.z), first);
+    Sample<double> s = terms_[k]->sample(wo, {first, u.y, u.z});
+    if (!(s.pdf > 0)) return {s.wi, Rgb<double>(0), 0};
+    s.pdf = pdf(s.wi, wo);
+    s.weight = eval(s.wi, wo) * (s.wi.z / s.pdf);
+    return s;
+  }
+  Rgb<double> mirror(const Vec3<double>& wo) const override {
+    Rgb<double> out(0);
+    for (const auto& term : terms_) out += term->mirror(wo);
+    return out;
+  }
+  Rgb<double> transmit(const Vec3<double>&) const override { return Rgb<double>(0); }
+  double ior() const override { return 1; }
+  std::array<double, 3> channel_iors() const override { return {1, 1, 1}; }
+  Rgb<double> transmittance(const double&) const override { return Rgb<double>(1); }
+  bool scatters_through() const override { return false; }
+  std::optional<ClosureSum<double>> exact(const Vec3<double>&) const override { return std::nullopt; }
+  ClosureSum<double> base(const Vec3<double>&) const override { return {}; }
+  void assign(const std::string&, const std::array<double, 3>&) override {}
+
+ private:
+  Terms<Brdf<double>> terms_;
+  std::shared_ptr<const Shares> shares_;
+};
+
+class PackedSum final : public PackedBrdf {
+ public:
+  PackedSum(Terms<PackedBrdf> terms, std::shared_ptr<const Shares> shares)
+      : terms_(std::move(terms)), shares_(std::move(shares)) {}
+  PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const override {
+    PackedEvaluation out{Rgb<Pack>(Pack(0)), Pack(0)};
+    std::array<const std::vector<double>*, kLanes> shares;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) shares[lane] = &shares_->at(wo.z[lane]);
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      const PackedEvaluation e = terms_[k]->evaluate(wi, wo);
+      Pack share;
+      for (std::size_t lane = 0; lane < kLanes; ++lane) share[lane] = (*shares[lane])[k];
+      out.f += e.f;
+      out.pdf = out.pdf + share * e.pdf;
+    }
+    return out;
+  }
+  Sample<Pack> sample(const Vec3<Pack>& wo, const Vec3<Pack>& u) const override {
+    std::array<std::size_t, kLanes> chosen;
+    Vec3<Pack> v = u;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      double first = u.x[lane];
+      chosen[lane] = choose(shares_->at(wo.z[lane]), first);
+      v.x[lane] = first;
+    }
+    Sample<Pack> out{{Pack(0), Pack(0), Pack(1)}, Rgb<Pack>(Pack(0)), Pack(0)};
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      if (std::ranges::find(chosen, k) == chosen.end()) continue;
+      const Sample<Pack> s = terms_[k]->sample(wo, v);
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        if (chosen[lane] != k) continue;
+        out.wi.x[lane] = s.wi.x[lane], out.wi.y[lane] = s.wi.y[lane], out.wi.z[lane] = s.wi.z[lane];
+        out.pdf[lane] = s.pdf[lane];
+      }
+    }
+    const PackedEvaluation e = evaluate(out.wi, wo);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!(out.pdf[lane] > 0)) continue;
+      out.pdf[lane] = e.pdf[lane];
+      const double scale = out.wi.z[lane] / e.pdf[lane];
+      out.weight.r[lane] = e.f.r[lane] * scale, out.weight.g[lane] = e.f.g[lane] * scale;
+      out.weight.b[lane] = e.f.b[lane] * scale;
+    }
+    return out;
+  }
+  Rgb<Pack> mirror(const Vec3<Pack>& wo) const override {
+    Rgb<Pack> out(Pack(0));
+    for (const auto& term : terms_) out += term->mirror(wo);
+    return out;
+  }
+  Rgb<Pack> transmit(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
+  Rgb<Pack> transmittance(const Pack&) const override { return Rgb<Pack>(Pack(1)); }
+  Pack ior() const override { return Pack(1); }
+  std::array<Pack, 3> channel_iors() const override { return {Pack(1), Pack(1), Pack(1)}; }
+  void assign(const std::string&, const std::array<Pack, 3>&) override {}
+
+ private:
+  Terms<PackedBrdf> terms_;
+  std::shared_ptr<const Shares> shares_;
+};
+
+Terms<Brdf<double>> terms_of(const std::vector<Lobe>& lobes) {
+  Terms<Brdf<double>> out;
+  for (const Lobe& lobe : lobes) out.push_back(lobe.model->make_double(lobe.values));
+  return out;
+}
+
+[[noreturn]] void no_own_formula() { throw std::logic_error("a sum of models has no formula of its own"); }
+
+}  // namespace
+
+SumModel::Shares::Shares(const std::vector<std::unique_ptr<Brdf<double>>>& terms)
+    : of_row_(kShareRows, std::vector<double>(terms.size())) {
+  for (int row = 0; row < kShareRows; ++row) {
+    std::vector<double>& shares = of_row_[std::size_t(row)];
+    double sum = 0;
+    for (std::size_t k = 0; k < terms.size(); ++k) {
+      Sequence3 points(std::uint64_t(row) + 1);
+      Sequence2 views(std::uint64_t(row) + 101);
+      for (int i = 0; i < kShareSamples; ++i) {
+        const Point2 v = views.next();
+        const Sample<double> s = terms[k]->sample(direction((row + v.x) / kShareRows, 2 * kPi * v.y), points.next());
+        if (s.pdf > 0) shares[k] += luminance(s.weight) / kShareSamples;
+      }
+      sum += shares[k];
+    }
+    // Nothing was reflected in this row: all lobes alike.
+    if (!(sum > 0)) std::ranges::fill(shares, 1), sum = double(terms.size());
+    double all = 0;
+    for (double& s : shares) all += s = std::max(s / sum, kLeast);
+    for (double& s : shares) s /= all;
+  }
+}
+
+const std::vector<double>& SumModel::Shares::at(double cosTheta_o) const {
+  return of_row_[std::size_t(std::clamp(int(cosTheta_o * kShareRows), 0, kShareRows - 1))];
+}
+
+SumModel::SumModel(std::vector<Lobe> lobes)
+    : info_{.name = "sum", .label = "Sum", .look = Look::Matte}, lobes_(std::move(lobes)) {
+  std::vector<std::string> names;
+  for (const Lobe& lobe : lobes_) {
+    const ModelInfo& each = lobe.model->info();
+    names.push_back(each.name);
+    if (each.look != Look::Matte) info_.look = Look::Glossy;
+    info_.properties.reciprocal &= each.properties.reciprocal;
+    info_.properties.isotropic &= each.properties.isotropic;
+  }
+  info_.doc = fmt::format("{}", fmt::join(names, " + "));
+  info_.properties.conserving = info_.properties.exact_sampling = false;
+  shares_ = std::make_shared<Shares>(terms_of(lobes_));
+}
+
+bool SumModel::has_scatter() const {
+  return std::ranges::any_of(lobes_, [](const Lobe& lobe) { return lobe.model->has_scatter(); });
+}
+bool SumModel::has_mirror() const {
+  return std::ranges::any_of(lobes_, [](const Lobe& lobe) { return lobe.model->has_mirror(); });
+}
+
+std::unique_ptr<Brdf<double>> SumModel::make_double(const ParamValues&) const {
+  return std::make_unique<SumBrdf>(terms_of(lobes_), shares_);
+}
+std::unique_ptr<PackedBrdf> SumModel::make_packed(const ParamValues&) const {
+  Terms<PackedBrdf> terms;
+  for (const Lobe& lobe : lobes_) terms.push_back(lobe.model->make_packed(lobe.values));
+  return std::make_unique<PackedSum>(std::move(terms), shares_);
+}
+std::unique_ptr<Brdf<float>> SumModel::make_float(const ParamValues&) const { no_own_formula(); }
+std::unique_ptr<Brdf<Wide>> SumModel::make_wide(const ParamValues&) const { no_own_formula(); }
+std::unique_ptr<Brdf<Expr>> SumModel::record(const ParamValues&) const { no_own_formula(); }
+
+}  // namespace brdfc::measured
