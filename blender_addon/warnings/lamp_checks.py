@@ -13,7 +13,7 @@ SMALL_SUN = 0.02
 #: Up to this size, an ideal mirror shows lamps as dots. A new lamp in Blender is larger (0.1): with
 #: its 4,096 samples, blocks of 8 x 8 pixels differ by less than 1 %.
 SMALL_IN_MIRROR = 0.05
-#: From this angle on (radians), a sun that random rays do not meet is noisy in sharp highlights: its
+#: From this angle on (radians), a sun that random rays do not meet is noisy in highlights: its
 #: light is that of one closure, with f towards one random point of the sun.
 WIDE_SUN = 0.5
 #: Sizes are stored in single precision.
