@@ -811,8 +811,11 @@ def test_warning_multiple_importance(extension, empty):
     empty.collection.objects.link(lamp)
     assert not any(codes(extension, m, empty) for m in made.values())
     data.cycles.use_multiple_importance_sampling = False
-    warned = {key for key, m in made.items() if codes(extension, m, empty)}
-    assert warned == made.keys() - {("blinn", "fitted"), ("blinn", "aimed")}
+    # Aimed forms miss none of the light, but are noisy under a sun that is so wide.
+    for angle, silent in (1.0, set()), (0.4, {("blinn", "aimed")}):
+        data.angle = angle
+        warned = {key for key, m in made.items() if codes(extension, m, empty)}
+        assert warned == made.keys() - {("blinn", "fitted")} - silent
     (found,) = extension.api.warnings(made["blinn", "sampled"], empty)
     assert found.code == "multiple_importance" and "Key" in found.message
     lamp.hide_render = True

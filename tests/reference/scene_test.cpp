@@ -444,6 +444,7 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
        {{"type", "orthographic"}, {"position", {0, 0, 9}}, {"look_at", {0, 1, 0}}, {"height", 2}}},
       {"material", "/materials/red", nullptr},
       {"measured_material", "/materials/red", {{"measured", "a.binary"}}},
+      {"sum_material", "/materials/red", {{"sum", json::array({{{"model", "lambert"}}})}}},
       {"textured", "/materials/red/parameters/rho", {{"texture", checker}}},
       {"image_texture", "/materials/red/parameters/rho/texture", {{"image", "a.png"}}},
       {"checker_texture", "/materials/red/parameters/rho/texture", checker},
