@@ -117,7 +117,7 @@ void add_measured_command(CLI::App& app) {
     std::vector<std::string> models{"all"};
     std::vector<double> at{0, 15, 30, 45, 60, 75, 89};
     bool no_matte = false;
-    int lobes = 0;
+    std::optional<int> lobes;
     std::vector<std::string> from;
   };
   auto o = std::make_shared<Options>();
@@ -135,10 +135,9 @@ void add_measured_command(CLI::App& app) {
       ->delimiter(',')
       ->capture_default_str();
   CLI::Option* lobes =
-      cmd->add_option("--lobes", o->lobes,
-                      "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
-                      "--models names them then")
-          ->check(CLI::Range(1, measured::kMostLobes));
+      add_number(*cmd, "--lobes", o->lobes, {1, measured::kMostLobes},
+                 "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
+                 "--models names them then");
   cmd->add_option("--from", o->from,
                   "Names of the models whose lobes may be in a sum, separated by commas; all that have")
       ->delimiter(',')
@@ -153,7 +152,7 @@ void add_measured_command(CLI::App& app) {
                 "stdout: CSV with header f_r,f_g,f_b,pdf")
       ->excludes("--json");
   cmd->callback([o, cmd] {
-    if (o->lobes > 0 && cmd->count("--models") == 0) o->models = {"none"};
+    if (o->lobes && cmd->count("--models") == 0) o->models = {"none"};
     const auto start = std::chrono::steady_clock::now();
     const measured::Measurement m = measured::read_measurement(o->file, reference::ColorConfig::current().to_rec709());
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
@@ -179,8 +178,8 @@ void add_measured_command(CLI::App& app) {
     for (const auto& view : found.views) j["albedo"].push_back({{"degrees", view.degrees}, {"rgb", rgb(view.albedo)}});
     const std::vector<const Model*> models = models_of(o->models);
     const std::vector<measured::LobeKind> kinds =
-        o->lobes > 0 ? measured::lobe_kinds(o->from, m.isotropic) : std::vector<measured::LobeKind>{};
-    const std::size_t steps = models.size() + std::size_t(o->lobes);
+        o->lobes ? measured::lobe_kinds(o->from, m.isotropic) : std::vector<measured::LobeKind>{};
+    const std::size_t steps = models.size() + std::size_t(o->lobes.value_or(0));
     const auto progress = [&](const Model& last, std::size_t done) {
       fmt::print(stderr, "brdfc measured: {}/{} {}\n", done, steps, last.info().name);
     };
@@ -189,8 +188,8 @@ void add_measured_command(CLI::App& app) {
     j["fits"] = Json::array();
     for (const measured::ModelFit& f : fits) j["fits"].push_back(describe(f));
     std::vector<measured::LobeSum> sums;
-    if (o->lobes > 0) {
-      sums = measured::fit_lobes(m, model, kinds, std::size_t(o->lobes), [&](const measured::LobeSum& sum) {
+    if (o->lobes) {
+      sums = measured::fit_lobes(m, model, kinds, std::size_t(*o->lobes), [&](const measured::LobeSum& sum) {
         fmt::print(stderr, "brdfc measured: {}/{} {}\n", models.size() + sum.lobes.size(), steps,
                    measured::counted(sum.lobes.size(), "lobe", "lobes"));
       });
@@ -217,7 +216,7 @@ void add_measured_command(CLI::App& app) {
           (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
               (f.mirror > 0 ? fmt::format("; its mirror, {:.2g} % of a white world, is not in the data", 100 * f.mirror)
                             : ""));
-    if (o->lobes > 0) print_sums(sums, o->lobes);
+    if (o->lobes) print_sums(sums, *o->lobes);
   });
 }
 

@@ -36,6 +36,10 @@ CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::stri
     return;
   }
   fields_ = header.size();
+  const auto separated_by = [&](char c) { return fields_ == 1 && header[0].find(c) != std::string::npos; };
+  for (const auto& [separator, title] : {std::pair(';', "semicolons"), std::pair('\t', "tabs")})
+    if (columns_.size() > 1 && separated_by(separator))
+      input_error("{}: expected fields separated by commas, got {}: '{:.80}'", where(), title, header[0]);
   for (const std::string& c : columns_) {
     std::size_t i = 0;
     while (i < header.size() && header[i] != c) ++i;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -16,6 +17,10 @@ namespace {
 
 /// Angles are told apart in these steps, in degrees.
 constexpr double kStep = 1e-4;
+/// Angles of unit vectors with six digits that differ by less, in steps, are the same.
+constexpr long kRounding = 100;
+/// Rows of the direction along the normal may differ by this share without a note.
+constexpr double kAlike = 1e-3;
 
 using Angles = std::array<long, 4>;  // theta_i, phi_i, theta_o, phi_o in steps
 
@@ -27,6 +32,70 @@ Angles without_pole(Angles a) {
   for (const std::size_t k : {0, 2})
     if (a[k] == 0) a[k + 1] = 0;
   return a;
+}
+
+struct Row {
+  Angles angles;
+  std::array<float, 3> value;
+  bool wrapped;  ///< an azimuth is given as one below 0 or from 360 on
+  std::string where;
+};
+
+/// Rows of one combination of angles. Only rows of the direction along the normal may be several, one an azimuth.
+struct Entry {
+  std::array<double, 3> sum{}, least, most;
+  int count = 0;
+  bool wrapped = false;
+
+  void add(const Row& row) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double v = double(row.value[c]);
+      sum[c] += v;
+      least[c] = count ? std::min(least[c], v) : v;
+      most[c] = count ? std::max(most[c], v) : v;
+    }
+    ++count;
+    wrapped |= row.wrapped;
+  }
+  std::array<float, 3> mean() const { return {at(0), at(1), at(2)}; }
+  /// By which share of the mean the rows differ.
+  double spread() const {
+    double out = 0;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (most[c] > 0) out = std::max(out, (most[c] - least[c]) * count / sum[c]);
+    return out;
+  }
+
+ private:
+  float at(std::size_t c) const { return float(sum[c] / count); }
+};
+
+/// The angles of an axis, of which those that rounding made different are the same.
+std::map<long, long> without_rounding(const std::set<long>& values) {
+  std::map<long, long> out;
+  for (auto first = values.begin(); first != values.end();) {
+    auto last = first;
+    long sum = *first, count = 1;
+    while (std::next(last) != values.end() && *std::next(last) - *last < kRounding) sum += *++last, ++count;
+    const long mean = *first < kRounding ? 0 : std::lround(double(sum) / double(count));
+    for (++last; first != last; ++first) out[*first] = mean;
+  }
+  return out;
+}
+
+/// Gives angles of unit vectors that rounding made different the same steps.
+void remove_rounding(std::vector<Row>& rows) {
+  for (std::size_t k = 0; k < 4; ++k) {
+    std::set<long> values;
+    const auto counts = [&](const Angles& a) { return k % 2 == 0 || a[k - 1] != 0; };
+    for (Row& row : rows) {
+      if (k % 2 == 1 && row.angles[k] > steps(360) - kRounding) row.angles[k] = 0;
+      if (counts(row.angles)) values.insert(row.angles[k]);
+    }
+    const auto same = without_rounding(values);
+    for (Row& row : rows)
+      if (counts(row.angles)) row.angles[k] = same.at(row.angles[k]);
+  }
 }
 
 std::vector<double> axis_of(const std::set<long>& values) {
@@ -54,6 +123,19 @@ std::array<long, 2> angles_of(const Vec3<double>& w) {
   return angles_of(std::atan2(s, w.z) * 180 / kPi, s > 1e-9 ? std::atan2(w.y, w.x) * 180 / kPi : 0);
 }
 
+/// Sentences on what an axis of angles leaves out.
+void add_gaps(const char* name, const std::vector<double>& at, std::vector<std::string>& notes) {
+  std::vector<double> gaps;
+  for (std::size_t k = 0; k < at.size(); ++k) gaps.push_back((k + 1 < at.size() ? at[k + 1] : at[0] + 360) - at[k]);
+  const auto widest = std::ranges::max_element(gaps);
+  const std::size_t from = std::size_t(widest - gaps.begin());
+  const double width = *widest;
+  *widest = 0;
+  if (width > 2 * *std::ranges::max_element(gaps))
+    notes.push_back(fmt::format("{}: nothing was measured from {:g} to {:g} degrees: linear between these", name,
+                                at[from], from + 1 < at.size() ? at[from + 1] : at[0] + 360));
+}
+
 }  // namespace
 
 Measurement read_csv_grid(const std::filesystem::path& path) {
@@ -67,8 +149,7 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
       split_fields(vectors ? "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,r,g,b" : "theta_i,phi_i,theta_o,phi_o,r,g,b");
   CsvReader csv(in, name, columns);
   if (csv.empty()) input_error("{}: expected a header with the columns {}", name, fmt::join(columns, ","));
-  std::map<Angles, std::array<float, 3>> rows;
-  std::array<std::set<long>, 4> found;
+  std::vector<Row> given;
   std::size_t negative = 0;
   std::vector<double> row;
   while (csv.next(row)) {
@@ -96,11 +177,22 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
       negative += v < 0;
       value[c] = float(std::max(v, 0.));
     }
+    const auto out_of_range = [](double phi) { return phi < 0 || phi >= 360; };
+    given.push_back({a, value, !vectors && (out_of_range(row[1]) || out_of_range(row[3])), csv.where()});
+  }
+  if (vectors) remove_rounding(given);
+  std::map<Angles, Entry> rows;
+  std::array<std::set<long>, 4> found;
+  for (const Row& r : given) {
+    const Angles& a = r.angles;
+    Entry& entry = rows[without_pole(a)];
     const bool pole = a[0] == 0 || a[2] == 0;
-    if (!rows.emplace(without_pole(a), value).second && !pole)
+    const auto same = [&] { return (entry.wrapped || r.wrapped) && entry.mean() == r.value; };
+    if (entry.count > 0 && !pole && !same())
       input_error(
           "{}: expected each combination of angles once: theta_i {}, phi_i {}, theta_o {}, phi_o {} stands twice",
-          csv.where(), degrees(a[0]), degrees(a[1]), degrees(a[2]), degrees(a[3]));
+          r.where, degrees(a[0]), degrees(a[1]), degrees(a[2]), degrees(a[3]));
+    entry.add(r);
     for (std::size_t k = 0; k < 4; ++k)
       if (k % 2 == 0 || a[k - 1] != 0) found[k].insert(a[k]);
   }
@@ -138,7 +230,7 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
         for (const long po : found[3]) {
           const Angles angles{ti, pi, to, po};
           if (const auto found_at = rows.find(without_pole(angles)); found_at != rows.end())
-            table->values[at] = found_at->second;
+            table->values[at] = found_at->second.mean();
           else if (missing++ == 0)
             first = angles;
           ++at;
@@ -151,8 +243,23 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
         degrees(first[3]));
   if (negative)
     out.notes.push_back(fmt::format("{} negative: taken for 0", counted(negative, "number is", "numbers are")));
-  if (table->mirrored)
+  double spread = 0;
+  for (const auto& [angles, entry] : rows) spread = std::max(spread, entry.spread());
+  if (spread > kAlike)
+    out.notes.push_back(fmt::format(
+        "rows of one direction along the normal differ by up to {:.2g} %: their mean is taken", 100 * spread));
+  for (const auto& [axis, title] : {std::pair(&table->theta_i, "theta_i"), std::pair(&table->theta_o, "theta_o")})
+    if (axis->at[0] > 0)
+      out.notes.push_back(fmt::format("{} begins at {:g} degrees: its values there hold below", title, axis->at[0]));
+  if (!isotropic) add_gaps("phi_i", table->phi_i.at, out.notes);
+  if (table->mirrored) {
     out.notes.emplace_back("phi_o lies within half a circle: the other half is taken for its mirror image");
+    if (table->phi_o.at[0] > 0 || table->phi_o.at.back() < 180)
+      out.notes.push_back(fmt::format("phi_o: measured from {:g} to {:g} degrees: the values at these ends hold beyond",
+                                      table->phi_o.at[0], table->phi_o.at.back()));
+  } else {
+    add_gaps("phi_o", table->phi_o.at, out.notes);
+  }
   out.file = name;
   out.format = "CSV";
   out.grid = fmt::format("{} x {} directions of light, {} x {} of view", found[0].size(), found[1].size(),

@@ -30,12 +30,26 @@ def _tool() -> str:
 
 
 def _run(*arguments: str, text: str = "") -> str:
-    done = subprocess.run(
-        [_tool(), "measured", *arguments], input=text, capture_output=True, text=True
-    )
+    tool = _tool()
+    try:
+        done = subprocess.run(
+            [tool, "measured", *arguments], input=text, capture_output=True, text=True
+        )
+    except OSError as error:
+        raise FileNotFoundError(f"the program brdfc, {tool}, can't be run: {error}") from None
     if done.returncode:
         raise ValueError(done.stderr.strip().removeprefix("brdfc: "))
     return done.stdout
+
+
+def _json(*arguments: str):
+    text = _run(*arguments, "--json")
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        raise FileNotFoundError(
+            f"{_tool()} is not the program brdfc: it answers {text[:60]!r}"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -50,6 +64,26 @@ class Fit:
     error: float
     #: Share of a white world's light that the model's ideal mirror reflects: no data hold it.
     mirror: float
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """One of the models whose sum comes close to a measured BRDF."""
+
+    model: str
+    parameters: dict[str, float | tuple[float, float, float] | str]
+    #: The share of the sum's light that is this one's.
+    share: float
+
+
+@dataclass(frozen=True)
+class LobeSum:
+    """A sum of models that comes close to a measured BRDF."""
+
+    #: Those that reflect most light first.
+    lobes: tuple[Lobe, ...]
+    #: Share of the light that the sum sends in other directions.
+    error: float
 
 
 @dataclass(frozen=True)
@@ -84,38 +118,48 @@ class Measured:
         if not ((cosine > 0.0018) & (cosine <= 1)).all():
             raise ValueError("cos_theta_o: expected numbers from 0.0018 to 1")
         at = ",".join(map(repr, np.degrees(np.arccos(cosine)).ravel().tolist()))
-        told = json.loads(_run(self.path, "--json", "--models", "none", "--at", at))
+        told = _json(self.path, "--models", "none", "--at", at)
         return np.array([view["rgb"] for view in told["albedo"]]).reshape(*cosine.shape, 3)
 
     def fits(self, *models: str, matte: bool = True) -> list[Fit]:
         """The models fitted to it, all if none is named, the nearest first. `matte`: light of a
         Lambert surface may be added to those that have none."""
         options = ["--models", ",".join(models) or "all", *([] if matte else ["--no-matte"])]
-        told = json.loads(_run(self.path, "--json", *options))
-
-        def plain(value):
-            return tuple(value) if isinstance(value, list) else value
-
         return [
-            Fit(
-                f["model"],
-                {k: plain(v) for k, v in f["parameters"].items()},
-                plain(f["matte"]),
-                f["error"],
-                f["mirror"],
-            )
-            for f in told["fits"]
+            Fit(f["model"], _values(f), _plain(f["matte"]), f["error"], f["mirror"])
+            for f in _json(self.path, *options)["fits"]
         ]
 
     def fit(self, model: str, *, matte: bool = True) -> Fit:
         """One model fitted to it."""
         return self.fits(model, matte=matte)[0]
 
+    def lobes(self, most: int = 4, *models: str) -> list[LobeSum]:
+        """Sums of 1, 2, ... at most `most` lobes (1 to 12) fitted to it, each nearer than the one
+        before: of all models that have a lobe, or of those named."""
+        options = ["--from", ",".join(models)] if models else []
+        told = _json(self.path, "--models", "none", "--lobes", str(most), *options)
+        return [
+            LobeSum(
+                tuple(Lobe(e["model"], _values(e), e["share"]) for e in found["lobes"]),
+                found["error"],
+            )
+            for found in told["sums"]
+        ]
+
+
+def _plain(value):
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _values(entry):
+    return {name: _plain(value) for name, value in entry["parameters"].items()}
+
 
 def measured(path: str | PathLike[str]) -> Measured:
     """Reads a file. ValueError that says what is wrong with it; FileNotFoundError without the
     program brdfc."""
-    told = json.loads(_run(os.fspath(path), "--json", "--models", "none"))
+    told = _json(os.fspath(path), "--models", "none")
     return Measured(
         os.fspath(path),
         told["format"],

@@ -222,6 +222,48 @@ def test_a_table_is_what_it_was_made_from(tmp_path):
     np.testing.assert_allclose(pairs(file, i, o)[0], brushed(i, o), rtol=1e-6)
 
 
+def test_unit_vectors_of_six_digits(tmp_path):
+    """Rounding makes angles different that were the same."""
+    ti, pi, to, po = grid(range(0, 81, 20), range(0, 360, 30), range(0, 81, 20), range(0, 360, 30))
+    i, o = vector(ti, pi), vector(to, po)
+    file = tmp_path / "m.csv"
+    text = COLUMNS + ",r,g,b\n"
+    for row in np.hstack([i, o, brushed(i, o)]):
+        text += ",".join(f"{x:.6f}" for x in row) + "\n"
+    file.write_text(text, encoding="utf-8")
+    said = told(file)
+    assert said["grid"] == "5 x 12 directions of light, 5 x 12 of view" and said["notes"] == []
+    np.testing.assert_allclose(pairs(file, i, o)[0], brushed(i, o), rtol=1e-3, atol=2e-6)
+
+
+def test_what_a_table_leaves_out_is_said(tmp_path):
+    file = tmp_path / "m.csv"
+
+    def notes(*axes, change=None):
+        ti, pi, to, po = grid(*axes)
+        f = 0 * ti + 0.2
+        if change is not None:
+            f[change(ti, pi, to, po)] *= 1.5
+        file.write_text(angle_table(ti, pi, to, po, f, f, f), encoding="utf-8")
+        return told(file)["notes"]
+
+    theta, circle = [0, 30, 60], range(0, 360, 30)
+    assert notes(theta, circle, theta, circle) == []
+    assert notes(theta, circle, theta, [*circle, 360]) == []
+    (said,) = notes(theta, range(0, 91, 30), theta, circle)
+    assert said == "phi_i: nothing was measured from 90 to 360 degrees: linear between these"
+    (said,) = notes(theta, [0], theta, range(0, 271, 30))
+    assert said == "phi_o: nothing was measured from 270 to 360 degrees: linear between these"
+    _, said = notes(theta, [0], theta, range(0, 151, 30))
+    assert said == "phi_o: measured from 0 to 150 degrees: the values at these ends hold beyond"
+    (said,) = notes([10, 30], circle, theta, circle)
+    assert said == "theta_i begins at 10 degrees: its values there hold below"
+    (said,) = notes(
+        theta, circle, theta, circle, change=lambda ti, pi, to, po: (ti == 0) & (pi == 90)
+    )
+    assert said.startswith("rows of one direction along the normal differ by up to 48 %")
+
+
 def test_more_light_than_comes_is_said(tmp_path):
     file = tmp_path / "m.csv"
     ti, pi, to, po = grid([0, 45, 90], [0], [0, 45, 90], [0, 90, 180])
@@ -282,8 +324,20 @@ BAD = {
         "line 2: theta_i: expected",
     ),
     "twice.csv": (
-        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,360,10,0,1,1,1\n",
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,0,10,0,1,1,1\n",
         "line 3: expected each combination of angles once",
+    ),
+    "turn.csv": (
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,360,10,0,1,1,2\n",
+        "line 3: expected each combination of angles once",
+    ),
+    "semicolons.csv": (
+        b"theta_i;phi_i;theta_o;phi_o;r;g;b\n10;0;10;0;1;1;1\n",
+        "line 1: expected fields separated by commas, got semicolons",
+    ),
+    "tabs.csv": (
+        b"theta_i\tphi_i\ttheta_o\tphi_o\tr\tg\tb\n",
+        "line 1: expected fields separated by commas, got tabs",
     ),
     "gap.csv": (
         b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n20,0,20,0,1,1,1\n10,0,20,0,1,1,1\n",
@@ -536,7 +590,8 @@ try:
 except ValueError as error:
     refused = str(error)
 print(json.dumps([data.format, data.isotropic, data.eval(wi, wo).tolist(), f.tolist(),
-    data.albedo(np.cos(np.radians([0, 45]))).tolist(), fit.error, refused]))
+    data.albedo(np.cos(np.radians([0, 45]))).tolist(), fit.error, refused,
+    [[s.error, [[l.model, l.share] for l in s.lobes]] for s in data.lobes(2, "blinn", "lambert")]]))
 """
     wi, wo = hemisphere(50, 20, 0.1), np.tile([0.6, 0, 0.8], (50, 1))
     np.save(tmp_path / "wi.npy", wi)
@@ -544,13 +599,22 @@ print(json.dumps([data.format, data.isotropic, data.eval(wi, wo).tolist(), f.tol
     command = [sys.executable, "-c", script]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
-    kind, isotropic, f, of_model, albedo, error, refused = json.loads(done.stdout)
+    kind, isotropic, f, of_model, albedo, error, refused, sums = json.loads(done.stdout)
     assert kind == "CSV" and isotropic and error < 0.01
     assert f == pairs(file, wi, wo)[0].tolist()
     np.testing.assert_allclose(of_model, f, rtol=0.1, atol=0.01)
     expected = [v["rgb"] for v in told(file)["albedo"]]
     np.testing.assert_allclose(albedo, [expected[0], expected[3]], rtol=0.01)
     assert refused == "none.binary: expected a file, found none"
-    del environment["BRDFC_TOOL"]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert "FileNotFoundError: measured BRDFs are read by the program brdfc" in done.stderr
+    for count, (off, lobes) in enumerate(sums, 1):
+        assert len(lobes) == count and off < 0.02 and {m for m, _ in lobes} <= {"blinn", "lambert"}
+        assert sum(share for _, share in lobes) == pytest.approx(1)
+    assert sums
+    for tool, expected in [
+        ("", "measured BRDFs are read by the program brdfc"),
+        ("/nowhere/brdfc", "the program brdfc, /nowhere/brdfc, can't be run: "),
+        ("/bin/echo", "/bin/echo is not the program brdfc: it answers 'measured"),
+    ]:
+        environment["BRDFC_TOOL"] = tool
+        done = subprocess.run(command, capture_output=True, text=True, env=environment)
+        assert f"FileNotFoundError: {expected}" in done.stderr, done.stderr
