@@ -195,8 +195,9 @@ class Page:
         return ((mean - of) / of, error / of) if of > 0 else None
 
     def means(self):
-        lines = ["## Means", ""]
-        lines += [
+        introduction = [
+            "## Means",
+            "",
             "Difference of the ball's mean radiance from that of the exact form (of the sampled",
             "form if there is no exact one), and its standard error, in percent. The form compared",
             "with has the largest number of samples that was measured. Differences above 1 % and 5",
@@ -205,6 +206,7 @@ class Page:
             "with has not met the lamp.",
             "",
         ]
+        lines = []
         for form in self.forms:
             places = self.common()
             rows = []
@@ -215,7 +217,7 @@ class Page:
             if rows:
                 lines += [f"### {form}", "", *heading("Model", *(self.title(p) for p in places))]
                 lines += [*rows, ""]
-        return lines if len(lines) > 7 else []
+        return [*introduction, *lines] if lines else []
 
     def penumbras(self):
         places = [p for p in self.places if self.conditions[p[0]]["picked"]]
