@@ -166,8 +166,7 @@ def new_measured_material(found, model=None, representation="auto"):
     if not isinstance(found, Measured):
         found = measured_fits(found)
     if model == "lobes":
-        lobes = [(lobe.model, lobe.parameters) for lobe in found.lobe_sum().lobes]
-        return new_sum(lobes, representation, found.path.stem)
+        return new_sum(found.lobe_sum().lobes, representation, found.path.stem)
     fit = found.fit(model)
     material = new_material(fit.model, representation, **fit.parameters)
     material.name = found.path.stem
@@ -179,10 +178,11 @@ def new_measured_material(found, model=None, representation="auto"):
 def new_sum(lobes, representation="auto", name="Sum"):
     """Makes a material whose light is the sum of that of several models, by Add Shader nodes.
 
-    `lobes`: pairs of a model and a dictionary of its parameters. Raises what new_material() raises;
-    after an error nothing is left in the file.
+    `lobes`: a list of models, each with a dictionary of its parameters, as in
+    `[("lambert", {"rho": (0.2, 0.1, 0.1)}), ("ward", {})]`, or those of a fitted sum. Raises
+    ValueError, and what new_material() raises; after an error nothing is left in the file.
     """
-    (first, values), *others = lobes
+    (first, values), *others = measured.as_pairs(lobes)
     checked = [(model, *_checked(model, representation, given)) for model, given in others]
     material = new_material(first, representation, **values)
     try:

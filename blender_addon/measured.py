@@ -163,6 +163,27 @@ def _values(entry):
     return {k: tuple(v) if isinstance(v, list) else v for k, v in entry["parameters"].items()}
 
 
+def as_pairs(lobes):
+    """A model's name and its parameters for each lobe of a sum. Raises ValueError."""
+    pairs = [
+        (lobe.model, lobe.parameters) if isinstance(lobe, Lobe) else lobe
+        for lobe in (lobes if isinstance(lobes, list | tuple) else ())
+    ]
+    for pair in pairs:
+        if not (isinstance(pair, list | tuple) and [type(x) for x in pair] == [str, dict]):
+            pairs = []
+            break
+    if not pairs:
+        raise ValueError(
+            say(
+                "Expected a list of lobes, each a model and a dictionary of its parameters, got "
+                "{given!r}",
+                given=lobes,
+            )
+        )
+    return pairs
+
+
 def add_matte(tree, node, albedo):
     """Adds the light of a Lambert surface to that of a model's node: Blender's Diffuse node with a
     roughness of 0."""

@@ -190,8 +190,9 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
     const auto same = [&] { return (entry.wrapped || r.wrapped) && entry.mean() == r.value; };
     if (entry.count > 0 && !pole && !same())
       input_error(
-          "{}: expected each combination of angles once: theta_i {}, phi_i {}, theta_o {}, phi_o {} stands twice",
-          r.where, degrees(a[0]), degrees(a[1]), degrees(a[2]), degrees(a[3]));
+          "{}: expected each combination of angles once: theta_i {}, phi_i {}, theta_o {}, phi_o {} stands twice{}",
+          r.where, degrees(a[0]), degrees(a[1]), degrees(a[2]), degrees(a[3]),
+          entry.wrapped || r.wrapped ? ", with other values: azimuths a full turn apart are the same" : "");
     entry.add(r);
     for (std::size_t k = 0; k < 4; ++k)
       if (k % 2 == 0 || a[k - 1] != 0) found[k].insert(a[k]);

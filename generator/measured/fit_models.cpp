@@ -270,6 +270,9 @@ std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pair
   return best;
 }
 
+/// What the ranking goes by: no data show the model's ideal mirror, so its light is misplaced as well.
+double distance(const ModelFit& f) { return f.error + f.mirror; }
+
 }  // namespace
 
 std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
@@ -286,12 +289,13 @@ std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data
   std::vector<ModelFit> out;
   for (auto& f : found)
     if (f) out.push_back(std::move(*f));
-  std::ranges::stable_sort(out, {}, &ModelFit::error);
+  std::ranges::stable_sort(out, {}, distance);
   // A model that contains another one comes as close, whatever it is: the simpler one says more.
   for (std::size_t i = 0; i < out.size(); ++i) {
     const auto begin = out.begin() + long(i);
-    const auto end = std::find_if(
-        begin, out.end(), [&](const ModelFit& f) { return f.error > begin->error * (1 + kAlike) + kNegligible; });
+    const auto end = std::find_if(begin, out.end(), [&](const ModelFit& f) {
+      return distance(f) > distance(*begin) * (1 + kAlike) + kNegligible;
+    });
     const auto simplest = std::ranges::min_element(begin, end, {}, &ModelFit::found);
     std::rotate(begin, simplest, simplest + 1);
   }

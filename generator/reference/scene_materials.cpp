@@ -231,6 +231,9 @@ class MaterialReader {
     if (fits.empty()) as->error("lets light through, which no measured BRDF shows: expected another model");
     const measured::ModelFit& fit = fits.front();
     const ModelInfo& info = fit.model->info();
+    if (fit.mirror > 0)
+      files_.note(fmt::format("{}: {} has a mirror, {:.2g} % of a white world, which is not in the data",
+                              measurement.file, info.name, 100 * fit.mirror));
     if (fit.matte) {
       const Model& lambert = find_model("lambert");
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};

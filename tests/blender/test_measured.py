@@ -131,6 +131,9 @@ def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     materials = len(bpy.data.materials)
     with pytest.raises(ValueError, match="ax"):
         extension.api.new_sum([("ward", {}), ("ward", {"ax": 5})])
+    for given in ([], None, "ward", ["ward", "lambert"], [{"model": "ward"}], [("ward", None)]):
+        with pytest.raises(ValueError, match="Expected a list of lobes, each a model and a dict"):
+            extension.api.new_sum(given)
     assert len(bpy.data.materials) == materials
 
 

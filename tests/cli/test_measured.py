@@ -329,7 +329,7 @@ BAD = {
     ),
     "turn.csv": (
         b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,360,10,0,1,1,2\n",
-        "line 3: expected each combination of angles once",
+        "phi_o 0 stands twice, with other values: azimuths a full turn apart are the same",
     ),
     "semicolons.csv": (
         b"theta_i;phi_i;theta_o;phi_o;r;g;b\n10;0;10;0;1;1;1\n",
