@@ -30,8 +30,8 @@ struct ModelFit {
 /// Whether light of a Lambert surface may be added to the models.
 enum class Matte { None, Added };
 /// The models whose f is not 0, fitted, those with the least sum of error and mirror first; of models whose sums hardly
-/// differ, those with fewer parameters. Light that passes through is not considered. `progress`, if there is one, is called after
-/// each model, from any thread, with the number of models that are done.
+/// differ, those with fewer parameters. Light that passes through is not considered. `progress`, if there is one, is
+/// called after each model, from any thread, with the number of models that are done.
 std::vector<ModelFit> fit_models(const Measurement&, const MeasuredModel&, const std::vector<const Model*>&, Matte,
                                  const std::function<void(const Model&, std::size_t done)>& progress = {});
 
