@@ -64,6 +64,7 @@ def refuse(*_):
     raise AssertionError("made anew")
 
 
+@pytest.mark.slow
 def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
     models = ("ward", "ashikhmin_shirley", "glass")
     made = {}
@@ -86,6 +87,7 @@ def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
     assert not list(bpy.data.node_groups)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"", b"no file of Blender", None])
 def test_a_file_that_is_damaged_is_made_anew(extension, kept, content):
     made = described(formulas(extension.api.new_material("ward", "nodes"), extension))

@@ -59,6 +59,7 @@ def picture(extension, material):
     return found
 
 
+@pytest.mark.slow
 def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     api, nodes = extension.api, extension.nodes
     values = {model: api.get_parameters(m) for model, m in used.items()}
@@ -114,6 +115,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_a_farm_renders_a_lean_file_and_its_moving_lamp(
     extension, empty, kept_program, monkeypatch, tmp_path
 ):
@@ -169,6 +171,7 @@ def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
     api.set_parameters(material, r0=0.2)
 
 
+@pytest.mark.slow
 def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, kept_program):
     api, nodes = extension.api, extension.nodes
     preferences = bpy.context.preferences.addons[extension.package].preferences

@@ -220,6 +220,7 @@ def test_links_and_ranges(extension, empty, tool):
     np.testing.assert_array_equal(render(empty), beyond)
 
 
+@pytest.mark.slow
 def test_a_bent_normal_takes_the_base_away(extension):
     """Cycles would darken a base about it, and the random direction would not compensate."""
 
@@ -306,6 +307,7 @@ def test_albedo_in_a_white_world(extension, empty, tool):
     np.testing.assert_allclose(found, albedo(tool, "cook_torrance", values, [1.0])[0], rtol=3e-3)
 
 
+@pytest.mark.slow
 def test_choices_of_automatic_materials(extension, empty):
     """With OSL off they reach the form inside the group, also as menus (from Blender 5.0 on)."""
     empty.cycles.shading_system = False

@@ -179,6 +179,7 @@ def test_a_pack_that_is_none(empty, extension_zip, tool, tmp_path):
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_value_that_was_cut_away_is_refused(empty, tool, tmp_path):
     source = tmp_path / "s.json"
     content = small("room-radziszewski_alda")

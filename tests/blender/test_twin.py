@@ -306,6 +306,7 @@ def test_all_models_that_scatter_have_a_twin_and_none_takes_it_unasked(extension
         assert extension.pack.resolve(name, "auto", values) != "twin"
 
 
+@pytest.mark.slow
 def test_every_model_renders_without_osl(extension):
     """A row of balls, and their pixels: none is black or has a non-finite value. Glass and ideal
     mirrors are Blender's own nodes."""
