@@ -20,16 +20,6 @@ using Json = nlohmann::ordered_json;
 
 Json rgb(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
 
-/// For people: four digits are more than a measurement has.
-ParamValues rounded(ParamValues values) {
-  const auto digits = [](double& v) { v = std::stod(fmt::format("{:.4g}", v)); };
-  for (auto& [name, value] : values) {
-    if (auto* number = std::get_if<double>(&value)) digits(*number);
-    if (auto* color = std::get_if<std::array<double, 3>>(&value)) std::ranges::for_each(*color, digits);
-  }
-  return values;
-}
-
 std::vector<const Model*> models_of(const std::vector<std::string>& names) {
   if (names == std::vector<std::string>{"none"}) return {};
   if (names == std::vector<std::string>{"all"}) return models_named("");
@@ -87,7 +77,7 @@ void print_sums(const std::vector<measured::LobeSum>& sums, int asked) {
   for (std::size_t i = 0; i < last.lobes.size(); ++i) {
     const ModelInfo& info = last.lobes[i].model->info();
     fmt::print("  {:>6.2f} %  {} {}\n", 100 * last.share[i], info.name,
-               format_values(info, rounded(last.lobes[i].values)));
+               format_values(info, measured::rounded(last.lobes[i].values)));
   }
   if (last.brightest > 1.005)
     fmt::print("  the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees\n", last.brightest,
@@ -212,7 +202,7 @@ void add_measured_command(CLI::App& app) {
     for (const measured::ModelFit& f : fits)
       fmt::print(
           "  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
-          format_values(f.model->info(), rounded(f.values)),
+          format_values(f.model->info(), measured::rounded(f.values)),
           (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
               (f.mirror > 0 ? fmt::format("; its mirror, {:.2g} % of a white world, is not in the data", 100 * f.mirror)
                             : ""));

@@ -275,6 +275,15 @@ double distance(const ModelFit& f) { return f.error + f.mirror; }
 
 }  // namespace
 
+ParamValues rounded(ParamValues values) {
+  const auto digits = [](double& v) { v = std::stod(fmt::format("{:.4g}", v)); };
+  for (auto& [name, value] : values) {
+    if (auto* number = std::get_if<double>(&value)) digits(*number);
+    if (auto* color = std::get_if<std::array<double, 3>>(&value)) std::ranges::for_each(*color, digits);
+  }
+  return values;
+}
+
 std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
                                  const std::vector<const Model*>& models, Matte matte,
                                  const std::function<void(const Model&, std::size_t done)>& progress) {

@@ -27,6 +27,9 @@ struct ModelFit {
   double seconds = 0;
 };
 
+/// The values to four digits, for people: a measurement has no more.
+ParamValues rounded(ParamValues);
+
 /// Whether light of a Lambert surface may be added to the models.
 enum class Matte { None, Added };
 /// The models whose f is not 0, fitted, those with the least sum of error and mirror first; of models whose sums hardly

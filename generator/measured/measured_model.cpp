@@ -3,10 +3,12 @@
 
 #include <stdexcept>
 
+#include "measured/opaque.h"
+
 namespace brdfc::measured {
 namespace {
 
-class MeasuredBrdf final : public Brdf<double> {
+class MeasuredBrdf final : public OpaqueBrdf {
  public:
   MeasuredBrdf(std::shared_ptr<const Table> table, std::shared_ptr<const HalfVectors> sampling)
       : table_(std::move(table)), sampling_(std::move(sampling)) {}
@@ -18,14 +20,6 @@ class MeasuredBrdf final : public Brdf<double> {
     return s;
   }
   Rgb<double> mirror(const Vec3<double>&) const override { return Rgb<double>(0); }
-  Rgb<double> transmit(const Vec3<double>&) const override { return Rgb<double>(0); }
-  double ior() const override { return 1; }
-  std::array<double, 3> channel_iors() const override { return {1, 1, 1}; }
-  Rgb<double> transmittance(const double&) const override { return Rgb<double>(1); }
-  bool scatters_through() const override { return false; }
-  std::optional<ClosureSum<double>> exact(const Vec3<double>&) const override { return std::nullopt; }
-  ClosureSum<double> base(const Vec3<double>&) const override { return {}; }
-  void assign(const std::string&, const std::array<double, 3>&) override {}
 
  private:
   std::shared_ptr<const Table> table_;
@@ -38,7 +32,7 @@ template <class T> void set(Rgb<T>& to, std::size_t lane, const Rgb<double>& val
 Vec3<double> get(const Vec3<Pack>& v, std::size_t lane) { return {v.x[lane], v.y[lane], v.z[lane]}; }
 
 /// Looks eight directions up, one after the other: reading a table is not computing.
-class PackedMeasured final : public PackedBrdf {
+class PackedMeasured final : public OpaquePacked {
  public:
   explicit PackedMeasured(std::unique_ptr<Brdf<double>> brdf) : brdf_(std::move(brdf)) {}
   PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const override {
@@ -60,11 +54,6 @@ class PackedMeasured final : public PackedBrdf {
     return out;
   }
   Rgb<Pack> mirror(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
-  Rgb<Pack> transmit(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
-  Rgb<Pack> transmittance(const Pack&) const override { return Rgb<Pack>(Pack(1)); }
-  Pack ior() const override { return Pack(1); }
-  std::array<Pack, 3> channel_iors() const override { return {Pack(1), Pack(1), Pack(1)}; }
-  void assign(const std::string&, const std::array<Pack, 3>&) override {}
 
  private:
   std::unique_ptr<Brdf<double>> brdf_;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/sequence.h"
+#include "measured/opaque.h"
 #include "model/sampling.h"
 
 namespace brdfc::measured {
@@ -32,7 +33,7 @@ std::size_t choose(const std::vector<double>& shares, double& u) {
   return last;
 }
 
-class SumBrdf final : public Brdf<double> {
+class SumBrdf final : public OpaqueBrdf {
  public:
   SumBrdf(Terms<Brdf<double>> terms, std::shared_ptr<const Shares> shares)
       : terms_(std::move(terms)), shares_(std::move(shares)) {}
@@ -62,21 +63,13 @@ class SumBrdf final : public Brdf<double> {
     for (const auto& term : terms_) out += term->mirror(wo);
     return out;
   }
-  Rgb<double> transmit(const Vec3<double>&) const override { return Rgb<double>(0); }
-  double ior() const override { return 1; }
-  std::array<double, 3> channel_iors() const override { return {1, 1, 1}; }
-  Rgb<double> transmittance(const double&) const override { return Rgb<double>(1); }
-  bool scatters_through() const override { return false; }
-  std::optional<ClosureSum<double>> exact(const Vec3<double>&) const override { return std::nullopt; }
-  ClosureSum<double> base(const Vec3<double>&) const override { return {}; }
-  void assign(const std::string&, const std::array<double, 3>&) override {}
 
  private:
   Terms<Brdf<double>> terms_;
   std::shared_ptr<const Shares> shares_;
 };
 
-class PackedSum final : public PackedBrdf {
+class PackedSum final : public OpaquePacked {
  public:
   PackedSum(Terms<PackedBrdf> terms, std::shared_ptr<const Shares> shares)
       : terms_(std::move(terms)), shares_(std::move(shares)) {}
@@ -126,11 +119,6 @@ class PackedSum final : public PackedBrdf {
     for (const auto& term : terms_) out += term->mirror(wo);
     return out;
   }
-  Rgb<Pack> transmit(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
-  Rgb<Pack> transmittance(const Pack&) const override { return Rgb<Pack>(Pack(1)); }
-  Pack ior() const override { return Pack(1); }
-  std::array<Pack, 3> channel_iors() const override { return {Pack(1), Pack(1), Pack(1)}; }
-  void assign(const std::string&, const std::array<Pack, 3>&) override {}
 
  private:
   Terms<PackedBrdf> terms_;

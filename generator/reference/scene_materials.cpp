@@ -163,14 +163,8 @@ class MaterialReader {
     value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
   }
 
-  /// For people: a measurement has no more digits.
-  static std::string described(const ModelInfo& info, ParamValues values) {
-    const auto digits = [](double& v) { v = std::stod(fmt::format("{:.4g}", v)); };
-    for (auto& [name, value] : values) {
-      if (auto* number = std::get_if<double>(&value)) digits(*number);
-      if (auto* color = std::get_if<std::array<double, 3>>(&value)) std::ranges::for_each(*color, digits);
-    }
-    return format_values(info, values);
+  static std::string described(const ModelInfo& info, const ParamValues& values) {
+    return format_values(info, measured::rounded(values));
   }
 
   /// Measured data as such, or as models that are fitted to them.
