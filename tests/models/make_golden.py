@@ -747,6 +747,89 @@ def beckmann_d_fp(p, hn):
     return math.exp(-(1 - hn**2) / hn**2 / m2) / (math.pi * m2 * hn**4)
 
 
+# ---- Microfacets: Walter et al. 2007, Heitz 2014 -----------------------------------------------
+
+
+def micro_d(p, h):
+    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    slope2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
+    if p["distribution"] == "ggx":
+        return 1 / (mp.pi * ax * ay * h[2] ** 4 * (1 + slope2) ** 2)
+    return mp.exp(-slope2) / (mp.pi * ax * ay * h[2] ** 4)
+
+
+def micro_lambda(p, w):
+    """Heitz's eqs. 72 and 68; for Beckmann's Walter's rational fit of sec. 5.2."""
+    across = mp.sqrt((mp.mpf(p["ax"]) * w[0]) ** 2 + (mp.mpf(p["ay"]) * w[1]) ** 2)
+    if across == 0:
+        return 0
+    a = w[2] / across
+    if p["distribution"] == "ggx":
+        return (mp.sqrt(1 + 1 / a**2) - 1) / 2
+    c = [mp.mpf(x) for x in ("1.259", "0.396", "3.535", "2.181")]
+    return (1 - c[0] * a + c[1] * a**2) / (c[2] * a + c[3] * a**2) if a < mp.mpf("1.6") else 0
+
+
+def micro_fresnel(p, oh):
+    def schlick(r, c):
+        return r + (1 - r) * (1 - c) ** 5
+
+    weaker = oh * (1 - oh) ** 6 / (mp.mpf(1) / 7 * (mp.mpf(6) / 7) ** 6)
+    return [
+        schlick(r, oh) * (1 - (1 - t) * weaker) for r, t in zip(p["f0"], p["tint"], strict=True)
+    ]
+
+
+def micro_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    i, o = micro_lambda(p, ki), micro_lambda(p, ko)
+    g = {
+        "smith_correlated": 1 / (1 + i + o),
+        "smith_separable": 1 / ((1 + i) * (1 + o)),
+        "v_cavity": cavity(h[2], oh, ki[2], ko[2]),
+    }[p["masking"]]
+    shape = micro_d(p, h) * g / (4 * ki[2] * ko[2])
+    return [c * shape for c in micro_fresnel(p, oh)]
+
+
+def micro_pdf(p, wi, wo):
+    """Visible normals, Heitz's eq. 16, of Smith's or of V-cavities, then reflection."""
+    _, ko, h, oh = half(wi, wo)
+    smith = p["distribution"] == "ggx" and p["masking"] != "v_cavity"
+    g1 = 1 / (1 + micro_lambda(p, ko)) if smith else min(1, 2 * h[2] * ko[2] / oh)
+    return micro_d(p, h) * g1 * oh / ko[2] / (4 * oh)
+
+
+def micro_albedo(p, cos_o):
+    """View in the x-z plane; integrated over half vectors."""
+
+    def at(w):
+        s = (p["ax"] * w[0]) ** 2 + (p["ay"] * w[1]) ** 2
+        a = w[2] / math.sqrt(max(s, 1e-300))
+        if p["distribution"] == "ggx":
+            return (math.sqrt(1 + 1 / a**2) - 1) / 2
+        fit = (1 - 1.259 * a + 0.396 * a**2) / (3.535 * a + 2.181 * a**2)
+        return fit if a < 1.6 else 0
+
+    wo = (math.sqrt(1 - cos_o**2), 0, cos_o)
+
+    def one(p, hn, oh, ni, no, phi):
+        sin = math.sqrt(1 - hn**2)
+        h = (sin * math.cos(phi), sin * math.sin(phi), hn)
+        slope2 = ((h[0] / p["ax"]) ** 2 + (h[1] / p["ay"]) ** 2) / hn**2
+        d = 1 / (1 + slope2) ** 2 if p["distribution"] == "ggx" else math.exp(-slope2)
+        d /= math.pi * p["ax"] * p["ay"] * hn**4
+        wi = [2 * oh * a - b for a, b in zip(h, wo, strict=True)]
+        g = {
+            "smith_correlated": lambda: 1 / (1 + at(wi) + at(wo)),
+            "smith_separable": lambda: 1 / ((1 + at(wi)) * (1 + at(wo))),
+            "v_cavity": lambda: cavity(hn, oh, ni, no),
+        }[p["masking"]]()
+        return d * g * oh / no * float(micro_fresnel(p, oh)[0])
+
+    return [half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)] * 3
+
+
 # ---- Ward, in three normalisations -------------------------------------------------------------
 
 
@@ -1196,6 +1279,38 @@ MODELS = {
             {"m": 1, "f0": (1, 1, 1)},
             {"m": 0.3, "f0": (0.04, 0.04, 0.04)},
             {"m": 0.05, "f0": (1, 1, 1)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "microfacet": dict(
+        f=micro_f,
+        pdf=micro_pdf,
+        albedo=micro_albedo,
+        defaults={
+            "f0": (0.9, 0.6, 0.3),
+            "tint": (1, 1, 1),
+            "ax": 0.3,
+            "ay": 0.3,
+            "distribution": "ggx",
+            "masking": "smith_correlated",
+        },
+        cases=[
+            {},
+            {"ax": 0.02, "ay": 0.5, "tint": (0.7, 0.3, 0)},
+            {"ax": 1, "ay": 1, "masking": "smith_separable", "f0": (0, 0.04, 1)},
+            {"ax": 0.4, "ay": 0.1, "masking": "v_cavity"},
+            {"distribution": "beckmann", "ax": 0.1, "ay": 0.6},
+            {"distribution": "beckmann", "masking": "smith_separable", "ax": 1, "ay": 1},
+            {"distribution": "beckmann", "masking": "v_cavity"},
+            {"ax": 1e-4, "ay": 1e-4},
+            {"distribution": "beckmann", "ax": 1e-4, "ay": 1},
+        ],
+        albedo_cases=[
+            {"ax": 0.5, "ay": 0.5, "f0": (1, 1, 1)},
+            {"ax": 0.2, "ay": 0.6, "f0": (0.5, 0.5, 0.5), "tint": (0.5, 0.5, 0.5)},
+            {"f0": (1, 1, 1), "masking": "smith_separable"},
+            {"f0": (1, 1, 1), "masking": "v_cavity"},
+            {"f0": (1, 1, 1), "distribution": "beckmann", "ax": 1, "ay": 1},
         ],
         cosines=[1, 0.5, 0.1],
     ),
