@@ -85,6 +85,12 @@ _COLORED = (
         {"f0": "Color"},
     ),
     Candidate(
+        "microfacet",
+        lambda n: {"f0": n.color, "tint": (1.0, 1.0, 1.0)},
+        Width("ax", 1e-4, 1.0, 2, across="ay", stretched=0.5),
+        {"f0": "Color"},
+    ),
+    Candidate(
         "ward",
         lambda n: {"ks": n.color},
         Width("ax", **_SLOPE, across="ay", stretched=0.5),
