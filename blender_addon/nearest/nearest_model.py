@@ -399,9 +399,13 @@ def _factor(candidate, targets, between):
     """The width factor that misplaces the least light."""
     if candidate.width is None:
         return 1.0
-    return math.exp(
-        _lowest(lambda x: _mean(Target.misplaced, candidate, targets, math.exp(x)), *between)
-    )
+
+    def error_of_log_width(x):
+        return _mean(Target.misplaced, candidate, targets, math.exp(x))
+
+    # The search stops beside the minimum; a model that is the node itself has the typical width.
+    found = _lowest(error_of_log_width, *between), math.log(candidate.width.usual)
+    return math.exp(min(found, key=error_of_log_width))
 
 
 def _lowest(function, low, best, high):
