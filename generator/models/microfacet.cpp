@@ -60,22 +60,22 @@ template <class T> struct Microfacet {
     v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"}.as(
               Optical::Reflectance));
     v(tint, ColorSpec{"tint", "Edge Tint", {1, 1, 1}, "Factor of the reflectance of facets seen at 82 degrees"});
-    v(ax,
-      NumberSpec{"ax", "Roughness X", 0.3, 1e-4, 1, 0.02, 1, "Roughness along the tangent, alpha_x"}.by_factors());
-    v(ay,
-      NumberSpec{"ay", "Roughness Y", 0.3, 1e-4, 1, 0.02, 1, "Roughness across the tangent, alpha_y"}.by_factors());
+    v(ax, NumberSpec{"ax", "Roughness X", 0.3, 1e-4, 1, 0.02, 1, "Roughness along the tangent, alpha_x"}.by_factors());
+    v(ay, NumberSpec{"ay", "Roughness Y", 0.3, 1e-4, 1, 0.02, 1, "Roughness across the tangent, alpha_y"}.by_factors());
     v(distribution, ChoiceSpec{"distribution",
                                "Distribution",
                                {"ggx", "beckmann"},
                                "ggx: a narrow highlight with a wide glow; beckmann: Gaussian slopes"});
-    v(masking, ChoiceSpec{"masking",
-                          "Masking",
-                          {"smith_correlated", "smith_separable", "v_cavity"},
-                          "Facets that hide others. smith_correlated: Heitz 2014; v_cavity: Torrance and Sparrow 1967"});
+    v(masking,
+      ChoiceSpec{"masking",
+                 "Masking",
+                 {"smith_correlated", "smith_separable", "v_cavity"},
+                 "Facets that hide others. smith_correlated: Heitz 2014; v_cavity: Torrance and Sparrow 1967"});
   }
 
   T D(const Vec3<T>& h) const {
-    if (distribution == Ggx) return named("D", T(1) / (pi<T>() * ax * ay * sqr(sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z))));
+    if (distribution == Ggx)
+      return named("D", T(1) / (pi<T>() * ax * ay * sqr(sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z))));
     const Slopes<T> s(h);
     return named("D", exp(-(sqr(s.x / ax) + sqr(s.y / ay))) * sqr(s.inverse_cos2()) / (pi<T>() * ax * ay));
   }
@@ -150,12 +150,18 @@ template <class T> struct Microfacet {
     return sample_if(above(wi, wo), wi, F(k.one_minus_oh) * weight, D(k.h) * v);
   }
 
-  /// The same microfacets, with the Fresnel term at the middle of the lobe. Cycles has one closure for each distribution,
-  /// with Smith's correlated masking; that of the other one is black.
+  /// The same microfacets, with the Fresnel term at the middle of the lobe. Cycles has one closure for each
+  /// distribution, with Smith's correlated masking; that of the other one is black. Separable masking hides more at
+  /// grazing views.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const Rgb<T> none(T(0));
     const T height = lobe_height(wo.z, T(0.7) * (sqr(ax * wo.x) + sqr(ay * wo.y)));
-    const Rgb<T> weight = F(clamp01(T(1) - height));
+    Rgb<T> weight = F(clamp01(T(1) - height));
+    if (masking == SmithSeparable) {
+      // (1 + 2 Lambda) / (1 + Lambda)^2 of the mirrored view, whose light is that of wo.
+      const T z = maximum(wo.z, tiny<T>()), h = hidden(wo);
+      weight = weight * (z / (z + h) * ((z + T(2) * h) / (z + h)));
+    }
     return {facets(ClosureKind::Ggx, distribution == Ggx ? weight : none, ax, ay, T(0)),
             facets(ClosureKind::Beckmann, distribution == Beckmann ? weight : none, ax, ay, T(0))};
   }
