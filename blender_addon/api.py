@@ -31,8 +31,8 @@ from .measured import Measured, MeasuredError
 from .packs import kernel, pack
 from .packs.pack import PackError
 from .trees import shader_trees
-from .warnings import checks, lamp_checks
-from .warnings.checks import Finding
+from .warnings import checks
+from .warnings.rows import Finding
 
 __all__ = [
     "CompileError",
@@ -550,7 +550,7 @@ def enlarge_lamps(scene):
     They become 1 cm large, suns 0.02 rad, and emit as much light as before. Returns two lists of
     names: the enlarged lamps, and the lamps of other files, which stay as they are.
     """
-    return lamp_checks.enlarge(argument_checks.scene(scene))
+    return lamps.enlarge(argument_checks.scene(scene))
 
 
 def make_local(material):

@@ -18,7 +18,6 @@ from .common.jobs import Job
 from .common.program import ToolJob, find
 from .groups import nodes, usage
 from .packs import pack
-from .warnings import lamp_checks
 
 #: Forms that a budget never chooses; users can still ask for them.
 ASKED_FOR = ("twin", "nodes")
@@ -59,7 +58,7 @@ def needs(materials):
     the facts about lamps that the forms depend on: which have no size, and how many can be aimed
     at."""
     found = {"materials": materials}
-    if sizeless := lamp_checks.sizeless_lamps():
+    if sizeless := lamps.sizeless():
         found["sizeless_lamps"] = sizeless
     if pack.has_aimed():
         found["lamps"] = lamps.count()

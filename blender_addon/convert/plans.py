@@ -207,7 +207,7 @@ def plan(materials):
                 if why := editable.refusal(material):
                     raise Refused(why)
                 if shader_trees.shading(material) is None:
-                    raise Refused(shader_trees.nodes_off())
+                    raise Refused(shader_trees.NODES_OFF)
                 if node.bl_idname == "ShaderNodeGroup":
                     raise Refused(say("its shader is inside this node group: ungroup it first"))
                 if node.bl_idname not in KINDS:

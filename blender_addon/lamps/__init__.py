@@ -14,22 +14,26 @@ from .scenes import lamps_of
 from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
+from .sizes import SLACK, enlarge, is_tiny, sizeless, smallest
 from .slots import NO_NEED, SLOTS, Lamp, by_slot, elsewhere, part_names, too_many
 
 __all__ = [
     "NO_NEED",
+    "SLACK",
     "SLOTS",
     "Lamp",
     "by_slot",
     "count",
     "current_scene",
     "elsewhere",
+    "enlarge",
     "ensure_group",
     "find_group",
     "follow",
     "has_importance",
     "is_group",
     "is_sizeless",
+    "is_tiny",
     "lamps_of",
     "last_found",
     "limit_by",
@@ -37,6 +41,8 @@ __all__ = [
     "refresh",
     "register",
     "remove_unused_group",
+    "sizeless",
+    "smallest",
     "too_many",
     "unregister",
 ]

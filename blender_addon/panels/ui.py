@@ -9,11 +9,12 @@ from bpy.types import Menu, Panel
 
 from .. import convert, lamps
 from ..common import color, editable
-from ..common.i18n import button, form_name, iface, of_error, say
+from ..common.i18n import form_name, iface, of_error, say
 from ..groups import nodes
 from ..packs import device, energy, kernel, optical, pack
 from ..trees import shader_trees
 from ..warnings import checks
+from ..warnings.table import BUTTONS, MAKE_LOCAL, UNABLE
 from .labels import wrapped
 from .methods import METHODS
 
@@ -278,27 +279,6 @@ def draw_lamps(layout, material, scene):
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
 
 
-_DOWNLOAD = ("wm.url_open", button("Get Blender"), {"url": "https://www.blender.org/download/"})
-_ENLARGE = ("brdfc.enlarge_lamps", button("Give Lamps a Size"), {})
-_MAKE_LOCAL = ("brdfc.make_local", button("Make Local"), {})
-#: The button for findings of each code: operator, text, properties.
-BUTTONS = {
-    "blender_version": _DOWNLOAD,
-    "no_osl": _DOWNLOAD,
-    "engine": ("brdfc.enable_osl", button("Use Cycles"), {}),
-    "osl_off": ("brdfc.enable_osl", button("Turn On OSL"), {}),
-    "device": ("brdfc.enable_osl", button("Use the CPU"), {}),
-    "device_elsewhere": ("brdfc.enable_osl", button("Use the CPU"), {}),
-    "outdated": ("brdfc.update", button("Update Materials"), {}),
-    "newer": ("screen.userpref_show", button("Look for Updates"), {"section": "EXTENSIONS"}),
-    "bump_correction": ("brdfc.fix_material", button("Set Up Material"), {}),
-    "path_guiding": ("brdfc.no_guiding", button("Turn Off Path Guiding"), {}),
-    "lost_lamps": _ENLARGE,
-    "zero_size_lights": _ENLARGE,
-    "linked_lamps": _MAKE_LOCAL,
-}
-
-
 def _more(layout, said):
     """A button for the details of a sentence, if it has any."""
     if more := getattr(said, "more", ""):
@@ -329,13 +309,13 @@ def draw_findings(layout, found):
 def draw_material(layout, material, scene):
     """The whole panel of a material, beginning with the findings that change the picture."""
     found = checks.warnings(material, scene)
-    first = [f for f in found if f.severity == "ERROR" or f.code in checks.UNABLE]
+    first = [f for f in found if f.severity == "ERROR" or f.code in UNABLE]
     draw_findings(layout, first)
     ours = nodes.group_nodes(material)
     if why := editable.refusal(material, *(node.id_data for node in ours)):
         wrapped(layout.column(align=True), why, "LINKED")
-        if not any(BUTTONS.get(f.code) == _MAKE_LOCAL for f in found):
-            layout.operator(_MAKE_LOCAL[0], text=_MAKE_LOCAL[1], icon="CHECKMARK")
+        if not any(BUTTONS.get(f.code) == MAKE_LOCAL for f in found):
+            layout.operator(MAKE_LOCAL.operator, text=MAKE_LOCAL.text, icon="CHECKMARK")
     for node in ours:
         draw_node(layout.box(), node, scene)
     draw_lamps(layout, material, scene)

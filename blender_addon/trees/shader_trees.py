@@ -14,6 +14,8 @@ import bpy
 from ..common.i18n import say
 from ..packs import pack
 
+#: The message for a material that has nodes but does not use them.
+NODES_OFF = say("Use Nodes is off in this material's settings: Blender shows none of its nodes")
 #: Before 5.0, a socket linked to a reroute or muted node without input gets 0; since then it has
 #: its own value.
 _ZERO = bpy.app.version < (5, 0, 0)
@@ -56,11 +58,6 @@ def shading(owner):
     if switch is None or getattr(switch, "is_deprecated", False) or owner.use_nodes:
         return owner.node_tree
     return None
-
-
-def nodes_off():
-    """The message for a material that has nodes but does not use them."""
-    return say("Use Nodes is off in this material's settings: Blender shows none of its nodes")
 
 
 def _surface(tree):

@@ -13,6 +13,7 @@
 
 #include "app/commands.h"
 #include "app/numbers.h"
+#include "app/scene_needs.h"
 #include "check/check.h"
 #include "core/data_dir.h"
 #include "core/parse.h"
@@ -42,24 +43,6 @@ void print_table(const pack::Result& result) {
                l.representation, l.closures, l.slots, l.operations,
                l.error.relative_l1 ? fmt::format("{:.2e}", *l.error.relative_l1) : "expectation", l.error.albedo,
                l.table_floats, l.table_error, l.bytes, l.albedo_bytes);
-}
-
-/// How the materials of a scene use their models; `views` has the angles from which each material is seen, if known.
-std::vector<plan::MaterialNeed> needs_of(const std::vector<reference::Material>& materials,
-                                         const std::vector<Cosines>& views = {}) {
-  reference::require_models(materials);
-  std::vector<plan::MaterialNeed> needs;
-  for (std::size_t i = 0; i < materials.size(); ++i) {
-    const reference::Material& m = materials[i];
-    const Cosines seen = views.empty() ? Cosines{} : views[i];
-    for (const measured::Lobe& lobe : m.sum)
-      needs.push_back({m.id, lobe.model, lobe.values, {}, m.representation, seen});
-    if (!m.sum.empty()) continue;
-    plan::MaterialNeed need{m.id, m.model, m.values, m.varying, m.representation, seen};
-    for (const auto& [name, image] : m.textures) need.textured.insert(name);
-    needs.push_back(std::move(need));
-  }
-  return needs;
 }
 
 /// The relative L1 error, or a statement that the form equals the model in expectation. Null for a form that these
@@ -204,7 +187,7 @@ void run(const Options& options) {
       if (given) input_error("build: {} goes with --scene FILE or --materials FILE", name);
   pack::require_target(options.out);
   const std::filesystem::path addon =
-      options.addon.empty() ? data_dir() / "blender_addon" : std::filesystem::path(options.addon);
+      options.addon.empty() ? data_path("blender_addon") : std::filesystem::path(options.addon);
   const std::filesystem::path costs = addon / "costs.csv";
   // A .blend file states which representation its nodes have, but not which others they could have.
   plan::Budget budget{{}, !options.materials.empty(), options.twin, options.fit_bases, {}, plan::Costs(costs)};
@@ -217,7 +200,7 @@ void run(const Options& options) {
   }
   std::vector<plan::PlannedModel> plan;
   if (!options.scene.empty()) {
-    const reference::Scene scene = reference::load_scene(options.scene);
+    const reference::Scene scene = load_scene(options.scene);
     print_notes(scene.notes);
     for (const reference::Light& l : scene.lights)
       if ((l.kind == reference::Light::Kind::Point || l.kind == reference::Light::Kind::Sun) && l.radius == 0)
@@ -234,7 +217,7 @@ void run(const Options& options) {
     plan = plan::plan_models(options.models);
   }
   for (const plan::PlannedModel& p : plan) check::require_vital(*p.model);
-  pack::Options pack{options.out, addon, data_dir() / "python" / "brdfc", plan, budget.costs, {}};
+  pack::Options pack{options.out, addon, data_path("python/brdfc"), plan, budget.costs, {}};
   const std::string& cut_to = options.scene.empty() ? options.materials : options.scene;
   pack.cut = std::filesystem::path(cut_to).stem().string();
   const auto start = std::chrono::steady_clock::now();

@@ -117,7 +117,8 @@ void add_measured_command(CLI::App& app) {
       "it,\n"
       "the best first: the share of the light that the model sends in other directions, and its parameters.\n"
       "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), or a table (.csv) with the columns\n"
-      "theta_i,phi_i,theta_o,phi_o in degrees, or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and r,g,b in 1/sr, a row for every\n"
+      "theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and "
+      "r,g,b in 1/sr, a row for every\n"
       "combination of angles. Colours are linear Rec.709.");
   cmd->add_option("file", o->file, "The file")->required();
   cmd->add_flag("--json", o->json, "JSON");
@@ -129,7 +130,7 @@ void add_measured_command(CLI::App& app) {
                  "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
                  "--models names them then");
   cmd->add_option("--from", o->from,
-                  "Names of the models whose lobes may be in a sum, separated by commas; all that have")
+                  "Names of the models whose lobes may be in a sum, separated by commas; all that have some")
       ->delimiter(',')
       ->needs(lobes);
   cmd->add_flag("--no-matte", o->no_matte,
@@ -140,9 +141,15 @@ void add_measured_command(CLI::App& app) {
                 "The BRDF in 1/sr for pairs of directions, and the pdf of the reference renderer's samples, instead.\n"
                 "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
                 "stdout: CSV with header f_r,f_g,f_b,pdf")
-      ->excludes("--json");
+      ->excludes("--json")
+      ->excludes("--models")
+      ->excludes("--lobes")
+      ->excludes("--from")
+      ->excludes("--no-matte")
+      ->excludes("--at");
   cmd->callback([o, cmd] {
     if (o->lobes && cmd->count("--models") == 0) o->models = {"none"};
+    if (o->from == std::vector<std::string>{"all"}) o->from.clear();
     const auto start = std::chrono::steady_clock::now();
     const measured::Measurement m = measured::read_measurement(o->file, reference::ColorConfig::current().to_rec709());
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;

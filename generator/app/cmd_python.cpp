@@ -26,20 +26,20 @@ void write(const fs::path& path, const std::string& text) {
 }
 
 void run(const fs::path& out) {
-  const fs::path data = data_dir(), package = out / "brdfc";
+  const fs::path package = out / "brdfc";
   pack::require_package(package);
   pack::make_folder(out);
-  const auto files = pack::python_package(models_named(""), data / "python" / "brdfc");
+  const auto files = pack::python_package(models_named(""), data_path("python/brdfc"));
   // Otherwise modules of models that no longer exist would become part of a wheel.
   fs::remove_all(package);
   for (const auto& [name, module] : files) write(package / name, module);
-  const fs::path project = data / "python" / "pyproject.toml";
+  const fs::path project = data_path("python/pyproject.toml");
   std::string text = pack::read_text(project);
   pack::stamp(text, project, "version", pack::quoted("@version@"), pack::quoted(BRDFC_VERSION));
   pack::stamp(text, project, "tool", R"(["brdfc-tool ==@version@"])",
               fmt::format(R"(["brdfc-tool =={}"])", BRDFC_VERSION));
   write(out / "pyproject.toml", text);
-  write(out / "LICENSE", pack::read_text(data / "LICENSE"));
+  write(out / "LICENSE", pack::read_text(data_path("LICENSE")));
   std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; pip wheel " << out.string()
             << " makes a wheel of them\n";
 }

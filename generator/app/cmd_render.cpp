@@ -9,6 +9,7 @@
 
 #include "app/commands.h"
 #include "app/numbers.h"
+#include "app/scene_needs.h"
 #include "core/process.h"
 #include "pictures/pictures.h"
 #include "reference/color.h"
@@ -125,7 +126,7 @@ void add_render_command(CLI::App& app) {
         input_error("--view {}: expected one of {}, the views of {}", options->view, fmt::join(views, ", "),
                     reference::ColorConfig::current().file().string());
     }
-    const reference::Scene scene = reference::load_scene(options->scene);
+    const reference::Scene scene = load_scene(options->scene);
     print_notes(scene.notes);
     reference::RenderOptions r;
     r.settings = scene.settings;

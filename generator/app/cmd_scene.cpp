@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "app/commands.h"
+#include "app/scene_needs.h"
 #include "reference/scene.h"
 
 namespace brdfc::app {
@@ -16,7 +17,7 @@ void add_scene_command(CLI::App& app) {
   command->add_option("SCENE", options->scene, "Scene file (.json)")->required();
   command->add_option("--out", options->out, "Folder to write scene.json to")->required();
   command->callback([options] {
-    const reference::Scene scene = reference::load_scene(options->scene);
+    const reference::Scene scene = load_scene(options->scene);
     print_notes(scene.notes);
     reference::require_models(scene.materials);
     reference::write_resolved(scene, options->out);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/csv.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -15,57 +16,73 @@ std::string trim(const std::string& s) {
 
 std::vector<std::string> split_fields(const std::string& line) {
   std::vector<std::string> fields;
-  std::size_t start = 0;
+  std::size_t at = 0;
   for (;;) {
-    const auto comma = line.find(',', start);
-    fields.push_back(trim(line.substr(start, comma == std::string::npos ? comma : comma - start)));
+    const auto first = line.find_first_not_of(" \t\r", at);
+    std::string field;
+    if (first != std::string::npos && line[first] == '"') {
+      // A quote is written twice between quotes.
+      for (at = first + 1; at < line.size(); ++at) {
+        if (line[at] == '"' && (++at == line.size() || line[at] != '"')) break;
+        field += line[at];
+      }
+    }
+    const auto comma = line.find(',', at);
+    field += line.substr(std::min(at, line.size()), comma == std::string::npos ? comma : comma - at);
+    fields.push_back(trim(field));
     if (comma == std::string::npos) return fields;
-    start = comma + 1;
+    at = comma + 1;
   }
 }
 
-std::string without_byte_order_mark(const std::string& line) {
-  return line.starts_with("\xEF\xBB\xBF") ? line.substr(3) : line;
+std::vector<std::string> split_header(const std::string& line) {
+  auto fields = split_fields(line.starts_with("\xEF\xBB\xBF") ? line.substr(3) : line);
+  for (std::string& f : fields)
+    for (char& c : f)
+      if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  return fields;
 }
 
 CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::string> columns)
     : in_(in), source_(std::move(source)), columns_(std::move(columns)) {
-  std::vector<std::string> header;
-  if (!read_line(header)) {
+  std::string line;
+  if (!read_line(line)) {
     line_ = 0;
     return;
   }
+  const std::vector<std::string> header = split_header(line);
   fields_ = header.size();
   const auto separated_by = [&](char c) { return fields_ == 1 && header[0].find(c) != std::string::npos; };
   for (const auto& [separator, title] : {std::pair(';', "semicolons"), std::pair('\t', "tabs")})
     if (columns_.size() > 1 && separated_by(separator))
       input_error("{}: expected fields separated by commas, got {}: '{:.80}'", where(), title, header[0]);
   for (const std::string& c : columns_) {
-    std::size_t i = 0;
-    while (i < header.size() && header[i] != c) ++i;
-    if (i == header.size())
+    const auto found = std::find(header.begin(), header.end(), c);
+    if (found == header.end())
       input_error("{}: expected a header with the columns {}; '{}' is missing, got '{:.80}'", where(),
                   fmt::join(columns_, ","), c, fmt::to_string(fmt::join(header, ",")));
-    where_.push_back(i);
+    if (std::find(found + 1, header.end(), c) != header.end())
+      input_error("{}: expected one column {}, found several", where(), c);
+    where_.push_back(std::size_t(found - header.begin()));
   }
+  for (const std::string& name : header)
+    if (std::find(columns_.begin(), columns_.end(), name) == columns_.end()) others_.push_back(name);
 }
 
 std::string CsvReader::where() const { return fmt::format("{} line {}", source_, line_); }
 
-bool CsvReader::read_line(std::vector<std::string>& fields) {
-  std::string line;
+bool CsvReader::read_line(std::string& line) {
   while (std::getline(in_, line)) {
-    if (++line_ == 1) line = without_byte_order_mark(line);
-    if (trim(line).empty()) continue;
-    fields = split_fields(line);
-    return true;
+    ++line_;
+    if (!trim(line).empty()) return true;
   }
   return false;
 }
 
 bool CsvReader::next(std::vector<double>& row) {
-  std::vector<std::string> fields;
-  if (!read_line(fields)) return false;
+  std::string line;
+  if (!read_line(line)) return false;
+  const std::vector<std::string> fields = split_fields(line);
   if (fields.size() != fields_)
     input_error("{}: expected {} values as in the header, got {}", where(), fields_, fields.size());
   row.clear();

@@ -15,21 +15,24 @@ namespace brdfc::inline core {
 
 /// The text without leading and trailing spaces, tabs and carriage returns.
 std::string trim(const std::string&);
-/// The fields of a line, which commas separate, each trimmed.
+/// The fields of a line, which commas separate, each trimmed. Quotes around a field are left out; a comma between
+/// quotes is part of the field.
 std::vector<std::string> split_fields(const std::string& line);
+/// The same of a table's first line, for names that may have capitals, and without the mark with which some programs
+/// begin a file in UTF-8.
+std::vector<std::string> split_header(const std::string& line);
 
 /// Reads numbers from named columns. The columns may come in any order, and other columns are ignored, so that the
-/// output of one command can be the input of the next. Every error is an InputError that names line, column and what
-/// was expected. Numbers must be finite.
-/// The first line of a file in UTF-8 without the mark with which some programs begin it.
-std::string without_byte_order_mark(const std::string& line);
-
+/// output of one command can be the input of the next. Capitals in their names do not matter. Every error is an
+/// InputError that names line, column and what was expected. Numbers must be finite.
 class CsvReader {
  public:
   /// Reads the header. For an input without any line empty() is true; only the caller can tell whether that is an
   /// error.
   CsvReader(std::istream&, std::string source, std::vector<std::string> columns);
   bool empty() const { return line_ == 0; }
+  /// The names of other columns, which are ignored.
+  const std::vector<std::string>& others() const { return others_; }
   /// Reads the next line's numbers, in the order of `columns`. Returns false at the end. Blank lines are skipped.
   bool next(std::vector<double>& row);
   /// The place of the row read last, for messages: "stdin line 7".
@@ -39,11 +42,11 @@ class CsvReader {
   Vec3<double> unit_vector(const std::vector<double>& row, std::size_t first) const;
 
  private:
-  bool read_line(std::vector<std::string>& fields);
+  bool read_line(std::string& line);
 
   std::istream& in_;
   std::string source_;
-  std::vector<std::string> columns_;
+  std::vector<std::string> columns_, others_;
   std::vector<std::size_t> where_;  // index of each column's field in a line
   std::size_t fields_ = 0;
   int line_ = 0;

@@ -21,11 +21,13 @@ bool holds_data(const fs::path& folder) {
 
 }  // namespace
 
-fs::path data_dir() {
+fs::path data_dir(const fs::path& needed) {
+  const std::string missing = (needed.empty() ? fs::path(kSign) : needed).generic_string();
   if (const char* given = std::getenv("BRDFC_DATA"); given && *given) {
     if (!holds_data(given))
-      input_error("BRDFC_DATA={}: expected a folder with {}: share/brdfc of an installation, or the sources", given,
-                  kSign);
+      input_error(
+          "{} is needed: expected the tool's data in BRDFC_DATA={}: share/brdfc of an installation, or the sources",
+          missing, given);
     return given;
   }
   const fs::path program = program_file(), installed = program.parent_path().parent_path() / "share" / "brdfc";
@@ -33,10 +35,12 @@ fs::path data_dir() {
   for (fs::path above = program.parent_path(); above != above.parent_path(); above = above.parent_path())
     if (holds_data(above)) return above;
   input_error(
-      "the tool's data: expected {} in {} or a folder above {}; the environment variable BRDFC_DATA names another "
-      "folder",
-      kSign, installed.string(), program.string());
+      "{} is needed, and the tool's data were not found: looked for in {} and in the folders above {}; the environment "
+      "variable BRDFC_DATA names another folder",
+      missing, installed.string(), program.string());
 }
+
+fs::path data_path(const fs::path& needed) { return data_dir(needed) / needed; }
 
 std::optional<fs::path> cache_dir() {
   if (const char* given = std::getenv("BRDFC_CACHE")) return *given ? std::optional<fs::path>(given) : std::nullopt;

@@ -104,13 +104,44 @@ std::vector<double> axis_of(const std::set<long>& values) {
   return out;
 }
 
-bool has_vectors(const std::string& file) {
+/// The directions of a table, and the units of their angles.
+enum class Columns { Vectors, Angles, Degrees, Radians };
+const std::vector<std::string>& names_of(Columns columns) {
+  static const std::vector<std::string> names[] = {split_fields("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,r,g,b"),
+                                                   split_fields("theta_i,phi_i,theta_o,phi_o,r,g,b"),
+                                                   split_fields("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b"),
+                                                   split_fields("theta_i_rad,phi_i_rad,theta_o_rad,phi_o_rad,r,g,b")};
+  return names[std::size_t(columns)];
+}
+
+/// What the first column of a table of its kind says; angles where there is none.
+Columns columns_of(const std::string& file) {
   std::ifstream in(file);
   std::string line;
   while (trim(line).empty() && std::getline(in, line)) {
   }
-  const auto fields = split_fields(without_byte_order_mark(line));
-  return std::find(fields.begin(), fields.end(), "wi_x") != fields.end();
+  const auto header = split_header(line);
+  for (const Columns c : {Columns::Vectors, Columns::Degrees, Columns::Radians})
+    if (std::find(header.begin(), header.end(), names_of(c)[0]) != header.end()) return c;
+  return Columns::Angles;
+}
+
+/// Radians of a few digits in degrees: whole degrees stay whole.
+double degrees_of_radians(double radians) {
+  const double degrees = radians * 180 / kPi, whole = std::round(degrees);
+  return std::abs(degrees - whole) < double(kRounding) / 2 * kStep ? whole : degrees;
+}
+
+/// Whether angles that are taken for degrees are likely to be radians: all are small, and some of each kind that
+/// matters are not 0. A highlight measured within 1.5 degrees of the normal alone is not a BRDF.
+bool look_like_radians(const std::array<std::set<long>, 4>& found) {
+  const auto within = [](const std::set<long>& values, double most) {
+    return values.empty() || degrees(*values.rbegin()) <= most + 1e-3;
+  };
+  std::set<long> thetas = found[0];
+  thetas.insert(found[2].begin(), found[2].end());
+  thetas.erase(0);
+  return thetas.size() > 1 && within(thetas, kPi / 2) && within(found[1], 2 * kPi) && within(found[3], 2 * kPi);
 }
 
 /// `theta` and `phi` in steps, phi in [0, 360).
@@ -144,9 +175,9 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error) || !in)
     input_error("{}: expected a CSV file that can be read", name);
-  const bool vectors = has_vectors(name);
-  const std::vector<std::string> columns =
-      split_fields(vectors ? "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,r,g,b" : "theta_i,phi_i,theta_o,phi_o,r,g,b");
+  const Columns kind = columns_of(name);
+  const bool vectors = kind == Columns::Vectors;
+  const std::vector<std::string>& columns = names_of(kind);
   CsvReader csv(in, name, columns);
   if (csv.empty()) input_error("{}: expected a header with the columns {}", name, fmt::join(columns, ","));
   std::vector<Row> given;
@@ -160,12 +191,15 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
       const auto i = angles_of(wi), o = angles_of(wo);
       a = {i[0], i[1], o[0], o[1]};
     } else {
+      const char* unit = kind == Columns::Radians ? "radians that are degrees" : "degrees";
+      if (kind == Columns::Radians)
+        for (const std::size_t k : {0, 1, 2, 3}) row[k] = degrees_of_radians(row[k]);
       for (const std::size_t theta : {0, 2})
         if (!(row[theta] >= 0 && row[theta] <= 90))
-          input_error("{}: {}: expected degrees from 0 to 90, got {}", csv.where(), columns[theta], row[theta]);
+          input_error("{}: {}: expected {} from 0 to 90, got {}", csv.where(), columns[theta], unit, row[theta]);
       for (const std::size_t phi : {1, 3})
         if (!(std::abs(row[phi]) <= 1e6))
-          input_error("{}: {}: expected degrees, got {}", csv.where(), columns[phi], row[phi]);
+          input_error("{}: {}: expected {}, got {}", csv.where(), columns[phi], unit, row[phi]);
       const auto i = angles_of(row[0], row[1]), o = angles_of(row[2], row[3]);
       a = {i[0], i[1], o[0], o[1]};
     }
@@ -198,6 +232,13 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
       if (k % 2 == 0 || a[k - 1] != 0) found[k].insert(a[k]);
   }
   if (rows.empty()) input_error("{}: expected rows below the header, found none", name);
+  if (kind == Columns::Angles && look_like_radians(found))
+    input_error(
+        "{}: theta_i, theta_o: expected degrees, and the largest is {}: name the columns {} for angles in radians, {} "
+        "for such small ones",
+        name, degrees(std::max(*found[0].rbegin(), *found[2].rbegin())),
+        fmt::join(names_of(Columns::Radians).begin(), names_of(Columns::Radians).begin() + 4, ","),
+        fmt::join(names_of(Columns::Degrees).begin(), names_of(Columns::Degrees).begin() + 4, ","));
   for (std::set<long>& values : found)
     if (values.empty()) values.insert(0);
 
@@ -216,6 +257,10 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
           name, found[0].size(), found[1].size(), found[2].size(), found[3].size(), rows.size());
   }
   Measurement out;
+  if (!csv.others().empty())
+    out.notes.push_back(fmt::format("{} not known and not read: {}",
+                                    csv.others().size() == 1 ? "a column is" : "columns are",
+                                    fmt::join(csv.others(), ", ")));
   const bool isotropic = found[1].size() == 1;
   if (isotropic && *found[1].begin() != 0)
     input_error("{}: phi_i: expected 0 where it has one value, got {}", name, degrees(*found[1].begin()));

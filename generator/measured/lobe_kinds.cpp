@@ -92,12 +92,11 @@ std::vector<LobeKind> lobe_kinds(const std::vector<std::string>& names, bool iso
     return names.empty() || std::ranges::find(names, model) != names.end();
   };
   for (const std::string& name : names) {
-    find_model(name);
     if (std::ranges::none_of(rows(), [&](const Row& row) { return row.model == name; })) {
       std::vector<std::string> known;
       for (const Row& row : rows())
         if (known.empty() || known.back() != row.model) known.emplace_back(row.model);
-      input_error("{} has no lobe for a sum, expected some of {}", name, fmt::join(known, ", "));
+      input_error("{} has no lobe for a sum, expected all or some of {}", name, fmt::join(known, ", "));
     }
   }
   std::vector<LobeKind> out;

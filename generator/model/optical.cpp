@@ -198,7 +198,7 @@ Substance read_substance(const fs::path& path) {
 const std::vector<Substance>& substances() {
   static const auto all = [] {
     std::vector<Substance> out;
-    const fs::path folder = data_dir() / "data" / "optical";
+    const fs::path folder = data_path("data/optical");
     for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
       out.push_back(read_substance(entry.path()));
       out.back().name = entry.path().stem().string();

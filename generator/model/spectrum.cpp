@@ -11,7 +11,7 @@ namespace brdfc::inline model {
 
 const std::array<Xyz, kWavelengths>& xyz_weights() {
   static const auto weights = [] {
-    const std::string file = (data_dir() / "data" / "color" / "observer.csv").string();
+    const std::string file = data_path("data/color/observer.csv").string();
     std::ifstream in(file);
     CsvReader csv(in, file, {"nm", "x", "y", "z", "d65"});
     std::array<Xyz, kWavelengths> w;

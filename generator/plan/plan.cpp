@@ -172,6 +172,30 @@ std::string under_lamps(const Form& form, const Budget& budget) {
   return fmt::format("; {} without a size shines {}", fmt::join(budget.sizeless, ", "), shine);
 }
 
+/// Reason, as the end of a sentence, why a material can't have a form that it asks for; empty if it can. `needs`: all
+/// materials of its model.
+std::string refusal(const MaterialNeed& need, const Needs& needs, const Form& form) {
+  if (form.made_of_fit()) {
+    const auto reason = unfit(needs, form);
+    return reason ? fmt::format("has no form '{}' here: {}", form.name(), *reason) : "";
+  }
+  const std::vector<const Form*> known = forms::forms_of(*need.model);
+  if (std::find(known.begin(), known.end(), &form) == known.end()) return fmt::format("has no form '{}'", form.name());
+  const std::string choice = lacking(need, form);
+  return choice.empty() ? "" : fmt::format("has the form '{}' only for {}", form.name(), choice);
+}
+
+void require_form(const MaterialNeed& need, const Needs& needs, const std::string& place) {
+  const auto asked = std::ranges::find(forms::forms(), need.representation, &Form::name);
+  const std::string why = asked == forms::forms().end() ? fmt::format("has no form '{}'", need.representation)
+                                                        : refusal(need, needs, **asked);
+  if (why.empty()) return;
+  std::vector<std::string> has{"auto"};
+  for (const Form* form : forms::forms())
+    if (refusal(need, needs, *form).empty()) has.push_back(form->name());
+  input_error("{}: {} {}; it has {}", place, need.model->info().name, why, fmt::join(has, ", "));
+}
+
 Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& budget) {
   const std::vector<const Form*> known = forms::forms_of(*need.model);
   if (need.representation == "auto") {
@@ -187,19 +211,8 @@ Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& b
     }
     return within_time(needs, order, budget);
   }
-  const Form* form = forms::form(need.representation);
-  if (form->made_of_fit()) {
-    if (const auto reason = unfit(needs, *form))
-      input_error("material {}: {} has no form '{}' here: {}", need.id, need.model->info().name, need.representation,
-                  *reason);
-    return {form, "asked for"};
-  }
-  if (std::find(known.begin(), known.end(), form) == known.end())
-    input_error("material {}: {} has no form '{}'", need.id, need.model->info().name, need.representation);
-  if (const std::string choice = lacking(need, *form); !choice.empty())
-    input_error("material {}: {} has the form '{}' only for {}", need.id, need.model->info().name, need.representation,
-                choice);
-  return {form, "asked for"};
+  require_form(need, needs, "material " + need.id);
+  return {forms::form(need.representation), "asked for"};
 }
 
 /// Reason why no material uses a form that some could use. `chosen` has the forms that they use.
@@ -338,6 +351,10 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
 }
 
 }  // namespace
+
+void require_form(const MaterialNeed& need, const std::string& place) {
+  if (need.representation != "auto") require_form(need, Needs{&need}, place);
+}
 
 std::vector<PlannedModel> plan_models(const std::vector<std::string>& names) {
   std::vector<PlannedModel> plan;

@@ -83,6 +83,10 @@ struct Budget {
   bool nodes = false;
 };
 
+/// Throws InputError for a form that its model does not have for the values of this material, which names those that it
+/// has, after the place in a file. plan_scene() does the same, for the values that all materials of a model share.
+void require_form(const MaterialNeed&, const std::string& place);
+
 /// The plan for the models of the materials, in alphabetical order. A parameter that all materials of a model set to
 /// the same constant becomes fixed, and forms that no material uses are left out. Throws InputError naming the material
 /// for a representation that its model does not have. If a material leaves its form open, forms are tried in this

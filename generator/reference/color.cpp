@@ -163,7 +163,7 @@ const std::vector<LinearSpace>& linear_spaces() {
 
 const ColorConfig& ColorConfig::current() {
   static const ColorConfig config = [] {
-    const fs::path own = data_dir() / "data" / "color" / "config.ocio";
+    const fs::path own = data_path("data/color/config.ocio");
     const char* given = std::getenv("OCIO");
     if (!given || !*given) return ColorConfig(own);
     // Blender sets OCIO for the programs that it starts.

@@ -39,7 +39,7 @@ StoreKey& StoreKey::add(const std::string& name, const std::string& value) {
 
 std::string StoreKey::hash() const { return sha256(kind_ + "\n" + model_ + "\n" + text_); }
 
-fs::path StoreKey::path() const { return data_dir() / "data" / kind_ / file_name(*this); }
+fs::path StoreKey::path() const { return data_path(fs::path("data") / kind_ / file_name(*this)); }
 
 std::optional<fs::path> StoreKey::cached_path() const {
   const std::optional<fs::path> folder = cache_dir();

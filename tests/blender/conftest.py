@@ -109,6 +109,8 @@ def extension(extension_zip):
         "packs.pack",
         "panels.ui",
         "warnings.checks",
+        "warnings.scene_rules",
+        "warnings.table",
     )
     from scene_loader import SceneLoader  # which needs bpy
 

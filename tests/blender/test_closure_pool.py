@@ -66,7 +66,7 @@ def test_forms_state_what_they_take(extension):
 def test_optix_is_an_error_until_a_run_is_on_record(extension, optix, monkeypatch):
     material = extension.api.new_material("lambert")
     assert codes(extension, material, optix)["optix_untested"].severity == "ERROR"
-    monkeypatch.setattr(extension.checks, "OPTIX_RUN", "some device")
+    monkeypatch.setattr(extension.scene_rules, "OPTIX_RUN", "some device")
     assert codes(extension, material, optix) == {}
 
 

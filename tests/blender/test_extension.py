@@ -610,7 +610,7 @@ def codes(extension, material, scene):
 def test_declared_sensitivities_are_known(extension):
     for pair in forms(extension):
         declared = set(extension.pack.representation(*pair)["warnings"])
-        assert declared <= extension.checks.DECLARED.keys()
+        assert declared <= {row.code for row in extension.table.DECLARED}
 
 
 def test_no_warnings_for_other_materials(extension, empty):
@@ -708,7 +708,7 @@ def test_only_choices_leave_parameters_unread(extension):
 
 def test_warning_old_blender_and_no_osl(extension, empty, monkeypatch):
     material = clean(extension, empty, "glass")  # its stand-in has no warnings of its own
-    monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
+    monkeypatch.setattr(extension.scene_rules, "BLENDER_MIN", (99, 0, 0))
     assert codes(extension, material, empty) == ["blender_version"]
     monkeypatch.undo()
     monkeypatch.setattr(extension.pack, "osl_available", lambda: False)
@@ -916,6 +916,14 @@ def test_warning_normal_pass(extension, empty):
     empty.cycles.use_denoising = True
     empty.cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
     assert codes(extension, material, empty) == []
+
+
+def test_warning_albedo_passes_of_a_mirror_beside_samples(extension, empty):
+    """Blender 5.2 counts both in the albedo that the denoiser is given."""
+    material = clean(extension, empty, "coupled", "sampled")
+    empty.view_layers[0].use_pass_diffuse_color = True
+    expected = ["albedo_passes_mirror"] if bpy.app.version >= (5, 2, 0) else []
+    assert codes(extension, material, empty) == expected
 
 
 def test_warning_albedo_passes(extension, empty):

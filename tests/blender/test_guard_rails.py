@@ -39,7 +39,7 @@ def workbench(extension, scene, monkeypatch):
 
 
 def old_blender(extension, scene, monkeypatch):
-    monkeypatch.setattr(extension.checks, "BLENDER_MIN", (99, 0, 0))
+    monkeypatch.setattr(extension.scene_rules, "BLENDER_MIN", (99, 0, 0))
 
 
 SPOILED = [

@@ -73,7 +73,7 @@ def test_data_elsewhere_are_named_by_the_environment(installed, own, tmp_path):
     assert run(program, "where", BRDFC_DATA=str(own)).stdout.strip() == str(own)
     done = run(program, "build", "--model", "lambert", "--out", tmp_path, BRDFC_DATA="/nowhere")
     assert done.returncode == 2
-    for word in ("BRDFC_DATA=/nowhere", "blender_addon/blender_manifest.toml", "share/brdfc"):
+    for word in ("BRDFC_DATA=/nowhere", "blender_addon is needed", "share/brdfc"):
         assert word in done.stderr
 
 

@@ -264,6 +264,52 @@ def test_what_a_table_leaves_out_is_said(tmp_path):
     assert said.startswith("rows of one direction along the normal differ by up to 48 %")
 
 
+def test_headers_are_read_as_programs_write_them(tmp_path):
+    """Quotes, capitals, spaces, byte order mark and CR LF; other columns are named."""
+    file = tmp_path / "m.csv"
+    ti, pi, to, po = grid([0, 30, 60], [0], [0, 30, 60], range(0, 181, 30))
+    f = 0.1 + ti / 900
+    text = angle_table(ti, pi, to, po, f, f, f)
+    file.write_text(text, encoding="utf-8")
+    plain = told(file)
+    _, *rows = text.splitlines()
+    header = '"Theta_I" , PHI_I,"theta_o","phi_o",  R ,"G",b'
+    file.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8-sig", newline="\r\n")
+    assert told(file)["albedo"] == plain["albedo"] and told(file)["notes"] == plain["notes"]
+    rows = [f'"{row.split(",")[0]}",{row.split(",", 1)[1]},"a, b",7' for row in rows]
+    file.write_text("\n".join([f"{header},Sample,Run", *rows]), encoding="utf-8")
+    said = told(file)
+    assert said["albedo"] == plain["albedo"]
+    assert said["notes"][0] == "columns are not known and not read: sample, run"
+    file.write_text("\n".join([f"{header},r", *rows]), encoding="utf-8")
+    done = run("measured", file)
+    assert done.returncode == 2 and "line 1: expected one column r, found several" in done.stderr
+
+
+def test_radians_are_named_or_refused(tmp_path):
+    file = tmp_path / "m.csv"
+    axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))
+    f = 0.1 + axes[0] / 900
+    file.write_text(angle_table(*axes, f, f, f), encoding="utf-8")
+    in_degrees = told(file)
+    text = angle_table(*(np.round(np.radians(a), 4) for a in axes), f, f, f)
+    file.write_text(text, encoding="utf-8")
+    done = run("measured", file)
+    assert done.returncode == 2 and "expected degrees, and the largest is 1.57" in done.stderr
+    assert "theta_i_rad,phi_i_rad,theta_o_rad,phi_o_rad for angles in radians" in done.stderr
+    head = "theta_i,phi_i,theta_o,phi_o"
+    named = text.replace(head, head.replace("_i", "_i_rad").replace("_o", "_o_rad"))
+    file.write_text(named, encoding="utf-8")
+    assert told(file)["albedo"] == in_degrees["albedo"]
+    assert told(file)["grid"] == in_degrees["grid"]
+    file.write_text(text.replace(head, head.replace("_i", "_i_deg").replace("_o", "_o_deg")))
+    assert any("nothing was measured beyond 1.57" in s for s in told(file)["lacks"])
+    # Few small angles may be degrees.
+    axes = grid([0, 1], [0], [0, 1], [0, 3])
+    file.write_text(angle_table(*axes, *(0 * axes[0] + 0.2,) * 3), encoding="utf-8")
+    assert told(file)["highest"] == 1
+
+
 def test_more_light_than_comes_is_said(tmp_path):
     file = tmp_path / "m.csv"
     ti, pi, to, po = grid([0, 45, 90], [0], [0, 45, 90], [0, 90, 180])
@@ -403,6 +449,50 @@ def test_models_are_ranked(tmp_path):
         assert done.returncode == 2 and expected in done.stderr
 
 
+def test_lobes_of_all_models_and_pairs_alone(tmp_path):
+    file = lobe_table(tmp_path)
+    command = ("measured", file, "--json", "--lobes", "1")
+    found = [json.loads(run(*command, *more).stdout)["sums"] for more in ((), ("--from", "all"))]
+    assert found[0][0]["lobes"] == found[1][0]["lobes"]
+    for more in (("--lobes", "2"), ("--models", "ward"), ("--no-matte",), ("--at", "0")):
+        done = run("measured", file, "--pairs", *more)
+        assert done.returncode == 2 and f"{more[0]} excludes --pairs" in done.stderr
+
+
+def test_data_that_are_missing_are_named(tmp_path):
+    """The file that is needed, not another one by which the folder is known."""
+    file = lobe_table(tmp_path)
+    command = [TOOL, "measured", str(file), "--models", "none"]
+    environment = {"BRDFC_DATA": "/nowhere"}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.returncode == 2 and done.stderr.startswith(
+        "brdfc: data/color/config.ocio is needed"
+    )
+    assert "BRDFC_DATA=/nowhere" in done.stderr and "blender_manifest" not in done.stderr
+
+
+def test_a_form_that_a_material_lacks_is_refused_when_the_scene_is_read(tmp_path):
+    lambert, phong = {"model": "lambert"}, {"model": "phong"}
+    lobes = [lambert, phong]
+    for material, expected in (
+        (
+            {"sum": lobes, "representation": "exact"},
+            ": lobe 2: phong has no form 'exact'",
+        ),
+        (phong | {"representation": "exact"}, ": phong has no form 'exact'; it has auto, aimed, "),
+        (phong | {"representation": "excat"}, ": phong has no form 'excat'; it has auto, aimed, "),
+    ):
+        content = scene(materials={"m": material}, **PLANE)
+        file = tmp_path / "s.json"
+        file.write_text(json.dumps(content), encoding="utf-8")
+        for command in ("scene", "build --scene", "render"):
+            out = tmp_path / ("o.exr" if command == "render" else "out")
+            done = run(*command.split(), file, "--out", out)
+            assert done.returncode == 2, done.stderr
+            assert f"{file}: materials.m.representation{expected}" in done.stderr, done.stderr
+            assert "aimed" in done.stderr
+
+
 def test_matte_light_is_added_unless_told_otherwise(tmp_path):
     file = lobe_table(tmp_path, matte=[0.1, 0.05, 0.02])
     with_matte, alone = (
@@ -515,7 +605,7 @@ def test_sums_of_lobes_are_told(tmp_path):
     assert re.search(r"% +lambert rho=", text) and "misplaced" in text
     for options, expected in (
         (("--lobes", "13"), "--lobes"),
-        (("--lobes", "2", "--from", "wart"), "wart"),
+        (("--lobes", "2", "--from", "wart"), "wart has no lobe for a sum, expected all or some of"),
         (("--lobes", "2", "--from", "coupled"), "coupled has no lobe for a sum"),
         (("--from", "ward"), "--lobes"),
     ):

@@ -83,6 +83,7 @@ def test_no_text_has_words_of_this_project_alone(english):
         ('layout.label(text=f"{n} nodes")', "label"),
         ('Finding("code", "ERROR", "bare")', "Finding"),
         ("say(text)", "expected a literal"),
+        ('Row("code", "ERROR", text, predicate)', "expected a literal"),
         ('class A(Operator):\n    """Text"""\n    bl_label = "A"', "bl_description"),
     ],
 )

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the predicates of warnings look at: a scene, a material in it, and a node of that. What
+several predicates ask for is found once."""
+
+from functools import cached_property
+
+import bpy
+
+from .. import lamps
+from ..common.i18n import say
+from ..groups import nodes, update
+from ..lamps import emission
+from ..packs import device, pack
+from . import closure_pool
+
+#: Power and radius of a new lamp in Blender.
+NEW_LAMP = 1000, 0.1
+#: Nodes of a world with a uniform colour.
+_PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
+
+
+def twin_of(node):
+    """Manifest entry of the twin of a node's model; None if it has no twin."""
+    made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
+    return pack.model(model_name)["representations"].get("twin") if made else None
+
+
+class SceneContext:
+    """A scene."""
+
+    def __init__(self, scene):
+        self.scene = scene
+        self.in_cycles = scene.render.engine == "CYCLES"
+
+    def said(self, sentence):
+        """A sentence of a warning about this, as it is shown."""
+        return sentence
+
+    @cached_property
+    def has_osl(self):
+        return pack.osl_available()
+
+    @cached_property
+    def offers_osl(self):
+        """Whether Open Shading Language can be turned on here."""
+        return self.has_osl and self.in_cycles
+
+    @cached_property
+    def lamps(self):
+        """The lamp objects that are visible in renders."""
+        return lamps.lamps_of(self.scene)
+
+    @cached_property
+    def found_lamps(self):
+        """[slots.Lamp] of the last survey."""
+        return lamps.last_found(self.scene)
+
+    @cached_property
+    def is_lit_as_new(self):
+        """Whether the scene is lit only by point lamps no brighter than a new one of Blender, and
+        by a uniform world no brighter than white. Measured for such a scene with a floor
+        (fresnel_conductor, schlick, coupled, radziszewski_alda): a clamp at 10 takes no light, and
+        Filter Glossy at 1 changes blocks of 8 x 8 pixels by at most 0.6 %."""
+        watts, radius = NEW_LAMP
+        found = [item.data for item in self.lamps]
+        world = self.scene.world
+        plain = nodes.all_nodes(world) if world else []
+        colors = [n.inputs for n in plain if n.bl_idname == "ShaderNodeBackground"]
+        return (
+            bool(found)
+            and all(
+                data.type == "POINT"
+                and data.energy <= watts
+                and data.shadow_soft_size >= radius * (1 - 1e-6)
+                for data in found
+            )
+            and {n.bl_idname for n in plain} <= _PLAIN_WORLD
+            and all(
+                max(sockets["Color"].default_value[:3]) * sockets["Strength"].default_value <= 1
+                for sockets in colors
+            )
+            and not any(emission.may_shine(material) for material in bpy.data.materials)
+        )
+
+
+class MaterialContext:
+    """A material in a scene."""
+
+    def __init__(self, of_scene, material):
+        self.of_scene, self.scene, self.material = of_scene, of_scene.scene, material
+        self.nodes = nodes.shown_nodes(material)
+
+    def said(self, sentence):
+        return sentence
+
+    @cached_property
+    def use(self):
+        """What its shaders take of Cycles' memory for closures."""
+        return closure_pool.of_material(self.material)
+
+    @cached_property
+    def on_optix(self):
+        return device.runs_on_optix(self.scene)
+
+
+class NodeContext:
+    """A group node of a material. `stood_in`: whether the scene shows its twin in its place."""
+
+    def __init__(self, of_material, node, stood_in):
+        self.material, self.node, self.stood_in = of_material.material, node, stood_in
+        self.of_scene, self.scene = of_material.of_scene, of_material.scene
+        #: The manifest's entry of the form that is shown, and the parameters by name; both empty if
+        #: another version made the node.
+        self.form, self.schema = nodes.manifest_entry(node) or ({}, {})
+        self.is_current = bool(self.form)
+        if stood_in:
+            self.form = twin_of(node) or {}
+        in_cycles = self.of_scene.in_cycles
+        #: The form if Cycles renders it, and the number of lamps that it aims at.
+        self.cycles_form = self.form if in_cycles else {}
+        self.aims = self.cycles_form.get("lamps") or 0
+
+    def said(self, sentence):
+        return say("{node}: {what}", node=self.node.label or self.node.name, what=sentence)
+
+    @property
+    def lamps(self):
+        return self.of_scene.lamps
+
+    @property
+    def declared(self):
+        """The codes of the settings and lamps that the form declares itself sensitive to."""
+        return [] if device.is_eevee(self.scene) else self.form.get("warnings", [])
+
+    @cached_property
+    def values(self):
+        """The value of each parameter, None where it is linked."""
+        return nodes.all_values(self.node)
+
+    @cached_property
+    def why_kept(self):
+        """Why an update leaves the node as it is; None if it does not."""
+        return update.refusal(self.material, self.node)
+
+    @cached_property
+    def _others_lamps(self):
+        """The shared group that a node of a linked material reads its lamps from; None if it is
+        this file's own."""
+        tree = self.node.node_tree
+        if tree.library is None:
+            return None
+        inner = (getattr(n, "node_tree", None) for n in nodes.content_group(tree).nodes)
+        return next((g for g in inner if g is not None and lamps.is_group(g)), None)
+
+    @cached_property
+    def elsewhere(self):
+        """Why a linked node aims at no lamp of this file; None for a node of this file."""
+        group = self._others_lamps
+        return lamps.elsewhere(group.library) if group is not None else None
+
+    @cached_property
+    def found_lamps(self):
+        """[slots.Lamp] of the last survey, with the slots of the group that the node reads."""
+        group = self._others_lamps
+        return self.of_scene.found_lamps if group is None else lamps.last_found(self.scene, group)

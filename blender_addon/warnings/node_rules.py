@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Predicates of warnings about a group node: its shader, its version and its values."""
+
+from ..groups import nodes
+from ..packs import pack
+from .rows import when
+
+
+def damaged(at):
+    """The node's group lacks its script, its compiled code or one of its sockets."""
+    problem = nodes.script_problem(at.node.node_tree)
+    return when(problem, problem=problem)
+
+
+def of_later_version(at):
+    """A later version of the extension made the node."""
+    newer = not at.is_current and nodes.is_newer(at.node)
+    return when(newer, version=nodes.made_by(at.node))
+
+
+def of_version_kept(at):
+    """Another version of the extension made the node, and an update can't change it."""
+    kept = not at.is_current and not nodes.is_newer(at.node) and at.why_kept
+    return when(kept, why=kept)
+
+
+def of_another_version(at):
+    """Another version of the extension made the node."""
+    return when(not at.is_current and not nodes.is_newer(at.node) and not at.why_kept)
+
+
+def _is_within(value, limits):
+    """Whether a value is within limits; sockets hold single precision, so with a tolerance."""
+    slack = 1e-6 * max(abs(limits["min"]), abs(limits["max"]))
+    return limits["min"] - slack <= value <= limits["max"] + slack
+
+
+def _outside(value, label, limits):
+    return {
+        "parameter": label,
+        "value": f"{value:g}",
+        "low": f"{limits['min']:g}",
+        "high": f"{limits['max']:g}",
+    }
+
+
+def out_of_range(at):
+    """A value is outside the limits of its parameter."""
+    for name, parameter in at.schema.items():
+        value = nodes.get_value(at.node, name)
+        if parameter["kind"] == "choice" or value is None:
+            continue
+        for number in value if parameter["kind"] == "color" else (value,):
+            if not _is_within(number, parameter):
+                yield _outside(number, parameter["label"], parameter)
+
+
+def no_effect(at):
+    """A value was changed that the model does not read while a choice is as it is."""
+    for name, choice in pack.unused_parameters(at.schema, at.values).items():
+        yield {
+            "parameter": at.schema[name]["label"],
+            "choice": at.schema[choice]["label"],
+            "value": pack.value_text(at.values[choice]),
+        }
+
+
+def out_of_fit(at):
+    """A value is outside those for which the closures of a fitted form were found."""
+    if axis := at.form.get("axis"):
+        value = nodes.get_value(at.node, axis["name"])
+        if value is not None and not _is_within(value, axis):
+            yield _outside(value, at.schema[axis["name"]]["label"], axis)
