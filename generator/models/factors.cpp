@@ -11,6 +11,9 @@
 // distribution with any exponent is such a curve, and so is a constant. Beyond its last knot, d is constant; at heights
 // below the last knot of G, G is proportional to the height, so that f stays finite.
 //
+// Numerical stability: the logarithms of the strength, d, F and G are added. Each may be as large as 70, so that f has
+// a rounding error of some hundred units in the last place where large ones cancel.
+//
 // f is reciprocal. Like measured data, it may reflect more light than arrives.
 //
 // Sampling: a matte direction or a half vector. The pdf of ln q, as of D with the largest d of the channels, consists
@@ -232,7 +235,7 @@ template <class T> struct Factors {
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T cos_o = maximum(wo.z, T(1. / 16));
     const T smith = sqrt(cos_o * cos_o + sqr(ax * wo.x) + sqr(ay * wo.y)) / cos_o;
-    const Rgb<T> weight = product(T(kLn2), cos_o, T(2) * log_visibility(cos_o)) * smith;
+    const Rgb<T> weight = product(T(kLn2), cos_o, T(2) * log_visibility(cos_o)) * (smith * T(0.9));
     Closure<T> matte(ClosureKind::Diffuse, rho);
     return {facets(ClosureKind::Ggx, weight, ax, ay, T(0)), matte};
   }

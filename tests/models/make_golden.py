@@ -659,13 +659,15 @@ def schlick_fresnel(name):
     return lambda p, oh: [r + (1 - r) * (1 - oh) ** 5 for r in p[name]]
 
 
-def half_albedo(density, width):
+def half_albedo(density, width, knots=lambda p: ((), (), ())):
     """Albedo by integration over half vectors, with Gauss-Legendre panels refined around the lobe
-    and around kinks: density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h."""
+    and around kinks: density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h. `knots` has
+    further kinks: at these theta_h, o.h and n.i."""
 
     def albedo(p, cos_o):
         sin_o = math.sqrt(1 - cos_o**2)
         wide = width(p)
+        kinks_t, kinks_oh, kinks_ni = knots(p)
 
         def ring(phi):
             c = math.cos(phi)
@@ -677,13 +679,14 @@ def half_albedo(density, width):
 
             def levels(t):
                 hn, oh, ni, _ = at(t)
-                return ni, ni - cos_o, 2 * hn * ni - oh, 2 * hn * cos_o - oh
+                plain = ni, ni - cos_o, 2 * hn * ni - oh, 2 * hn * cos_o - oh
+                return *plain, *(oh - x for x in kinks_oh), *(ni - x for x in kinks_ni)
 
             # Roots of the conditions at which the integrand has a kink or ends.
             grid = [k * math.pi / 2 / 256 for k in range(257)]
             values = [levels(t) for t in grid]
-            cuts = {0.0, math.pi / 2, *(k * wide for k in (0.5, 1, 2, 4, 8))}
-            for j in range(4):
+            cuts = {0.0, math.pi / 2, *(k * wide for k in (0.5, 1, 2, 4, 8)), *kinks_t}
+            for j in range(len(values[0])):
                 for a, b, va, vb in zip(grid, grid[1:], values, values[1:], strict=False):
                     if va[j] * vb[j] < 0:
                         for _ in range(48):
@@ -862,7 +865,7 @@ def factors_pdf(p, wi, wo):
 
 
 def factors_albedo(p, cos_o):
-    """With equal channels of all heights."""
+    """With equal channels of all heights, and equal roughnesses."""
 
     def one(p, hn, oh, ni, no, phi):
         t2 = (1 - hn**2) / hn**2
@@ -870,7 +873,11 @@ def factors_albedo(p, cos_o):
         scale = 1 / (math.pi * p["ax"] * p["ay"] * hn**4)
         return factor_product(p, s2, oh, (ni, no), 0, math, float) * scale * ni * 4 * oh
 
-    a = half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)
+    def knots(p):
+        slopes = [p["ax"] * math.sqrt(math.expm1(x)) for x in D_KNOTS]
+        return [math.atan(s) for s in slopes], [1 - x for x in F_KNOTS], [0.5**k for k in G_KNOTS]
+
+    a = half_albedo(one, lambda p: min(p["ax"], p["ay"]), knots)(p, cos_o)
     return [c + a for c in p["rho"]]
 
 
@@ -1334,7 +1341,7 @@ MODELS = {
             {"ax": 0.4, "ay": 0.4, "d2": (0.3, 0.3, 0.3), "g4": 0.2, "strength": 2},
         ],
         cosines=[1, 0.5, 0.1],
-        # The integrand of the albedo has kinks at the knots, at which its panels do not end.
+        # Logarithms as large as 70 are added, whose rounding errors are those of a number near 70.
         floor=lambda p: 1e-12,
     ),
     "schlick": dict(
