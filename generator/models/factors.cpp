@@ -230,12 +230,16 @@ template <class T> struct Factors {
     return sample_if(above(wi, wo) && p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
-  /// GGX facets and the matte part. Their weight is that of the curves at the most frequent slopes, in the direction of
-  /// the mirrored view, over the shadowing of Cycles' facets.
+  /// GGX facets and the matte part. The facets' weight is that of the curves over those of Cycles' facets, which have
+  /// d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at its mean height.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    const T cos_o = maximum(wo.z, T(1. / 16));
-    const T smith = sqrt(cos_o * cos_o + sqr(ax * wo.x) + sqr(ay * wo.y)) / cos_o;
-    const Rgb<T> weight = product(T(kLn2), cos_o, T(2) * log_visibility(cos_o)) * (smith * T(0.9));
+    const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
+    const T zi = lobe_height(zo, T(0.7) * p2);
+    // (n.w) Lambda.
+    const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };
+    const T inverse_smith = zi * zo + zo * hidden(zi) + zi * hidden(zo);
+    const Rgb<T> weight = product(T(kLn2), zi, log_visibility(zi) + log_visibility(zo)) *
+                          (T(0.92) * inverse_smith / (least_height(zi) * least_height(zo)));
     Closure<T> matte(ClosureKind::Diffuse, rho);
     return {facets(ClosureKind::Ggx, weight, ax, ay, T(0)), matte};
   }
