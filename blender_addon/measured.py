@@ -169,11 +169,9 @@ def as_pairs(lobes):
         (lobe.model, lobe.parameters) if isinstance(lobe, Lobe) else lobe
         for lobe in (lobes if isinstance(lobes, list | tuple) else ())
     ]
-    for pair in pairs:
-        if not (isinstance(pair, list | tuple) and [type(x) for x in pair] == [str, dict]):
-            pairs = []
-            break
-    if not pairs:
+    if not pairs or not all(
+        isinstance(pair, list | tuple) and [type(x) for x in pair] == [str, dict] for pair in pairs
+    ):
         raise ValueError(
             say(
                 "Expected a list of lobes, each a model and a dictionary of its parameters, got "

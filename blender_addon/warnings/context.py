@@ -163,3 +163,12 @@ class NodeContext:
         """[slots.Lamp] of the last survey, with the slots of the group that the node reads."""
         group = self._others_lamps
         return self.of_scene.found_lamps if group is None else lamps.last_found(self.scene, group)
+
+    @cached_property
+    def not_aimed(self):
+        """[(lamp, reason)] of the lamps that the node does not aim at."""
+        return [
+            (lamp, lamp.why or lamps.too_many(self.aims))
+            for lamp in (self.found_lamps if self.aims else ())
+            if lamp.slot is None or lamp.slot > self.aims
+        ]

@@ -36,15 +36,6 @@ def _any(found):
 # ---- lamps that a form aims at, or not -----------------------------------------------------------
 
 
-def _not_aimed(at):
-    """[(lamp, reason)] of the lamps that a node does not aim at."""
-    return [
-        (lamp, lamp.why or lamps.too_many(at.aims))
-        for lamp in (at.found_lamps if at.aims else ())
-        if lamp.slot is None or lamp.slot > at.aims
-    ]
-
-
 def _by_reason(at, left_out, least):
     """The values of a sentence about lamps that a node does not aim at, if their share of the light
     exceeds `least`."""
@@ -55,7 +46,7 @@ def _by_reason(at, left_out, least):
 
 
 def _lost(at, linked):
-    for values in _by_reason(at, [(x, why) for x, why in _not_aimed(at) if x.sizeless], UNSEEN):
+    for values in _by_reason(at, [(x, why) for x, why in at.not_aimed if x.sizeless], UNSEEN):
         if (values["why"] == at.elsewhere) == linked:
             yield values
 
@@ -74,13 +65,13 @@ def linked_lost_lamps(at):
 def missed_lamps(at):
     """A form that aims at lamps has no slot for a lamp without Multiple Importance, which holds
     more than 1 % of the light. Cycles hides it from random rays."""
-    missed = [(x, why) for x, why in _not_aimed(at) if not x.met and not x.sizeless]
+    missed = [(x, why) for x, why in at.not_aimed if not x.met and not x.sizeless]
     return _by_reason(at, missed, UNSEEN)
 
 
 def _noisy(at, linked):
     kinds = {}
-    for lamp, why in _not_aimed(at):
+    for lamp, why in at.not_aimed:
         if lamp.met and not lamp.sizeless and why != lamps.NO_NEED:
             kinds.setdefault(why, []).append((lamp, why))
     for why, noisy in kinds.items():
