@@ -778,7 +778,9 @@ def test_a_picture_of_what_is_mixed_is_as_before(extension, convert, empty, chan
     assert extension.api.convert_materials([plan]) == 1
     after = flat(empty, material)
     print(f"{change.__name__}: before {before}, after {after}")
-    assert np.array(after) == pytest.approx(np.array(before), rel=max(plan.error, 0.02), abs=0.01)
+    # Where an image chooses between two models, the error is that of both in its mean colour.
+    change_of_all = np.abs(np.array(after) - before).mean(0)
+    assert (change_of_all <= max(plan.error, 0.02) * np.mean(before, 0) + 0.01).all()
     nodes = {n.name for n in material.node_tree.nodes}
     assert convert.restore(material) == 1
     assert np.array(flat(empty, material)) == pytest.approx(np.array(before), rel=1e-3)
