@@ -34,6 +34,13 @@ def has_albedo_script(model_name, representation):
     return pack.representation(model_name, representation).get("albedo_shader") is not None
 
 
+def has_albedo(model_name):
+    """Whether a model's forms can have an Albedo output: not where no table could have all of its
+    parameters."""
+    entry = pack.model(model_name)
+    return not entry["scatter"] or entry.get("albedo") is not None
+
+
 def expected_inputs(model_name, representation):
     """Identifiers of the script node's inputs, with the types of their sockets."""
     inputs = {
@@ -119,6 +126,8 @@ def _start_group(group, outputs):
 
 def outputs_of(model_name, representation, albedo):
     """Names of the outputs of a script form; `albedo` as in ensure_group()."""
+    if not has_albedo(model_name):
+        return [name for name in OUTPUTS if name != ALBEDO]
     apart = has_albedo_script(model_name, representation)
     return [name for name in OUTPUTS if albedo or not apart or name != ALBEDO]
 
@@ -268,7 +277,7 @@ def fill_with_scripts(group, model_name, representation, texts, twin_group):
     from_scripts = {s.identifier: s for s in script.outputs}
     tag = group[TAG]
     tag["script_inputs"] = expected_inputs(model_name, representation)
-    tag["albedo_apart"] = apart
+    tag["albedo_apart"] = apart or not has_albedo(model_name)
     if len(texts) > 1:
         albedo = _add_script(group, texts[1], f"{what}, the Albedo output")
         albedo.name = albedo.label = ALBEDO

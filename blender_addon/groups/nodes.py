@@ -566,8 +566,8 @@ def uses_albedo(node):
 def add_albedo(node):
     """Adds the Albedo output to a group node if it lacks it; values and links stay.
 
-    Raises ValueError if another version of the extension made the group, or the file would not keep
-    the change, and CompileError.
+    Raises ValueError if another version of the extension made the group, the model has none, or
+    the file would not keep the change, and CompileError.
     """
     editable.check(node.id_data)
     if ALBEDO in node.outputs:
@@ -586,6 +586,13 @@ def add_albedo(node):
             say("{node} is of another version of the extension: update it first", node=name)
         )
     tag = node.node_tree[TAG]
+    if not group_content.has_albedo(tag["model"]):
+        raise ValueError(
+            say(
+                "{model} has no Albedo output: it has too many parameters for tables of it",
+                model=pack.model(tag["model"])["label"],
+            )
+        )
     if is_automatic(node):
         _exchange(node, _ensure_automatic(tag["model"], tag[AUTO], albedo=True))
         return

@@ -85,6 +85,12 @@ _COLORED = (
         {"f0": "Color"},
     ),
     Candidate(
+        "microfacet",
+        lambda n: {"f0": n.color, "tint": (1.0, 1.0, 1.0)},
+        Width("ax", 1e-4, 1.0, 2, across="ay", stretched=0.5),
+        {"f0": "Color"},
+    ),
+    Candidate(
         "ward",
         lambda n: {"ks": n.color},
         Width("ax", **_SLOPE, across="ay", stretched=0.5),
@@ -393,9 +399,13 @@ def _factor(candidate, targets, between):
     """The width factor that misplaces the least light."""
     if candidate.width is None:
         return 1.0
-    return math.exp(
-        _lowest(lambda x: _mean(Target.misplaced, candidate, targets, math.exp(x)), *between)
-    )
+
+    def error_of_log_width(x):
+        return _mean(Target.misplaced, candidate, targets, math.exp(x))
+
+    # The search stops beside the minimum; a model that is the node itself has the typical width.
+    found = _lowest(error_of_log_width, *between), math.log(candidate.width.usual)
+    return math.exp(min(found, key=error_of_log_width))
 
 
 def _lowest(function, low, best, high):

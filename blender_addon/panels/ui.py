@@ -10,6 +10,7 @@ from bpy.types import Menu, Panel
 from .. import convert, lamps
 from ..common import color, editable
 from ..common.i18n import form_name, iface, of_error, say
+from ..content import group_content
 from ..groups import nodes
 from ..packs import device, energy, kernel, optical, pack
 from ..trees import shader_trees
@@ -240,7 +241,8 @@ def draw_node(layout, node, scene):
     if made and optical.can_have(model_name):
         menu = layout.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
         menu.node = node.name
-    if made and nodes.ALBEDO not in node.outputs and not nodes.is_baked(node):
+    may_have = made and not nodes.is_baked(node) and group_content.has_albedo(model_name)
+    if may_have and nodes.ALBEDO not in node.outputs:
         layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
     if model_name == kernel.MODEL:
         layout.operator("brdfc.kernel", icon="FCURVE").node = node.name

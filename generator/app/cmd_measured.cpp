@@ -176,7 +176,7 @@ void add_measured_command(CLI::App& app) {
     const std::vector<const Model*> models = models_of(o->models);
     const std::vector<measured::LobeKind> kinds =
         o->lobes ? measured::lobe_kinds(o->from, m.isotropic) : std::vector<measured::LobeKind>{};
-    const std::size_t steps = models.size() + std::size_t(o->lobes.value_or(0));
+    const std::size_t steps = models.size() + (o->lobes ? measured::lobe_steps(std::size_t(*o->lobes)) : 0);
     const auto progress = [&](const Model& last, std::size_t done) {
       fmt::print(stderr, "brdfc measured: {}/{} {}\n", done, steps, last.info().name);
     };
@@ -186,9 +186,8 @@ void add_measured_command(CLI::App& app) {
     for (const measured::ModelFit& f : fits) j["fits"].push_back(describe(f));
     std::vector<measured::LobeSum> sums;
     if (o->lobes) {
-      sums = measured::fit_lobes(m, model, kinds, std::size_t(*o->lobes), [&](const measured::LobeSum& sum) {
-        fmt::print(stderr, "brdfc measured: {}/{} {}\n", models.size() + sum.lobes.size(), steps,
-                   measured::counted(sum.lobes.size(), "lobe", "lobes"));
+      sums = measured::fit_lobes(m, model, kinds, std::size_t(*o->lobes), [&](std::size_t done) {
+        fmt::print(stderr, "brdfc measured: {}/{} lobes\n", models.size() + done, steps);
       });
       j["sums"] = Json::array();
       for (const measured::LobeSum& sum : sums) j["sums"].push_back(describe(sum));

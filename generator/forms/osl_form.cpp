@@ -292,7 +292,9 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   add(assign("BSDF", print::balanced_sum(made.terms)));
   add(print::Gap{});
   Statements of_albedo;
-  if (model.has_scatter()) {
+  const bool with_albedo = info.properties.albedo_table;
+  if (!with_albedo) {
+  } else if (model.has_scatter()) {
     of_albedo = albedo_output(info, table, fixed);
     if (print::osl_statements(of_albedo, 1).text.size() <= kMaxAlbedoText) append(body, std::exchange(of_albedo, {}));
   } else {
@@ -327,7 +329,7 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
   sockets +=
       "    vector Normal = vector(0, 0, 0),\n    vector Tangent = vector(0, 0, 0),\n"
       "    output closure color BSDF = 0";
-  if (of_albedo.empty()) sockets += fmt::format(",\n{}", albedo_socket);
+  if (with_albedo && of_albedo.empty()) sockets += fmt::format(",\n{}", albedo_socket);
   print::OslText whole = text(shader.name, fmt::format("Form: {}", name()), sockets, body);
   shader.source = std::move(whole.text);
   shader.statements = whole.statements;

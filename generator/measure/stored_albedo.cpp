@@ -15,6 +15,7 @@
 namespace brdfc::measure {
 
 bool has_albedo_table(const Model& model) {
+  if (!model.info().properties.albedo_table) return false;
   const std::vector<ParamInfo>& params = model.info().params;
   return model.has_scatter() ||
          std::count_if(params.begin(), params.end(), [](const auto& p) { return p.kind == ParamKind::Number; }) < 3;

@@ -27,6 +27,9 @@ constexpr int kLeastSearches = 2, kMostSearches = 8;
 constexpr double kFirstStep = 0.06, kStepFalls = 0.5, kSearchOn = 0.97;
 /// Another lobe must make the error at least so many times smaller; so must one that takes a lobe's place.
 constexpr double kWorthLobe = 0.995, kWorthExchange = 0.99;
+/// Where the error is larger, lobes are searched for anew, without the model of the strongest highlight: one that was
+/// taken early may stand for two others so well that no single exchange leads to them.
+constexpr double kSearchAnew = 0.005;
 /// A lobe that not every device renders must be so much better than others.
 constexpr double kEverywhere = 0.95;
 /// Of lobes with which the error differs by no more than this share and this part of the light, the one with fewer
@@ -139,14 +142,14 @@ class Fitter {
 
   bool black() const { return !(last_.pairs.light > 0); }
 
-  /// The sum with one more lobe, on the fine pairs.
-  std::vector<Place> extended(const std::vector<Place>& places) const {
-    std::vector<Place> out = searched(with_best(places));
+  /// The sum with one more lobe, on the fine pairs; none of the lobes is of the model that is left out, if any.
+  std::vector<Place> extended(const std::vector<Place>& places, const Model* without) const {
+    std::vector<Place> out = searched(with_best(places, without));
     // Lobes that came first may have stood for several.
     for (std::size_t i = 0; out.size() > 1 && i < out.size(); ++i) {
       std::vector<Place> rest = out;
       rest.erase(rest.begin() + long(i));
-      std::vector<Place> other = searched(with_best(rest));
+      std::vector<Place> other = searched(with_best(rest, without));
       const double now = error(out), then = error(other);
       const bool simpler = numbers(other) < numbers(out) && then < now * (1 + kAlikeLobes) + kNegligibly;
       if (simpler || then < kWorthExchange * now) out = std::move(other);
@@ -285,11 +288,13 @@ class Fitter {
   }
 
   /// The places with the lobe that helps most.
-  std::vector<Place> with_best(const std::vector<Place>& places) const {
+  std::vector<Place> with_best(const std::vector<Place>& places, const Model* without) const {
     std::vector<Response> present;
-    std::vector<double> scores(atoms_.size());
+    std::vector<double> scores(atoms_.size(), std::numeric_limits<double>::infinity());
+    const auto left_out = [&](std::size_t i) { return atoms_[i].kind->model == without; };
     if (!places.empty()) solved(places, coarse_, kFewRounds, present);
     for_all(atoms_.size(), [&](std::size_t i) {
+      if (left_out(i)) return;
       std::vector<const Response*> all;
       for (const Response& r : present) all.push_back(&r);
       all.push_back(&responses_[i]);
@@ -297,6 +302,7 @@ class Fitter {
     });
     std::vector<std::size_t> order(atoms_.size());
     std::iota(order.begin(), order.end(), 0);
+    std::erase_if(order, left_out);
     std::ranges::stable_sort(order, {}, [&](std::size_t i) { return scores[i]; });
     struct Candidate {
       std::vector<Place> places;
@@ -392,27 +398,69 @@ class Fitter {
   std::vector<Response> responses_;  ///< of the atoms, for the coarse pairs
 };
 
-}  // namespace
-
-std::vector<LobeSum> fit_lobes(const Measurement& m, const MeasuredModel& data, const std::vector<LobeKind>& kinds,
-                               std::size_t most, const std::function<void(const LobeSum&)>& progress) {
-  const auto start = std::chrono::steady_clock::now();
-  const Fitter fitter(m, data, kinds);
+/// One orthogonal matching pursuit; `found` is called after each lobe.
+std::vector<LobeSum> pursued(const Fitter& fitter, const Model* without, std::size_t most,
+                             const std::function<void(LobeSum&)>& found) {
   std::vector<LobeSum> out;
-  if (fitter.black()) return out;
   std::vector<Place> places;
   while (out.size() < most && (out.empty() || out.back().error > kNothing)) {
-    std::vector<Place> more = fitter.extended(places);
+    std::vector<Place> more = fitter.extended(places, without);
     LobeSum sum = fitter.finished(more);
-    sum.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    found(sum);
     // A lobe may have taken the place of two.
     while (!out.empty() && out.size() >= sum.lobes.size() && sum.error < kWorthLobe * out.back().error) out.pop_back();
     if (sum.lobes.empty() || sum.lobes.size() != out.size() + 1) break;
     if (!out.empty() && !(sum.error < kWorthLobe * out.back().error)) break;
     places = std::move(more);
     out.push_back(std::move(sum));
-    if (progress) progress(out.back());
   }
+  return out;
+}
+
+/// The better sum for each number of lobes, while another lobe helps.
+std::vector<LobeSum> better(std::vector<LobeSum> a, std::vector<LobeSum> b) {
+  std::vector<LobeSum> out;
+  for (std::size_t k = 0; k < std::max(a.size(), b.size()); ++k) {
+    const bool second = k >= a.size() || (k < b.size() && b[k].error < a[k].error);
+    LobeSum& sum = second ? b[k] : a[k];
+    if (k > 0 && !(sum.error < kWorthLobe * out.back().error)) break;
+    out.push_back(std::move(sum));
+  }
+  return out;
+}
+
+/// The model whose lobes reflect most of a sum's light and have numbers that can be searched.
+const Model* strongest_highlight(const LobeSum& sum, const std::vector<LobeKind>& kinds) {
+  for (const Lobe& lobe : sum.lobes)
+    for (const LobeKind& kind : kinds)
+      if (kind.model == lobe.model && !kind.numbers.empty()) return lobe.model;
+  return nullptr;
+}
+
+}  // namespace
+
+std::vector<LobeSum> fit_lobes(const Measurement& m, const MeasuredModel& data, const std::vector<LobeKind>& kinds,
+                               std::size_t most, const std::function<void(std::size_t)>& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const Fitter fitter(m, data, kinds);
+  std::vector<LobeSum> out;
+  if (fitter.black()) return out;
+  const std::size_t steps = lobe_steps(most);
+  std::size_t done = 0;
+  const auto pursue = [&](const Model* without) {
+    return pursued(fitter, without, most, [&](LobeSum& sum) {
+      sum.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      if (progress && done < steps) progress(++done);
+    });
+  };
+  out = pursue(nullptr);
+  if (!out.empty() && out.back().error > kSearchAnew) {
+    const Model* strongest = strongest_highlight(out.back(), kinds);
+    const auto remains = [&](const LobeKind& kind) { return kind.model != strongest; };
+    done = std::max(done, most);
+    if (strongest && std::ranges::any_of(kinds, remains)) out = better(std::move(out), pursue(strongest));
+  }
+  if (progress) progress(steps);
   return out;
 }
 

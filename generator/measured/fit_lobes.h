@@ -4,6 +4,7 @@
 // One lobe after another is added, the one of all kinds with which the sum comes closest when all colours are found
 // anew: orthogonal matching pursuit. Y. Pati, R. Rezaiifar, P. Krishnaprasad: Orthogonal Matching Pursuit, Asilomar
 // 1993. Then the numbers of all lobes are searched together, and each lobe is exchanged where another one does better.
+// What is left may be due to a first choice, so a second pursuit does without the model of the strongest highlight.
 // The error is that of fit_models.h.
 #pragma once
 
@@ -26,10 +27,11 @@ struct LobeSum {
 
 /// The best sums that were found of 1, 2, ... `most` lobes; each has a smaller error than the one before. There are
 /// fewer where another lobe no longer helps, and none for black data. Where the data reflect no more light than comes,
-/// neither does a sum, unless that would cost much: `brightest` says. `progress`, if there is one, is called after
-/// each.
+/// neither does a sum, unless that would cost much: `brightest` says. `progress`, if there is one, is called with the
+/// number of steps that are done, of lobe_steps().
 std::vector<LobeSum> fit_lobes(const Measurement&, const MeasuredModel&, const std::vector<LobeKind>&, std::size_t most,
-                               const std::function<void(const LobeSum&)>& progress = {});
+                               const std::function<void(std::size_t)>& progress = {});
+inline constexpr std::size_t lobe_steps(std::size_t most) { return 2 * most; }
 
 /// The largest number of lobes that can be asked for.
 inline constexpr int kMostLobes = 12;

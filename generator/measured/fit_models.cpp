@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/sequence.h"
 #include "fit/view.h"
+#include "measured/fit_factors.h"
 #include "measured/least_deviations.h"
 #include "measured/pairs.h"
 #include "model/choices.h"
@@ -18,6 +19,7 @@ namespace brdfc::measured {
 namespace {
 
 constexpr std::size_t kCoarse = 256, kFine = 1024, kFinal = 8192;  ///< pairs of directions
+constexpr std::size_t kCurves = 4096;                              ///< pairs for curves, which have more parameters
 constexpr int kTries = 24;          ///< places where numbers are tried before a search, for each choice
 constexpr std::size_t kStarts = 4;  ///< searches begin at the best of them
 /// A model that misplaces less than this needs no matte light.
@@ -292,7 +294,10 @@ std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data
   std::vector<std::optional<ModelFit>> found(models.size());
   std::atomic<std::size_t> done{0};
   for_all(models.size(), [&](std::size_t i) {
-    if (models[i]->has_scatter()) found[i] = fit_model(*models[i], m.isotropic, coarse, fine, last, matte);
+    if (const auto curves = curve_roles(*models[i]))
+      found[i] = fit_factors(*models[i], *curves, m.isotropic, fine, make_pairs(data, kCurves, 4), last);
+    else if (models[i]->has_scatter())
+      found[i] = fit_model(*models[i], m.isotropic, coarse, fine, last, matte);
     if (progress) progress(*models[i], ++done);
   });
   std::vector<ModelFit> out;

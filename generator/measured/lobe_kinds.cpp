@@ -48,6 +48,17 @@ const std::vector<Row>& rows() {
        {{{"ax"}, {Log, 0.01, 1}, 7}, {{"ay"}, {Log, 0.01, 1}, 7}},
        Data::Anisotropic},
       {"cook_torrance", {}, "f0", {{{"m"}, {Log, 0.01, 1}, 14}}},
+      {"microfacet",
+       {"distribution=ggx", "masking=smith_correlated", "tint=1"},
+       "f0",
+       {{{"ax", "ay"}, {Log, 0.01, 1}, 14}},
+       Data::Isotropic},
+      {"microfacet",
+       {"distribution=ggx", "masking=smith_correlated", "tint=1"},
+       "f0",
+       {{{"ax"}, {Log, 0.01, 1}, 7}, {{"ay"}, {Log, 0.01, 1}, 7}},
+       Data::Anisotropic},
+      // Its Beckmann facets are so near to those of cook_torrance and ward that a search takes either for the other.
       {"blinn", {}, "ks", {{{"e"}, {Log1p, 1, 1e5}, 14}}},
       // Smoother ones have a part of an ideal mirror, which no data show.
       {"schlick", {"p=1"}, "r", {{{"rough"}, {Linear, 0.5, 1}, 4}}, Data::Isotropic},

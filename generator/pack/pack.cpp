@@ -120,10 +120,13 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
   if (const Json roles = optical_json(model, plan.fixed); !roles.empty()) j["fixed_optical"] = roles;
   if (!plan.views.all()) j["view_cosines"] = {plan.views.low, plan.views.high};
 
-  measure::AlbedoTable table;
+  const bool with_table = measure::has_albedo_table(model);
+  const auto folded = [&](const ParamValues& fixed) {
+    return with_table ? measure::fold(whole_table, model, fixed, plan.views) : measure::AlbedoTable();
+  };
+  const measure::AlbedoTable table = folded(plan.fixed);
   const std::string table_file = "tables/" + info.name + "_albedo.exr";
-  if (measure::has_albedo_table(model)) {
-    table = measure::fold(whole_table, model, plan.fixed, plan.views);
+  if (with_table) {
     const fs::path exr = scratch / (info.name + ".exr");
     measure::write_albedo_exr(table, exr);
     built.files[table_file] = read_text(exr);
@@ -137,16 +140,17 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
     const fit::Fit* fit = form->fit(model, setting);
     const std::size_t of_whole_fit = fit ? fit->size() : 0,
                       of_fit = fit && !plan.views.all() ? fit->cut_to(plan.views).size() : of_whole_fit;
-    const measure::AlbedoTable of_form =
-        fixed == plan.fixed ? table : measure::fold(whole_table, model, fixed, plan.views);
+    const measure::AlbedoTable of_form = fixed == plan.fixed ? table : folded(fixed);
     const forms::Shader shader = form->write(model, of_form, setting);
     // The savings of a plan are shown relative to the whole shader; if nothing was left out, that is this one. A fitted
     // form exists for these parameters only.
     const ParamValues whole_fixed = form->made_of_fit() ? fixed : ParamValues{};
     const bool cut = !plan.views.all() || (!form->made_of_fit() && !plan.fixed.empty());
-    const forms::Shader whole = cut && !form->native()
-                                    ? form->write(model, measure::fold(whole_table, model, whole_fixed), {whole_fixed})
-                                    : shader;
+    const forms::Shader whole =
+        cut && !form->native()
+            ? form->write(model, with_table ? measure::fold(whole_table, model, whole_fixed) : whole_table,
+                          {whole_fixed})
+            : shader;
     const forms::FormError error = form->error(model, setting);
     const std::optional<double> cost = form->cost_is_measured(setting) ? costs.of(model, *form) : std::nullopt;
     const std::string file = form->native() ? (form->made_of_fit() ? "twins/" : "nodes/") + shader.name + ".json"
@@ -176,7 +180,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
         {"albedo_shader", shader.albedo.empty() ? Json() : Json(albedo_file)},
         {"albedo_sha256", shader.albedo.empty() ? Json() : Json(sha256(shader.albedo))}};
   }
-  if (measure::has_albedo_table(model)) j["albedo"] = table_json(table, table_file, model, plan.fixed);
+  if (with_table) j["albedo"] = table_json(table, table_file, model, plan.fixed);
   return built;
 }
 

@@ -106,8 +106,10 @@ class Lowering {
       case Op::Cbrt:
         return select(real(0) < Expr(0.0), Expr(-1.0), Expr(1.0)) * pow(abs(real(0)), Expr(1 / 3.));
       case Op::Exp:
+        if (color) return exp(arg(n, 0).color);
         return exp(real(0));
       case Op::Log:
+        if (color) return log(arg(n, 0).color);
         return log(real(0));
       case Op::Log1p:
         if (is_random(n.args[0])) return log(Expr(1.0) + real(0));

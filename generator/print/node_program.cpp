@@ -13,6 +13,8 @@
 namespace brdfc::print {
 namespace {
 
+constexpr double kE = 2.718281828459045;
+
 /// Writes the result of lowered_to_nodes(), depth first, so that few values are alive at once.
 class Writer {
  public:
@@ -332,9 +334,9 @@ class Writer {
       case Op::Sqrt:
         return add("SQRT", args, false);
       case Op::Exp:
-        return add("EXPONENT", args, false);
+        return color ? by_channel("EXPONENT", args[0]) : add("EXPONENT", args, false);
       case Op::Log:
-        return add("LOGARITHM", {args[0], number(2.718281828459045)}, false);
+        return color ? by_channel("LOGARITHM", args[0], kE) : add("LOGARITHM", {args[0], number(kE)}, false);
       case Op::Sin:
         return add("SINE", args, false);
       case Op::Cos:
@@ -361,6 +363,17 @@ class Writer {
       default:
         throw ExprError(std::string("no node for ") + name_of(n.op));
     }
+  }
+
+  /// A function of each channel; with a second operand if there is one.
+  NodeOperand by_channel(const char* kind, const NodeOperand& color, std::optional<double> second = std::nullopt) {
+    std::vector<NodeOperand> channels;
+    for (const char* c : {"X", "Y", "Z"}) {
+      std::vector<NodeOperand> operands = {add(c, {color}, false)};
+      if (second) operands.push_back(number(*second));
+      channels.push_back(add(kind, operands, false));
+    }
+    return add("COMBINE", channels, true);
   }
 
   NodeOperand select_node(const ExprNode& n, bool color) {

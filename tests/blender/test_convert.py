@@ -110,7 +110,7 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
     ("kind", "inputs", "models", "worst"),
     [
         ("diffuse", {"Roughness": 0.5}, {"oren_nayar"}, 0.08),
-        ("glossy", {"Roughness": 0.3}, {"cook_torrance", "ward", "blinn", "max_phong"}, 0.35),
+        ("glossy", {"Roughness": 0.3}, {"microfacet"}, 0.05),
         ("glossy", {"Roughness": 0.0, "Color": (0.5, 0.5, 0.5)}, {"lambertian_specular"}, 1e-6),
         ("principled", {"Roughness": 0.4}, {"ashikhmin_shirley"}, 0.15),
         ("principled", {"Roughness": 0.0}, {"coupled"}, 0.1),
@@ -127,8 +127,8 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
         (
             "principled",
             {"Roughness": 0.3, "Metallic": 1.0},
-            {"cook_torrance", "ward", "blinn", "ashikhmin_shirley"},
-            0.35,
+            {"microfacet"},
+            0.03,
         ),
     ],
 )
@@ -150,6 +150,20 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
                 other = dict(plan.values)
                 other[candidate.width.name] *= factor
                 assert target.misplaced(plan.model, other) >= least - 1e-6
+
+
+def test_a_metal_of_single_scattering_is_the_microfacet_model(convert):
+    """What is left is Cycles' energy compensation: the more of it, the rougher."""
+    for distribution, worst in (("GGX", 1e-3), ("MULTI_GGX", 0.09)):
+        material, _ = material_of(
+            "principled", distribution, Base_Color=GOLD, Metallic=1.0, Roughness=0.5
+        )
+        plan = only(convert.plan([material]))
+        print(distribution, plan.line(), plan.values)
+        assert plan.model == "microfacet" and plan.error < worst
+        if distribution == "GGX":
+            assert plan.values["ax"] == plan.values["ay"] == pytest.approx(0.25)
+            assert plan.values["f0"] == pytest.approx(GOLD)
 
 
 def test_the_error_is_that_of_the_bright_colour(convert):
@@ -351,12 +365,12 @@ def test_a_strip_still_moves_a_parameter_in_another_form(extension, convert, emp
 
 
 def test_a_limit_is_a_reason(extension, convert):
-    material, node = material_of("glossy", "GGX", Roughness=0.3)
+    material, node = material_of("glossy", "MULTI_GGX", Roughness=0.5)
     (plan,) = extension.api.plan_conversion([material])
     assert not plan.refusal and 0.05 < plan.error < 0.35
     (plan,) = extension.api.plan_conversion([material], limit=0.05)
     assert plan.line() == (
-        f"{material.name}, Glossy BSDF: stays, its nearest model, Ward, sends "
+        f"{material.name}, Glossy BSDF: stays, its nearest model, Microfacet, sends "
         f"{100 * plan.error:.2g} % of the light in other directions"
     )
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
@@ -764,7 +778,9 @@ def test_a_picture_of_what_is_mixed_is_as_before(extension, convert, empty, chan
     assert extension.api.convert_materials([plan]) == 1
     after = flat(empty, material)
     print(f"{change.__name__}: before {before}, after {after}")
-    assert np.array(after) == pytest.approx(np.array(before), rel=max(plan.error, 0.02), abs=0.01)
+    # Where an image chooses between two models, the error is that of both in its mean colour.
+    change_of_all = np.abs(np.array(after) - before).mean(0)
+    assert (change_of_all <= max(plan.error, 0.02) * np.mean(before, 0) + 0.01).all()
     nodes = {n.name for n in material.node_tree.nodes}
     assert convert.restore(material) == 1
     assert np.array(flat(empty, material)) == pytest.approx(np.array(before), rel=1e-3)

@@ -659,13 +659,15 @@ def schlick_fresnel(name):
     return lambda p, oh: [r + (1 - r) * (1 - oh) ** 5 for r in p[name]]
 
 
-def half_albedo(density, width):
+def half_albedo(density, width, knots=lambda p: ((), (), ())):
     """Albedo by integration over half vectors, with Gauss-Legendre panels refined around the lobe
-    and around kinks: density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h."""
+    and around kinks: density(p, hn, oh, ni, no, phi) is f cos_i d omega_i / d omega_h. `knots` has
+    further kinks: at these theta_h, o.h and n.i."""
 
     def albedo(p, cos_o):
         sin_o = math.sqrt(1 - cos_o**2)
         wide = width(p)
+        kinks_t, kinks_oh, kinks_ni = knots(p)
 
         def ring(phi):
             c = math.cos(phi)
@@ -677,13 +679,14 @@ def half_albedo(density, width):
 
             def levels(t):
                 hn, oh, ni, _ = at(t)
-                return ni, ni - cos_o, 2 * hn * ni - oh, 2 * hn * cos_o - oh
+                plain = ni, ni - cos_o, 2 * hn * ni - oh, 2 * hn * cos_o - oh
+                return *plain, *(oh - x for x in kinks_oh), *(ni - x for x in kinks_ni)
 
             # Roots of the conditions at which the integrand has a kink or ends.
             grid = [k * math.pi / 2 / 256 for k in range(257)]
             values = [levels(t) for t in grid]
-            cuts = {0.0, math.pi / 2, *(k * wide for k in (0.5, 1, 2, 4, 8))}
-            for j in range(4):
+            cuts = {0.0, math.pi / 2, *(k * wide for k in (0.5, 1, 2, 4, 8)), *kinks_t}
+            for j in range(len(values[0])):
                 for a, b, va, vb in zip(grid, grid[1:], values, values[1:], strict=False):
                     if va[j] * vb[j] < 0:
                         for _ in range(48):
@@ -747,6 +750,89 @@ def beckmann_d_fp(p, hn):
     return math.exp(-(1 - hn**2) / hn**2 / m2) / (math.pi * m2 * hn**4)
 
 
+# ---- Microfacets: Walter et al. 2007, Heitz 2014 -----------------------------------------------
+
+
+def micro_d(p, h):
+    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    slope2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
+    if p["distribution"] == "ggx":
+        return 1 / (mp.pi * ax * ay * h[2] ** 4 * (1 + slope2) ** 2)
+    return mp.exp(-slope2) / (mp.pi * ax * ay * h[2] ** 4)
+
+
+def micro_lambda(p, w):
+    """Heitz's eqs. 72 and 68; for Beckmann's Walter's rational fit of sec. 5.2."""
+    across = mp.sqrt((mp.mpf(p["ax"]) * w[0]) ** 2 + (mp.mpf(p["ay"]) * w[1]) ** 2)
+    if across == 0:
+        return 0
+    a = w[2] / across
+    if p["distribution"] == "ggx":
+        return (mp.sqrt(1 + 1 / a**2) - 1) / 2
+    c = [mp.mpf(x) for x in ("1.259", "0.396", "3.535", "2.181")]
+    return (1 - c[0] * a + c[1] * a**2) / (c[2] * a + c[3] * a**2) if a < mp.mpf("1.6") else 0
+
+
+def micro_fresnel(p, oh):
+    def schlick(r, c):
+        return r + (1 - r) * (1 - c) ** 5
+
+    weaker = oh * (1 - oh) ** 6 / (mp.mpf(1) / 7 * (mp.mpf(6) / 7) ** 6)
+    return [
+        schlick(r, oh) * (1 - (1 - t) * weaker) for r, t in zip(p["f0"], p["tint"], strict=True)
+    ]
+
+
+def micro_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    i, o = micro_lambda(p, ki), micro_lambda(p, ko)
+    g = {
+        "smith_correlated": 1 / (1 + i + o),
+        "smith_separable": 1 / ((1 + i) * (1 + o)),
+        "v_cavity": cavity(h[2], oh, ki[2], ko[2]),
+    }[p["masking"]]
+    shape = micro_d(p, h) * g / (4 * ki[2] * ko[2])
+    return [c * shape for c in micro_fresnel(p, oh)]
+
+
+def micro_pdf(p, wi, wo):
+    """Visible normals, Heitz's eq. 16, of Smith's or of V-cavities, then reflection."""
+    _, ko, h, oh = half(wi, wo)
+    smith = p["distribution"] == "ggx" and p["masking"] != "v_cavity"
+    g1 = 1 / (1 + micro_lambda(p, ko)) if smith else min(1, 2 * h[2] * ko[2] / oh)
+    return micro_d(p, h) * g1 * oh / ko[2] / (4 * oh)
+
+
+def micro_albedo(p, cos_o):
+    """View in the x-z plane; integrated over half vectors."""
+
+    def at(w):
+        s = (p["ax"] * w[0]) ** 2 + (p["ay"] * w[1]) ** 2
+        a = w[2] / math.sqrt(max(s, 1e-300))
+        if p["distribution"] == "ggx":
+            return (math.sqrt(1 + 1 / a**2) - 1) / 2
+        fit = (1 - 1.259 * a + 0.396 * a**2) / (3.535 * a + 2.181 * a**2)
+        return fit if a < 1.6 else 0
+
+    wo = (math.sqrt(1 - cos_o**2), 0, cos_o)
+
+    def one(p, hn, oh, ni, no, phi):
+        sin = math.sqrt(1 - hn**2)
+        h = (sin * math.cos(phi), sin * math.sin(phi), hn)
+        slope2 = ((h[0] / p["ax"]) ** 2 + (h[1] / p["ay"]) ** 2) / hn**2
+        d = 1 / (1 + slope2) ** 2 if p["distribution"] == "ggx" else math.exp(-slope2)
+        d /= math.pi * p["ax"] * p["ay"] * hn**4
+        wi = [2 * oh * a - b for a, b in zip(h, wo, strict=True)]
+        g = {
+            "smith_correlated": lambda: 1 / (1 + at(wi) + at(wo)),
+            "smith_separable": lambda: 1 / ((1 + at(wi)) * (1 + at(wo))),
+            "v_cavity": lambda: cavity(hn, oh, ni, no),
+        }[p["masking"]]()
+        return d * g * oh / no * float(micro_fresnel(p, oh)[0])
+
+    return [half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)] * 3
+
+
 # ---- Ward, in three normalisations -------------------------------------------------------------
 
 
@@ -783,6 +869,99 @@ def ward_albedo(p, cos_o):
 
     a = half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)
     return [k * a for k in p["ks"]]
+
+
+# ---- Curves of microfacet factors --------------------------------------------------------------
+
+D_KNOTS = (0, 0.3, 0.6, 0.9, 1.25, 1.65, 2.1, 2.6, 3.2, 4, 5, 6.5, 8.5, 11)
+F_KNOTS = (0, 0.05, 0.2, 0.4, 0.6, 0.8, 1)
+G_KNOTS = (0, 1, 2, 3, 4)
+
+
+def log_curve(knots, heights, x, log):
+    """exp of the polygon through the logarithms of the heights, constant beyond the ends."""
+    logs = [log(h + type(h)(1e-30)) for h in heights]
+    if x <= knots[0]:
+        return logs[0]
+    for a, b, left, right in zip(knots, knots[1:], logs, logs[1:], strict=False):
+        if x < b:
+            return left + (right - left) * (x - a) / (b - a)
+    return logs[-1]
+
+
+def factor_heights(p, stem, count, channel, number):
+    return [number(p[f"{stem}{k}"][channel]) for k in range(count)]
+
+
+def factor_product(p, s2, oh, cosines, channel, maths, number):
+    """d F G G, and the remaining factors of the highlight but 1 / (pi a_x a_y cos^4 theta_h)."""
+    shadowing = [number(1)] + [number(p[f"g{k}"]) for k in (1, 2, 3, 4)]
+    d = log_curve(
+        D_KNOTS, factor_heights(p, "d", 14, channel, number), maths.log(1 + s2), maths.log
+    )
+    f = log_curve(F_KNOTS, factor_heights(p, "f", 7, channel, number), 1 - oh, maths.log)
+    g = sum(
+        log_curve(G_KNOTS, shadowing, -maths.log(c) / maths.log(number(2)), maths.log)
+        for c in cosines
+    )
+    heights = [max(c, number(1) / 16) for c in cosines]
+    return (
+        maths.exp(d + f + g) * number(p["strength"]) / (1 + s2) ** 2 / (4 * heights[0] * heights[1])
+    )
+
+
+def factors_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    s2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
+    scale = 1 / (mp.pi * ax * ay * h[2] ** 4)
+    return [
+        mp.mpf(p["rho"][c]) / mp.pi
+        + scale * factor_product(p, s2, oh, (ki[2], ko[2]), c, mp, mp.mpf)
+        for c in range(3)
+    ]
+
+
+def factors_pdf(p, wi, wo):
+    """The pdf of ln q is a product of powers of q, which are integrated one after another."""
+    ki, ko, h, oh = half(wi, wo)
+    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    largest = [mp.mpf(max(p[f"d{k}"])) for k in range(14)]
+
+    def density(x):
+        return mp.exp(log_curve(D_KNOTS, largest, x, mp.log) - x)
+
+    ends = [density(mp.mpf(x)) for x in D_KNOTS]
+    total = ends[-1]
+    for x, y, left, right in zip(D_KNOTS, D_KNOTS[1:], ends, ends[1:], strict=False):
+        power = mp.log(right / left)
+        total += (y - x) * (left if power == 0 else (right - left) / power)
+    mirrored = max(
+        mp.exp(log_curve(F_KNOTS, factor_heights(p, "f", 7, c, mp.mpf), 1 - ko[2], mp.log))
+        for c in range(3)
+    )
+    highlight = p["strength"] * total * mirrored
+    share = highlight / (highlight + max(mp.mpf(c) for c in p["rho"]))
+    s2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
+    p_h = density(mp.log(1 + s2)) / total / (1 + s2) / (mp.pi * ax * ay * h[2] ** 3)
+    return share * p_h / (4 * oh) + (1 - share) * ki[2] / mp.pi
+
+
+def factors_albedo(p, cos_o):
+    """With equal channels of all heights, and equal roughnesses."""
+
+    def one(p, hn, oh, ni, no, phi):
+        t2 = (1 - hn**2) / hn**2
+        s2 = t2 * ((math.cos(phi) / p["ax"]) ** 2 + (math.sin(phi) / p["ay"]) ** 2)
+        scale = 1 / (math.pi * p["ax"] * p["ay"] * hn**4)
+        return factor_product(p, s2, oh, (ni, no), 0, math, float) * scale * ni * 4 * oh
+
+    def knots(p):
+        slopes = [p["ax"] * math.sqrt(math.expm1(x)) for x in D_KNOTS]
+        return [math.atan(s) for s in slopes], [1 - x for x in F_KNOTS], [0.5**k for k in G_KNOTS]
+
+    a = half_albedo(one, lambda p: min(p["ax"], p["ay"]), knots)(p, cos_o)
+    return [c + a for c in p["rho"]]
 
 
 # ---- Schlick -----------------------------------------------------------------------------------
@@ -1199,6 +1378,38 @@ MODELS = {
         ],
         cosines=[1, 0.5, 0.1],
     ),
+    "microfacet": dict(
+        f=micro_f,
+        pdf=micro_pdf,
+        albedo=micro_albedo,
+        defaults={
+            "f0": (0.9, 0.6, 0.3),
+            "tint": (1, 1, 1),
+            "ax": 0.3,
+            "ay": 0.3,
+            "distribution": "ggx",
+            "masking": "smith_correlated",
+        },
+        cases=[
+            {},
+            {"ax": 0.02, "ay": 0.5, "tint": (0.7, 0.3, 0)},
+            {"ax": 1, "ay": 1, "masking": "smith_separable", "f0": (0, 0.04, 1)},
+            {"ax": 0.4, "ay": 0.1, "masking": "v_cavity"},
+            {"distribution": "beckmann", "ax": 0.1, "ay": 0.6},
+            {"distribution": "beckmann", "masking": "smith_separable", "ax": 1, "ay": 1},
+            {"distribution": "beckmann", "masking": "v_cavity"},
+            {"ax": 1e-4, "ay": 1e-4},
+            {"distribution": "beckmann", "ax": 1e-4, "ay": 1},
+        ],
+        albedo_cases=[
+            {"ax": 0.5, "ay": 0.5, "f0": (1, 1, 1)},
+            {"ax": 0.2, "ay": 0.6, "f0": (0.5, 0.5, 0.5), "tint": (0.5, 0.5, 0.5)},
+            {"f0": (1, 1, 1), "masking": "smith_separable"},
+            {"f0": (1, 1, 1), "masking": "v_cavity"},
+            {"f0": (1, 1, 1), "distribution": "beckmann", "ax": 1, "ay": 1},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
     "ward": dict(
         f=ward_f,
         pdf=ward_pdf,
@@ -1218,6 +1429,35 @@ MODELS = {
             {"ax": 0.2, "ay": 0.4, "ks": (1, 1, 1), "normalisation": "duer"},
         ],
         cosines=[1, 0.5, 0.1],
+    ),
+    "factors": dict(
+        f=factors_f,
+        pdf=factors_pdf,
+        albedo=factors_albedo,
+        defaults={"rho": (0.1, 0.03, 0.02), "strength": 1, "ax": 0.2, "ay": 0.2}
+        | {f"d{k}": (1, 1, 1) for k in range(14)}
+        | {f"f{k}": (0.05 + 0.95 * x**5,) * 3 for k, x in enumerate(F_KNOTS)}
+        | dict(zip(("g1", "g2", "g3", "g4"), (0.97, 0.88, 0.7, 0.45), strict=True)),
+        cases=[
+            {},
+            {
+                "ax": 0.05,
+                "ay": 0.4,
+                "d1": (0.9, 0.5, 0.1),
+                "d3": (0.2, 0.3, 0.1),
+                "f2": (1, 0, 0.5),
+            },
+            {"d0": (0.01, 0.01, 0.01), "d6": (0.3, 0.2, 0.1), "g1": 0.5, "g2": 1, "rho": (0, 0, 0)},
+            {"ax": 1, "ay": 1, "strength": 1e3, "d13": (1e-6, 1e-3, 0)},
+            {"ax": 1e-4, "ay": 1e-4},
+        ],
+        albedo_cases=[
+            {},
+            {"ax": 0.4, "ay": 0.4, "d2": (0.3, 0.3, 0.3), "g4": 0.2, "strength": 2},
+        ],
+        cosines=[1, 0.5, 0.1],
+        # Logarithms as large as 70 are added, whose rounding errors are those of a number near 70.
+        floor=lambda p: 1e-12,
     ),
     "schlick": dict(
         f=schlick_f,

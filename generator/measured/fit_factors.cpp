@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measured/fit_factors.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "fit/view.h"
+
+namespace brdfc::measured {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kPlaces = 17, kPlacesEach = 7;  ///< roughnesses that are tried: of one, and of each of two
+constexpr std::size_t kStarts = 3;            ///< searches begin at the best of them
+constexpr double kSmoothest = 0.003, kRoughest = 1;
+constexpr int kFewSteps = 12, kSteps = 60;  ///< of the search for heights
+/// Heights of colours are searched between the exponentials of these: wider than single precision tells from 0
+/// beside 1. The heights that channels share are shadowing, which is seldom less.
+constexpr double kRange = 34, kSharedRange = 12;
+/// Of the deviations, the least that counts in the weights, in units of the mean of the data.
+constexpr double kFirstFloor = 0.3, kLastFloor = 3e-3;
+/// How far the slope of a curve's logarithm may change from piece to piece where the data say nothing.
+constexpr double kStiffness = 1e-4;
+
+/// The highlight's powers and the rest of it, for pairs of directions and roughnesses.
+struct Powers {
+  VectorXd unit;   ///< f with all heights and the strength 1, and without matte light
+  MatrixXd power;  ///< of each height, a row for each pair
+};
+
+class Curves {
+ public:
+  Curves(const Model& model, const CurveRoles& roles)
+      : model_(model), roles_(roles), values_(complete(model.info(), {})) {
+    set(*roles_.matte, 0);
+    set(*roles_.strength, 1);
+    for (const auto* heights : {&roles_.colors, &roles_.numbers})
+      for (const ParamInfo* p : *heights) set(*p, 1);
+  }
+
+  Powers powers(const std::vector<double>& roughness, const Pairs& pairs) const {
+    ParamValues values = values_;
+    for (std::size_t i = 0; i < roughness.size(); ++i) values[roles_.roughness[i]->name] = roughness[i];
+    const auto brdf = model_.make_double(values);
+    const Index count = Index(pairs.wi.size());
+    Powers out{f(*brdf, pairs), MatrixXd(count, heights())};
+    Index column = 0;
+    for (const auto* heights : {&roles_.colors, &roles_.numbers})
+      for (const ParamInfo* p : *heights) {
+        constexpr double kLess = 0.5;
+        brdf->assign(p->name, {kLess, kLess, kLess});
+        out.power.col(column++) = ((f(*brdf, pairs).array() / out.unit.array()).log() / std::log(kLess)).matrix();
+        brdf->assign(p->name, {1, 1, 1});
+      }
+    return out;
+  }
+  Index heights() const { return Index(roles_.colors.size() + roles_.numbers.size()); }
+  Index own() const { return Index(roles_.colors.size()); }
+
+  /// Heights of 1 at most, the rest of them in the strength. `logs`: of the heights, a column for each channel.
+  ParamValues values(const std::vector<double>& roughness, MatrixXd logs, const Rgb<double>& matte) const {
+    ParamValues out = values_;
+    for (std::size_t i = 0; i < roughness.size(); ++i) out[roles_.roughness[i]->name] = roughness[i];
+    out[roles_.matte->name] = std::array<double, 3>{matte.r, matte.g, matte.b};
+    double strength = 0;
+    for (const auto& [first, end] : curves()) {
+      const double highest = logs.middleRows(first, end - first).maxCoeff();
+      logs.middleRows(first, end - first).array() -= highest;
+      strength += highest;
+    }
+    Index row = 0;
+    for (const ParamInfo* p : roles_.colors) {
+      std::array<double, 3>& height = std::get<std::array<double, 3>>(out[p->name]);
+      for (std::size_t c = 0; c < 3; ++c) height[c] = std::exp(logs(row, Index(c)));
+      ++row;
+    }
+    for (const ParamInfo* p : roles_.numbers) out[p->name] = std::exp(logs(row++, 0));
+    out[roles_.strength->name] = std::exp(strength);
+    return out;
+  }
+
+  /// The rows of each curve of colours: heights whose names differ in their numbers alone.
+  std::vector<std::pair<Index, Index>> curves() const {
+    const auto stem = [](const ParamInfo* p) { return p->name.substr(0, p->name.find_first_of("0123456789")); };
+    std::vector<std::pair<Index, Index>> out;
+    for (std::size_t i = 0; i < roles_.colors.size(); ++i) {
+      if (i == 0 || stem(roles_.colors[i]) != stem(roles_.colors[i - 1])) out.emplace_back(Index(i), Index(i));
+      out.back().second = Index(i) + 1;
+    }
+    return out;
+  }
+
+ private:
+  static VectorXd f(const Brdf<double>& brdf, const Pairs& pairs) {
+    VectorXd out(Index(pairs.wi.size()));
+    for (std::size_t k = 0; k < pairs.wi.size(); ++k) out[Index(k)] = brdf.eval(pairs.wi[k], pairs.wo[k]).g;
+    return out;
+  }
+  void set(const ParamInfo& p, double value) {
+    if (p.kind == ParamKind::Color)
+      values_[p.name] = std::array<double, 3>{value, value, value};
+    else
+      values_[p.name] = value;
+  }
+
+  const Model& model_;
+  const CurveRoles& roles_;
+  ParamValues values_;
+};
+
+/// Heights and matte light for given roughnesses. Unknowns: for each channel matte light and the logarithms of its
+/// heights, then those of the heights that all three share.
+class Heights {
+ public:
+  Heights(const Curves& curves, const std::vector<double>& roughness, const Pairs& pairs)
+      : curves_(curves), pairs_(pairs), p_(curves.powers(roughness, pairs)), own_(curves.own() + 1) {
+    const Index count = p_.power.rows();
+    for (Index k = 0; k < count; ++k) {
+      std::vector<Index> used;
+      for (Index j = 0; j < p_.power.cols(); ++j)
+        if (std::abs(p_.power(k, j)) > 1e-9) used.push_back(j);
+      used_.push_back(std::move(used));
+    }
+    double weight = 0, sum = 0;
+    for (std::size_t k = 0; k < pairs.data.size(); ++k) {
+      const double w = pairs.weight[Index(k)];
+      weight += 3 * w, sum += w * (pairs.data[k].r + pairs.data[k].g + pairs.data[k].b);
+    }
+    mean_ = sum / weight;
+  }
+
+  /// Searches from both guesses for the matte light.
+  void solve(int steps) {
+    double best = std::numeric_limits<double>::infinity();
+    VectorXd best_x;
+    for (const double share : {0., 0.9}) {
+      const VectorXd x = descend(guess(share), steps);
+      const double e = error(x);
+      if (!(e < best)) continue;
+      best = e, best_x = x;
+    }
+    x_ = best_x, error_ = best;
+  }
+  double error() const { return error_; }
+
+  Rgb<double> matte() const { return {x_[0], x_[own_], x_[2 * own_]}; }
+  MatrixXd logs() const {
+    MatrixXd out(p_.power.cols(), 3);
+    for (Index c = 0; c < 3; ++c)
+      for (Index j = 0; j < out.rows(); ++j) out(j, c) = x_[place(j, c)];
+    return out;
+  }
+
+ private:
+  Index unknowns() const { return 3 * own_ + p_.power.cols() - (own_ - 1); }
+  /// Where the height j of channel c stands among the unknowns.
+  Index place(Index j, Index c) const { return j < own_ - 1 ? c * own_ + 1 + j : 3 * own_ + j - (own_ - 1); }
+
+  double highlight(const VectorXd& x, std::size_t k, Index c) const {
+    double sum = 0;
+    for (const Index j : used_[k]) sum += p_.power(Index(k), j) * x[place(j, c)];
+    return p_.unit[Index(k)] * std::exp(sum);
+  }
+  double error(const VectorXd& x) const {
+    double off = 0;
+    for (std::size_t k = 0; k < used_.size(); ++k)
+      for (Index c = 0; c < 3; ++c)
+        off += pairs_.weight[Index(k)] *
+               std::abs(x[c * own_] / kPi + highlight(x, k, c) - channel(pairs_.data[k], std::size_t(c)));
+    return off / pairs_.light;
+  }
+
+  /// Where curves bend: the change of slope at a knot, for each curve of each channel.
+  void add_stiffness(MatrixXd& a, VectorXd& b, const VectorXd& x, double strength) const {
+    const auto bend = [&](Index i, Index j, Index k) {
+      const double r = x[i] - 2 * x[j] + x[k];
+      const std::array<std::pair<Index, double>, 3> d{{{i, 1}, {j, -2}, {k, 1}}};
+      for (const auto& [p, u] : d) {
+        b[p] -= strength * u * r;
+        for (const auto& [q, v] : d) a(p, q) += strength * u * v;
+      }
+    };
+    for (const auto& [first, end] : curves_.curves())
+      for (Index c = 0; c < 3; ++c)
+        for (Index j = first + 1; j + 1 < end; ++j) bend(place(j - 1, c), place(j, c), place(j + 1, c));
+  }
+
+  void keep_in_range(VectorXd& x) const {
+    for (Index i = 0; i < x.size(); ++i) {
+      const bool is_matte = i < 3 * own_ && i % own_ == 0, is_shared = i >= 3 * own_;
+      if (is_matte)
+        x[i] = std::clamp(x[i], 0., 1.);
+      else
+        x[i] = std::clamp(x[i], is_shared ? -kSharedRange : -kRange, is_shared ? 0. : kRange);
+    }
+  }
+
+  /// The logarithm of what the matte light leaves, by weighted least squares.
+  VectorXd guess(double share) const {
+    VectorXd x = VectorXd::Zero(unknowns());
+    MatrixXd a = MatrixXd::Zero(x.size(), x.size());
+    VectorXd b = VectorXd::Zero(x.size());
+    for (Index c = 0; c < 3; ++c) {
+      std::vector<double> sorted;
+      for (const Rgb<double>& d : pairs_.data) sorted.push_back(channel(d, std::size_t(c)));
+      std::ranges::nth_element(sorted, sorted.begin() + long(sorted.size() / 20));
+      const double matte = std::clamp(share * kPi * sorted[sorted.size() / 20], 0., 1.);
+      x[c * own_] = matte;
+      for (std::size_t k = 0; k < used_.size(); ++k) {
+        const double d = channel(pairs_.data[k], std::size_t(c)), rest = std::max(d - matte / kPi, 0.05 * d);
+        if (!(rest > 0)) continue;
+        const double w = pairs_.weight[Index(k)] * rest / pairs_.light;
+        const double target = std::log(rest / p_.unit[Index(k)]);
+        for (const Index i : used_[k]) {
+          b[place(i, c)] += w * p_.power(Index(k), i) * target;
+          for (const Index j : used_[k])
+            a(place(i, c), place(j, c)) += w * p_.power(Index(k), i) * p_.power(Index(k), j);
+        }
+      }
+    }
+    add_stiffness(a, b, x, 1e-3);
+    for (Index i = 0; i < x.size(); ++i) a(i, i) += 1e-6;
+    const VectorXd found = a.ldlt().solve(b);
+    for (Index i = 0; i < x.size(); ++i)
+      if (!(i < 3 * own_ && i % own_ == 0)) x[i] = found[i];
+    keep_in_range(x);
+    return x;
+  }
+
+  /// K. Levenberg, D. Marquardt's method, with weights that make squares absolute deviations.
+  VectorXd descend(VectorXd x, int steps) const {
+    double damping = 1e-3, now = error(x);
+    for (int step = 0; step < steps; ++step) {
+      const double floor = mean_ * kFirstFloor * std::pow(kLastFloor / kFirstFloor, std::min(1., 1.5 * step / steps));
+      MatrixXd a = MatrixXd::Zero(x.size(), x.size());
+      VectorXd b = VectorXd::Zero(x.size());
+      std::vector<std::pair<Index, double>> slope;
+      for (std::size_t k = 0; k < used_.size(); ++k)
+        for (Index c = 0; c < 3; ++c) {
+          const double high = highlight(x, k, c);
+          const double r = x[c * own_] / kPi + high - channel(pairs_.data[k], std::size_t(c));
+          const double w = pairs_.weight[Index(k)] / (pairs_.light * std::max(std::abs(r), floor));
+          slope.assign(1, {c * own_, 1 / kPi});
+          for (const Index j : used_[k]) slope.emplace_back(place(j, c), high * p_.power(Index(k), j));
+          for (const auto& [i, u] : slope) {
+            b[i] -= w * u * r;
+            for (const auto& [j, v] : slope) a(i, j) += w * u * v;
+          }
+        }
+      add_stiffness(a, b, x, kStiffness);
+      bool better = false;
+      for (int tries = 0; tries < 6 && !better; ++tries) {
+        MatrixXd damped = a;
+        for (Index i = 0; i < x.size(); ++i) damped(i, i) += damping * a(i, i) + 1e-9;
+        VectorXd to = x + damped.ldlt().solve(b);
+        keep_in_range(to);
+        const double then = error(to);
+        better = then < now;
+        if (better) {
+          x = to, now = then;
+          damping = std::max(damping / 4, 1e-7);
+        } else {
+          damping = std::min(damping * 5, 1e3);
+        }
+      }
+    }
+    return x;
+  }
+
+  const Curves& curves_;
+  const Pairs& pairs_;
+  Powers p_;
+  Index own_;  ///< unknowns of each channel
+  std::vector<std::vector<Index>> used_;
+  double mean_ = 0;
+  VectorXd x_;
+  double error_ = 0;
+};
+
+}  // namespace
+
+std::optional<CurveRoles> curve_roles(const Model& model) {
+  if (model.info().name != "factors") return std::nullopt;
+  CurveRoles out;
+  for (const ParamInfo& p : model.info().params) {
+    if (p.name == "rho")
+      out.matte = &p;
+    else if (p.name == "strength")
+      out.strength = &p;
+    else if (p.name == "ax" || p.name == "ay")
+      out.roughness.push_back(&p);
+    else
+      (p.kind == ParamKind::Color ? out.colors : out.numbers).push_back(&p);
+  }
+  return out;
+}
+
+ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic, const Pairs& coarse,
+                     const Pairs& fine, const Pairs& last) {
+  const auto start = std::chrono::steady_clock::now();
+  const Curves curves(model, roles);
+  const auto roughness = [&](const std::vector<double>& t) {
+    std::vector<double> out;
+    for (std::size_t i = 0; i < roles.roughness.size(); ++i)
+      out.push_back(kSmoothest * std::pow(kRoughest / kSmoothest, t[isotropic ? 0 : i]));
+    return out;
+  };
+  struct Try {
+    std::vector<double> t;
+    double error = 0;
+  };
+  std::vector<Try> tries;
+  if (isotropic)
+    for (int i = 0; i < kPlaces; ++i) tries.push_back({{i / (kPlaces - 1.)}});
+  else
+    for (int i = 0; i < kPlacesEach; ++i)
+      for (int j = 0; j < kPlacesEach; ++j) tries.push_back({{i / (kPlacesEach - 1.), j / (kPlacesEach - 1.)}});
+  const auto error = [&](const std::vector<double>& t, const Pairs& pairs) {
+    Heights heights(curves, roughness(t), pairs);
+    heights.solve(kFewSteps);
+    return heights.error();
+  };
+  for (Try& t : tries) t.error = error(t.t, coarse);
+  std::ranges::stable_sort(tries, {}, &Try::error);
+  tries.resize(kStarts);
+  for (Try& t : tries) {
+    std::vector<fit::Variable> variables;
+    for (const double x : t.t) variables.push_back({x, 0, 1, isotropic ? 0.03 : 0.08});
+    t.t = fit::argmin(variables, [&](const std::vector<double>& x) { return std::min(error(x, coarse), 1e6); });
+    t.error = error(t.t, fine);
+  }
+  const std::vector<double> best = roughness(std::ranges::min_element(tries, {}, &Try::error)->t);
+  Heights heights(curves, best, fine);
+  heights.solve(kSteps);
+  ModelFit out;
+  out.model = &model;
+  out.values = curves.values(best, heights.logs(), heights.matte());
+  const auto brdf = model.make_double(out.values);
+  Colors f(last.wi.size());
+  for (std::size_t k = 0; k < f.size(); ++k) f[k] = brdf->eval(last.wi[k], last.wo[k]);
+  out.error = error_of(last, f);
+  out.found = int(roles.colors.size() + roles.numbers.size()) + 2 + (isotropic ? 1 : 2);
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return out;
+}
+
+}  // namespace brdfc::measured

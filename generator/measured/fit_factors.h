@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fits of curves to a measured BRDF, for a model whose highlight is a product of powers of its parameters, such as the
+// heights of its curves: a nonlinear least-squares problem in their logarithms.
+#pragma once
+
+#include <optional>
+
+#include "measured/fit_models.h"
+#include "measured/pairs.h"
+
+namespace brdfc::measured {
+
+/// How parameters of a model make its f: rho / pi + strength * (a product of powers of the curves' heights), where the
+/// powers depend on the directions and on the roughnesses.
+struct CurveRoles {
+  const ParamInfo* matte = nullptr;               ///< a colour
+  const ParamInfo* strength = nullptr;            ///< a number
+  std::vector<const ParamInfo*> roughness;        ///< numbers, along the tangent first
+  std::vector<const ParamInfo*> colors, numbers;  ///< heights: of each channel, and of all three
+};
+/// The roles of a model's parameters; nullopt for a model that is not made of curves.
+std::optional<CurveRoles> curve_roles(const Model&);
+
+/// The curves that come closest to the data, with the error for `last`. Roughnesses are equal for isotropic data.
+ModelFit fit_factors(const Model&, const CurveRoles&, bool isotropic, const Pairs& coarse, const Pairs& fine,
+                     const Pairs& last);
+
+}  // namespace brdfc::measured

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Microfacet reflection whose factors are curves instead of formulas, so that it can follow a measured material.
+//
+// M. M. Bagher, J. Snyder, D. Nowrouzezahrai: A Non-Parametric Factor Microfacet Model for Isotropic BRDFs, ACM
+// Transactions on Graphics 35(5), 2016. There
+//   f = rho / pi + s D(theta_h) F(theta_d) G(theta_i) G(theta_o) / (4 cos theta_i cos theta_o)
+// with tabulated D, F and G in each channel. Here the tables have few knots, so that they can be parameters:
+//   D = d(ln q) / (pi a_x a_y cos^4 theta_h q^2),  q = 1 + tan^2 theta_h (cos^2 phi_h / a_x^2 + sin^2 phi_h / a_y^2),
+// where d = 1 gives the distribution of Trowbridge and Reitz (GGX). ln d is linear in ln q between its knots, ln F
+// linear in cos theta_d, and ln G linear in ln cos theta. D thus consists of powers of q: Trowbridge and Reitz's
+// distribution with any exponent is such a curve, and so is a constant. Beyond its last knot, d is constant; at heights
+// below the last knot of G, G is proportional to the height, so that f stays finite.
+//
+// Numerical stability: the logarithms of the strength, d, F and G are added. Each may be as large as 70, so that f has
+// a rounding error of some hundred units in the last place where large ones cancel.
+//
+// f is reciprocal. Like measured data, it may reflect more light than arrives.
+//
+// Sampling: a matte direction or a half vector. The pdf of ln q, as of D with the largest d of the channels, consists
+// of exponentials, whose integrals are inverted in closed form.
+#include "model/base_terms.h"
+#include "model/half_vector.h"
+
+namespace brdfc {
+namespace {
+
+// Knots of d in ln q: denser where most of the light is, and out to slopes of 250 a.
+constexpr std::array<double, 14> kD = {0, 0.3, 0.6, 0.9, 1.25, 1.65, 2.1, 2.6, 3.2, 4, 5, 6.5, 8.5, 11};
+// Knots of F in 1 - cos theta_d: denser at 0, where a surface may return light towards its source.
+constexpr std::array<double, 7> kF = {0, 0.05, 0.2, 0.4, 0.6, 0.8, 1};
+// Knots of G in -log2 cos theta. G = 1 at the first.
+constexpr std::array<double, 5> kG = {0, 1, 2, 3, 4};
+
+constexpr double kLn2 = 0.69314718055994530942;
+
+/// How much of each piece between knots lies below x, from 0 to 1.
+template <std::size_t N, class T> std::array<T, N - 1> passed(const std::array<double, N>& knots, const T& x) {
+  std::array<T, N - 1> out;
+  for (std::size_t k = 0; k + 1 < N; ++k) out[k] = clamp01((x - T(knots[k])) / T(knots[k + 1] - knots[k]));
+  return out;
+}
+/// The curve through values at knots, which is linear between them and constant beyond.
+template <class V, std::size_t N, class T> V curve(const std::array<V, N>& at, const std::array<T, N - 1>& passed) {
+  V sum = at[0];
+  for (std::size_t k = 0; k + 1 < N; ++k) sum = sum + (at[k + 1] - at[k]) * passed[k];
+  return sum;
+}
+
+}  // namespace
+
+template <class T> struct Factors {
+  Rgb<T> rho;
+  T strength, ax, ay;
+  std::array<Rgb<T>, kD.size()> d;
+  std::array<Rgb<T>, kF.size()> f;
+  std::array<T, kG.size() - 1> g;
+
+  static ModelInfo info() {
+    return {.name = "factors",
+            .label = "Microfacet Factors",
+            .look = Look::Special,
+            .paper =
+                "M. M. Bagher, J. Snyder, D. Nowrouzezahrai: A Non-Parametric Factor Microfacet Model for "
+                "Isotropic BRDFs, ACM TOG 35(5), 2016",
+            .equations = "f = rho / pi + s D(theta_h) F(theta_d) G(theta_i) G(theta_o) / (4 cos theta_i cos theta_o)",
+            .doc = "Microfacets whose distribution, Fresnel term and shadowing are curves, for measured materials.",
+            .properties = {.conserving = false,  // as measured data are not
+                           .isotropic = false,
+                           .smooth = false,  // the curves have knots
+                           .exact_sampling = false,
+                           .diffuse_limit = "strength=0",
+                           .albedo_table = false},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(rho, ColorSpec{"rho", "Matte", {0.1, 0.03, 0.02}, "Share of the light that is reflected in all directions"}.as(
+               Optical::Reflectance));
+    v(strength, NumberSpec{"strength", "Strength", 1, 0, 1e30, 0, 4, "Factor of the highlight"}.by_factors());
+    v(ax, NumberSpec{"ax", "Roughness X", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope along the tangent"}.by_factors());
+    v(ay,
+      NumberSpec{"ay", "Roughness Y", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope across the tangent"}.by_factors());
+    static constexpr const char* kNames[] = {"d0", "d1", "d2", "d3",  "d4",  "d5",  "d6",
+                                             "d7", "d8", "d9", "d10", "d11", "d12", "d13"};
+    static constexpr const char* kLabels[] = {"Facets 0",  "Facets 1",  "Facets 2",  "Facets 3", "Facets 4",
+                                              "Facets 5",  "Facets 6",  "Facets 7",  "Facets 8", "Facets 9",
+                                              "Facets 10", "Facets 11", "Facets 12", "Facets 13"};
+    for (std::size_t k = 0; k < d.size(); ++k)
+      v(d[k], ColorSpec{kNames[k],
+                        kLabels[k],
+                        {1, 1, 1},
+                        "Facets at a knot, in units of GGX: 0 is where they face the normal, 13 the steepest"});
+    static constexpr const char* kFresnel[] = {"f0", "f1", "f2", "f3", "f4", "f5", "f6"};
+    static constexpr const char* kFresnelLabels[] = {"Fresnel 0", "Fresnel 1", "Fresnel 2", "Fresnel 3",
+                                                     "Fresnel 4", "Fresnel 5", "Fresnel 6"};
+    for (std::size_t k = 0; k < f.size(); ++k) {
+      const double schlick = 0.05 + 0.95 * pow5(kF[k]);
+      v(f[k], ColorSpec{kFresnel[k],
+                        kFresnelLabels[k],
+                        {schlick, schlick, schlick},
+                        "Reflectance of a facet at a knot: 0 is seen and lit from the front, 6 from the side"});
+    }
+    static constexpr const char* kShadowing[] = {"g1", "g2", "g3", "g4"};
+    static constexpr const char* kShadowingLabels[] = {"Visibility 1", "Visibility 2", "Visibility 3", "Visibility 4"};
+    static constexpr double kVisible[] = {0.97, 0.88, 0.7, 0.45};
+    for (std::size_t k = 0; k < g.size(); ++k)
+      v(g[k], NumberSpec{kShadowing[k], kShadowingLabels[k], kVisible[k], 0, 1, 0, 1,
+                         "Share of the facets that are seen where the cosine to the normal is 1/2, 1/4, 1/8 or 1/16"});
+  }
+
+  template <class V, std::size_t N> static std::array<V, N> logs(const std::array<V, N>& heights) {
+    std::array<V, N> out;
+    for (std::size_t k = 0; k < N; ++k) out[k] = log(heights[k] + V(tiny<T>()));
+    return out;
+  }
+
+  /// The half vector's slope in units of the roughness: s^2 = q - 1, and 1 / cos^2 theta_h.
+  struct Facet {
+    T s2, inverse_cos2, oh;
+  };
+  Facet facet(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> half(wi, wo);
+    const Slopes<T> slope(half.h);
+    return {named("s2", sqr(slope.x / ax) + sqr(slope.y / ay)), slope.inverse_cos2(), half.oh};
+  }
+
+  /// ln G(theta).
+  T log_visibility(const T& cosTheta) const {
+    std::array<T, kG.size()> at = {T(0)};
+    for (std::size_t k = 0; k < g.size(); ++k) at[k + 1] = log(g[k] + tiny<T>());
+    return named("log_G", curve(at, passed(kG, log(maximum(cosTheta, tiny<T>())) * T(-1 / kLn2))));
+  }
+  /// G / cos theta; below the last knot it is constant.
+  static T least_height(const T& cosTheta) { return maximum(cosTheta, T(1. / 16)); }
+  /// The product of the strength, d, F and both G. Their logarithms are added, since one may be as large as others are
+  /// small.
+  Rgb<T> product(const T& log_q, const T& cosTheta_d, const T& log_visible) const {
+    const Rgb<T> log_d = curve(logs(d), passed(kD, log_q));
+    const Rgb<T> log_f = curve(logs(f), passed(kF, T(1) - cosTheta_d));
+    return exp(log_d + log_f + Rgb<T>(log_visible + log(strength + tiny<T>())));
+  }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const Facet m = facet(wi, wo);
+    const T visible = log_visibility(wi.z) + log_visibility(wo.z);
+    // 1 / (a_x a_y q^2 cos^4 theta_h), divided by one factor at a time: q^2 alone may overflow.
+    const T q = T(1) + m.s2;
+    const T density = named("density", m.inverse_cos2 / (ax * q) * (m.inverse_cos2 / (ay * q)));
+    const T scale = density / (T(4) * pi<T>() * least_height(wi.z) * least_height(wo.z));
+    return select(above(wi, wo), rho * T(kInvPi) + product(log1p(m.s2), m.oh, visible) * scale, Rgb<T>(T(0)));
+  }
+
+  /// The pdf of x = ln q: the exponential of a curve, e^(E(x)), divided by its integral. E = ln d - x.
+  struct Slant {
+    std::array<T, kD.size()> log_d;
+    std::array<T, kD.size()> before;  ///< the integral up to each knot
+    T total;
+  };
+  /// (e^t - 1) / t.
+  static T expm1_over(const T& t) {
+    const auto small = abs(t) < T(1e-4);
+    return select(small, T(1) + t / T(2), expm1(t) / select(small, T(1), t));
+  }
+  /// The change of E over a piece, and its integral.
+  static T rise(const std::array<T, kD.size()>& log_d, std::size_t k) {
+    return log_d[k + 1] - log_d[k] - T(kD[k + 1] - kD[k]);
+  }
+  Slant slant() const {
+    Slant out;
+    for (std::size_t k = 0; k < kD.size(); ++k) out.log_d[k] = log(max_component(d[k]) + tiny<T>());
+    T sum(0);
+    for (std::size_t k = 0; k + 1 < kD.size(); ++k) {
+      out.before[k] = sum;
+      sum = sum + exp(out.log_d[k] - T(kD[k])) * T(kD[k + 1] - kD[k]) * expm1_over(rise(out.log_d, k));
+    }
+    out.before[kD.size() - 1] = sum;
+    out.total = sum + exp(out.log_d[kD.size() - 1] - T(kD[kD.size() - 1]));
+    return out;
+  }
+
+  /// The probability of sampling a half vector: the share of the highlight in what both would reflect towards wo.
+  T highlight_share(const Vec3<T>& wo, const Slant& slant) const {
+    const Rgb<T> log_f = curve(logs(f), passed(kF, T(1) - maximum(wo.z, T(0))));
+    const T highlight = slant.total * max_component(exp(log_f + Rgb<T>(log(strength + tiny<T>()))));
+    const T matte = max_component(rho);
+    return named("highlight_share", highlight / maximum(highlight + matte, tiny<T>()));
+  }
+
+  /// The pdf of wi for a sampled half vector: p_h / (4 o.h), with p_h = p(s) / cos^3 theta_h and p(s) that of slopes.
+  T highlight_pdf(const Vec3<T>& wi, const Vec3<T>& wo, const Slant& slant) const {
+    const Facet m = facet(wi, wo);
+    const T x = log1p(m.s2), q = T(1) + m.s2;
+    // x has the pdf e^E / total, and dx = d(s^2) / q, where pi a_x a_y d(s^2) is the area of slopes.
+    const T pdf_x = exp(curve(slant.log_d, passed(kD, x))) / slant.total;
+    const T inverse_cos = sqrt(m.inverse_cos2);
+    return pdf_x * (inverse_cos / (ax * q)) * (m.inverse_cos2 / (ay * q)) / (T(4) * pi<T>() * maximum(m.oh, tiny<T>()));
+  }
+
+  T pdf_of(const Vec3<T>& wi, const Vec3<T>& wo, const Slant& s) const {
+    const T share = highlight_share(wo, s);
+    return select(above(wi, wo), share * highlight_pdf(wi, wo, s) + (T(1) - share) * wi.z * T(kInvPi), T(0));
+  }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return pdf_of(wi, wo, slant()); }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Slant s = slant();
+    const auto matte = u.x >= highlight_share(wo, s);
+    // In the last piece that begins below it: the integral from its first knot is `rest`.
+    const T target = u.y * s.total;
+    const std::size_t last = kD.size() - 1;
+    T x(0);
+    for (std::size_t k = 0; k < last; ++k) {
+      const T r = rise(s.log_d, k), width(kD[k + 1] - kD[k]);
+      const T height = exp(s.log_d[k] - T(kD[k])) * width;
+      const T rest = maximum(target - s.before[k], T(0)) / maximum(height, tiny<T>());
+      const auto flat = abs(r) < T(1e-4);
+      const T curved = log1p(maximum(rest * r, T(-1) + T(1e-7))) / select(flat, T(1), r);
+      const T part = clamp01(select(flat, rest, curved));
+      x = select(target >= s.before[k], T(kD[k]) + width * part, x);
+    }
+    // Beyond the last knot, e^(E) falls as e^(-x).
+    const T above_it = maximum((s.total - target) / maximum(s.total - s.before[last], tiny<T>()), T(1e-12));
+    x = named("x", select(target >= s.before[last], T(kD[last]) - log(minimum(above_it, T(1))), x));
+    const T slope = sqrt(expm1(x)), phi = T(2) * pi<T>() * u.z;
+    const T sx = ax * slope * cos(phi), sy = ay * slope * sin(phi);
+    const T cos_h = T(1) / sqrt(T(1) + sx * sx + sy * sy);
+    const Vec3<T> h = {sx * cos_h, sy * cos_h, cos_h};
+    const Vec3<T> wi = select(matte, sample_cosine(u.y, u.z), h * (T(2) * dot(wo, h)) - wo);
+    const T p = pdf_of(wi, wo, s);
+    return sample_if(above(wi, wo) && p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
+  }
+
+  /// GGX facets and the matte part. The facets' weight is that of the curves over those of Cycles' facets, which have
+  /// d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at its mean height.
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
+    const T zi = lobe_height(zo, T(0.7) * p2);
+    // (n.w) Lambda.
+    const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };
+    const T inverse_smith = zi * zo + zo * hidden(zi) + zi * hidden(zo);
+    const Rgb<T> weight = product(T(kLn2), zi, log_visibility(zi) + log_visibility(zo)) *
+                          (T(0.92) * inverse_smith / (least_height(zi) * least_height(zo)));
+    Closure<T> matte(ClosureKind::Diffuse, rho);
+    return {facets(ClosureKind::Ggx, weight, ax, ay, T(0)), matte};
+  }
+};
+
+BRDFC_MODEL(Factors)
+
+}  // namespace brdfc

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Microfacets composed of a distribution of normals, a masking function and a Fresnel term.
+//
+// B. Walter, S. Marschner, H. Li, K. Torrance: Microfacet Models for Refraction through Rough Surfaces, EGSR 2007:
+// f = F D G / (4 (n.i)(n.o)), eq. 20, with two roughnesses as in E. Heitz: Understanding the Masking-Shadowing Function
+// in Microfacet-Based BRDFs, JCGT 3(2), 2014. With the slopes x, y of the normal and s2 = (x / ax)^2 + (y / ay)^2,
+//   ggx:       D = 1 / (pi ax ay (n.h)^4 (1 + s2)^2), also named after Trowbridge and Reitz, 1975,
+//   beckmann:  D = exp(-s2) / (pi ax ay (n.h)^4);
+//   smith_correlated: G = 1 / (1 + Lambda_i + Lambda_o), Heitz eq. 99,
+//   smith_separable:  G = 1 / ((1 + Lambda_i) (1 + Lambda_o)),
+//   v_cavity:         Torrance and Sparrow's, of model/v_cavity.h.
+// With a = (n.w) / sqrt((ax w.x)^2 + (ay w.y)^2), Lambda is (sqrt(1 + 1 / a^2) - 1) / 2 for ggx. For beckmann it is
+// Walter's rational approximation of its sec. 5.2, off by less than 0.35 % of G, which Cycles uses as well.
+//
+// F is Schlick's approximation S with the reflectance f0, times a tint that is strongest at 82 degrees, where the
+// cosine is 1/7: P. Kutz, M. Hasan, D. Edmondson: Novel Aspects of the Adobe Standard Material, 2021. Their
+//   F = S(c) - (1 - tint) S(1/7) q(c),  q = c (1 - c)^6 / ((1/7) (6/7)^6)
+// is negative for dark colours. Here the same q is a factor, F = S(c) (1 - (1 - tint) q(c)), which is the same at 0, 82
+// and 90 degrees, never negative, and linear in either colour, as tables of the albedo require. With a white tint both
+// are Schlick's F. For f0 above 0.5 and tints above 0.7 the two differ by less than 0.03, for f0 above 0.9 by 0.006.
+//
+// Numerical stability. (n.w) Lambda is finite at the horizon, Lambda is not: the quotient G / (4 (n.i)(n.o)) is
+// computed from the former. With s = 7 (1 - c) / 6, q is 7 c s^6 and 1 - q is (1 - s)^2 (1 + 2 s + ... + 6 s^5).
+//
+// Sampling. Visible normals of Smith's ggx by spherical caps: J. Dupuy, A. Benyoub: Sampling Visible GGX Normals with
+// Spherical Caps, HPG 2023. Visible normals of V-cavities, which need nothing but D (n.h): a normal is drawn, and
+// itself or its opposite is taken, with probabilities as their projected areas (Heitz 2014, sec. 5.2; E. Heitz, E.
+// d'Eon: Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals, EGSR 2014). Smith's
+// beckmann takes these as well: its own need the inverse of an error function.
+#include "model/base_terms.h"
+#include "model/v_cavity.h"
+
+namespace brdfc {
+
+template <class T> struct Microfacet {
+  Rgb<T> f0, tint;
+  T ax, ay;
+  Choice distribution, masking;
+
+  enum { Ggx, Beckmann };
+  enum { SmithCorrelated, SmithSeparable, VCavity };
+
+  static ModelInfo info() {
+    return {.name = "microfacet",
+            .label = "Microfacet",
+            .look = Look::Metal,
+            .paper =
+                "B. Walter, S. Marschner, H. Li, K. Torrance: Microfacet Models for Refraction through Rough Surfaces, "
+                "EGSR 2007",
+            .equations = "f = F D G / (4 (n.i)(n.o)), eq. 20; G of Heitz 2014, eq. 99; F after Kutz et al. 2021",
+            .doc = "Rough metal of microfacets, with the distribution and the masking that most renderers use.",
+            .properties = {.isotropic = false,
+                           .smooth = false,  // min() in the V-cavities' masking
+                           .exact_sampling = false,
+                           .specular_limit = "ax=1e-4 ay=1e-4"},
+            .params = {}};
+  }
+
+  template <class Visitor> void parameters(const Visitor& v) {
+    v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"}.as(
+              Optical::Reflectance));
+    v(tint, ColorSpec{"tint", "Edge Tint", {1, 1, 1}, "Factor of the reflectance of facets seen at 82 degrees"});
+    v(ax, NumberSpec{"ax", "Roughness X", 0.3, 1e-4, 1, 0.02, 1, "Roughness along the tangent, alpha_x"}.by_factors());
+    v(ay, NumberSpec{"ay", "Roughness Y", 0.3, 1e-4, 1, 0.02, 1, "Roughness across the tangent, alpha_y"}.by_factors());
+    v(distribution, ChoiceSpec{"distribution",
+                               "Distribution",
+                               {"ggx", "beckmann"},
+                               "ggx: a narrow highlight with a wide glow; beckmann: Gaussian slopes"});
+    v(masking,
+      ChoiceSpec{"masking",
+                 "Masking",
+                 {"smith_correlated", "smith_separable", "v_cavity"},
+                 "Facets that hide others. smith_correlated: Heitz 2014; v_cavity: Torrance and Sparrow 1967"});
+  }
+
+  T D(const Vec3<T>& h) const {
+    if (distribution == Ggx)
+      return named("D", T(1) / (pi<T>() * ax * ay * sqr(sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z))));
+    const Slopes<T> s(h);
+    return named("D", exp(-(sqr(s.x / ax) + sqr(s.y / ay))) * sqr(s.inverse_cos2()) / (pi<T>() * ax * ay));
+  }
+
+  /// (n.w) Lambda, for w above the surface.
+  T hidden(const Vec3<T>& w) const {
+    const T c = maximum(w.z, tiny<T>()), p2 = named("p2", sqr(ax * w.x) + sqr(ay * w.y));
+    if (distribution == Ggx) return p2 / (T(2) * (sqrt(c * c + p2) + c));
+    const T p = sqrt(p2), a = named("a", minimum(c / maximum(p, tiny<T>()), T(1.6)));
+    return select(a < T(1.6), p * (T(1) - a * (T(1.259) - T(0.396) * a)) / (T(3.535) + T(2.181) * a), T(0));
+  }
+
+  /// G / (4 (n.i)(n.o)).
+  T shape(const HalfVector<T>& k, const Vec3<T>& wi, const Vec3<T>& wo) const {
+    if (masking == VCavity) return v_cavity_shape(k, wi, wo) / T(4);
+    const T zi = maximum(wi.z, T(0)), zo = maximum(wo.z, T(0)), hi = hidden(wi), ho = hidden(wo);
+    const T product = masking == SmithCorrelated ? zi * zo + zi * ho + zo * hi : (zi + hi) * (zo + ho);
+    return T(1) / (T(4) * maximum(product, tiny<T>()));
+  }
+
+  /// The density of visible normals over D, times the Jacobian of reflection.
+  T visible(const HalfVector<T>& k, const Vec3<T>& wo) const {
+    if (folds()) return minimum(T(1) / maximum(wo.z, tiny<T>()), T(2) * k.h.z / k.oh) / T(4);
+    return T(1) / (T(4) * (maximum(wo.z, T(0)) + hidden(wo)));
+  }
+  /// True if sampled normals are those that V-cavities show.
+  bool folds() const { return masking == VCavity || distribution == Beckmann; }
+
+  /// Of 1 - (o.h).
+  Rgb<T> F(const T& one_minus_oh) const {
+    const T s = T(7. / 6) * one_minus_oh, s2 = s * s;
+    const T q = named("q", T(7) * (T(1) - one_minus_oh) * s2 * s2 * s2);
+    const T rest = T(1) + s * (T(2) + s * (T(3) + s * (T(4) + s * (T(5) + s * T(6)))));
+    const T untinted = named("untinted", sqr(T(1) - s) * rest);
+    return named("F", (f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)) * (Rgb<T>(untinted) + tint * q));
+  }
+
+  Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return F(k.one_minus_oh) * select(above(wi, wo), D(k.h) * shape(k, wi, wo), T(0));
+  }
+
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return select(above(wi, wo), D(k.h) * visible(k, wo), T(0));
+  }
+
+  /// A normal that Smith's ggx shows to w.
+  Vec3<T> sample_caps(const Vec3<T>& w, const T& u1, const T& u2) const {
+    const Vec3<T> k = normalize(Vec3<T>{ax * w.x, ay * w.y, w.z});
+    // A direction of the cap of cosines above -k.z: 1 - cosine, without cancellation.
+    const T drop = u1 * (T(1) + k.z), sine = sqrt(maximum(drop * (T(2) - drop), T(0)));
+    const T phi = named("phi", T(2) * pi<T>() * u2);
+    return normalize(Vec3<T>{ax * (k.x + sine * cos(phi)), ay * (k.y + sine * sin(phi)), (T(1) - u1) * (T(1) + k.z)});
+  }
+
+  Vec3<T> sample_normal(const Vec3<T>& wo, const Vec3<T>& u) const {
+    if (!folds()) return sample_caps(wo, u.y, u.z);
+    const Vec3<T> up = {T(0), T(0), T(1)};
+    const Vec3<T> h = distribution == Ggx ? sample_caps(up, u.y, u.z) : sample_gaussian_slopes(ax, ay, u.y, u.z);
+    const Vec3<T> opposite = {-h.x, -h.y, h.z};
+    const T one = maximum(dot(wo, h), T(0)), other = maximum(dot(wo, opposite), T(0));
+    return select(u.x * (one + other) < one, h, opposite);
+  }
+
+  Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
+    const Vec3<T> h = sample_normal(wo, u);
+    const Vec3<T> wi = h * (T(2) * dot(wo, h)) - wo;
+    const HalfVector<T> k(wi, wo);
+    const T v = visible(k, wo);
+    const T weight = shape(k, wi, wo) * maximum(wi.z, T(0)) / maximum(v, tiny<T>());
+    return sample_if(above(wi, wo), wi, F(k.one_minus_oh) * weight, D(k.h) * v);
+  }
+
+  /// The same microfacets, with the Fresnel term at the middle of the lobe. Cycles has one closure for each
+  /// distribution, with Smith's correlated masking; that of the other one is black. Separable masking hides more at
+  /// grazing views.
+  ClosureSum<T> base(const Vec3<T>& wo) const {
+    const Rgb<T> none(T(0));
+    const T height = lobe_height(wo.z, T(0.7) * (sqr(ax * wo.x) + sqr(ay * wo.y)));
+    Rgb<T> weight = F(clamp01(T(1) - height));
+    if (masking == SmithSeparable) {
+      // (1 + 2 Lambda) / (1 + Lambda)^2 of the mirrored view, whose light is that of wo.
+      const T z = maximum(wo.z, tiny<T>()), h = hidden(wo);
+      weight = weight * (z / (z + h) * ((z + T(2) * h) / (z + h)));
+    }
+    return {facets(ClosureKind::Ggx, distribution == Ggx ? weight : none, ax, ay, T(0)),
+            facets(ClosureKind::Beckmann, distribution == Beckmann ? weight : none, ax, ay, T(0))};
+  }
+};
+
+BRDFC_MODEL(Microfacet)
+
+}  // namespace brdfc

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Curves of microfacet factors: fits to data that models and formulas make.
+#include <gtest/gtest.h>
+
+#include "measured/fit_factors.h"
+
+namespace brdfc::measured {
+namespace {
+
+struct Part {
+  const char* model;
+  std::vector<std::string> values;
+};
+
+/// A table that is a sum of models of this project.
+class OfModels final : public Table {
+ public:
+  explicit OfModels(const std::vector<Part>& parts) {
+    for (const Part& p : parts) {
+      const Model& model = find_model(p.model);
+      terms_.push_back(model.make_double(complete(model.info(), parse_values(model.info(), p.values))));
+    }
+  }
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    Rgb<double> f(0);
+    for (const auto& term : terms_) f += term->eval(wi, wo);
+    return f;
+  }
+
+ private:
+  std::vector<std::unique_ptr<Brdf<double>>> terms_;
+};
+
+/// B. Walter, S. Marschner, H. Li, K. Torrance: Microfacet Models for Refraction through Rough Surfaces, EGSR 2007,
+/// with height-correlated shadowing and Schlick's Fresnel term, over a matte surface.
+class Ggx final : public Table {
+ public:
+  explicit Ggx(double alpha) : alpha_(alpha) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    if (!(wi.z > 0 && wo.z > 0)) return Rgb<double>(0);
+    const Vec3<double> h = normalize(wi + wo);
+    const double d = sqr(alpha_) / (kPi * sqr(sqr(h.z) * (sqr(alpha_) - 1) + 1));
+    const auto lambda = [&](double z) { return (std::sqrt(1 + sqr(alpha_) * (1 / sqr(z) - 1)) - 1) / 2; };
+    const double f = 0.04 + 0.96 * pow5(1 - dot(wi, h));
+    return Rgb<double>(0.2, 0.05, 0.1) / kPi +
+           Rgb<double>(d * f / (1 + lambda(wi.z) + lambda(wo.z)) / (4 * wi.z * wo.z));
+  }
+
+ private:
+  double alpha_;
+};
+
+ModelFit fitted(std::shared_ptr<const Table> table, bool isotropic = true) {
+  Measurement m;
+  m.file = "made";
+  m.isotropic = isotropic;
+  m.table = std::move(table);
+  const auto fits = fit_models(m, MeasuredModel(m), {&find_model("factors")}, Matte::None);
+  EXPECT_EQ(fits.size(), 1u);
+  // Every value is within its range.
+  EXPECT_NO_THROW(complete(fits.at(0).model->info(), fits.at(0).values));
+  return fits.at(0);
+}
+
+TEST(FitFactors, OnlyAModelOfCurvesHasCurves) {
+  const auto roles = curve_roles(find_model("factors"));
+  ASSERT_TRUE(roles && roles->matte && roles->strength);
+  EXPECT_EQ(roles->roughness.size(), 2u);
+  EXPECT_EQ(roles->colors.size() + roles->numbers.size() + 4, find_model("factors").info().params.size());
+  EXPECT_FALSE(curve_roles(find_model("ward")));
+}
+
+TEST(FitFactors, FacetsThatNoOtherModelHereIsAreFound) {
+  for (const double alpha : {0.07, 0.15, 0.3, 0.5, 0.8})
+    EXPECT_LT(fitted(std::make_shared<Ggx>(alpha)).error, 0.01) << alpha;
+}
+
+TEST(FitFactors, ColouredCurvesAreFound) {
+  const Part made{"factors",
+                  {"rho=0.1,0.2,0.05", "ax=0.13", "ay=0.13", "strength=0.7", "d1=0.9,0.8,0.6", "d3=0.6,0.5,0.3",
+                   "d5=0.5,0.2,0.2", "d7=0.3,0.1,0.1", "f0=0.3,0.2,0.1", "f3=0.35,0.25,0.15", "g3=0.6"}};
+  EXPECT_LT(fitted(std::make_shared<OfModels>(std::vector{made})).error, 0.01);
+}
+
+TEST(FitFactors, TwoHighlightsOverAMatteSurface) {
+  const std::vector<Part> paint{{"lambert", {"rho=0.3,0.02,0.01"}},
+                                {"cook_torrance", {"m=0.4", "f0=0.3,0.05,0.02"}},
+                                {"cook_torrance", {"m=0.06", "f0=0.04"}}};
+  // Their Fresnel terms differ, so they are no product; but no formula comes as near.
+  Measurement m;
+  m.file = "made";
+  m.isotropic = true;
+  m.table = std::make_shared<OfModels>(paint);
+  const auto formulas =
+      fit_models(m, MeasuredModel(m), {&find_model("cook_torrance"), &find_model("ward")}, Matte::Added);
+  const double error = fitted(m.table).error;
+  EXPECT_LT(error, 0.1);
+  EXPECT_LT(error, 0.6 * formulas.front().error);
+}
+
+TEST(FitFactors, BrushedMetal) {
+  const std::vector<Part> metal{{"ward", {"ks=0.5,0.4,0.3", "ax=0.08", "ay=0.33"}}, {"lambert", {"rho=0.05"}}};
+  const ModelFit fit = fitted(std::make_shared<OfModels>(metal), false);
+  EXPECT_LT(fit.error, 0.03);
+  EXPECT_NEAR(std::get<double>(fit.values.at("ay")) / std::get<double>(fit.values.at("ax")), 0.33 / 0.08, 0.3);
+}
+
+TEST(FitFactors, WhatIsNoProductOfFactorsHasALargeError) {
+  // Lobes about the mirror direction are far from it: the error says so.
+  EXPECT_GT(fitted(std::make_shared<OfModels>(std::vector<Part>{{"radziszewski_alda", {"n=4"}}})).error, 0.05);
+}
+
+TEST(FitFactors, AMatteSurfaceHasNoHighlight) {
+  const ModelFit fit = fitted(std::make_shared<OfModels>(std::vector<Part>{{"lambert", {"rho=0.5,0.3,0.2"}}}));
+  EXPECT_LT(fit.error, 0.002);
+}
+
+}  // namespace
+}  // namespace brdfc::measured
