@@ -78,11 +78,15 @@ def test_what_a_file_holds(paint, found):
         found.fit("minnaert")
 
 
-def test_a_material_of_a_file(extension, empty, found):
-    material = extension.api.new_measured_material(found, "ward")
+@pytest.mark.parametrize("model", ["ward", "factors"])
+def test_a_material_of_a_file(extension, empty, found, model):
+    material = extension.api.new_measured_material(found, model)
     assert material.name == "paint"
     (node,) = extension.nodes.group_nodes(material)
-    assert extension.nodes.get_value(node, "ax") == pytest.approx(0.25, rel=0.02)
+    for name, value in found.fit(model).parameters.items():
+        if not isinstance(value, str):
+            got = extension.nodes.get_value(node, name)
+            assert got == pytest.approx(value, rel=1e-5, abs=1e-6), name
 
 
 @pytest.mark.long
@@ -149,48 +153,78 @@ SUM = {
 }
 
 
+BALL = {
+    "name": "ball",
+    "settings": {"width": 48, "height": 48, "spp": 512, "seed": 1, "max_bounces": 0},
+    "camera": {
+        "type": "orthographic",
+        "height": 2.2,
+        "position": [0, -5, 0],
+        "look_at": [0, 0, 0],
+        "up": [0, 0, 1],
+    },
+    "objects": [{"name": "o", "shape": {"type": "sphere", "radius": 1}, "material": "m"}],
+    "lights": [{"type": "point", "position": [2, -4, 3], "radius": 0.5, "power": 300}],
+    "environment": {"color": [0.3, 0.3, 0.3]},
+}
+
+
+def blocks(picture):
+    """Means of 8 x 8 pixels, without those at the edge of the picture."""
+    return picture[..., :3].reshape(6, 8, 6, 8, 3).mean((1, 3))[1:5, 1:5]
+
+
+@pytest.fixture
+def ball(program, tmp_path):
+    """ball(name, material): the file of a scene, a ball under a lamp and a grey sky, and its blocks
+    by the reference."""
+
+    def render(name, material):
+        file, out = tmp_path / f"{name}.json", tmp_path / f"{name}.exr"
+        file.write_text(json.dumps(BALL | {"materials": {"m": material}}))
+        subprocess.run([program, "render", file, "--out", out], check=True, capture_output=True)
+        pixels = helpers.open_image_io().ImageBuf(str(out)).get_pixels()
+        return file, blocks(pixels[::-1])  # row 0 at the bottom, as in helpers.render()
+
+    return render
+
+
+@pytest.fixture
+def in_blender(extension, empty, program, tmp_path):
+    """in_blender(file, osl): the blocks of a scene's file by Blender."""
+
+    def render(file, osl):
+        subprocess.run([program, "scene", file, "--out", tmp_path / file.stem], check=True)
+        resolved = tmp_path / file.stem / "scene.json"
+        return blocks(helpers.render(extension.scene_loader.load_scene(resolved, osl=osl)))
+
+    return render
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [True, False])
-def test_blender_and_the_reference_have_one_sum(extension, empty, program, tmp_path, osl):
-    """A ball under a lamp and a grey sky: blocks of the pictures differ by noise, and a lobe that
-    is left out is seen."""
-    scene = {
-        "name": "sum",
-        "settings": {"width": 48, "height": 48, "spp": 512, "seed": 1, "max_bounces": 0},
-        "camera": {
-            "type": "orthographic",
-            "height": 2.2,
-            "position": [0, -5, 0],
-            "look_at": [0, 0, 0],
-            "up": [0, 0, 1],
-        },
-        "materials": {"m": SUM},
-        "objects": [{"name": "o", "shape": {"type": "sphere", "radius": 1}, "material": "m"}],
-        "lights": [{"type": "point", "position": [2, -4, 3], "radius": 0.5, "power": 300}],
-        "environment": {"color": [0.3, 0.3, 0.3]},
-    }
-
-    def reference(name, material):
-        file = tmp_path / f"{name}.json"
-        file.write_text(json.dumps(scene | {"materials": {"m": material}}))
-        out = tmp_path / f"{name}.exr"
-        subprocess.run([program, "render", file, "--out", out], check=True, capture_output=True)
-        subprocess.run([program, "scene", file, "--out", tmp_path / name], check=True)
-        pixels = helpers.open_image_io().ImageBuf(str(out)).get_pixels()
-        return blocks(pixels[::-1])  # row 0 at the bottom, as in helpers.render()
-
-    def blocks(picture):
-        return picture[..., :3].reshape(6, 8, 6, 8, 3).mean((1, 3))
-
-    expected = reference("whole", SUM)
-    loaded = extension.scene_loader.load_scene(tmp_path / "whole" / "scene.json", osl=osl)
-    got = blocks(helpers.render(loaded))
-    lit = expected[1:5, 1:5]
-    worst = np.abs(got[1:5, 1:5] / lit - 1).max()
-    without = reference("part", {"sum": SUM["sum"][:2]})[1:5, 1:5]
-    assert worst < 0.03
-    assert np.abs(without / lit - 1).max() > 0.15
+def test_blender_and_the_reference_have_one_sum(ball, in_blender, osl):
+    """Blocks of the pictures differ by noise, and a lobe that is left out is seen."""
+    file, expected = ball("whole", SUM)
+    got = in_blender(file, osl)
+    _, without = ball("part", {"sum": SUM["sum"][:2]})
+    assert np.abs(got / expected - 1).max() < 0.03
+    assert np.abs(without / expected - 1).max() > 0.15
     np.testing.assert_allclose(got.mean((0, 1)), expected.mean((0, 1)), rtol=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("osl", [True, False])
+def test_curves_look_as_the_data_do(ball, in_blender, write_table, osl):
+    """The reference renders the data themselves. A Ward highlight with a colour of its own over a
+    matte surface: no other single model is near."""
+    path = write_table("paint.csv", "ward", matte=0.2, ks=(0.2, 0.1, 0.05), ax=0.2, ay=0.2)
+    file, fitted = ball("curves", {"measured": str(path), "as": "factors"})
+    _, data = ball("data", {"measured": str(path)})
+    got = in_blender(file, osl)
+    assert np.abs(got / fitted - 1).max() < 0.03
+    assert np.abs(got / data - 1).max() < 0.06
+    np.testing.assert_allclose(got.mean((0, 1)), data.mean((0, 1)), rtol=0.02)
 
 
 @pytest.mark.slow
