@@ -14,8 +14,9 @@ from .common.i18n import say
 from .common.program import ToolJob
 from .packs import pack
 
-#: The largest number of lobes in a sum: with more, renders take longer, and errors hardly fall.
-LOBES = 4
+#: The largest number of lobes in a fitted sum: with more, renders take longer, and errors hardly
+#: fall; and in any sum.
+LOBES, MOST_LOBES = 4, 12
 
 #: Endings of the files that the program reads: MERL, RGL, UTIA, and tables.
 ENDINGS = (".binary", ".bsdf", ".bin", ".csv")
@@ -179,6 +180,15 @@ def as_pairs(lobes):
                 given=lobes,
             )
         )
+    if len(pairs) > MOST_LOBES:
+        raise ValueError(
+            say("Expected at most {most} lobes, got {count}", most=MOST_LOBES, count=len(pairs))
+        )
+    for model, _ in pairs:
+        if pack.model(model).get("two_sided"):
+            raise ValueError(
+                say("{model!r} lets light through: expected models that reflect", model=model)
+            )
     return pairs
 
 

@@ -92,9 +92,20 @@ def _number_socket(group, parameter):
     )
 
 
+def _panel(group, name):
+    """The panel of a group with this name, made if there is none. A new one is closed."""
+    panels = (i for i in group.interface.items_tree if i.item_type == "PANEL")
+    found = next((p for p in panels if p.name == name), None)
+    return found or group.interface.new_panel(name, default_closed=True)
+
+
 def _parameter_socket(group, parameter):
     make = _choice_socket if parameter["kind"] == "choice" else _number_socket
-    return make(group, parameter)
+    socket = make(group, parameter)
+    if name := parameter.get("panel"):
+        panel = _panel(group, name)
+        group.interface.move_to_parent(socket, panel, len(panel.interface_items))
+    return socket
 
 
 def add_parameter(group, group_input, target, parameter, socket=None):

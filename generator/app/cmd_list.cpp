@@ -42,6 +42,7 @@ Json describe(const Model& m) {
       if (p.kind == ParamKind::Number) j["by_factors"] = p.by_factors;
     }
     j["doc"] = p.doc;
+    if (!p.panel.empty()) j["panel"] = p.panel;
     params.push_back(std::move(j));
   }
   const ModelProperties& q = info.properties;

@@ -185,23 +185,27 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
   std::vector<double> row;
   while (csv.next(row)) {
     Angles a;
+    bool wrapped = false;  // an azimuth is not from 0 to 360 degrees
     if (vectors) {
       const Vec3<double> wi = csv.unit_vector(row, 0), wo = csv.unit_vector(row, 3);
       if (!(wi.z > 0 && wo.z > 0)) input_error("{}: expected directions above the surface", csv.where());
       const auto i = angles_of(wi), o = angles_of(wo);
       a = {i[0], i[1], o[0], o[1]};
     } else {
-      const char* unit = kind == Columns::Radians ? "radians that are degrees" : "degrees";
-      if (kind == Columns::Radians)
-        for (const std::size_t k : {0, 1, 2, 3}) row[k] = degrees_of_radians(row[k]);
+      const bool radians = kind == Columns::Radians;
+      std::array<double, 4> angle;
+      for (std::size_t k = 0; k < 4; ++k) angle[k] = radians ? degrees_of_radians(row[k]) : row[k];
       for (const std::size_t theta : {0, 2})
-        if (!(row[theta] >= 0 && row[theta] <= 90))
-          input_error("{}: {}: expected {} from 0 to 90, got {}", csv.where(), columns[theta], unit, row[theta]);
+        if (!(angle[theta] >= 0 && angle[theta] <= 90))
+          input_error("{}: {}: expected {}, got {}", csv.where(), columns[theta],
+                      radians ? "radians from 0 to pi/2" : "degrees from 0 to 90", row[theta]);
       for (const std::size_t phi : {1, 3})
-        if (!(std::abs(row[phi]) <= 1e6))
-          input_error("{}: {}: expected {}, got {}", csv.where(), columns[phi], unit, row[phi]);
-      const auto i = angles_of(row[0], row[1]), o = angles_of(row[2], row[3]);
+        if (!(std::abs(angle[phi]) <= 1e6))
+          input_error("{}: {}: expected {}, got {}", csv.where(), columns[phi], radians ? "radians" : "degrees",
+                      row[phi]);
+      const auto i = angles_of(angle[0], angle[1]), o = angles_of(angle[2], angle[3]);
       a = {i[0], i[1], o[0], o[1]};
+      for (const std::size_t phi : {1, 3}) wrapped |= angle[phi] < 0 || angle[phi] >= 360;
     }
     std::array<float, 3> value;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -211,8 +215,7 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
       negative += v < 0;
       value[c] = float(std::max(v, 0.));
     }
-    const auto out_of_range = [](double phi) { return phi < 0 || phi >= 360; };
-    given.push_back({a, value, !vectors && (out_of_range(row[1]) || out_of_range(row[3])), csv.where()});
+    given.push_back({a, value, wrapped, csv.where()});
   }
   if (vectors) remove_rounding(given);
   std::map<Angles, Entry> rows;

@@ -49,6 +49,8 @@ struct ParamInfo {
   /// True if the parameter's effect depends on ratios of its values rather than on differences.
   bool by_factors = false;
   Optical optical = Optical::None;
+  /// The panel of a node, closed at first, that this parameter is in; "" if it is in none.
+  std::string panel = "";
 
   /// The scale and range of the slider, and of all accepted values.
   ScaledRange slider() const;
@@ -133,6 +135,7 @@ struct NumberSpec {
   const char* unit = "";
   bool factors = false;
   Optical optical = Optical::None;
+  const char* panel = "";
 
   /// The same specification with ParamInfo::by_factors set.
   NumberSpec by_factors() const {
@@ -146,6 +149,12 @@ struct NumberSpec {
     out.optical = what;
     return out;
   }
+  /// The same specification with ParamInfo::panel set.
+  NumberSpec in(const char* which) const {
+    NumberSpec out = *this;
+    out.panel = which;
+    return out;
+  }
 };
 struct ColorSpec {
   const char* name;
@@ -153,10 +162,16 @@ struct ColorSpec {
   std::array<double, 3> value;
   const char* doc;
   Optical optical = Optical::None;
+  const char* panel = "";
 
   ColorSpec as(Optical what) const {
     ColorSpec out = *this;
     out.optical = what;
+    return out;
+  }
+  ColorSpec in(const char* which) const {
+    ColorSpec out = *this;
+    out.panel = which;
     return out;
   }
 };
@@ -185,10 +200,11 @@ struct SchemaVisitor {
                    {},
                    ParamKind::Number,
                    s.factors,
-                   s.optical});
+                   s.optical,
+                   s.panel});
   }
   template <class T> void operator()(Rgb<T>&, const ColorSpec& s) const {
-    out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color, false, s.optical});
+    out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color, false, s.optical, s.panel});
   }
   void operator()(Choice&, const ChoiceSpec& s) const {
     out.push_back({s.name,

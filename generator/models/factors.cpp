@@ -89,7 +89,8 @@ template <class T> struct Factors {
       v(d[k], ColorSpec{kNames[k],
                         kLabels[k],
                         {1, 1, 1},
-                        "Facets at a knot, in units of GGX: 0 is where they face the normal, 13 the steepest"});
+                        "Facets at a knot, in units of GGX: 0 is where they face the normal, 13 the steepest"}
+                  .in("Curves"));
     static constexpr const char* kFresnel[] = {"f0", "f1", "f2", "f3", "f4", "f5", "f6"};
     static constexpr const char* kFresnelLabels[] = {"Fresnel 0", "Fresnel 1", "Fresnel 2", "Fresnel 3",
                                                      "Fresnel 4", "Fresnel 5", "Fresnel 6"};
@@ -98,14 +99,16 @@ template <class T> struct Factors {
       v(f[k], ColorSpec{kFresnel[k],
                         kFresnelLabels[k],
                         {schlick, schlick, schlick},
-                        "Reflectance of a facet at a knot: 0 is seen and lit from the front, 6 from the side"});
+                        "Reflectance of a facet at a knot: 0 is seen and lit from the front, 6 from the side"}
+                  .in("Curves"));
     }
     static constexpr const char* kShadowing[] = {"g1", "g2", "g3", "g4"};
     static constexpr const char* kShadowingLabels[] = {"Visibility 1", "Visibility 2", "Visibility 3", "Visibility 4"};
     static constexpr double kVisible[] = {0.97, 0.88, 0.7, 0.45};
     for (std::size_t k = 0; k < g.size(); ++k)
       v(g[k], NumberSpec{kShadowing[k], kShadowingLabels[k], kVisible[k], 0, 1, 0, 1,
-                         "Share of the facets that are seen where the cosine to the normal is 1/2, 1/4, 1/8 or 1/16"});
+                         "Share of the facets that are seen where the cosine to the normal is 1/2, 1/4, 1/8 or 1/16"}
+                  .in("Curves"));
   }
 
   template <class V, std::size_t N> static std::array<V, N> logs(const std::array<V, N>& heights) {

@@ -73,6 +73,7 @@ Json parameter_json(const ParamInfo& p) {
   }
   j["doc"] = p.doc;
   if (p.optical != Optical::None) j["optical"] = name_of(p.optical);
+  if (!p.panel.empty()) j["panel"] = p.panel;
   return j;
 }
 

@@ -114,7 +114,8 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
        {"equations", info.equations},
        {"doc", info.doc},
        {"isotropic", info.properties.isotropic},
-       {"scatter", model.has_scatter()}};
+       {"scatter", model.has_scatter()},
+       {"two_sided", model.two_sided()}};
   j["parameters"] = parameters_json(model, plan.fixed);
   j["fixed"] = values_json(plan.fixed);
   if (const Json roles = optical_json(model, plan.fixed); !roles.empty()) j["fixed_optical"] = roles;

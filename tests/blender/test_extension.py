@@ -283,6 +283,8 @@ def test_sockets_equal_the_manifest(extension, made_forms, subtests):
                 item = interface[socket.identifier]
                 assert socket.name == item.name == parameter["label"]
                 assert item.description.startswith(parameter["doc"].rstrip("."))
+                # Blender's own panel is nameless.
+                assert item.parent.name == parameter.get("panel", "")
                 if parameter["kind"] == "number":
                     assert socket.type == "VALUE"
                     assert item.min_value == np.float32(parameter["soft_min"])

@@ -302,6 +302,10 @@ def test_radians_are_named_or_refused(tmp_path):
     file.write_text(named, encoding="utf-8")
     assert told(file)["albedo"] == in_degrees["albedo"]
     assert told(file)["grid"] == in_degrees["grid"]
+    file.write_text(named.replace("\n0.2618,", "\n2.5,", 1), encoding="utf-8")
+    done = run("measured", file)
+    assert done.returncode == 2
+    assert "theta_i_rad: expected radians from 0 to pi/2, got 2.5" in done.stderr
     file.write_text(text.replace(head, head.replace("_i", "_i_deg").replace("_o", "_o_deg")))
     assert any("nothing was measured beyond 1.57" in s for s in told(file)["lacks"])
     # Few small angles may be degrees.
