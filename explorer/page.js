@@ -329,7 +329,7 @@ function drawDifference() {
   byId("difference-text").replaceChildren(
     make("strong", {}, percent(everywhere)),
     `of the light, over all views; ${percent(here)} in the view at θ = ${state.theta}°.`,
-    make("p", { class: "note" }, "The sum of |f − g| cos θ over that of f cos θ: f is the first model, g the second; 200 % if they share nothing."),
+    make("p", { class: "note" }, "The integral of |f − g| cos θ over that of f cos θ, with the first model f and the second g."),
     make("p", { class: "note" }, "In the picture, red is where the first is brighter, and blue where the second is, both doubled."),
   );
 }
