@@ -21,8 +21,8 @@ function direction(theta, phi) {
 }
 
 /**
- * GLSL that makes a model available as eval_K, pdf_K, sample_K, mirror_K, transmit_K and iors_K, with its parameters as
- * uniforms, and defines SCATTERS_K, MIRROR_K, TRANSMIT_K and THROUGH_K. Only what is in `needed` is compiled.
+ * GLSL that makes a model available as eval_K, pdf_K, sample_K, mirror_K, transmit_K, iors_K and inside_K, with its
+ * parameters as uniforms, and defines SCATTERS_K, MIRROR_K, TRANSMIT_K and THROUGH_K. Only what is in `needed` is compiled.
  */
 function modelSource(slot, k, needed, functions, tables) {
   const model = BRDFC.models[slot.model];
@@ -31,27 +31,28 @@ function modelSource(slot, k, needed, functions, tables) {
   let out = "";
   for (const p of parameters) out += `uniform ${p.kind === "color" ? "vec3" : "float"} p${k}_${p.name};\n`;
   const passed = parameters.map((p) => `p${k}_${p.name}`);
-  const call = (what, directions, more = []) => {
+  const xyz = (...vectors) => vectors.flatMap((v) => [`${v}.x`, `${v}.y`, `${v}.z`]);
+  const call = (what, inputs, results = []) => {
     const name = formulas[what];
     functions.set(name, model.functions[name].text);
     for (const table of model.functions[name].tables) tables.add(table);
-    const parts = directions.flatMap((d) => ["x", "y", "z"].map((c) => `${d}.${c}`));
-    return `${name}(${[...parts, ...passed, ...more].join(", ")})`;
+    return `${name}(${[...inputs, ...passed, ...results].join(", ")})`;
   };
-  const define = (what, head, directions, none) => {
+  const define = (what, head, inputs, none) => {
     if (!needed.includes(what)) return;
-    const body = formulas[what] ? call(what, directions) : none;
+    const body = formulas[what] ? call(what, inputs) : none;
     out += `${head.replace("(", `_${k}(`)} { return ${body}; }\n`;
   };
-  define("eval", "vec3 eval(vec3 wi, vec3 wo)", ["wi", "wo"], "vec3(0.0)");
-  define("pdf", "float pdf(vec3 wi, vec3 wo)", ["wi", "wo"], "0.0");
-  define("mirror", "vec3 mirror(vec3 wo)", ["wo"], "vec3(0.0)");
-  define("transmit", "vec3 transmit(vec3 wo)", ["wo"], "vec3(0.0)");
+  define("eval", "vec3 eval(vec3 wi, vec3 wo)", xyz("wi", "wo"), "vec3(0.0)");
+  define("pdf", "float pdf(vec3 wi, vec3 wo)", xyz("wi", "wo"), "0.0");
+  define("mirror", "vec3 mirror(vec3 wo)", xyz("wo"), "vec3(0.0)");
+  define("transmit", "vec3 transmit(vec3 wo)", xyz("wo"), "vec3(0.0)");
   define("iors", "vec3 iors()", [], "vec3(1.0)");
+  define("inside", "vec3 inside(float distance)", ["distance"], "vec3(1.0)");
   if (needed.includes("sample") && formulas.sample)
     out +=
       `void sample_${k}(vec3 wo, vec3 u, out vec3 wi, out vec3 weight, out float pdf) { ` +
-      `${call("sample", ["wo", "u"], ["wi.x", "wi.y", "wi.z", "weight", "pdf"])}; }\n`;
+      `${call("sample", xyz("wo", "u"), [...xyz("wi"), "weight", "pdf"])}; }\n`;
   if (formulas.eval) out = `#define SCATTERS_${k}\n${out}`;
   for (const what of ["mirror", "transmit", "through"])
     if (formulas[what]) out = `#define ${what.toUpperCase()}_${k}\n${out}`;
@@ -254,11 +255,11 @@ class Renderer {
     return { here: found[4 * views] / found[4 * views + 1], everywhere: off / all };
   }
 
-  /** Adds a sample to the picture of a slot; `picture` is its state, which begins as {}. False if it is finished. */
+  /** Adds a sample to the picture of a slot unless that is finished; `picture` is its state, which begins as {}. */
   addSample(picture, key, slot, view, size, lamp) {
-    if (picture.samples >= SAMPLES[view]) return false;
+    if (picture.samples >= SAMPLES[view]) return;
     const number = picture.samples || 0;
-    const needed = view === "lamp" ? ["eval"] : ["eval", "pdf", "sample", "mirror", "transmit", "iors"];
+    const needed = view === "lamp" ? ["eval"] : ["eval", "pdf", "sample", "mirror", "transmit", "iors", "inside"];
     const made = this.program(view, [slot], needed);
     const from = this.target(`${key} ${number % 2}`, size, size), to = this.target(`${key} ${1 - (number % 2)}`, size, size);
     if (number === 0) {
@@ -271,7 +272,6 @@ class Renderer {
     this.draw(made, to, [slot], { sum: from.texture, size: [size, size], offset, lamp, number });
     picture.sum = to;
     picture.samples = number + 1;
-    return true;
   }
 
   /** Copies a picture, or the difference of two, to a 2D canvas. */

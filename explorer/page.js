@@ -162,9 +162,9 @@ function writeAddress() {
 let renderer;
 /** Pictures by slot: {samples, sum}. */
 let pictures = [];
-/** What is not up to date. Pictures come first, then one of the others a frame. */
+/** What is not up to date. */
 const stale = new Set();
-let scheduled = false;
+let scheduled = false, begun = false;
 /** Pictures shrink on devices that take too long for a frame. */
 let quality = 1, slowFrames = 0, lastFrame = 0;
 
@@ -179,6 +179,12 @@ const channelOf = (rgba, i) => {
   return at >= 0 ? rgba[4 * i + at] : (rgba[4 * i] + rgba[4 * i + 1] + rgba[4 * i + 2]) / 3;
 };
 const formulasOf = (slot) => BRDFC.models[slot.model].formulas[choiceKey(slot.model, slot.values)];
+
+/** The labels of models whose formulas are such, separated by commas. */
+function labelsOf(are) {
+  const slots = state.slots.filter((s) => are(formulasOf(s)));
+  return [...new Set(slots.map((s) => BRDFC.models[s.model].label))].join(", ");
+}
 
 function fail(error) {
   byId("error").textContent = error.message || String(error);
@@ -198,24 +204,23 @@ function frame(now) {
   scheduled = false;
   try {
     if (renderer.lost) throw new Error("The graphics device was reset. Reload the page to go on.");
-    const first = stale.delete("pictures");
-    const more = drawPictures();
-    if (!first) {
-      const next = Object.keys(DRAWN).find((w) => stale.has(w));
-      if (next) {
-        stale.delete(next);
-        DRAWN[next]();
-      }
+    // A sample of the pictures, and one of the others: the one that has waited longest, so that all follow a slider.
+    // While some wait, pictures that have a sample get no more. The first picture is not kept waiting.
+    const next = [...stale].find((w) => Object.hasOwn(DRAWN, w));
+    const more = drawPictures(stale.delete("pictures") || !next);
+    if (next && begun) {
+      stale.delete(next);
+      DRAWN[next]();
     }
+    begun = true;
     if (more && quality === 1) {
       slowFrames = lastFrame && now - lastFrame > 150 ? slowFrames + 1 : 0;
       if (slowFrames > 4) {
         quality = 0.5;
-        stale.add("pictures");
-        pictures = state.slots.map(() => ({}));
+        redraw("pictures");
       }
     }
-    lastFrame = more ? now : 0;
+    lastFrame = more && !next ? now : 0;
     if (more || stale.size) redraw();
   } catch (error) {
     fail(error);
@@ -227,8 +232,8 @@ function pictureSize(canvas) {
   return Math.max(64, Math.min(512, Math.round(wanted)));
 }
 
-/** Adds a sample to each picture; true if more will follow. */
-function drawPictures() {
+/** Shows the pictures, with another sample if `add`; true if more will follow. */
+function drawPictures(add) {
   let more = false;
   const lamp = lampDirection(state.lamp), scale = 2 ** state.exposure;
   const canvases = document.querySelectorAll("#pictures canvas");
@@ -236,13 +241,17 @@ function drawPictures() {
   const size = pictureSize(canvases[0]);
   state.slots.forEach((slot, k) => {
     if (pictures[k].sum && pictures[k].sum.width !== size) pictures[k] = {};
-    more = renderer.addSample(pictures[k], `picture ${k}`, slot, state.view, size, lamp) || more;
+    if (add || !pictures[k].sum) renderer.addSample(pictures[k], `picture ${k}`, slot, state.view, size, lamp);
+    more = more || pictures[k].samples < SAMPLES[state.view];
     renderer.show(canvases[k], pictures[k], scale);
   });
   if (state.slots.length > 1)
     renderer.show(byId("difference-picture"), pictures[0], scale * 2, pictures[1]);
   const { samples } = pictures[0];
-  byId("samples").textContent = more ? `${samples} samples a pixel` : `${samples} samples a pixel, done`;
+  const dark = state.view === "lamp" ? labelsOf((f) => !f.eval) : "";
+  byId("samples").textContent =
+    `Samples a pixel: ${samples} of ${SAMPLES[state.view]}.` +
+    (dark ? ` A lamp without a size is not seen in ideal reflection and refraction (${dark}): choose the sky.` : "");
   return more;
 }
 
@@ -285,11 +294,11 @@ function drawSlice() {
     const marks = inPlane ? [{ angle: state.theta }] : [];
     drawGraph(byId("slice"), shownCurves, { logarithmic, first: -end, last: end, label, marks });
   }
-  const ideal = state.slots.filter((s) => formulasOf(s).mirror || formulasOf(s).transmit).map((s) => BRDFC.models[s.model].label);
+  const ideal = labelsOf((f) => f.mirror || f.transmit);
   const what = { f: "BRDF", cos: "BRDF times the cosine of the view", pdf: "pdf of the light's direction" }[state.quantity];
   byId("slice-note").textContent =
     `${what} for each ${drawn}, ${given} at θ = ${state.theta}°. Point at the plot to read values.` +
-    (ideal.length ? ` Ideal reflection and refraction (${[...new Set(ideal)].join(", ")}) have no finite value: see sphere and albedo.` : "");
+    (ideal ? ` Ideal reflection and refraction (${ideal}) have no finite value: see sphere and albedo.` : "");
 }
 
 function readSlice(event) {
@@ -411,7 +420,7 @@ function parameterControl(slot, p, k, update) {
   const control = { number: numberControl, color: colorControl, choice: choiceControl }[p.kind](slot, p, id, update);
   return make(
     "div",
-    { class: "parameter", title: p.doc },
+    { class: `parameter ${p.kind}`, title: p.doc },
     make("label", { for: id }, p.unit ? `${p.label}, ${p.unit}` : p.label),
     ...control,
     make("span", { id: `${id}-doc`, class: "hidden" }, p.doc),

@@ -12,10 +12,10 @@ out vec4 color;
 
 const float SUN_COS = 0.9986;                   // a radius of 3 degrees
 const vec3 SUN = vec3(1.0, 0.9, 0.75) * 160.0;  // radiance
-const vec3 BOX_CENTRE = vec3(-1.5, 0.9, 0.9);
-const vec3 BOX_X = vec3(0.257, 0.0, 0.429);  // half the width
+const vec3 BOX_CENTRE = vec3(1.5, 0.9, 0.9);
+const vec3 BOX_X = vec3(0.257, 0.0, -0.429);  // half the width
 const vec3 BOX_Y = vec3(0.0, 0.5, 0.0);      // half the height
-const vec3 BOX_NORMAL = vec3(0.858, 0.0, -0.514);
+const vec3 BOX_NORMAL = vec3(-0.858, 0.0, -0.514);
 const vec3 BOX = vec3(5.0);
 
 // The pdf of a point drawn uniformly on the softbox, per solid angle; 0 beside it.
@@ -51,12 +51,31 @@ vec3 radiance(vec3 d)
     return c;
 }
 
-vec3 refracted(mat3 frame, vec3 wo, float ior)
+#ifdef TRANSMIT_0
+// Light that reaches the viewer through a solid ball of radius 1, from where the ray enters it. Inside, all angles are
+// equal: at each point some light leaves, and the rest goes on.
+vec3 through_ball(vec3 n, mat3 frame, vec3 wo, float ior)
 {
-    float side = wo.z < 0.0 ? -1.0 : 1.0;
-    vec3 d = refract(-wo, vec3(0, 0, side), side > 0.0 ? 1.0 / ior : ior);
-    return dot(d, d) > 0.0 ? radiance(frame * d) : vec3(0.0);
+    vec3 d = refract(-vec3(0, 0, 1), n, 1.0 / ior), share = transmit_0(wo), light = vec3(0.0);
+    if (dot(d, d) == 0.0)
+        return light;
+    for (int i = 0; i < 6; ++i) {
+        float way = -2.0 * dot(n, d);
+        n = normalize(n + d * way);
+        frame = frame_of(n);
+        share *= inside_0(way);
+        wo = -d * frame;
+        vec3 leaves = refract(d, -n, ior);
+        if (dot(leaves, leaves) > 0.0)
+            light += share * transmit_0(wo) * radiance(leaves);
+#ifdef MIRROR_0
+        share *= mirror_0(wo);
+#endif
+        d = reflect(d, n);
+    }
+    return light;
 }
+#endif
 
 void main()
 {
@@ -106,8 +125,9 @@ void main()
     light += mirror_0(wo) * radiance(frame * vec3(-wo.xy, wo.z));
 #endif
 #ifdef TRANSMIT_0
-    vec3 iors = iors_0(), rest = transmit_0(wo);
-    light += rest * vec3(refracted(frame, wo, iors.r).r, refracted(frame, wo, iors.g).g, refracted(frame, wo, iors.b).b);
+    vec3 iors = iors_0();
+    for (int i = 0; i < 3; ++i)
+        light[i] += through_ball(n.xyz, frame, wo, iors[i])[i];
 #endif
     color += vec4(light, 1.0);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/explorer.h"
 
+#include <openssl/evp.h>
+
 #include <bit>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -22,18 +24,14 @@ constexpr const char* kMadeBy = "// Made by brdfc ";
 
 /// Little-endian floats in base64, which JavaScript decodes to the same bits.
 std::string base64(const std::vector<double>& values) {
-  static constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string bytes, out;
+  std::vector<unsigned char> bytes;
   for (const double v : values) {
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(float(v));
-    for (int shift = 0; shift < 32; shift += 8) bytes += char(bits >> shift & 0xff);
+    for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<unsigned char>(bits >> shift));
   }
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      three = three << 8 | (i + k < bytes.size() ? std::uint32_t(static_cast<unsigned char>(bytes[i + k])) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : kDigits[three >> (18 - 6 * k) & 0x3f];
-  }
+  std::string out((bytes.size() + 2) / 3 * 4 + 1, '\0');  // OpenSSL writes a 0 at the end
+  out.resize(
+      std::size_t(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()), bytes.data(), int(bytes.size()))));
   return out;
 }
 
@@ -75,16 +73,20 @@ class Functions {
     constexpr ExprType kReal = ExprType::Real, kColor = ExprType::Color;
     const RecordedModel recorded = record_model(model_, choices, Precision::Single);
     Json names = Json::object();
-    const auto function = [&](const char* what, const Program& program, const std::vector<const char*>& vectors,
+    const auto function = [&](const char* what, const Program& program, const std::vector<const char*>& inputs,
                               const std::vector<ExprType>& results) {
-      if (!program.outputs().empty()) names[what] = name_of(what, suffix, program, vectors, results);
+      if (!program.outputs().empty()) names[what] = name_of(what, suffix, program, inputs, results);
     };
-    function("eval", recorded.eval, {"wi", "wo"}, {kColor});
-    function("pdf", recorded.pdf, {"wi", "wo"}, {kReal});
-    function("sample", recorded.sample, {"wo", "u"}, {kReal, kReal, kReal, kColor, kReal});
-    function("mirror", recorded.mirror, {"wo"}, {kColor});
-    function("transmit", recorded.transmit, {"wo"}, {kColor});
+    const std::vector<const char*> wi_wo = {"wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"};
+    const std::vector<const char*> wo = {"wo_x", "wo_y", "wo_z"};
+    function("eval", recorded.eval, wi_wo, {kColor});
+    function("pdf", recorded.pdf, wi_wo, {kReal});
+    function("sample", recorded.sample, {"wo_x", "wo_y", "wo_z", "u_x", "u_y", "u_z"},
+             {kReal, kReal, kReal, kColor, kReal});
+    function("mirror", recorded.mirror, wo, {kColor});
+    function("transmit", recorded.transmit, wo, {kColor});
     function("iors", recorded.iors, {}, {kColor});
+    function("inside", recorded.inside, {"distance"}, {kColor});
     return names;
   }
 
@@ -93,11 +95,9 @@ class Functions {
 
  private:
   std::string name_of(const std::string& what, const std::string& suffix, const Program& program,
-                      const std::vector<const char*>& vectors, const std::vector<ExprType>& results) {
+                      const std::vector<const char*>& inputs, const std::vector<ExprType>& results) {
     std::vector<GlslArgument> arguments;
-    for (const char* v : vectors)
-      for (const char* component : {"_x", "_y", "_z"})
-        arguments.push_back({std::string(v) + component, ExprType::Real});
+    for (const char* input : inputs) arguments.push_back({input, ExprType::Real});
     arguments.insert(arguments.end(), parameters_.begin(), parameters_.end());
     print::Tables used;
     // The text of two functions is compared without their names.

@@ -23,6 +23,8 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
     const std::array<Expr, 3> of = brdf->channel_iors();
     iors = Rgb<Expr>(of[0], of[1], of[2]);
   }
+  Rgb<Expr> transmittance;
+  if (model.has_medium()) transmittance = brdf->transmittance(Expr::input("distance"));
   RecordedModel out;
   if (model.has_scatter()) {
     out.eval.output("f", f);
@@ -36,6 +38,7 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
     out.transmit.output("weight", refracted);
     out.iors.output("iors", iors);
   }
+  if (model.has_medium()) out.inside.output("transmittance", transmittance);
   return out;
 }
 

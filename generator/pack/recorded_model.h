@@ -17,6 +17,7 @@ struct RecordedModel {
   Program mirror;    ///< weight, of wo
   Program transmit;  ///< weight, likewise
   Program iors;      ///< iors, of ideal refraction for red, green and blue
+  Program inside;    ///< transmittance, of the input `distance`
 };
 RecordedModel record_model(const Model&, const Choices&, Precision);
 

@@ -49,7 +49,7 @@ for (const model of Object.keys(BRDFC.models))
     for (const view of ["lamp", "sky"]) {
       state.view = view;
       pictures = state.slots.map(() => ({}));
-      drawPictures();
+      drawPictures(true);
       const pixels = renderer.read(pictures[0].sum);
       lit[view] = [pixels.reduce((a, x) => a + x, 0), pixels.reduce((a, x) => Math.min(a, x), 0)];
     }
@@ -62,12 +62,31 @@ for (const model of Object.keys(BRDFC.models))
 found.differences = PAIRS.map((address) => attempt(address, () => {
   readAddress(address);
   rebuild();
-  drawPictures();
+  drawPictures(true);
   drawDifference();
   return {...renderer.difference(state.slots, 0.5, 0), text: byId("difference-text").textContent};
 }));
+/** The mean colour of a picture in another light, and a 1. */
+const brightness = (address, light, samples) => {
+  readAddress(address);
+  SAMPLES[light] = samples;
+  const picture = {}, sums = [0, 0, 0, 0];
+  for (let i = 0; i < samples; ++i)
+    renderer.addSample(picture, light, state.slots[0], light, 64, lampDirection([-0.4, 0.3]));
+  renderer.read(picture.sum).forEach((x, i) => { sums[i % 4] += x; });
+  return sums.map((x) => x / sums[3]);
+};
+// The same integral with directions from the cosine alone; and white light from everywhere.
+BRDFC.glsl.plain = BRDFC.glsl.sky
+  .replace("int k = 0; k < 4", "int k = 1; k < 2")
+  .replace("pdf_0(wi, wo) + cosine_pdf + sun_pdf(d) + box_pdf(d)", "cosine_pdf");
+BRDFC.glsl.furnace = BRDFC.glsl.sky
+  .replace("vec3 radiance(vec3 d)\\n{", "$&\\n    return vec3(1.0);");
+found.sky = attempt("sky", () => ["sky", "plain"].map((l) => brightness("#m=microfacet", l, 200)));
+found.furnace = attempt("furnace", () => FURNACE.map((m) => brightness(m, "furnace", 50)));
 attempt("address", () => {
-  const address = "#m=ward,ax=0.3,ks=0.1:0.2:0.3,normalisation=duer&m=lambert,rho=0.5&theta=30&view=sky&lamp=0.100:0.200";
+  const ward = "m=ward,ax=0.3,ks=0.1:0.2:0.3,normalisation=duer";
+  const address = `#${ward}&m=lambert,rho=0.5&theta=30&view=sky&lamp=0.100:0.200`;
   found.unread = readAddress(address);
   found.address = [address, addressOf()];
   found.recipes = recipes(state.slots[0]).map(([, text]) => text);
@@ -110,6 +129,16 @@ PAIRS = {
     # All light is reflected in one, and refracted in the other.
     "#m=fresnel_conductor,n_r=0.001,n_g=0.001,n_b=0.001,k_r=100,k_g=100,k_b=100&m=glass,ior=1": 2,
 }
+#: Models that reflect, or let through, all light.
+FURNACE = [
+    "#m=lambert,rho=1",
+    "#m=lossless,tint=1",
+    "#m=coupled,rm=1",
+    "#m=glass,density=0",
+    "#m=fresnel_dielectric,dispersion=1",
+    "#m=radziszewski_alda,tint=1",
+    "#m=radziszewski_alda,tint=1,around=refraction",
+]
 LIGHTS, VIEWS = directions()
 CASES = list(cases())
 
@@ -132,6 +161,7 @@ def found(folder, tmp_path_factory):
     given = {
         "CASES": [{"model": m, "choices": c} for m, c in CASES],
         "PAIRS": list(PAIRS),
+        "FURNACE": FURNACE,
         "LIGHTS": LIGHTS.tolist(),
         "VIEWS": VIEWS.tolist(),
     }
@@ -209,6 +239,16 @@ def test_the_albedo_is_that_of_the_tool(found, model):
     assert done.returncode == 0, done.stderr
     truth = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
     assert got[chosen] == pytest.approx(truth[:, 1:4], abs=0.01)
+
+
+def test_the_sky_is_as_bright_by_any_strategy(found):
+    sky, plain = found["sky"]
+    assert sky != plain and sky == pytest.approx(plain, rel=0.02)
+
+
+def test_no_light_is_lost_in_pictures(found):
+    for address, (*color, _) in zip(FURNACE, found["furnace"], strict=True):
+        assert color == pytest.approx([1, 1, 1], abs=0.01), address
 
 
 def test_a_link_carries_the_settings(found):
