@@ -19,9 +19,9 @@ void main()
     vec3 c = a.rgb / a.a;
     if (difference) {
         vec4 b = texelFetch(other, at, 0);
-        // Red: the first is brighter; blue: the second.
+        // Orange: the first is brighter; blue: the second.
         float d = dot(c - b.rgb / max(b.a, 1.0), vec3(1.0 / 3.0)) * scale;
-        c = vec3(max(d, 0.0), 0.25 * abs(d), max(-d, 0.0));
+        c = vec3(max(d, 0.0), 0.3 * abs(d), max(-d, 0.0));
     } else {
         c *= scale;
     }

@@ -6,6 +6,8 @@ const MOST_MODELS = 4;
 const CHANNELS = ["red", "green", "blue"];
 /** Angles of the albedo's curve. */
 const ALBEDO_ANGLES = 46;
+/** Milliseconds that a frame may take before pictures shrink. */
+const SLOW_FRAME = 150;
 /** Parameters of a model that are shown at once; the others unfold. */
 const SHOWN_PARAMETERS = 8;
 const LOOKS = { matte: "Matte", glossy: "Glossy", metal: "Metal", glass: "Glass", special: "Special" };
@@ -213,12 +215,12 @@ function frame(now) {
       DRAWN[next]();
     }
     begun = true;
-    if (more && quality === 1) {
-      slowFrames = lastFrame && now - lastFrame > 150 ? slowFrames + 1 : 0;
-      if (slowFrames > 4) {
-        quality = 0.5;
-        redraw("pictures");
-      }
+    // How many times a frame took what it may; compilation and other drawing do not count.
+    const late = more && lastFrame ? (now - lastFrame) / SLOW_FRAME : 0;
+    slowFrames = late > 1 ? slowFrames + Math.min(late, 3) : 0;
+    if (slowFrames > 5 && quality > 0.25) {
+      quality /= 2;
+      slowFrames = 0;
     }
     lastFrame = more && !next ? now : 0;
     if (more || stale.size) redraw();
@@ -339,7 +341,7 @@ function drawDifference() {
     make("strong", {}, percent(everywhere)),
     `of the light, over all views; ${percent(here)} in the view at θ = ${state.theta}°.`,
     make("p", { class: "note" }, "The integral of |f − g| cos θ over that of f cos θ, with the first model f and the second g."),
-    make("p", { class: "note" }, "In the picture, red is where the first is brighter, and blue where the second is, both doubled."),
+    make("p", { class: "note" }, "In the picture, orange is where the first is brighter, and blue where the second is, both doubled."),
   );
 }
 
@@ -492,6 +494,7 @@ function slotCard(slot, k) {
   const reset = () => {
     state.slots[k] = { model: slot.model, values: defaultsOf(slot.model) };
     rebuild();
+    document.querySelectorAll("#slots .head")[k].querySelector("button").focus();
   };
   head.append(make("button", { type: "button", title: "Set all parameters to their defaults", onclick: reset }, "Reset"));
   if (state.slots.length > 1)
@@ -540,6 +543,11 @@ function pictureOf(slot, k) {
   return make("figure", { style: `--own: var(--color-${k})` }, canvas, make("figcaption", {}, slotLabel(k)));
 }
 
+/** The names of the models, in the colours of their curves. */
+function legend() {
+  return state.slots.map((_, k) => make("span", { style: `color: var(--color-${k})` }, slotLabel(k)));
+}
+
 function changedState(...what) {
   writeAddress();
   redraw(...what);
@@ -560,6 +568,7 @@ function showOptions() {
 function rebuild() {
   byId("slots").replaceChildren(...state.slots.map(slotCard));
   byId("pictures").replaceChildren(...state.slots.map(pictureOf));
+  for (const id of ["slice-legend", "albedo-legend"]) byId(id).replaceChildren(...legend());
   byId("add").hidden = state.slots.length >= MOST_MODELS;
   byId("compared").hidden = state.slots.length < 2;
   showOptions();

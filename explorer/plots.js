@@ -16,7 +16,7 @@ function element(name, attributes, text) {
 /** A round number from the value up: 1, 2 or 5 times a power of ten. */
 function roundUp(value) {
   const power = 10 ** Math.floor(Math.log10(value));
-  return [1, 2, 5, 10].map((m) => m * power).find((x) => x >= value * (1 - 1e-9));
+  return [1, 2, 5, 10].map((m) => m * power).find((x) => x >= value * (1 - 1e-3));
 }
 
 function shortNumber(x) {
@@ -35,7 +35,8 @@ function scaleOf(curves, logarithmic) {
     const marks = Array.from({ length: DECADES }, (_, i) => 10 ** (end - i));
     return { at: (y) => (y > 0 ? Math.max(0, 1 + (Math.log10(y) - end) / DECADES) : 0), marks, top: 10 ** end };
   }
-  const step = roundUp(top / 4), count = Math.ceil(top / step - 1e-9), end = count * step;
+  // Values that exceed a mark by rounding alone do not need another.
+  const step = roundUp(top / 4), count = Math.ceil(top / step - 1e-3), end = count * step;
   return { at: (y) => Math.max(0, y) / end, marks: Array.from({ length: count }, (_, i) => (i + 1) * step), top: end };
 }
 
