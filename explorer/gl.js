@@ -65,16 +65,16 @@ class Renderer {
     this.canvas = document.createElement("canvas");
     const gl = this.canvas.getContext("webgl2", { alpha: true, premultipliedAlpha: true, antialias: false });
     if (!gl) throw new Error("This browser offers no WebGL 2. Update it, or turn on hardware acceleration in its settings.");
-    if (!gl.getExtension("EXT_color_buffer_float"))
-      throw new Error("This device can't draw into float textures (EXT_color_buffer_float), which the pictures need.");
     this.gl = gl;
+    this.targets = new Map();
+    if (!gl.getExtension("EXT_color_buffer_float") || !this.isComplete(this.target("trial", 1, 1)))
+      throw new Error("This device can't draw into float textures (EXT_color_buffer_float), which the pictures need.");
     this.lost = false;
     this.canvas.addEventListener("webglcontextlost", () => {
       this.lost = true;
     });
     this.programs = new Map();
     this.tables = new Map();
-    this.targets = new Map();
     gl.disable(gl.DITHER);
     gl.bindVertexArray(gl.createVertexArray());
     this.vertex = this.shader(
@@ -167,6 +167,11 @@ class Renderer {
       this.targets.set(key, target);
     }
     return target;
+  }
+
+  isComplete(target) {
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, target.framebuffer);
+    return this.gl.checkFramebufferStatus(this.gl.FRAMEBUFFER) === this.gl.FRAMEBUFFER_COMPLETE;
   }
 
   /** Runs a program for each pixel of the target, or of the canvas if that is null. */

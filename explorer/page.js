@@ -566,6 +566,7 @@ function showOptions() {
 
 /** Makes the controls of models anew, after models were chosen, added or removed. */
 function rebuild() {
+  if (renderer) byId("error").hidden = true;
   byId("slots").replaceChildren(...state.slots.map(slotCard));
   byId("pictures").replaceChildren(...state.slots.map(pictureOf));
   for (const id of ["slice-legend", "albedo-legend"]) byId(id).replaceChildren(...legend());
@@ -632,9 +633,8 @@ function begin() {
 
 function load() {
   const wrong = readAddress(location.hash);
-  if (renderer) byId("error").hidden = true;
-  if (renderer && wrong.length) fail(new Error(`This page does not know what the link says here, and ignores it: ${wrong.join("; ")}`));
   rebuild();
+  if (renderer && wrong.length) fail(new Error(`This page does not know what the link says here, and ignores it: ${wrong.join("; ")}`));
 }
 
 begin();
