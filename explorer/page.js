@@ -330,7 +330,7 @@ function drawAlbedo() {
   });
   drawGraph(byId("albedo"), curves, { first: 0, last: 90, limit: 1, label: "angle of the view from the normal", height: 260, marks: [{ angle: state.theta }] });
   byId("albedo-note").textContent =
-    `The share of light from everywhere that reaches a view, or of light from one direction that leaves; the dashed line is 1. At ${state.theta}°: ${at.join(", ")}.`;
+    `The integral of f cos θ over all directions of light, with ideal reflection and refraction; the dashed line is 1. At ${state.theta}°: ${at.join(", ")}.`;
 }
 
 function drawDifference() {
