@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adds pages from the repository's root to the site, and adapts links for it.
+"""Adds pages from the repository's root and the explorer to the site, and adapts links for it.
 
 A file in the root links to docs/NAME.md, which is NAME.md in the site. Pages in docs/ link only to
 one another: files outside would be missing in the site, and pages added here would be missing when
@@ -22,6 +22,10 @@ PAGES = {
 }
 #: Folder in which script/gallery writes one page per model.
 MODELS = "gallery/models"
+#: The output of `brdfc explorer`, its folder in the site, and the page that the site links to it.
+EXPLORER = ROOT / "build" / "explorer"
+EXPLORER_IN_SITE = "explorer"
+EXPLORER_PAGE = "explorer.md"
 #: Matches [text](target) and ![text](target), with an optional # part.
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
 
@@ -48,10 +52,15 @@ def on_files(files, config):
         text = (ROOT / source).read_text(encoding="utf-8")
         text = LINK.sub(lambda m: m[1] + _in_the_site(m[2]) + m[3], text)
         files.append(File.generated(config, name, content=text))
+    for path in sorted(EXPLORER.iterdir()):
+        name = f"{EXPLORER_IN_SITE}/{path.name}"
+        files.append(File.generated(config, name, abs_src_path=str(path)))
     return files
 
 
 def on_page_markdown(markdown, page, config, files):
+    if page.file.src_uri == EXPLORER_PAGE:
+        markdown += f"\n**[Open the explorer]({EXPLORER_IN_SITE}/index.html)**\n"
     if page.file.generated_by is None:
         for link in LINK.finditer(markdown):
             if posixpath.basename(link[2]) in PAGES.values():

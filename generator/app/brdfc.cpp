@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
     brdfc::app::add_base_command(app);
     brdfc::app::add_build_command(app);
     brdfc::app::add_python_command(app);
+    brdfc::app::add_explorer_command(app);
     brdfc::app::add_render_command(app);
     brdfc::app::add_scene_command(app);
     brdfc::app::add_compare_command(app);

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -20,6 +19,7 @@
 #include "forms/form.h"
 #include "pack/pack.h"
 #include "pack/standalone.h"
+#include "pack/target.h"
 #include "plan/costs.h"
 #include "plan/plan.h"
 #include "reference/scene.h"
@@ -156,15 +156,7 @@ void write_osl(const Options& options) {
       options.error || options.time || options.json || options.twin || options.fit_bases || options.osl_only)
     input_error("build: --osl DIR goes with --all or --model NAME alone");
   const auto files = pack::standalone_files(options.models);
-  for (const auto& [name, text] : files) {
-    const std::filesystem::path path = std::filesystem::path(options.osl) / name;
-    std::error_code ignored;
-    std::filesystem::create_directories(path.parent_path(), ignored);
-    std::ofstream out(path, std::ios::binary);
-    out << text;
-    out.close();
-    if (!out) input_error("{}: cannot be written", path.string());
-  }
+  for (const auto& [name, text] : files) pack::write_text(std::filesystem::path(options.osl) / name, text);
   fmt::print(stderr, "brdfc build: wrote {} files to {}\n", files.size(), options.osl);
 }
 

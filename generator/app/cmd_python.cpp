@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc python: writes the Python package of models.
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 
 #include "app/commands.h"
 #include "core/data_dir.h"
-#include "core/error.h"
 #include "pack/addon.h"
 #include "pack/python_package.h"
 #include "pack/target.h"
@@ -16,15 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void write(const fs::path& path, const std::string& text) {
-  std::error_code ignored;
-  fs::create_directories(path.parent_path(), ignored);
-  std::ofstream out(path, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) input_error("{}: cannot be written", path.string());
-}
-
 void run(const fs::path& out) {
   const fs::path package = out / "brdfc";
   pack::require_package(package);
@@ -32,14 +21,14 @@ void run(const fs::path& out) {
   const auto files = pack::python_package(models_named(""), data_path("python/brdfc"));
   // Otherwise modules of models that no longer exist would become part of a wheel.
   fs::remove_all(package);
-  for (const auto& [name, module] : files) write(package / name, module);
+  for (const auto& [name, module] : files) pack::write_text(package / name, module);
   const fs::path project = data_path("python/pyproject.toml");
   std::string text = pack::read_text(project);
   pack::stamp(text, project, "version", pack::quoted("@version@"), pack::quoted(BRDFC_VERSION));
   pack::stamp(text, project, "tool", R"(["brdfc-tool ==@version@"])",
               fmt::format(R"(["brdfc-tool =={}"])", BRDFC_VERSION));
-  write(out / "pyproject.toml", text);
-  write(out / "LICENSE", pack::read_text(data_path("LICENSE")));
+  pack::write_text(out / "pyproject.toml", text);
+  pack::write_text(out / "LICENSE", pack::read_text(data_path("LICENSE")));
   std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; pip wheel " << out.string()
             << " makes a wheel of them\n";
 }

@@ -38,6 +38,7 @@ void add_fit_command(CLI::App&);
 void add_base_command(CLI::App&);
 void add_build_command(CLI::App&);
 void add_python_command(CLI::App&);
+void add_explorer_command(CLI::App&);
 void add_render_command(CLI::App&);
 void add_scene_command(CLI::App&);
 void add_compare_command(CLI::App&);

@@ -5,7 +5,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <mutex>
 
@@ -35,14 +34,6 @@ namespace fs = std::filesystem;
 constexpr const char* kFolder = "brdfc_shaders";
 /// The manifest's "generator" entry, before the version.
 constexpr const char* kGenerator = "brdfc ";
-
-void write_text(const fs::path& path, const std::string& text) {
-  fs::create_directories(path.parent_path());
-  std::ofstream out(path, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) input_error("{}: cannot be written", path.string());
-}
 
 /// A temporary folder beside the target, which is deleted unless it is renamed.
 class Staging {

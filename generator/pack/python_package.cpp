@@ -8,9 +8,9 @@
 
 #include "closures/closure.h"
 #include "core/error.h"
-#include "model/choices.h"
 #include "model/optical.h"
 #include "pack/addon.h"
+#include "pack/recorded_model.h"
 #include "pack/target.h"
 #include "print/numpy.h"
 
@@ -90,35 +90,11 @@ class Functions {
     std::size_t k = 0;
     for (const ParamInfo& p : info.params)
       if (p.kind == ParamKind::Choice) suffix.append("_").append(p.choices[std::size_t(choices[k++])]);
-    Recorder recorder(Precision::Double);
-    const std::unique_ptr<Brdf<Expr>> brdf = model_.record(with_choices(info, choices));
-    const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
-    // All are recorded before programs are made of them, so that a name given in one formula also applies in the
-    // others.
-    Rgb<Expr> f, reflected, refracted;
-    Expr density;
-    Sample<Expr> s;
-    if (model_.has_scatter()) {
-      f = brdf->eval(wi, wo);
-      density = brdf->pdf(wi, wo);
-      s = brdf->sample(wo, input3("u"));
-    }
-    if (model_.has_mirror()) reflected = brdf->mirror(wo);
-    if (model_.has_transmit()) refracted = brdf->transmit(wo);
-    Program eval, pdf, sample, mirror, transmit;
-    if (model_.has_scatter()) {
-      eval.output("f", f);
-      pdf.output("pdf", density);
-      sample.output("wi", s.wi);
-      sample.output("weight", s.weight);
-      sample.output("pdf", s.pdf);
-    }
-    if (model_.has_mirror()) mirror.output("weight", reflected);
-    if (model_.has_transmit()) transmit.output("weight", refracted);
+    const RecordedModel recorded = record_model(model_, choices, Precision::Double);
     const std::array<std::string, 5> names = {
-        function("eval", suffix, eval, {"wi", "wo"}), function("pdf", suffix, pdf, {"wi", "wo"}),
-        function("sample", suffix, sample, {"wo", "u"}), function("mirror", suffix, mirror, {"wo"}),
-        function("transmit", suffix, transmit, {"wo"})};
+        function("eval", suffix, recorded.eval, {"wi", "wo"}), function("pdf", suffix, recorded.pdf, {"wi", "wo"}),
+        function("sample", suffix, recorded.sample, {"wo", "u"}), function("mirror", suffix, recorded.mirror, {"wo"}),
+        function("transmit", suffix, recorded.transmit, {"wo"})};
     return fmt::format("Formulas({})", fmt::join(names, ", "));
   }
 
@@ -146,7 +122,7 @@ class Functions {
   const Model& model_;
   std::vector<std::string> parameters_;
   std::map<std::string, std::string> names_;
-  print::NumpyTables tables_;
+  print::Tables tables_;
   std::string text_;
 };
 
@@ -215,7 +191,7 @@ std::string optics_module() {
                     python_string(s.name), python_string(s.label), python_string(s.source), tuple_of(s.n.nm),
                     tuple_of(s.n.values), tuple_of(s.k.nm), tuple_of(s.k.values));
   out += "}\n";
-  print::NumpyTables none;
+  print::Tables none;
   const auto function = [&](const char* name, const std::vector<std::string>& arguments, const auto& record) {
     Recorder recorder(Precision::Double);
     std::vector<Expr> inputs;
@@ -303,7 +279,7 @@ std::string closures_module() {
     }
     Program program;
     program.output("f_cos", evaluate(c, wi, wo));
-    print::NumpyTables none;
+    print::Tables none;
     out += "\n\n" + print::numpy_function(program, name, arguments, none);
   }
   return out;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/target.h"
 
+#include <fstream>
+
 #include "core/error.h"
 #include "pack/addon.h"
 
@@ -23,6 +25,15 @@ void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder)) input_error("{}: expected a folder that can be written", folder.string());
+}
+
+void write_text(const fs::path& path, const std::string& text) {
+  std::error_code ignored;
+  fs::create_directories(path.parent_path(), ignored);
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) input_error("{}: cannot be written", path.string());
 }
 
 }  // namespace brdfc::pack

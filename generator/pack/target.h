@@ -14,4 +14,7 @@ void require_replaceable(const std::filesystem::path& folder, const std::string&
 /// Makes the folder if it does not exist. Throws InputError if that fails.
 void make_folder(const std::filesystem::path&);
 
+/// Writes a file, after making its folder if that does not exist. Throws InputError if it can't be written.
+void write_text(const std::filesystem::path&, const std::string& text);
+
 }  // namespace brdfc::pack

@@ -7,8 +7,6 @@
 #include <set>
 #include <string_view>
 
-#include "print/program_printer.h"
-
 namespace brdfc::print {
 bool is_python_word(const std::string& name) {
   static const std::set<std::string_view> words = {
@@ -208,13 +206,8 @@ std::string numpy_table(const Table& table) {
 }
 
 std::string numpy_function(const Program& program, const std::string& name, const std::vector<std::string>& arguments,
-                           NumpyTables& tables) {
-  const std::vector<bool>& reachable = program.reachable();
-  for (std::size_t i = 0; i < reachable.size(); ++i) {
-    const ExprNode& n = program.node(int(i));
-    if (reachable[i] && n.op == Op::Lookup && tables.emplace(n.name, n.table).first->second != n.table)
-      throw ExprError("two tables are named " + n.name);
-  }
+                           Tables& tables) {
+  add_tables(program, tables);
   std::string out = fmt::format("def {}(", name);
   for (const std::string& a : arguments) {
     if (is_python_word(a)) throw ExprError("Python can't have an argument named " + a);

@@ -4,17 +4,12 @@
 // A real is an array of shape (N,), a colour (3, N). Constants are (), (1,) or (3, 1); NumPy broadcasts these shapes.
 #pragma once
 
-#include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "trace/program.h"
+#include "print/program_printer.h"
 
 namespace brdfc::print {
-
-/// The tables that the functions of a module read, by name.
-using NumpyTables = std::map<std::string, std::shared_ptr<const Table>>;
 
 /// True if Python functions use the name themselves: for a keyword, a module or function that formulas call, or a
 /// table.
@@ -25,7 +20,7 @@ bool is_python_word(const std::string& name);
 /// tables are added to `tables`. Throws ExprError for an argument that is no valid name in Python, and if two tables
 /// have the same name.
 std::string numpy_function(const Program&, const std::string& name, const std::vector<std::string>& arguments,
-                           NumpyTables& tables);
+                           Tables& tables);
 
 /// The statement that creates table_NAME with a call of table(sizes, text).
 std::string numpy_table(const Table&);

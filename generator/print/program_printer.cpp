@@ -5,6 +5,16 @@
 
 namespace brdfc::print {
 
+void add_tables(const Program& program, Tables& tables) {
+  const std::vector<bool>& reachable = program.reachable();
+  for (std::size_t i = 0; i < reachable.size(); ++i) {
+    if (!reachable[i]) continue;
+    const ExprNode& n = program.node(int(i));
+    if (n.op == Op::Lookup && tables.emplace(n.name, n.table).first->second != n.table)
+      throw ExprError("two tables are named " + n.name);
+  }
+}
+
 ProgramPrinter::ProgramPrinter(const Program& program, const std::vector<std::string>& taken)
     : program_(program),
       reachable_(program.reachable()),

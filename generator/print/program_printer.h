@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -10,6 +11,12 @@
 #include "trace/program.h"
 
 namespace brdfc::print {
+
+/// The tables that printed functions read, by name.
+using Tables = std::map<std::string, std::shared_ptr<const Table>>;
+
+/// Adds the tables that the program reads. Throws ExprError if two tables have the same name.
+void add_tables(const Program&, Tables&);
 
 /// Base class of the printers. Each language implements the virtual functions.
 class ProgramPrinter {

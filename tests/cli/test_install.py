@@ -65,6 +65,9 @@ def test_it_lists_and_builds_what_the_built_one_does(installed, tmp_path):
         assert (out / "python" / "LICENSE").read_bytes() and (
             out / "python" / "pyproject.toml"
         ).exists()
+        done = run(tool, "explorer", "--out", out / "explorer")
+        assert done.returncode == 0, done.stderr
+        assert (out / "explorer" / "index.html").exists()
     assert len(hashes) == 1
 
 

@@ -94,7 +94,7 @@ def test_that_of_the_tool_is_what_is_built_and_its_data(wheels):
                 archive.read(f"brdfc_tool/tree/{file}") == Path(ROOT / "build", name).read_bytes()
             )
         assert archive.getinfo("brdfc_tool/tree/bin/brdfc").external_attr >> 16 & 0o111 == 0o111
-    share = {"data", "blender_addon", "scenes"}
+    share = {"data", "blender_addon", "explorer", "scenes"}
     kept = succeeded(["git", "ls-files", "-z", *share], cwd=ROOT).split("\0")[:-1]
     assert {f"brdfc_tool/tree/share/brdfc/{file}" for file in kept} <= names
 

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 std::string function_of(const Expr& value, const std::vector<std::string>& arguments) {
   Program program;
   program.output("y", value);
-  NumpyTables tables;
+  Tables tables;
   return numpy_function(program, "f", arguments, tables);
 }
 
@@ -55,7 +55,7 @@ TEST(NumPy, ColoursAndTables) {
   Program program;
   program.output("c", Rgb<Expr>::input("k") * Rgb<Expr>(x, Expr(0.5), Expr(1.0)));
   program.output("m", lookup(table, std::array<Expr, 2>{x, max_component(Rgb<Expr>::input("k"))}));
-  NumpyTables tables;
+  Tables tables;
   EXPECT_EQ(numpy_function(program, "f", {"x", "k"}, tables),
             "def f(x, k):\n    return k * rgb(x, 0.5, 1.0), lookup(table_t, x, np.max(k, axis=0))\n");
   EXPECT_EQ(tables.at("t"), table);

@@ -42,7 +42,7 @@ TEST(Program, OutlivesItsRecorder) {
   EXPECT_EQ(program.run<double>({{"x", {2, 2, 2}}, {"scale", {3, 3, 3}}}), values);
   EXPECT_EQ(values.at("y")[0], 3 * 677.0);
   EXPECT_THAT(program.inputs(), ElementsAre("x", "scale"));
-  print::NumpyTables tables;
+  print::Tables tables;
   EXPECT_THAT(print::numpy_function(program, "f", {"x", "scale"}, tables), HasSubstr("return x0 * scale"));
   EXPECT_FALSE(unrelated.is_literal());
 }

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brdfc explorer: writes the page that draws the models in a browser.
+#include <filesystem>
+#include <iostream>
+
+#include "app/commands.h"
+#include "core/data_dir.h"
+#include "pack/explorer.h"
+#include "pack/target.h"
+
+namespace brdfc::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+void run(const fs::path& out) {
+  pack::require_explorer(out);
+  const auto files = pack::explorer_page(models_named(""), data_path("explorer"));
+  // Files of an earlier version would otherwise stay.
+  fs::remove_all(out);
+  pack::make_folder(out);
+  for (const auto& [name, text] : files) pack::write_text(out / name, text);
+  std::cerr << "brdfc explorer: open " << (out / "index.html").string() << " in a browser\n";
+}
+
+}  // namespace
+
+void add_explorer_command(CLI::App& app) {
+  auto out = std::make_shared<std::string>();
+  CLI::App* cmd = app.add_subcommand("explorer",
+                                     "Writes a page that draws all models in a browser, from their formulas: curves,\n"
+                                     "albedo, lit spheres, differences. It needs WebGL 2, no server and no network.");
+  cmd->add_option("--out", *out, "Folder for the page; begin with its index.html")->required();
+  cmd->callback([out] { run(*out); });
+}
+
+}  // namespace brdfc::app

@@ -1,0 +1,343 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page of `brdfc explorer` in a headless Chromium, which draws without a GPU.
+
+One start of the browser opens the page with a script at its end, which has the page draw every
+model, evaluates formulas at given directions, and leaves what it found in the page as JSON.
+"""
+
+import csv
+import io
+import itertools
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from support import LISTED, ROOT, TOOL
+
+pytestmark = pytest.mark.slow
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
+    "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
+).split()
+#: Relative errors of f and pdf in single precision; and larger ones, of extreme parameters.
+TOLERANCE = 1e-4
+STIFF = {
+    ("coupled", "fresnel=dielectric r0=0.9999999"): 0.3,
+    ("lossless", "kernel=exponential n=10000"): 1e-3,
+    # Narrower than single precision resolves: only that no value is invalid or too large.
+    ("radziszewski_alda", "proportion=custom n_theta=100000000 n_phi=0"): 1,
+}
+CHECK = """
+const found = {errors: [], values: [], pages: {}};
+window.addEventListener("error", (e) => found.errors.push(e.message));
+const attempt = (what, run) => {
+  try {
+    return run();
+  } catch (error) {
+    found.errors.push(`${what}: ${error.message}`);
+  }
+};
+quality = 0.2;  // small pictures
+for (const {model, values} of CASES)
+  found.values.push(attempt(model, () => {
+    const slot = {model, values: {...defaultsOf(model), ...values}};
+    return Array.from(renderer.evaluate(slot, LIGHTS, VIEWS));
+  }));
+for (const model of Object.keys(BRDFC.models))
+  found.pages[model] = attempt(model, () => {
+    readAddress(`#m=${model}`);
+    rebuild();
+    const lit = {};
+    for (const view of ["lamp", "sky"]) {
+      state.view = view;
+      pictures = state.slots.map(() => ({}));
+      drawPictures(true);
+      const pixels = renderer.read(pictures[0].sum);
+      lit[view] = [pixels.reduce((a, x) => a + x, 0), pixels.reduce((a, x) => Math.min(a, x), 0)];
+    }
+    drawSlice();
+    drawAlbedo();
+    const albedo = Array.from(renderer.albedo(state.slots[0], ALBEDO_ANGLES, 0));
+    const curves = document.querySelectorAll("#slice .curve, #albedo .curve").length;
+    return {lit, albedo, curves, error: byId("error").hidden ? "" : byId("error").textContent};
+  });
+found.differences = PAIRS.map((address) => attempt(address, () => {
+  readAddress(address);
+  rebuild();
+  drawPictures(true);
+  drawDifference();
+  return {...renderer.difference(state.slots, 0.5, 0), text: byId("difference-text").textContent};
+}));
+/** The mean colour of a picture in another light, and a 1. */
+const brightness = (address, light, samples) => {
+  readAddress(address);
+  SAMPLES[light] = samples;
+  const picture = {}, sums = [0, 0, 0, 0];
+  for (let i = 0; i < samples; ++i)
+    renderer.addSample(picture, light, state.slots[0], light, 64, lampDirection([-0.4, 0.3]));
+  renderer.read(picture.sum).forEach((x, i) => { sums[i % 4] += x; });
+  return sums.map((x) => x / sums[3]);
+};
+// The same integral with directions from the cosine alone; and white light from everywhere.
+BRDFC.glsl.plain = BRDFC.glsl.sky
+  .replace("int k = 0; k < 4", "int k = 1; k < 2")
+  .replace("pdf_0(wi, wo) + cosine_pdf + sun_pdf(d) + box_pdf(d)", "cosine_pdf");
+BRDFC.glsl.furnace = BRDFC.glsl.sky
+  .replace("vec3 radiance(vec3 d)\\n{", "$&\\n    return vec3(1.0);");
+found.sky = attempt("sky", () => ["sky", "plain"].map((l) => brightness("#m=microfacet", l, 200)));
+found.furnace = attempt("furnace", () => FURNACE.map((m) => brightness(m, "furnace", 50)));
+attempt("address", () => {
+  const ward = "m=ward,ax=0.3,ks=0.1:0.2:0.3,normalisation=duer";
+  const address = `#${ward}&m=lambert,rho=0.5&theta=30&view=sky&lamp=0.100:0.200`;
+  found.unread = readAddress(address);
+  found.address = [address, addressOf()];
+  rebuild();
+  const slider = byId("p0-ax");
+  slider.value = 1;
+  slider.dispatchEvent(new Event("input"));
+  const canvas = document.querySelector("#pictures canvas");
+  canvas.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowUp", cancelable: true}));
+  byId("add").click();
+  document.querySelector('[aria-label="Remove model 2"]').click();
+  found.moved = addressOf();
+  const named = (e) => e.getAttribute("aria-label") || e.getAttribute("aria-labelledby") ||
+    [...(e.labels || [])].map((label) => label.textContent).join("") || e.textContent;
+  const controls = [...document.querySelectorAll("input, select, button, canvas, svg")];
+  found.unnamed = controls.filter((e) => !named(e).trim()).map((e) => e.outerHTML);
+  found.controls = controls.length;
+  readAddress(address);
+  found.recipes = recipes(state.slots[0]).map(([, text]) => text);
+  found.wrong = readAddress("#m=nothing&m=ward,ax=7&theta=95&other=1");
+  HTMLCanvasElement.prototype.getContext = () => null;
+  try {
+    new Renderer();
+  } catch (error) {
+    found.missing = error.message;
+  }
+});
+const result = document.createElement("pre");
+result.id = "found";
+result.textContent = JSON.stringify(found);
+document.body.append(result);
+"""
+
+
+def directions():
+    """Pairs of unit vectors: views, and lights on a grid and about the mirror direction."""
+    lights, views = [], []
+    for view in (0, 20, 44, 70, 84):  # at 45, a model is discontinuous at the normal
+        polar = [(t, p) for t in (0, 15, 40, 65, 84) for p in (0, 50, 110, 180, 260)]
+        about = [(abs(view + d), 180 + a) for d in (-5, -1, 0, 1, 5) for a in (0, 2)]
+        for theta, phi in [*polar, *about]:
+            for out, (t, p) in ((lights, (theta, phi)), (views, (view, 0))):
+                t, p = np.radians(t), np.radians(p)
+                out.append([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+    return np.array(lights), np.array(views)
+
+
+def cases():
+    """Models with parameters as text: every combination of choices, and those of tests/models."""
+    for model in LISTED:
+        names = {p["name"]: p["choices"] for p in model["parameters"] if p["kind"] == "choice"}
+        for chosen in itertools.product(*names.values()):
+            yield model["name"], " ".join(map("=".join, zip(names, chosen, strict=True)))
+    for row in csv.DictReader((ROOT / "tests/models/cases.csv").open(encoding="utf-8")):
+        for text in [*row["cases"].split("|"), *row["stiff"].split("|")]:
+            yield row["model"], text
+
+
+def values_of(model, text):
+    """The parameters of a case as the page has them."""
+    kinds = {p["name"]: p["kind"] for m in LISTED if m["name"] == model for p in m["parameters"]}
+    out = {}
+    for name, value in (assignment.split("=") for assignment in text.split()):
+        numbers = [] if kinds[name] == "choice" else [float(c) for c in value.split(":")]
+        match kinds[name]:
+            case "choice":
+                out[name] = value
+            case "number":
+                out[name] = numbers[0]
+            case _:
+                out[name] = numbers if len(numbers) == 3 else 3 * numbers
+    return out
+
+
+#: Two models, and the difference that they have by their formulas.
+PAIRS = {
+    "#m=lambert&m=lambert": 0,
+    "#m=lambert,rho=0.8&m=lambert,rho=0.2": 0.75,
+    "#m=lambert,rho=0.2&m=lambert,rho=0.8": 3,
+    "#m=max_phong,e=20,ks=0.5&m=max_phong,e=20,ks=0.25": 0.5,
+    # All light is reflected in one, and refracted in the other.
+    "#m=fresnel_conductor,n_r=0.001,n_g=0.001,n_b=0.001,k_r=100,k_g=100,k_b=100&m=glass,ior=1": 2,
+}
+#: Models that reflect, or let through, all light.
+FURNACE = [
+    "#m=coupled,rm=1",
+    "#m=glass,density=0",
+    "#m=fresnel_dielectric,dispersion=1",
+    "#m=radziszewski_alda,tint=1,around=refraction",
+]
+LIGHTS, VIEWS = directions()
+CASES = list(dict.fromkeys(cases()))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The output of `brdfc explorer`."""
+    out = tmp_path_factory.mktemp("explorer") / "page"
+    done = subprocess.run([TOOL, "explorer", "--out", out], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.fixture(scope="module")
+def found(folder, tmp_path_factory):
+    """What the script at the page's end found."""
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is installed: the explorer was not tested")
+    given = {
+        "CASES": [{"model": m, "values": values_of(m, text)} for m, text in CASES],
+        "PAIRS": list(PAIRS),
+        "FURNACE": FURNACE,
+        "LIGHTS": LIGHTS.tolist(),
+        "VIEWS": VIEWS.tolist(),
+    }
+    data = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in given.items())
+    (folder / "check.js").write_text(data + CHECK, encoding="utf-8")
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    last = '<script src="page.js"></script>'
+    assert last in page
+    page = page.replace(last, last + '<script src="check.js"></script>')
+    (folder / "check.html").write_text(page, encoding="utf-8")
+    profile = tmp_path_factory.mktemp("profile")
+    address = (folder / "check.html").as_uri()
+    command = [browser, *FLAGS, f"--user-data-dir={profile}", address]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
+    assert result, done.stderr[-2000:]
+    out = json.loads(result[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    out["console"] = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    return out
+
+
+def test_nothing_is_reported(found):
+    assert found["errors"] == [] and found["console"] == []
+
+
+def in_double_precision():
+    """f and pdf of each case, an array (directions, 4); one run of the tool for all cases of a
+    model that have the same choices."""
+    groups, found = {}, {}
+    for model, text in CASES:
+        schema = next(m for m in LISTED if m["name"] == model)
+        values = {p["name"]: p["default"] for p in schema["parameters"]} | values_of(model, text)
+        choices = tuple(f"{k}={v}" for k, v in values.items() if isinstance(v, str))
+        numbers = {k: np.atleast_1d(v) for k, v in values.items() if not isinstance(v, str)}
+        if schema["scatter"]:
+            groups.setdefault((model, choices), []).append((text, numbers))
+        else:
+            found[model, text] = np.zeros((len(LIGHTS), 4))
+    for (model, choices), members in groups.items():
+        header = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,u1,u2,u3".split(",")
+        for name, value in members[0][1].items():
+            header += [name] if len(value) == 1 else [f"{name}_{c}" for c in "rgb"]
+        rows = []
+        for _, numbers in members:
+            same = np.concatenate([[0.5, 0.5, 0.5], *numbers.values()])
+            rows.append(np.hstack([LIGHTS, VIEWS, np.broadcast_to(same, (len(LIGHTS), len(same)))]))
+        lines = [",".join(header), *(",".join(map(repr, r)) for r in np.vstack(rows).tolist())]
+        command = [TOOL, "probe", model, *choices, "--run"]
+        done = subprocess.run(command, input="\n".join(lines), capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        table = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, usecols=range(4))
+        parts = np.split(table, len(members))
+        found |= {(model, text): part for (text, _), part in zip(members, parts, strict=True)}
+    return found
+
+
+def test_values_are_those_of_the_tool(found):
+    wrong, truths = [], in_double_precision()
+    for (model, text), values in zip(CASES, found["values"], strict=True):
+        truth = truths[model, text]
+        got = np.array(values, dtype=float).reshape(-1, 4)
+        error = np.abs(got - truth) / np.maximum(np.abs(truth), 1e-6 * np.abs(truth).max() + 1e-30)
+        at = np.unravel_index(np.argmax(np.nan_to_num(error, nan=np.inf)), error.shape)
+        if not error[at] <= STIFF.get((model, text), TOLERANCE):
+            wrong.append((model, text, LIGHTS[at[0]], VIEWS[at[0]], got[at[0]], truth[at[0]]))
+    assert not wrong
+    assert set(STIFF) <= set(CASES)
+
+
+@pytest.mark.parametrize("model", [m["name"] for m in LISTED])
+def test_every_model_is_drawn(found, model):
+    page = found["pages"][model]
+    assert page["error"] == "" and page["curves"] == 2
+    for view in ("lamp", "sky"):
+        total, least = page["lit"][view]
+        assert np.isfinite(total) and total > 0 and least >= 0, view
+
+
+def test_the_difference_of_two_is_that_of_their_formulas(found):
+    for (address, truth), got in zip(PAIRS.items(), found["differences"], strict=True):
+        for where in ("here", "everywhere"):
+            assert got[where] == pytest.approx(truth, rel=1e-4, abs=1e-6), address
+        assert f"{100 * truth:g} %" in got["text"]
+
+
+@pytest.mark.parametrize("model", [m["name"] for m in LISTED])
+def test_the_albedo_is_that_of_the_tool(found, model):
+    got = np.array(found["pages"][model]["albedo"]).reshape(-1, 4)[:, :3]
+    angles = np.minimum(np.arange(len(got)) / (len(got) - 1) * np.pi / 2, 1.569)
+    chosen = [15, 40]
+    lines = ["cos_theta_o", *(repr(float(np.cos(angles[i]))) for i in chosen)]
+    done = subprocess.run(
+        [TOOL, "albedo", model], input="\n".join(lines), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    truth = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+    assert got[chosen] == pytest.approx(truth[:, 1:4], abs=0.01)
+
+
+def test_the_sky_is_as_bright_by_any_strategy(found):
+    sky, plain = found["sky"]
+    assert sky != plain and sky == pytest.approx(plain, rel=0.02)
+
+
+def test_no_light_is_lost_in_pictures(found):
+    for address, (*color, _) in zip(FURNACE, found["furnace"], strict=True):
+        assert color == pytest.approx([1, 1, 1], abs=0.01), address
+
+
+def test_a_link_carries_the_settings(found):
+    given, written = found["address"]
+    assert found["unread"] == []
+    assert sorted(re.split("[&,]", given[1:])) == sorted(re.split("[&,]", written[1:]))
+    assert len(found["wrong"]) == 4
+    command, python, blender = found["recipes"]
+    assert command == "brdfc eval ward ks=0.1,0.2,0.3 ax=0.3 normalisation=duer < directions.csv"
+    for text in (python, blender):
+        assert text.endswith('ks=(0.1, 0.2, 0.3), ax=0.3, normalisation="duer")')
+
+
+def test_a_folder_of_others_stays(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    done = subprocess.run([TOOL, "explorer", "--out", tmp_path], capture_output=True, text=True)
+    assert done.returncode == 2 and "models.js" in done.stderr
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def test_controls_change_the_link_and_have_names(found):
+    assert found["controls"] > 20 and found["unnamed"] == []
+    assert "m=ward,ks=0.1:0.2:0.3,ax=0.5,normalisation=duer" in found["moved"]
+    assert "m=lambert" not in found["moved"] and "lamp=0.100:0.250" in found["moved"]
+
+
+def test_a_browser_without_webgl_is_told(found):
+    assert "WebGL 2" in found["missing"]
