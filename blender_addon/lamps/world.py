@@ -22,15 +22,15 @@ def _turn_of(shown):
     reached = shown.reach(shown.node.inputs["Vector"])
     while reached.output is not None and reached.node.bl_idname == "ShaderNodeMapping":
         source, inputs = reached.node, reached.node.inputs
-        place, angles, sizes = (
-            shader_values.current(inputs[name], reached.within)
-            for name in ("Location", "Rotation", "Scale")
+        angles, sizes = (
+            shader_values.current(inputs[name], reached.within) for name in ("Rotation", "Scale")
         )
         if angles is None or sizes is None:
             return None
-        moves = place is None or any(place)
-        if moves and source.vector_type in {"POINT", "TEXTURE"}:
-            return None
+        if source.vector_type in {"POINT", "TEXTURE"}:  # others have no location
+            place = shader_values.current(inputs["Location"], reached.within)
+            if place is None or any(place):
+                return None
         turn, scale = Euler(angles).to_matrix(), Matrix.Diagonal(sizes)
         try:
             step = {

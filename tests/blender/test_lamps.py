@@ -540,15 +540,16 @@ def test_spot_of_an_environment_image(extension, ball, empty):
     tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
     rotation = mapping.inputs["Rotation"].default_value
     rotation[:] = (0.2, 0.1, 0.8)
-    for kind in ("POINT", "TEXTURE"):
+    for kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
         mapping.vector_type = kind
         turn = np.array(rotation.to_matrix())
-        turn = turn if kind == "POINT" else turn.T
+        turn = turn.T if kind == "TEXTURE" else turn
         (slot,) = slots(empty)
         assert turn @ axes(slot)[:, 2] == pytest.approx(direction, abs=5e-3)
     bright = extension.api.see_lamps(empty)[0].irradiance
     background.inputs["Strength"].default_value = 3.0
     assert extension.api.see_lamps(empty)[0].irradiance == pytest.approx(3 * bright)
+    mapping.vector_type = "POINT"
     mapping.inputs["Location"].default_value = (0.3, 0, 0)
     assert slots(empty) == []
     noise = tree.nodes.new("ShaderNodeTexNoise")
