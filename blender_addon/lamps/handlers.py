@@ -39,8 +39,8 @@ def _concerns(update, scene):
 def _is_limited_anew(updates, scene):
     """Whether the number of lamps that materials can aim at may have changed. Counting takes time,
     so this looks only at changes of the device, a material or a setting."""
-    kinds = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
-    if not filling.device_changed(scene) and not any(isinstance(u.id, kinds) for u in updates):
+    types = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
+    if not filling.device_changed(scene) and not any(isinstance(u.id, types) for u in updates):
         return False
     return filling.limit_of(scene) != filling.memory.limit
 
